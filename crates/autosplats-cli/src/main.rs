@@ -1,0 +1,2 @@
+//! The `autosplats` command.
+fn main() {}

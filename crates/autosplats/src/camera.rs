@@ -1,0 +1,132 @@
+//! Where the picture is taken from.
+//!
+//! View space, the working space of every stage: the eye is the origin, x points right, y down and z forward, so depth is
+//! z and grows away from the eye. Distances are world distances. Pixel (0, 0) is the top-left one and covers
+//! `0.0..1.0` in both directions; its centre is at (0.5, 0.5).
+
+use glam::{DVec3, Mat3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// A camera in world coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Position of the eye, world coordinates.
+    pub eye: DVec3,
+    /// The point in the middle of the picture, world coordinates; not the eye.
+    pub look_at: DVec3,
+    /// Direction that is upward in the picture, any length; not along the line of sight.
+    pub up: DVec3,
+    /// How points meet the image plane.
+    pub projection: Projection,
+}
+
+/// How points meet the image plane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Projection {
+    /// Vertical field of view in degrees, within 0.01..=170.
+    PerspectiveFovDeg(f64),
+    /// Height of the picture in world units, above 0.
+    OrthographicHeight(f64),
+}
+
+/// A [`Camera`] made ready for one picture of one cloud: rotations and focal lengths in `f32`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct View {
+    /// Image size in pixels.
+    pub(crate) width: u32,
+    /// Image size in pixels.
+    pub(crate) height: u32,
+    /// Rotation from world to view space.
+    pub(crate) view_from_world: Mat3,
+    /// The eye relative to the cloud's origin, world orientation.
+    pub(crate) eye_local: Vec3,
+    /// Pixels per unit of x/z (perspective) or of x (orthographic).
+    pub(crate) focal_px: f32,
+    /// Whether lines of sight meet in the eye.
+    pub(crate) perspective: bool,
+    /// Points at this depth or nearer are dropped.
+    pub(crate) near: f32,
+}
+
+impl Camera {
+    /// Unit vectors right, down and forward in world coordinates.
+    ///
+    /// # Errors
+    /// [`Error::Camera`] if the eye is at the target, up is along the line of sight, or anything is not finite.
+    pub fn axes(&self) -> Result<[DVec3; 3], Error> {
+        let invalid = |what: &str| Error::Camera(what.into());
+        if !(self.eye.is_finite() && self.look_at.is_finite() && self.up.is_finite()) {
+            return Err(invalid("eye, look-at and up must be finite numbers"));
+        }
+        let forward =
+            (self.look_at - self.eye).try_normalize().ok_or_else(|| invalid("eye and look-at are the same point"))?;
+        let up = self.up.try_normalize().ok_or_else(|| invalid("up must not be zero"))?;
+        let right = forward.cross(up);
+        if right.length() < 1e-6 {
+            return Err(invalid("up must not lie along the line of sight"));
+        }
+        let right = right.normalize();
+        Ok([right, forward.cross(right), forward])
+    }
+
+    /// Makes the camera ready for a picture of `size` pixels of a cloud about `origin`.
+    pub(crate) fn view(&self, origin: DVec3, size: [u32; 2]) -> Result<View, Error> {
+        let [right, down, forward] = self.axes()?;
+        let height = f64::from(size[1]);
+        let (focal_px, perspective) = match self.projection {
+            Projection::PerspectiveFovDeg(fov) if (0.01..=170.0).contains(&fov) => {
+                (0.5 * height / (0.5 * fov.to_radians()).tan(), true)
+            }
+            Projection::PerspectiveFovDeg(fov) => {
+                return Err(Error::Camera(format!("field of view {fov} is not within 0.01 to 170 degrees")));
+            }
+            Projection::OrthographicHeight(world) if world > 0.0 && world.is_finite() => (height / world, false),
+            Projection::OrthographicHeight(world) => {
+                return Err(Error::Camera(format!("orthographic height {world} is not above 0")));
+            }
+        };
+        let distance = (self.look_at - self.eye).length();
+        Ok(View {
+            width: size[0],
+            height: size[1],
+            view_from_world: Mat3::from_cols(right.as_vec3(), down.as_vec3(), forward.as_vec3()).transpose(),
+            eye_local: (self.eye - origin).as_vec3(),
+            focal_px: focal_px as f32,
+            perspective,
+            // An orthographic eye is a plane to stand behind; a perspective one divides by depth.
+            near: if perspective { (distance * 1e-5) as f32 } else { 0.0 },
+        })
+    }
+}
+
+impl View {
+    /// View-space position of a point given relative to the cloud's origin.
+    #[inline(always)]
+    pub(crate) fn to_view(&self, position: [f32; 3]) -> Vec3 {
+        self.view_from_world * (Vec3::from(position) - self.eye_local)
+    }
+
+    /// Pixel coordinates of a view-space position in front of the eye.
+    #[inline(always)]
+    pub(crate) fn to_pixel(&self, position_view: Vec3) -> [f32; 2] {
+        let scale = if self.perspective { self.focal_px / position_view.z } else { self.focal_px };
+        [position_view.x * scale + 0.5 * self.width as f32, position_view.y * scale + 0.5 * self.height as f32]
+    }
+
+    /// Size of a pixel in world units at `depth`.
+    #[inline(always)]
+    pub(crate) fn pixel_size(&self, depth: f32) -> f32 {
+        if self.perspective { depth / self.focal_px } else { 1.0 / self.focal_px }
+    }
+
+    /// The view-space position that projects to `pixel` at `depth`.
+    #[inline(always)]
+    pub(crate) fn unproject(&self, pixel: [f32; 2], depth: f32) -> Vec3 {
+        let scale = self.pixel_size(depth);
+        Vec3::new((pixel[0] - 0.5 * self.width as f32) * scale, (pixel[1] - 0.5 * self.height as f32) * scale, depth)
+    }
+}
