@@ -21,9 +21,16 @@ const LONGEST: f32 = 4.0;
 /// Radius in pixels of a point drawn although it has no neighbour.
 const LONE_RADIUS_PX: f32 = 1.0;
 
+/// Points behind the culling plane of their cell get no splat wider than one whose k-radius were this many first search
+/// radii.
+// Differs from the paper: such a point is seen past the edge of a nearer surface, its neighbours are mostly hidden, and
+// the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
+const WIDEST_BEHIND: f32 = 1.0;
+
 /// What the fit may be asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FitRules {
+    pub(crate) k: u32,
     pub(crate) splat_scale: f32,
     pub(crate) ellipses: bool,
     /// Keep points without neighbours, as dots.
@@ -68,6 +75,10 @@ fn fit_blocks_with<'a, S: Simd>(
         for (lane, (surfel, &query)) in out.iter_mut().zip(queries).enumerate() {
             let point = &screen.points[query as usize];
             *surfel = fitted.surfel(lane, block, point.position_view, view, rules);
+            if screen.density.culls(point) {
+                let widest = WIDEST_BEHIND * screen.density.initial_radius(point, rules.k, view);
+                surfel.radius = surfel.radius.min(splat_radius(widest, rules.k as f32, rules));
+            }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
         }
@@ -120,7 +131,7 @@ impl Fitted {
         let lone = if rules.keep_lone { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
             center,
-            radius: if count > 0.0 { rules.splat_scale * 2.0 * k_radius / count.sqrt() } else { lone },
+            radius: if count > 0.0 { splat_radius(k_radius, count, rules) } else { lone },
             normal: if away { normal.map(|c| -c) } else { normal },
             k_radius,
             major_axis,
@@ -129,6 +140,12 @@ impl Fitted {
             ..Surfel::default()
         }
     }
+}
+
+/// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6].
+#[inline(always)]
+fn splat_radius(k_radius: f32, count: f32, rules: &FitRules) -> f32 {
+    rules.splat_scale * 2.0 * k_radius / count.sqrt()
 }
 
 /// Covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2].

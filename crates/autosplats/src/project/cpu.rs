@@ -37,7 +37,7 @@ impl Projector {
         let spacing_px = mean_spacing(&self.keys, width);
         compact(cloud.positions(), view, &self.keys, spacing_px, &mut self.screen);
         measure_density(&self.keys, view, spacing_px, k, &mut self.screen.density);
-        split_by_depth(view, grid_culling, &mut self.screen);
+        split_by_depth(grid_culling, &mut self.screen);
         &self.screen
     }
 }
@@ -227,21 +227,18 @@ fn measure_density(keys: &[AtomicU64], view: &View, spacing_px: f32, k: u32, den
             }
         }
     });
+    let cell_px = cell_px as f32;
+    density.culling.clear();
+    density.culling.extend(density.nearest.iter().map(|&depth| depth + cell_px * view.pixel_size(depth)));
 }
 
-/// Puts back the points further behind the nearest of their cell than the cell is wide [Paper, §7, Grid Culling].
-fn split_by_depth(view: &View, grid_culling: bool, screen: &mut ScreenPoints) {
+/// Puts back the points behind the culling plane of their cell [Paper, §7, Grid Culling].
+fn split_by_depth(grid_culling: bool, screen: &mut ScreenPoints) {
     let ScreenPoints { points, density, active, passive, .. } = screen;
     active.clear();
     passive.clear();
-    if !grid_culling {
-        active.extend(0..points.len() as u32);
-        return;
-    }
-    let cell_px = density.cell_px as f32;
-    let limit: Vec<f32> = density.nearest.iter().map(|&depth| depth + cell_px * view.pixel_size(depth)).collect();
     for (index, point) in (0..).zip(&*points) {
-        let hidden = point.position_view[2] > limit[density.cell(point.pixel_xy())];
-        if hidden { passive.push(index) } else { active.push(index) }
+        let list = if grid_culling & density.culls(point) { &mut *passive } else { &mut *active };
+        list.push(index);
     }
 }

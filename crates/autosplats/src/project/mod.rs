@@ -86,12 +86,21 @@ pub(crate) struct DensityGrid {
     pub(crate) count: Vec<u32>,
     /// Depth of the nearest point in each cell; infinite in an empty one.
     pub(crate) nearest: Vec<f32>,
+    /// Depth beyond which points of a cell are probably hidden: the nearest, and the width of the cell in world units
+    /// there [Paper, §7, Grid Culling].
+    pub(crate) culling: Vec<f32>,
 }
 
 impl DensityGrid {
     #[inline(always)]
     fn cell(&self, [x, y]: [usize; 2]) -> usize {
         y / self.cell_px * self.columns + x / self.cell_px
+    }
+
+    /// Whether a point lies behind the culling plane of its cell.
+    #[inline(always)]
+    pub(crate) fn culls(&self, point: &ScreenPoint) -> bool {
+        point.position_view[2] > self.culling[self.cell(point.pixel_xy())]
     }
 
     /// First search radius of a point in world units: that of the circle which holds k points at the density of the

@@ -213,6 +213,7 @@ impl Reconstruct<'_> {
         clock.lap(|timings| &mut timings.search);
 
         let rules = FitRules {
+            k: settings.k,
             splat_scale: settings.splat_scale,
             ellipses: settings.ellipses,
             keep_lone: settings.outlier_expansions.is_none(),

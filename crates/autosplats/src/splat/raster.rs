@@ -121,11 +121,11 @@ fn add<S: Simd>(simd: S, sums: &mut [f32], vector: usize, value: F32s<S>) {
     (F32s::load(simd, sums, vector) + value).store(sums, vector);
 }
 
-/// The weight of a fragment at a squared distance 0..=1 from the centre, in radii: exp(-2·d²) but for a few percent,
-/// without the exponential.
+/// The weight of a fragment at a squared distance 0..=1 from the centre, in supports: much like exp(-2·d²) with d in splat
+/// radii, without the exponential, and 0.003 at the end.
 #[inline(always)]
 fn kernel<S: Simd>(simd: S, squared: F32s<S>) -> F32s<S> {
-    let w = F32s::splat(simd, 1.0) - F32s::splat(simd, 0.25) * squared;
+    let w = F32s::splat(simd, 1.0) - F32s::splat(simd, 0.52) * squared;
     let w = w * w;
     let w = w * w;
     w * w
