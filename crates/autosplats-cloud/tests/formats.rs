@@ -250,6 +250,65 @@ fn laz_equals_las() {
     }
 }
 
+/// A LAS 1.2 file of format 3, compressed in one way or another.
+fn recompressed(las: &[u8], chunk_size: Option<u32>, in_chunks: bool) -> Vec<u8> {
+    use std::io::{Cursor, Seek as _, SeekFrom};
+
+    let (header, records) = las.split_at(227);
+    let items = laz::LazItemRecordBuilder::default_for_point_format_id(3, 0).unwrap();
+    let builder = laz::LazVlrBuilder::new(items);
+    let vlr = match chunk_size {
+        Some(size) => builder.with_fixed_chunk_size(size).build(),
+        None => builder.with_variable_chunk_size().build(),
+    };
+    let mut vlr_data = Vec::new();
+    vlr.write_to(&mut vlr_data).unwrap();
+    if !in_chunks {
+        vlr_data[0] = 1;
+    }
+    let mut bytes = header.to_vec();
+    bytes[96..100].copy_from_slice(&(227 + 54 + vlr_data.len() as u32).to_le_bytes());
+    bytes[100] = 1;
+    bytes[104] |= 0x80;
+    bytes.extend([0; 2]);
+    bytes.extend(b"laszip encoded\0\0");
+    bytes.extend(22204_u16.to_le_bytes());
+    bytes.extend((vlr_data.len() as u16).to_le_bytes());
+    bytes.extend([0; 32]);
+    bytes.extend(vlr_data);
+
+    let start = bytes.len();
+    let mut cursor = Cursor::new(bytes);
+    cursor.seek(SeekFrom::End(0)).unwrap();
+    let mut compressor = laz::LasZipCompressor::new(cursor, vlr).unwrap();
+    for part in records.chunks(34 * 1234) {
+        compressor.compress_many(part).unwrap();
+        if chunk_size.is_none() {
+            compressor.finish_current_chunk().unwrap();
+        }
+    }
+    compressor.done().unwrap();
+    let mut bytes = compressor.into_inner().into_inner();
+    if !in_chunks {
+        // A single run has no offset of a chunk table before it.
+        bytes.drain(start..start + 8);
+    }
+    bytes
+}
+
+#[test]
+fn laz_in_chunks_of_every_kind() {
+    let las = las_bytes((1, 2), 3, false, 600_000);
+    let plain = read_bytes("a.las", &las).unwrap();
+    for (chunk_size, in_chunks) in [(Some(777), true), (Some(700_000), true), (None, true), (Some(700_000), false)] {
+        let laz = recompressed(&las, chunk_size, in_chunks);
+        let cloud = read_bytes("a.laz", &laz).unwrap_or_else(|error| panic!("{chunk_size:?} {in_chunks}: {error}"));
+        assert!(cloud == plain, "chunks of {chunk_size:?}, {in_chunks}: the same points");
+        let message = error("a.laz", &laz[..laz.len() / 2]);
+        assert!(message.contains("copy"), "chunks of {chunk_size:?}, {in_chunks}: cut in half: {message}");
+    }
+}
+
 #[test]
 fn pcd_of_every_encoding() {
     for encoding in ["ascii", "binary", "binary_compressed"] {

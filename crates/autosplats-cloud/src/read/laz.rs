@@ -55,65 +55,86 @@ pub(super) fn decode(
     }
     let chunks = guard(|| chunks(job.bytes, header, &vlr, chunked)).map_err(fail)?;
 
-    let len = header.record_len;
-    let mut records = Vec::new();
-    let mut done = 0;
+    let mut decoder = Decoder { job, header, items: vlr.items(), records: Vec::new(), done: 0 };
     let mut rest = &chunks[..];
     while let Some(first) = rest.first() {
-        let fraction = |done: usize| 0.9 * done as f32 / header.points as f32;
-        job.tick(fraction(done))?;
-        let place = |done: usize| format!("point {}", done + 1);
         if first.points > BATCH {
-            // One long chunk, as old writers make them, can only be decompressed from its beginning on.
-            let mut decompressor =
-                guard(|| decompressor(vlr.items(), &job.bytes[first.bytes.clone()])).map_err(fail)?;
-            let mut left = first.points;
-            while left > 0 {
-                job.tick(fraction(done))?;
-                let points = left.min(BATCH / 4);
-                resize(&mut records, points * len)?;
-                guard(|| decompress(&mut *decompressor, &mut records, len))
-                    .map_err(|what| job.malformed(place(done), what))?;
-                keep(&records)?;
-                done += points;
-                left -= points;
-            }
+            decoder.long_chunk(first, &mut keep)?;
             rest = &rest[1..];
             continue;
         }
         let mut points = 0;
-        let batch = rest.iter().take_while(|chunk| {
+        let fitting = rest.iter().take_while(|chunk| {
             points += chunk.points;
-            points <= BATCH.max(chunk.points)
+            points <= BATCH
         });
-        let (batch, after) = rest.split_at(batch.count().max(1));
+        let (batch, after) = rest.split_at(fitting.count());
+        decoder.batch(batch, &mut keep)?;
         rest = after;
-        resize(&mut records, batch.iter().map(|chunk| chunk.points).sum::<usize>() * len)?;
-        let mut outputs = Vec::new();
-        let mut unassigned = &mut records[..];
-        for chunk in batch {
-            let (output, after) = unassigned.split_at_mut(chunk.points * len);
-            outputs.push((chunk, output));
-            unassigned = after;
-        }
-        let result = outputs.into_par_iter().try_for_each(|(chunk, output)| {
-            guard(|| {
-                let mut decompressor = decompressor(vlr.items(), &job.bytes[chunk.bytes.clone()])?;
-                decompress(&mut *decompressor, output, len)
-            })
-        });
-        result.map_err(|what| job.malformed(place(done), format!("here or in the points that follow: {what}")))?;
-        keep(&records)?;
-        done += records.len() / len;
     }
     Ok(())
 }
 
-fn resize(records: &mut Vec<u8>, len: usize) -> Result<(), Error> {
-    records.clear();
-    reserve(records, len, "compressed points")?;
-    records.resize(len, 0);
-    Ok(())
+/// Where the decompression stands.
+struct Decoder<'a> {
+    job: &'a Job<'a>,
+    header: &'a Header,
+    items: &'a Vec<LazItem>,
+    /// The records decompressed last.
+    records: Vec<u8>,
+    /// Points decompressed before these.
+    done: usize,
+}
+
+impl Decoder<'_> {
+    /// Decompresses chunks side by side.
+    fn batch(&mut self, chunks: &[Chunk], keep: &mut impl FnMut(&[u8]) -> Result<(), Error>) -> Result<(), Error> {
+        let len = self.header.record_len;
+        self.make_room(chunks.iter().map(|chunk| chunk.points).sum())?;
+        let mut outputs = Vec::new();
+        let mut unassigned = &mut self.records[..];
+        for chunk in chunks {
+            let (output, after) = unassigned.split_at_mut(chunk.points * len);
+            outputs.push((&self.job.bytes[chunk.bytes.clone()], output));
+            unassigned = after;
+        }
+        let items = self.items;
+        outputs
+            .into_par_iter()
+            .try_for_each(|(input, output)| guard(|| decompress(&mut *decompressor(items, input)?, output, len)))
+            .map_err(|what| self.fail(&format!("here or in the points that follow: {what}")))?;
+        self.done += self.records.len() / len;
+        keep(&self.records)
+    }
+
+    /// Decompresses a chunk that is too long for one batch, as old writers make them, piece by piece.
+    fn long_chunk(&mut self, chunk: &Chunk, keep: &mut impl FnMut(&[u8]) -> Result<(), Error>) -> Result<(), Error> {
+        let input = &self.job.bytes[chunk.bytes.clone()];
+        let mut decompressor = guard(|| decompressor(self.items, input)).map_err(|what| self.fail(&what))?;
+        let end = self.done + chunk.points;
+        while self.done < end {
+            let points = (end - self.done).min(BATCH / 4);
+            self.make_room(points)?;
+            guard(|| decompress(&mut *decompressor, &mut self.records, self.header.record_len))
+                .map_err(|what| self.fail(&what))?;
+            self.done += points;
+            keep(&self.records)?;
+        }
+        Ok(())
+    }
+
+    fn make_room(&mut self, points: usize) -> Result<(), Error> {
+        self.job.tick(0.9 * self.done as f32 / self.header.points as f32)?;
+        let len = points * self.header.record_len;
+        self.records.clear();
+        reserve(&mut self.records, len, "compressed points")?;
+        self.records.resize(len, 0);
+        Ok(())
+    }
+
+    fn fail(&self, what: &str) -> Error {
+        self.job.malformed(format!("point {}", self.done + 1), what)
+    }
 }
 
 /// How the points are compressed, and whether in chunks: one of the variable length records after the header.
