@@ -298,9 +298,11 @@ fn recompressed(las: &[u8], chunk_size: Option<u32>, in_chunks: bool) -> Vec<u8>
 
 #[test]
 fn laz_in_chunks_of_every_kind() {
-    let las = las_bytes((1, 2), 3, false, 600_000);
-    let plain = read_bytes("a.las", &las).unwrap();
-    for (chunk_size, in_chunks) in [(Some(777), true), (Some(700_000), true), (None, true), (Some(700_000), false)] {
+    // The longer ones are decompressed piece by piece.
+    let cases = [(50_000, Some(777), true), (50_000, None, true), (540_000, Some(700_000), true)];
+    for (count, chunk_size, in_chunks) in cases.into_iter().chain([(540_000, Some(700_000), false)]) {
+        let las = las_bytes((1, 2), 3, false, count);
+        let plain = read_bytes("a.las", &las).unwrap();
         let laz = recompressed(&las, chunk_size, in_chunks);
         let cloud = read_bytes("a.laz", &laz).unwrap_or_else(|error| panic!("{chunk_size:?} {in_chunks}: {error}"));
         assert!(cloud == plain, "chunks of {chunk_size:?}, {in_chunks}: the same points");
