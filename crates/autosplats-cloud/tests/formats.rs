@@ -32,6 +32,10 @@ fn ply_round_trip_keeps_every_bit() {
         assert!(read(&path, &()).unwrap() == cloud, "a cloud of {count} points comes back as it was");
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+    let other = folder.path().join("other");
+    std::fs::write(&other, b"").unwrap();
+    let permissions = |path| std::fs::metadata(path).unwrap().permissions();
+    assert_eq!(permissions(&path), permissions(&other), "those who may read files here may read this one");
 }
 
 #[test]

@@ -145,6 +145,11 @@ fn headers_that_lie_allocate_nothing() {
     let start = Instant::now();
     error("d.ply", format!("ply\nformat ascii 1.0\nelement vertex 0\n{many}end_header\n").as_bytes());
     assert!(start.elapsed() < LIMIT, "a header of 200,000 properties is refused at once");
+    let long = "1 ".repeat(1 << 20);
+    error("e.ply", format!("ply\ncomment {long}").as_bytes());
+    error("c.pcd", format!("VERSION .7\nFIELDS {long}\n").as_bytes());
+    error("a.xyz", format!("{long}\n{long}\n").as_bytes());
+    error("b.xyz", format!("x {long}\nx {long}\n").as_bytes());
 }
 
 #[test]

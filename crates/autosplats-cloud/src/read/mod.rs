@@ -76,6 +76,9 @@ impl Format {
     }
 }
 
+/// Bytes of a header line beyond which it is rather broken than long.
+const MAX_HEADER_LINE: usize = 1 << 16;
+
 /// What every reader is given.
 #[derive(Clone, Copy)]
 struct Job<'a> {

@@ -15,7 +15,7 @@ const BLOCK: usize = 1 << 18;
 pub(crate) const SMALL: f64 = 1e4;
 
 /// Values of a point beyond which a header is rather broken than rich.
-const MAX_COLUMNS: usize = 1024;
+pub(super) const MAX_COLUMNS: usize = 1024;
 
 /// The number types that files hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,8 +4,8 @@
 //! rows: 3 are positions, 4 add an intensity, 6 a colour or a normal, 7 both intensity and colour, and so on.
 
 use super::{
-    Job,
-    table::{Column, Part, Scalar, Table},
+    Job, MAX_HEADER_LINE,
+    table::{Column, MAX_COLUMNS, Part, Scalar, Table},
     text::{self, Rows, Token},
 };
 use crate::{Error, PointCloud};
@@ -45,6 +45,9 @@ pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
     };
     if width < 3 {
         return Err(job.malformed(job.line(start), format!("{width} values; a point needs x, y and z")));
+    }
+    if width > MAX_COLUMNS {
+        return Err(job.malformed(job.line(start), format!("more than {MAX_COLUMNS} values; are there no line ends?")));
     }
     let names = match names {
         Some(names) if names.len() == width => named(names),
@@ -118,6 +121,9 @@ fn has_xyz(names: &[String]) -> bool {
 
 /// The names in a header line, which may be a comment. Names may hold blanks where something else separates them.
 fn column_names(line: &[u8]) -> Option<Vec<String>> {
+    if line.len() > MAX_HEADER_LINE {
+        return None;
+    }
     let line = String::from_utf8_lossy(line);
     let line = line.trim_start_matches(['#', '/', ' ']);
     let separator = [',', ';', '\t'].into_iter().find(|&separator| line.contains(separator));
@@ -151,7 +157,10 @@ fn sample(bytes: &[u8], start: usize) -> Vec<Vec<f64>> {
         if text::is_blank(line) || text::is_count(line) {
             continue;
         }
-        let Ok(row) = text::values(line).map(text::number).collect::<Result<Vec<f64>, _>>() else { break };
+        let Ok(row) = text::values(line).take(MAX_COLUMNS + 1).map(text::number).collect::<Result<Vec<f64>, _>>()
+        else {
+            break;
+        };
         if rows.first().is_some_and(|first| first.len() != row.len()) {
             break;
         }

@@ -1,7 +1,7 @@
 //! The header of a PCD file.
 
 use super::super::{
-    Job, shown,
+    Job, MAX_HEADER_LINE, shown,
     table::Scalar,
     text::{after_line_end, line_end},
 };
@@ -53,7 +53,11 @@ impl Header {
             if at >= job.bytes.len() {
                 return Err(fail("the file ends inside the header, before DATA; copy it again".into()));
             }
-            let words = words(&job.bytes[at..line_end(job.bytes, at)]);
+            let end = line_end(job.bytes, at);
+            if end - at > MAX_HEADER_LINE {
+                return Err(fail(format!("a header line of {} bytes", end - at)));
+            }
+            let words = words(&job.bytes[at..end]);
             at = after_line_end(job.bytes, at);
             let Some((keyword, values)) = words.split_first() else { continue };
             let number = || {

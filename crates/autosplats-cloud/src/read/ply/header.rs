@@ -1,6 +1,6 @@
 //! The header of a PLY file.
 
-use super::super::{Job, shown, table::Scalar, text};
+use super::super::{Job, MAX_HEADER_LINE, shown, table::Scalar, text};
 use crate::{Axes, Error};
 
 /// How the values after the header are written.
@@ -64,6 +64,9 @@ impl Header {
             }
             let (line, next) = header_line(bytes, start);
             start = next;
+            if line.len() > MAX_HEADER_LINE {
+                return Err(fail(format!("a header line of {} bytes", line.len())));
+            }
             let line = String::from_utf8_lossy(line);
             let mut words = line.split_ascii_whitespace();
             let word = words.next();
