@@ -1,11 +1,32 @@
 //! Point clouds, the files they come from and the sources that make them.
 //!
 //! This crate never sees a GPU and never draws: it turns bytes into a [`PointCloud`].
+//!
+//! ```
+//! use autosplats_cloud::{PointCloud, write_ply};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = |name| folder.path().join(name);
+//! std::fs::write(path("survey.csv"), "x,y,z,Intensity\n512000.5,5400000.25,310.0,7\n")?;
+//! let cloud = PointCloud::from_path(path("survey.csv"), &())?;
+//! assert_eq!(cloud.world_position(0).y, 5_400_000.25);
+//! write_ply(&cloud, &path("survey.ply"), &())?;
+//! # Ok(())
+//! # }
+//! ```
 
 mod cloud;
 mod error;
+mod merge;
+mod progress;
+mod read;
+mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud};
 pub use error::Error;
 /// The vector library of the public interface.
 pub use glam;
+pub use progress::Progress;
+pub use read::read;
+pub use write::write_ply;
