@@ -1,0 +1,83 @@
+//! `autosplats render`: read, look, draw, write, say what happened.
+
+mod camera;
+mod job;
+mod report;
+
+use std::time::Instant;
+
+use autosplats::{Error, Frame, Renderer};
+
+pub(crate) use self::camera::scene_camera;
+use self::job::Job;
+use self::report::Report;
+use crate::args::RenderArgs;
+use crate::device::Device;
+use crate::exit::{Exit, Failure};
+use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
+use crate::progress::Bar;
+
+/// Renders one picture to one file or several.
+pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
+    let job = Job::new(args)?;
+    let device = Device::cpu();
+
+    let started = Instant::now();
+    let cloud = job.inputs.read(job.quiet)?;
+    let read = milliseconds_since(started);
+
+    job.check_color(&cloud)?;
+    let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
+    let cloud = cloud.with_axes(axes);
+
+    let mut renderer = Renderer::new();
+    let bar = Bar::spinner("rendering", job.quiet);
+    let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
+    drop(bar);
+
+    let started = Instant::now();
+    let mut written = Vec::new();
+    for picture in &job.pictures {
+        let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), job.quiet);
+        written.push((picture.path.clone(), write_picture(picture, &frame, &camera, job.transparent())?));
+    }
+    if let Some(path) = &job.save_camera {
+        written.push((path.clone(), camera::save(path, &camera)?));
+    }
+    let write = milliseconds_since(started);
+
+    let report = Report::new(&job, &device, camera, axes, &frame, written, [read, write]);
+    if job.json {
+        print_line(&report.to_json()?)?;
+    }
+    if !job.quiet {
+        report.summarize();
+    }
+    Ok(())
+}
+
+fn write_picture(
+    picture: &Picture,
+    frame: &Frame<'_>,
+    camera: &autosplats::Camera,
+    alpha: bool,
+) -> Result<u64, Failure> {
+    write_file(&picture.path, |writer| match picture.format {
+        Format::Png => write_png(&frame.image, alpha, writer),
+        Format::Exr => write_exr(frame, camera, writer),
+    })
+}
+
+/// What failing to render is to the caller of the program.
+pub(crate) fn render_failure(error: Error) -> Failure {
+    let exit = match error {
+        Error::Camera(_) | Error::Setting { .. } | Error::UnknownField { .. } | Error::ImageSize { .. } => Exit::Usage,
+        Error::TooManyPoints(_) => Exit::Memory,
+        _ => Exit::Input,
+    };
+    Failure::new(exit, error)
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
