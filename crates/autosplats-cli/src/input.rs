@@ -8,7 +8,6 @@ use autosplats_cloud::{Error, PointCloud, Progress as _, Scene};
 
 use crate::device::check_memory;
 use crate::exit::{Exit, Failure};
-use crate::interrupt;
 use crate::progress::Bar;
 
 /// What begins the name of a generated scene.
@@ -41,6 +40,8 @@ impl Inputs {
     /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
     pub(crate) fn new(names: &[String], poses: &[String]) -> Result<Self, Failure> {
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
+        let generated = list.iter().map(Input::generated_points).sum::<u64>();
+        check_memory(&format!("generating {generated} points"), generated * BYTES_PER_GENERATED_POINT)?;
         for pose in poses {
             let (input, matrix) = list
                 .iter_mut()
@@ -99,7 +100,6 @@ impl Input {
     fn new(name: &str) -> Result<Self, Failure> {
         let source = if name.starts_with(SCENE_PREFIX) {
             let (scene, count) = Scene::parse(name).map_err(Failure::usage)?;
-            check_memory(name, count as u64 * BYTES_PER_GENERATED_POINT)?;
             Source::Scene(scene, count)
         } else {
             let path = PathBuf::from(name);
@@ -117,6 +117,14 @@ impl Input {
             Source::File(path)
         };
         Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY })
+    }
+
+    /// Points that will be made, if it is a scene.
+    fn generated_points(&self) -> u64 {
+        match &self.source {
+            Source::File(_) => 0,
+            Source::Scene(_, count) => *count as u64,
+        }
     }
 
     fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
@@ -140,8 +148,12 @@ impl Input {
 }
 
 /// What failing to read is to the caller of the program.
-pub(crate) fn read_failure(error: Error) -> Failure {
-    if interrupt::requested() { Failure::interrupted() } else { Failure::new(Exit::Input, error) }
+fn read_failure(error: Error) -> Failure {
+    match error {
+        Error::Cancelled => Failure::interrupted(),
+        Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),
+        _ => Failure::new(Exit::Input, error),
+    }
 }
 
 /// Reads a row-major 4x4 or 3x4 matrix from a text file: numbers separated by blanks or commas, `#` begins a comment.

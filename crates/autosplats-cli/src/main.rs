@@ -16,13 +16,14 @@ mod render;
 mod threads;
 mod values;
 
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser as _;
 use clap::error::ErrorKind;
+use clap::{CommandFactory as _, Parser as _};
 
 use crate::args::{Command, CommandLine};
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, suggest};
 
 fn main() -> ExitCode {
     interrupt::install();
@@ -50,13 +51,20 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
         Some(Command::Render(args)) => render::run(*args),
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Demo(args)) => demo::run(&args),
-        None => {
-            let typed = command_line.rest.join(" ");
-            Err(Failure::usage(format!(
-                "there is no command '{typed}' and no viewer yet; for a picture: autosplats render {typed} -o out.png"
-            )))
-        }
+        None => Err(Failure::usage(without_command(&command_line.rest))),
     }
+}
+
+/// What to say to inputs without a command, which is a viewer's place, and to a command that is none.
+fn without_command(typed: &[String]) -> String {
+    let first = typed.first().map_or("", String::as_str);
+    if first.starts_with("scene:") || first.contains('.') || Path::new(first).exists() {
+        let inputs = typed.join(" ");
+        return format!("this version has no viewer; for a picture: autosplats render {inputs} -o out.png");
+    }
+    let commands = CommandLine::command();
+    let names = commands.get_subcommands().map(clap::Command::get_name);
+    format!("there is no command '{first}'; {} (--help explains)", suggest(first, names))
 }
 
 /// What is wrong with the command line, without the page about its usage.

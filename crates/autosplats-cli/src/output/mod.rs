@@ -77,9 +77,11 @@ pub(crate) fn print_line(line: &str) -> Result<(), Failure> {
     }
 }
 
-/// What failing to write is to the caller of the program.
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(Exit::Output, format!("{}: cannot write it: {error}", path.display()))
+    let error = error.to_string();
+    // The temporary name is nothing the caller knows.
+    let reason = error.split(" at path ").next().unwrap_or(&error);
+    Failure::new(Exit::Output, format!("{}: cannot write it: {reason}", path.display()))
 }
 
 fn folder_of(path: &Path) -> &Path {
