@@ -1,8 +1,10 @@
 //! The point cloud: what every reader makes and every renderer takes.
 
+use std::path::Path;
+
 use glam::DVec3;
 
-use crate::Error;
+use crate::{Error, Progress};
 
 /// Points of one frame: positions, and whatever else the scanner recorded.
 ///
@@ -103,6 +105,25 @@ impl PointCloud {
     /// Non-finite positions are allowed, as scanners record them; the renderer drops and counts them.
     pub fn new(origin: DVec3, positions: Vec<[f32; 3]>) -> Self {
         Self { origin, positions, colors: None, fields: Vec::new(), axes: None }
+    }
+
+    /// Reads a file of any format known; see [`read`](crate::read).
+    ///
+    /// # Errors
+    /// Those of [`read`](crate::read).
+    pub fn from_path(path: impl AsRef<Path>, progress: &dyn Progress) -> Result<Self, Error> {
+        crate::read(path.as_ref(), progress)
+    }
+
+    /// A cloud of attributes that are known to fit.
+    pub(crate) fn from_parts(
+        origin: DVec3,
+        positions: Vec<[f32; 3]>,
+        colors: Option<Vec<[u8; 3]>>,
+        fields: Vec<Field>,
+        axes: Option<Axes>,
+    ) -> Self {
+        Self { origin, positions, colors, fields, axes }
     }
 
     /// Adds colours, sRGB, 8 bits a channel, replacing any.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Everything that reading, writing or generating a cloud can fail with.
+/// Everything that reading, writing or generating a cloud can fail with. Each message is one line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -24,4 +24,39 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Neither the content nor the name of the file tells a format that is read.
+    #[error("{}: unknown format; {} can be read", path.display(), crate::read::FORMATS)]
+    UnknownFormat {
+        /// File concerned.
+        path: PathBuf,
+    },
+    /// The file breaks the rules of its format.
+    #[error("{}: {place}: {what}", path.display())]
+    Malformed {
+        /// File concerned.
+        path: PathBuf,
+        /// Line, byte or point at which it was noticed.
+        place: String,
+        /// What is wrong, and the remedy where one exists.
+        what: String,
+    },
+    /// The file is in order but uses a part of its format that is not read.
+    #[error("{}: {what}", path.display())]
+    Unsupported {
+        /// File concerned.
+        path: PathBuf,
+        /// What is not read, and the remedy where one exists.
+        what: String,
+    },
+    /// The memory for a cloud could not be had.
+    #[error("out of memory: {bytes} bytes for {what} could not be had; thin the cloud or split it")]
+    OutOfMemory {
+        /// What the memory was for.
+        what: String,
+        /// Size of the request in bytes.
+        bytes: usize,
+    },
+    /// [`Progress::cancelled`](crate::Progress::cancelled) asked to stop.
+    #[error("cancelled")]
+    Cancelled,
 }

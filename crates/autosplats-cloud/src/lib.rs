@@ -4,8 +4,15 @@
 
 mod cloud;
 mod error;
+mod merge;
+mod progress;
+mod read;
+mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud};
 pub use error::Error;
 /// The vector library of the public interface.
 pub use glam;
+pub use progress::Progress;
+pub use read::read;
+pub use write::write_ply;

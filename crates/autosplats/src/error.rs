@@ -17,7 +17,26 @@ pub enum Error {
         /// What is allowed.
         range: &'static str,
     },
+    /// The image has no pixels or too many.
+    #[error("image size {width}x{height}: each side must be within 1 to {}", crate::MAX_SIDE)]
+    ImageSize {
+        /// Width asked for.
+        width: u32,
+        /// Height asked for.
+        height: u32,
+    },
     /// More points than a 32-bit index can name.
     #[error("{0} points are more than the 4,294,967,295 that one picture can hold; reduce the cloud first")]
     TooManyPoints(usize),
+    /// The colour mode needs an attribute that the cloud lacks.
+    #[error("the cloud has no {name}; it has {has}")]
+    MissingAttribute {
+        /// What was asked for.
+        name: String,
+        /// What there is instead.
+        has: String,
+    },
+    /// No surface would be seen: its message says why.
+    #[error("nothing to show: {0}")]
+    NothingVisible(String),
 }

@@ -1,8 +1,42 @@
 //! Raw points in, a lit surface out, every frame.
+//!
+//! The method is Preiner, Jeschke and Wimmer, "Auto Splats: Dynamic Point Cloud Visualization on the GPU" (EGPGV 2012): no
+//! normals, no radii and no preprocessing are needed, because the surface is found anew for the points visible in each
+//! frame. A frame is five stages, each a module of this crate that owns the type that leaves it:
+//!
+//! ```text
+//! PointCloud --project--> ScreenPoints --search--> Neighborhoods --fit--> Surfels --splat--> GBuffer --shade--> Image
+//! ```
+//!
+//! ```
+//! use autosplats::{Camera, Projection, Renderer, Settings, ViewDirection, cloud::PointCloud, guess_axes};
+//! # use autosplats::cloud::glam::DVec3;
+//! # let grid = (0..40_000).map(|i| [(i % 200) as f32, (i / 200) as f32, ((i % 200) as f32 * 0.1).sin() * 5.0]);
+//! # let cloud = PointCloud::new(DVec3::ZERO, grid.collect());
+//! let size = [400, 300];
+//! let projection = Projection::PerspectiveFovDeg(40.0);
+//! let camera = Camera::fit(&cloud, guess_axes(&cloud), ViewDirection::Iso, 400.0 / 300.0, projection)?;
+//! let mut renderer = Renderer::new();
+//! let frame = renderer.render(&cloud, &camera, size, &Settings::default())?;
+//! assert_eq!(frame.image.pixels.len(), 400 * 300);
+//! # Ok::<(), autosplats::Error>(())
+//! ```
 
 mod camera;
 mod error;
+mod fit;
+mod project;
+mod renderer;
+mod search;
+mod shade;
+mod splat;
 
 pub use autosplats_cloud as cloud;
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Projection, ViewDirection, guess_axes};
 pub use error::Error;
+pub use renderer::{
+    Background, ColorMap, ColorMode, Counts, Frame, MAX_SIDE, Reconstruction, Renderer, SearchEngine, Settings,
+    Shading, Timings,
+};
+pub use shade::Image;
+pub use splat::{GBuffer, TILE};

@@ -4,6 +4,11 @@
 //! z and grows away from the eye. Distances are world distances. Pixel (0, 0) is the top-left one and covers
 //! `0.0..1.0` in both directions; its centre is at (0.5, 0.5).
 
+mod fit;
+
+pub(crate) use fit::up;
+pub use fit::{ViewDirection, guess_axes};
+
 use glam::{DVec3, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 

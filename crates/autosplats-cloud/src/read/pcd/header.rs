@@ -1,0 +1,145 @@
+//! The header of a PCD file.
+
+use super::super::{
+    Job,
+    table::Scalar,
+    text::{after_line_end, line_end},
+};
+use crate::Error;
+
+/// How the values after the header are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Ascii,
+    Binary,
+    Compressed,
+}
+
+/// A named number, or `count` of them, of each point.
+#[derive(Clone, Debug)]
+pub(super) struct Field {
+    pub(super) name: String,
+    pub(super) scalar: Scalar,
+    pub(super) count: usize,
+}
+
+/// All that the header says.
+pub(super) struct Header {
+    pub(super) fields: Vec<Field>,
+    pub(super) height: usize,
+    pub(super) points: usize,
+    pub(super) encoding: Encoding,
+    /// Whether the points lie in the sensor's own frame.
+    pub(super) viewpoint_is_identity: bool,
+    /// First byte after the header.
+    pub(super) end: usize,
+}
+
+/// The words of a header line, which is text; a broken one just has no sensible words.
+fn words(line: &[u8]) -> Vec<String> {
+    String::from_utf8_lossy(line).split_ascii_whitespace().map(str::to_owned).collect()
+}
+
+impl Header {
+    pub(super) fn parse(job: &Job<'_>) -> Result<Self, Error> {
+        let (mut names, mut sizes, mut types, mut counts) = (None, None, None, None);
+        let (mut width, mut height, mut points) = (None, None, None);
+        let mut viewpoint_is_identity = true;
+        let (mut at, mut line) = (0, 0);
+        let (encoding, line) = loop {
+            line += 1;
+            let place = format!("line {line}");
+            let fail = |what: String| job.malformed(place.clone(), what);
+            if at >= job.bytes.len() {
+                return Err(fail("the file ends inside the header, before DATA; copy it again".into()));
+            }
+            let words = words(&job.bytes[at..line_end(job.bytes, at)]);
+            at = after_line_end(job.bytes, at);
+            let Some((keyword, values)) = words.split_first() else { continue };
+            let number = || {
+                let value = values.first().map_or("", String::as_str);
+                value.parse::<usize>().map_err(|_| fail(format!("{keyword} '{value}' is no count")))
+            };
+            match keyword.to_ascii_uppercase().as_str() {
+                "VERSION" => {}
+                "FIELDS" | "COLUMNS" => names = Some(values.to_vec()),
+                "SIZE" => sizes = Some(values.to_vec()),
+                "TYPE" => types = Some(values.to_vec()),
+                "COUNT" => counts = Some(values.to_vec()),
+                "WIDTH" => width = Some(number()?),
+                "HEIGHT" => height = Some(number()?),
+                "POINTS" => points = Some(number()?),
+                "VIEWPOINT" => {
+                    let pose: Vec<f64> = values.iter().map(|value| value.parse().unwrap_or(f64::NAN)).collect();
+                    viewpoint_is_identity = pose == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+                }
+                "DATA" => match values.first().map(|value| value.to_ascii_lowercase()).as_deref() {
+                    Some("ascii") => break (Encoding::Ascii, place),
+                    Some("binary") => break (Encoding::Binary, place),
+                    Some("binary_compressed") => break (Encoding::Compressed, place),
+                    other => return Err(fail(format!("unknown DATA '{}'", other.unwrap_or_default()))),
+                },
+                word if word.starts_with('#') => {}
+                word => {
+                    let shown: String = word.chars().take(40).collect();
+                    let what = format!("'{shown}' is no word of a PCD header; if the file is plain text, name it .xyz");
+                    return Err(fail(what));
+                }
+            }
+        };
+        let fail = |what: String| job.malformed(line.clone(), what);
+        let (Some(names), Some(sizes), Some(types)) = (names, sizes, types) else {
+            return Err(fail("the header lacks FIELDS, SIZE or TYPE".into()));
+        };
+        let counts = counts.unwrap_or_else(|| vec!["1".into(); names.len()]);
+        if [sizes.len(), types.len(), counts.len()] != [names.len(); 3] {
+            return Err(fail("FIELDS, SIZE, TYPE and COUNT differ in length".into()));
+        }
+        let fields =
+            names.into_iter().zip(sizes.iter().zip(&types)).zip(&counts).map(|((name, (size, kind)), count)| {
+                let scalar = scalar_of(kind, size).ok_or_else(|| fail(format!("no type {kind} of {size} bytes")))?;
+                let count = count.parse().map_err(|_| fail(format!("COUNT '{count}' is no count")))?;
+                Ok(Field { name, scalar, count })
+            });
+        let fields = fields.collect::<Result<_, Error>>()?;
+        let height = height.unwrap_or(1);
+        let points = points
+            .or_else(|| width?.checked_mul(height))
+            .ok_or_else(|| fail("the header lacks POINTS, or WIDTH and HEIGHT".into()))?;
+        Ok(Self { fields, height, points, encoding, viewpoint_is_identity, end: at })
+    }
+
+    /// Bytes of a point.
+    pub(super) fn stride(&self) -> Option<usize> {
+        self.fields
+            .iter()
+            .try_fold(0_usize, |sum, field| sum.checked_add(field.scalar.size().checked_mul(field.count)?))
+    }
+}
+
+fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {
+    Some(match (kind.to_ascii_uppercase().as_str(), size) {
+        ("I", "1") => Scalar::I8,
+        ("U", "1") => Scalar::U8,
+        ("I", "2") => Scalar::I16,
+        ("U", "2") => Scalar::U16,
+        ("I", "4") => Scalar::I32,
+        ("U", "4") => Scalar::U32,
+        ("I", "8") => Scalar::I64,
+        ("U", "8") => Scalar::U64,
+        ("F", "4") => Scalar::F32,
+        ("F", "8") => Scalar::F64,
+        _ => return None,
+    })
+}
+
+/// Whether the file begins as a PCD header does, comments apart.
+pub(crate) fn recognised(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(1 << 12)];
+    let first = start.split(|&byte| byte == b'\n').map(words).find(|words| {
+        let first = words.first().map_or("#", String::as_str);
+        !first.starts_with('#')
+    });
+    let Some(first) = first else { return start.starts_with(b"# .PCD") };
+    matches!(first[0].as_str(), "VERSION" | "FIELDS" | "COLUMNS")
+}

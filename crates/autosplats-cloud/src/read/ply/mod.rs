@@ -1,0 +1,186 @@
+//! PLY: ascii and binary of both byte orders, any properties in any order, further elements before and after.
+
+mod header;
+
+use self::header::{Element, Encoding, Header};
+use super::{
+    Job,
+    table::{Column, Part, Scalar, Table, reserve},
+    text::{Rows, Token},
+};
+use crate::{Error, PointCloud};
+
+/// Part of the work that packing text or lists into records is.
+const PACKING: Part = Part { start: 0.0, len: 0.8 };
+
+pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
+    let header = Header::parse(job)?;
+    let Some(index) = header.elements.iter().position(|element| element.name == "vertex") else {
+        return Err(job.malformed("header", "there is no element 'vertex', hence no points"));
+    };
+    let (before, vertex) = (&header.elements[..index], &header.elements[index]);
+    if header.encoding != Encoding::Ascii {
+        job.check_not_text_converted(header.end)?;
+    }
+    let cloud = match (header.encoding, vertex.stride()) {
+        (Encoding::Ascii, _) => ascii(job, &header, before, vertex)?,
+        (_, Some(stride)) => plain(job, &header, before, vertex, stride)?,
+        (_, None) => with_lists(job, &header, before, vertex)?,
+    };
+    Ok(match header.axes {
+        Some(axes) => cloud.with_axes(axes),
+        None => cloud,
+    })
+}
+
+fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
+    let lines = before.iter().fold(0, |lines: usize, element| lines.saturating_add(element.count));
+    let Some(start) = header::skip_lines(job, header.end, lines)? else {
+        return Err(cut_off(job, vertex));
+    };
+    let mut columns = Vec::new();
+    let mut tokens = Vec::new();
+    let mut offset = 0;
+    for property in &vertex.properties {
+        if property.list.is_some() {
+            tokens.push(Token::SkipList);
+            continue;
+        }
+        // Text may hold more digits than the type declared for it; coordinates need them.
+        let coordinate = ["x", "y", "z"].contains(&&*property.name.to_ascii_lowercase());
+        let scalar = if coordinate { Scalar::F64 } else { property.scalar };
+        columns.push(Column { name: property.name.clone(), scalar, offset, stride: 0 });
+        tokens.push(Token::Store(scalar));
+        offset += scalar.size();
+    }
+    let rows = Rows { tokens: &tokens, count: Some(vertex.count), counts_between: false };
+    let (records, count) = rows.parse(job, start, PACKING)?;
+    packed_table(&records, count, false, columns, offset).into_cloud(job, "header")
+}
+
+/// The fast path: records of equal length are a table as they lie in the file.
+fn plain(
+    job: &Job<'_>,
+    header: &Header,
+    before: &[Element],
+    vertex: &Element,
+    stride: usize,
+) -> Result<PointCloud, Error> {
+    let start = skip(job, header, before, vertex)?;
+    let bytes = &job.bytes[start..];
+    if vertex.count.checked_mul(stride).is_none_or(|needed| needed > bytes.len()) {
+        let complete = bytes.len() / stride.max(1);
+        return Err(job.malformed(
+            format!("byte {}", job.bytes.len()),
+            format!("the file ends after {complete} of {} points; it is cut off, copy it again", vertex.count),
+        ));
+    }
+    let mut offset = 0;
+    let columns = vertex.properties.iter().map(|property| {
+        offset += property.scalar.size();
+        Column { name: property.name.clone(), scalar: property.scalar, offset: offset - property.scalar.size(), stride }
+    });
+    let columns = columns.collect();
+    let big_endian = header.encoding == Encoding::Big;
+    Table { bytes, count: vertex.count, big_endian, columns, packed_rgb: false, done: 0.0 }.into_cloud(job, "header")
+}
+
+/// Lists make records of unequal length: the other values are packed together first.
+fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
+    let start = skip(job, header, before, vertex)?;
+    let mut columns = Vec::new();
+    let mut stride = 0;
+    for property in vertex.properties.iter().filter(|property| property.list.is_none()) {
+        columns.push(Column { name: property.name.clone(), scalar: property.scalar, offset: stride, stride: 0 });
+        stride += property.scalar.size();
+    }
+    let mut records = Vec::new();
+    walk(job, header, vertex, start, |bytes| {
+        reserve(&mut records, bytes.len(), "points with lists")?;
+        records.extend_from_slice(bytes);
+        Ok(())
+    })?;
+    let big_endian = header.encoding == Encoding::Big;
+    packed_table(&records, vertex.count, big_endian, columns, stride).into_cloud(job, "header")
+}
+
+fn packed_table(bytes: &[u8], count: usize, big_endian: bool, mut columns: Vec<Column>, stride: usize) -> Table<'_> {
+    for column in &mut columns {
+        column.stride = stride;
+    }
+    Table { bytes, count, big_endian, columns, packed_rgb: false, done: PACKING.start + PACKING.len }
+}
+
+/// The first byte after the binary elements before the vertices.
+fn skip(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<usize, Error> {
+    let mut at = header.end;
+    for element in before {
+        at = match element.stride() {
+            Some(stride) => element.count.checked_mul(stride).and_then(|len| at.checked_add(len)),
+            None => Some(walk(job, header, element, at, |_| Ok(()))?),
+        }
+        .filter(|&end| end <= job.bytes.len())
+        .ok_or_else(|| cut_off(job, vertex))?;
+    }
+    Ok(at)
+}
+
+/// Goes through the records of an element with lists; `keep` gets the bytes of each value that is no list. Returns the
+/// first byte after the element.
+fn walk(
+    job: &Job<'_>,
+    header: &Header,
+    element: &Element,
+    start: usize,
+    mut keep: impl FnMut(&[u8]) -> Result<(), Error>,
+) -> Result<usize, Error> {
+    let mut at = start;
+    for record in 0..element.count {
+        if record % (1 << 14) == 0 {
+            job.tick(PACKING.len * record as f32 / element.count as f32)?;
+        }
+        let fail = |what: &str| {
+            let name = &element.name;
+            job.malformed(format!("byte {at}"), format!("{what} in {name} {} of {}", record + 1, element.count))
+        };
+        let cut = || fail("the file ends, it is cut off or damaged; copy it again;");
+        let mut next = at;
+        for property in &element.properties {
+            let size = property.scalar.size();
+            let Some(count) = property.list else {
+                keep(job.bytes.get(next..next + size).ok_or_else(cut)?)?;
+                next += size;
+                continue;
+            };
+            let raw = job.bytes.get(next..next + count.size()).ok_or_else(cut)?;
+            let len = list_len(raw, header.encoding == Encoding::Big, count).ok_or_else(|| fail("a negative count"))?;
+            next = len
+                .checked_mul(size)
+                .and_then(|len| (next + count.size()).checked_add(len))
+                .filter(|&end| end <= job.bytes.len())
+                .ok_or_else(cut)?;
+        }
+        at = next;
+    }
+    Ok(at)
+}
+
+fn list_len(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<usize> {
+    let mut bytes = [0; 8];
+    let len = raw.len();
+    bytes[..len].copy_from_slice(raw);
+    if big_endian {
+        bytes[..len].reverse();
+    }
+    let value = u64::from_le_bytes(bytes);
+    let signed = matches!(scalar, Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64);
+    let negative = signed && value >> (8 * len - 1) == 1;
+    if negative { None } else { usize::try_from(value).ok() }
+}
+
+fn cut_off(job: &Job<'_>, vertex: &Element) -> Error {
+    job.malformed(
+        format!("byte {}", job.bytes.len()),
+        format!("the file ends before the first of {} points; it is cut off, copy it again", vertex.count),
+    )
+}

@@ -1,0 +1,304 @@
+//! Columns of numbers to a cloud: what binary and text formats share.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::Job;
+use crate::{Error, FieldValues, PointCloud};
+
+/// Points handled between two looks at the caller's wish to stop: a few milliseconds.
+const BLOCK: usize = 1 << 18;
+
+/// Coordinates below this magnitude need no origin: `f32` steps there are below a millimetre.
+pub(crate) const SMALL: f64 = 1e4;
+
+/// Values of a point beyond which a header is rather broken than rich.
+const MAX_COLUMNS: usize = 1024;
+
+/// The number types that files hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::I64 | Self::U64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// A number that lies in a file in either byte order.
+trait Number: Copy + Send + Sync {
+    fn read(bytes: &[u8], at: usize, big_endian: bool) -> Self;
+}
+
+macro_rules! number {
+    ($($type:ty),*) => {$(
+        impl Number for $type {
+            #[inline]
+            fn read(bytes: &[u8], at: usize, big_endian: bool) -> Self {
+                let mut raw = [0; size_of::<Self>()];
+                raw.copy_from_slice(&bytes[at..at + size_of::<Self>()]);
+                if big_endian { Self::from_be_bytes(raw) } else { Self::from_le_bytes(raw) }
+            }
+        }
+    )*};
+}
+number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
+
+/// One number per point: the one of point `i` starts at byte `offset + i * stride`.
+#[derive(Clone, Debug)]
+pub(super) struct Column {
+    pub(super) name: String,
+    pub(super) scalar: Scalar,
+    pub(super) offset: usize,
+    pub(super) stride: usize,
+}
+
+/// Columns over some bytes.
+pub(super) struct Table<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) count: usize,
+    pub(super) big_endian: bool,
+    pub(super) columns: Vec<Column>,
+    /// Whether a column named `rgb` or `rgba` holds a colour packed into 32 bits.
+    pub(super) packed_rgb: bool,
+    /// Part of the whole work that was done before this.
+    pub(super) done: f32,
+}
+
+impl Table<'_> {
+    /// Makes the cloud. `place` is where an error about missing coordinates points to.
+    pub(super) fn into_cloud(mut self, job: &Job<'_>, place: &str) -> Result<PointCloud, Error> {
+        if self.columns.len() > MAX_COLUMNS {
+            return Err(job.malformed(place, format!("{} values a point; at most {MAX_COLUMNS}", self.columns.len())));
+        }
+        let Some(xyz) = self.take(["x", "y", "z"]) else {
+            return Err(job.malformed(place, "there are no x, y and z among the values of a point"));
+        };
+        self.check_size(job, place)?;
+        let colors = [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]]
+            .into_iter()
+            .find_map(|names| self.take(names));
+        let packed = self.columns.iter().position(|column| {
+            self.packed_rgb && column.scalar.size() == 4 && ["rgb", "rgba"].contains(&&*column.name.to_lowercase())
+        });
+        let packed = packed.map(|index| self.columns.remove(index));
+
+        let steps = 1 + usize::from(colors.is_some() || packed.is_some()) + self.columns.len();
+        let part = |step: usize| Part {
+            start: self.done + (1.0 - self.done) * step as f32 / steps as f32,
+            len: (1.0 - self.done) / steps as f32,
+        };
+        let (origin, positions) = self.positions(job, &xyz, part(0))?;
+        let mut cloud = PointCloud::new(origin, positions);
+        let mut step = 1;
+        if let Some(rgb) = &colors {
+            cloud = cloud.with_colors(self.colors(job, rgb, part(step))?)?;
+            step += 1;
+        } else if let Some(column) = &packed {
+            let unpack = |i| {
+                let [_, red, green, blue] = self.value::<u32>(column, i).to_be_bytes();
+                [red, green, blue]
+            };
+            cloud = cloud.with_colors(collect("colours", self.count, job, part(step), unpack)?)?;
+            step += 1;
+        }
+        for column in &self.columns {
+            let values = self.field(job, column, part(step))?;
+            step += 1;
+            cloud = cloud.with_field(field_name(&column.name), values)?;
+        }
+        Ok(cloud)
+    }
+
+    /// Takes the columns of three names out, letter case ignored, if they are all there.
+    fn take(&mut self, names: [&str; 3]) -> Option<[Column; 3]> {
+        let find = |name: &str| self.columns.iter().position(|column| column.name.eq_ignore_ascii_case(name));
+        let indices = [find(names[0])?, find(names[1])?, find(names[2])?];
+        let taken = indices.map(|index| self.columns[index].clone());
+        let mut index = 0;
+        self.columns.retain(|_| {
+            index += 1;
+            !indices.contains(&(index - 1))
+        });
+        Some(taken)
+    }
+
+    /// Every value that will be read lies within the bytes. Readers check this with better words; this is the backstop.
+    fn check_size(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
+        let fits = |column: &Column| {
+            let last = self.count.checked_sub(1).unwrap_or_default().checked_mul(column.stride)?;
+            let end = last.checked_add(column.offset)?.checked_add(column.scalar.size())?;
+            (end <= self.bytes.len()).then_some(())
+        };
+        if self.count > 0 && !self.columns.iter().all(|column| fits(column).is_some()) {
+            return Err(job.malformed(place, format!("{} points do not fit into the file", self.count)));
+        }
+        Ok(())
+    }
+
+    fn value<T: Number>(&self, column: &Column, index: usize) -> T {
+        T::read(self.bytes, column.offset + index * column.stride, self.big_endian)
+    }
+
+    fn value_f64(&self, column: &Column, index: usize) -> f64 {
+        match column.scalar {
+            Scalar::I8 => self.value::<i8>(column, index).into(),
+            Scalar::U8 => self.value::<u8>(column, index).into(),
+            Scalar::I16 => self.value::<i16>(column, index).into(),
+            Scalar::U16 => self.value::<u16>(column, index).into(),
+            Scalar::I32 => self.value::<i32>(column, index).into(),
+            Scalar::U32 => self.value::<u32>(column, index).into(),
+            Scalar::I64 => self.value::<i64>(column, index) as f64,
+            Scalar::U64 => self.value::<u64>(column, index) as f64,
+            Scalar::F32 => self.value::<f32>(column, index).into(),
+            Scalar::F64 => self.value(column, index),
+        }
+    }
+
+    fn positions(&self, job: &Job<'_>, xyz: &[Column; 3], part: Part) -> Result<(DVec3, Vec<[f32; 3]>), Error> {
+        let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
+        let middle = middle(self.count, world);
+        let origin = if middle.abs().max_element() < SMALL { DVec3::ZERO } else { middle };
+
+        let [x, y, z] = xyz;
+        let floats = xyz.iter().all(|column| column.scalar == Scalar::F32 && column.stride == x.stride);
+        let adjacent = y.offset == x.offset + 4 && z.offset == x.offset + 8;
+        let positions = if origin == DVec3::ZERO && floats && adjacent && !self.big_endian {
+            // The common case, and the fast one: twelve bytes in a row, copied as they are.
+            collect("positions", self.count, job, part, |i| {
+                let at = x.offset + i * x.stride;
+                let mut raw = [0; 12];
+                raw.copy_from_slice(&self.bytes[at..at + 12]);
+                bytemuck::cast::<[u8; 12], [[u8; 4]; 3]>(raw).map(f32::from_le_bytes)
+            })
+        } else if origin == DVec3::ZERO && floats {
+            let xyz = xyz.each_ref();
+            collect("positions", self.count, job, part, |i| xyz.map(|column| self.value::<f32>(column, i)))
+        } else {
+            collect("positions", self.count, job, part, |i| (world(i) - origin).as_vec3().to_array())
+        };
+        Ok((origin, positions?))
+    }
+
+    /// Colours of any number type to 8 bits. Wide types often hold 8-bit values, and floats 0 to 1 or 0 to 255, so the
+    /// largest value decides.
+    fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: Part) -> Result<Vec<[u8; 3]>, Error> {
+        let rgb = rgb.each_ref();
+        if rgb.iter().all(|column| column.scalar == Scalar::U8) {
+            return collect("colours", self.count, job, part, |i| rgb.map(|column| self.value::<u8>(column, i)));
+        }
+        job.tick(part.start)?;
+        let largest = |i: usize| rgb.map(|column| self.value_f64(column, i)).into_iter().fold(0.0, f64::max);
+        let largest = (0..self.count).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
+        let float = rgb.iter().any(|column| matches!(column.scalar, Scalar::F32 | Scalar::F64));
+        let scale = if largest > 255.0 {
+            1.0 / 256.0
+        } else if float && largest <= 1.0 {
+            255.0
+        } else {
+            1.0
+        };
+        // 16-bit values are cut, not rounded: that returns the byte both of v * 256 and of v * 257.
+        let round = if scale < 1.0 { 0.0 } else { 0.5 };
+        let convert = |value: f64| (value * scale + round) as u8;
+        collect("colours", self.count, job, part, |i| rgb.map(|column| convert(self.value_f64(column, i))))
+    }
+
+    fn field(&self, job: &Job<'_>, column: &Column, part: Part) -> Result<FieldValues, Error> {
+        macro_rules! typed {
+            ($variant:ident) => {
+                FieldValues::$variant(collect(&column.name, self.count, job, part, |i| self.value(column, i))?)
+            };
+        }
+        Ok(match column.scalar {
+            Scalar::I8 => typed!(I8),
+            Scalar::U8 => typed!(U8),
+            Scalar::I16 => typed!(I16),
+            Scalar::U16 => typed!(U16),
+            Scalar::I32 => typed!(I32),
+            Scalar::U32 => typed!(U32),
+            Scalar::F32 => typed!(F32),
+            Scalar::F64 => typed!(F64),
+            // No field is that wide; 53 bits of it survive.
+            Scalar::I64 | Scalar::U64 => {
+                FieldValues::F64(collect(&column.name, self.count, job, part, |i| self.value_f64(column, i))?)
+            }
+        })
+    }
+}
+
+/// The share of the progress bar that a step has.
+#[derive(Clone, Copy)]
+pub(super) struct Part {
+    pub(super) start: f32,
+    pub(super) len: f32,
+}
+
+/// One value per point, computed in parallel straight into its place.
+pub(super) fn collect<T: Send>(
+    what: &str,
+    count: usize,
+    job: &Job<'_>,
+    part: Part,
+    value: impl Fn(usize) -> T + Sync + Send,
+) -> Result<Vec<T>, Error> {
+    let mut values = Vec::new();
+    reserve(&mut values, count, what)?;
+    for block in blocks(count) {
+        job.tick(part.start + part.len * block.start as f32 / count as f32)?;
+        values.par_extend(block.into_par_iter().map(&value));
+    }
+    Ok(values)
+}
+
+fn blocks(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count).step_by(BLOCK).map(move |start| start..count.min(start + BLOCK))
+}
+
+/// Makes room for `additional` values, or says that there is none.
+pub(super) fn reserve<T>(values: &mut Vec<T>, additional: usize, what: &str) -> Result<(), Error> {
+    values
+        .try_reserve(additional)
+        .map_err(|_| Error::OutOfMemory { what: what.into(), bytes: additional.saturating_mul(size_of::<T>()) })
+}
+
+/// A point of whole numbers in the middle of the data: the median of a sample, which a few wild points do not move as
+/// they would move the centre of the bounds.
+pub(crate) fn middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
+    let step = count.div_ceil(1024).max(1);
+    let sample: Vec<DVec3> = (0..count).step_by(step).map(world).filter(|point| point.is_finite()).collect();
+    let median = |axis: usize| {
+        let mut values: Vec<f64> = sample.iter().map(|point| point[axis]).collect();
+        let index = values.len() / 2;
+        values.sort_by(f64::total_cmp);
+        values.get(index).copied().unwrap_or_default().round()
+    };
+    DVec3::new(median(0), median(1), median(2))
+}
+
+/// PDAL's name for what files call by several.
+fn field_name(name: &str) -> String {
+    match name.to_ascii_lowercase().as_str() {
+        "intensity" | "scalar_intensity" => "Intensity".into(),
+        "classification" | "scalar_classification" => "Classification".into(),
+        _ => name.into(),
+    }
+}

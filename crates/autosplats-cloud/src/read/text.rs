@@ -1,0 +1,221 @@
+//! Rows of numbers in text to packed records, in parallel.
+//!
+//! The text is cut into pieces at line ends, the pieces are parsed side by side, and each row becomes one record of
+//! little-endian numbers, which a [`Table`](super::table::Table) then reads.
+
+use rayon::prelude::*;
+
+use super::{
+    Job,
+    table::{Part, Scalar, reserve},
+};
+use crate::Error;
+
+/// Bytes of text that one thread parses at a time.
+const PIECE: usize = 1 << 19;
+
+/// What to do with the next value of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Token {
+    /// Put it into the record.
+    Store(Scalar),
+    /// A colour packed into 32 bits, written as an integer or as the float of the same bits.
+    Packed,
+    /// Leave it out.
+    Skip,
+    /// A count, and so many values to leave out.
+    SkipList,
+}
+
+impl Token {
+    /// Bytes of it in the record.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::Store(scalar) => scalar.size(),
+            Self::Packed => 4,
+            Self::Skip | Self::SkipList => 0,
+        }
+    }
+}
+
+/// How the rows of a text look.
+pub(super) struct Rows<'a> {
+    pub(super) tokens: &'a [Token],
+    /// Number of rows wanted; to the end of the file if absent.
+    pub(super) count: Option<usize>,
+    /// Whether lines of a single integer are counts, not rows.
+    pub(super) counts_between: bool,
+}
+
+/// The outcome for one piece of text.
+struct Piece {
+    records: Vec<u8>,
+    rows: usize,
+    error: Option<(usize, String)>,
+}
+
+impl Rows<'_> {
+    /// Parses rows from byte `start` on. Returns the records and how many there are.
+    pub(super) fn parse(&self, job: &Job<'_>, start: usize, part: Part) -> Result<(Vec<u8>, usize), Error> {
+        let text = job.bytes;
+        let wanted = self.count.unwrap_or(usize::MAX);
+        let mut records = Vec::new();
+        let mut rows = 0;
+        let mut at = start;
+        while at < text.len() && rows < wanted {
+            job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
+            let mut cuts = vec![at];
+            while at < text.len() && cuts.len() <= 4 * rayon::current_num_threads() {
+                at = after_line_end(text, at.saturating_add(PIECE).min(text.len()));
+                cuts.push(at);
+            }
+            let pieces: Vec<Piece> =
+                cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0])).collect();
+            for piece in pieces {
+                let take = piece.rows.min(wanted - rows);
+                let bytes = take * self.record_len();
+                reserve(&mut records, bytes, "the points of a text file")?;
+                records.extend_from_slice(&piece.records[..bytes]);
+                rows += take;
+                if rows == wanted {
+                    break;
+                }
+                if let Some((offset, what)) = piece.error {
+                    return Err(job.malformed(job.line(offset), what));
+                }
+            }
+        }
+        if self.count.is_some() && rows < wanted {
+            return Err(job.malformed(
+                job.line(text.len()),
+                format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
+            ));
+        }
+        Ok((records, rows))
+    }
+
+    fn record_len(&self) -> usize {
+        self.tokens.iter().map(|token| token.size()).sum()
+    }
+
+    fn parse_piece(&self, text: &[u8], start: usize) -> Piece {
+        let mut piece = Piece { records: Vec::new(), rows: 0, error: None };
+        let mut at = 0;
+        while at < text.len() {
+            let end = line_end(text, at);
+            let line = text[at..end].trim_ascii();
+            if !is_blank(line) && !(self.counts_between && is_count(line)) {
+                let len = piece.records.len();
+                if let Err(what) = self.parse_row(line, &mut piece.records) {
+                    piece.records.truncate(len);
+                    piece.error = Some((start + at, what));
+                    break;
+                }
+                piece.rows += 1;
+            }
+            at = end + 1;
+        }
+        piece
+    }
+
+    fn parse_row(&self, line: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
+        let mut values = values(line);
+        for (index, token) in self.tokens.iter().enumerate() {
+            let value = values.next().ok_or_else(|| {
+                format!("{index} values where a point has {}; complete or remove the line", self.tokens.len())
+            })?;
+            match token {
+                Token::Skip => {}
+                Token::SkipList => {
+                    let len = number(value)?;
+                    for index in 0..len as usize {
+                        values.next().ok_or_else(|| format!("a list of {len} values has only {index}"))?;
+                    }
+                }
+                Token::Packed => record.extend(packed(value)?.to_le_bytes()),
+                Token::Store(scalar) => store(*scalar, value, record)?,
+            }
+        }
+        match values.next() {
+            None => Ok(()),
+            Some(value) => Err(format!(
+                "more values than the {} a point has, from '{}' on",
+                self.tokens.len(),
+                String::from_utf8_lossy(&value[..value.len().min(40)])
+            )),
+        }
+    }
+}
+
+fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
+    macro_rules! integer {
+        ($type:ty) => {{
+            let number = number(value)?;
+            if number < <$type>::MIN as f64 || number > <$type>::MAX as f64 || number.is_nan() {
+                return Err(format!("{number} is no {}", stringify!($type)));
+            }
+            record.extend((number as $type).to_le_bytes());
+        }};
+    }
+    match scalar {
+        Scalar::I8 => integer!(i8),
+        Scalar::U8 => integer!(u8),
+        Scalar::I16 => integer!(i16),
+        Scalar::U16 => integer!(u16),
+        Scalar::I32 => integer!(i32),
+        Scalar::U32 => integer!(u32),
+        Scalar::I64 => integer!(i64),
+        Scalar::U64 => integer!(u64),
+        Scalar::F32 => record.extend((number(value)? as f32).to_le_bytes()),
+        Scalar::F64 => record.extend(number(value)?.to_le_bytes()),
+    }
+    Ok(())
+}
+
+/// Packed colours are written as integers, as floats whose bits are meant, or, by old programs, as floats whose value
+/// is meant: those are whole numbers, which the bits of a colour never look like.
+fn packed(value: &[u8]) -> Result<u32, String> {
+    if let Some(integer) = std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
+        return Ok(integer as u32);
+    }
+    let number = number(value)?;
+    let whole = number.fract() == 0.0 && (1.0..16_777_216.0).contains(&number);
+    Ok(if whole { number as u32 } else { (number as f32).to_bits() })
+}
+
+/// A number as text has it, `nan` and `inf` in any case included.
+pub(super) fn number(value: &[u8]) -> Result<f64, String> {
+    fast_float2::parse(value).or_else(|_| {
+        // Windows writes -nan(ind) and 1.#QNAN.
+        let lower = value.to_ascii_lowercase();
+        if lower.starts_with(b"-nan") || lower.starts_with(b"nan(") || lower.windows(2).any(|pair| pair == b"#q") {
+            return Ok(f64::NAN);
+        }
+        Err(format!("'{}' is no number", String::from_utf8_lossy(&value[..value.len().min(40)])))
+    })
+}
+
+/// The values of a line, between blanks, commas and semicolons.
+pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
+}
+
+/// Whether a trimmed line holds nothing or a comment.
+pub(super) fn is_blank(line: &[u8]) -> bool {
+    line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
+}
+
+/// Whether a trimmed line is a single integer, as PTS has it before its points.
+pub(super) fn is_count(line: &[u8]) -> bool {
+    !line.is_empty() && line.iter().all(u8::is_ascii_digit)
+}
+
+/// The end of the line that `at` is in, without its line feed.
+pub(super) fn line_end(text: &[u8], at: usize) -> usize {
+    text[at..].iter().position(|&byte| byte == b'\n').map_or(text.len(), |len| at + len)
+}
+
+/// The start of the line after the one that `at` is in.
+pub(super) fn after_line_end(text: &[u8], at: usize) -> usize {
+    (line_end(text, at) + 1).min(text.len())
+}

@@ -1,0 +1,5 @@
+//! Point clouds to files.
+
+mod ply;
+
+pub use ply::write_ply;

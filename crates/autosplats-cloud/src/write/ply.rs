@@ -1,0 +1,147 @@
+//! PLY, binary little endian: the one format that keeps all a cloud has.
+
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+use rayon::prelude::*;
+
+use crate::{Axes, Error, Field, FieldValues, PointCloud, Progress, cloud::each_type, progress::tick};
+
+/// Bytes encoded before they are written.
+const BUFFER: usize = 4 << 20;
+
+/// Records that one thread encodes at a time.
+const PIECE: usize = 1 << 13;
+
+/// Writes `cloud` as a binary little-endian PLY that [`read`](crate::read) turns back into the same cloud.
+///
+/// Positions are floats if the cloud's origin is zero, else world coordinates in double precision. Blanks in field names
+/// become underscores. The file appears complete or not at all: it is written beside `path` under another name, which
+/// is removed on failure, and then renamed, replacing what was there.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written, [`Error::Cancelled`] if `progress` says so.
+pub fn write_ply(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
+    let io = |source| Error::Io { path: PathBuf::from(path), source };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".autosplats-").suffix(".tmp");
+    // Temporary files are for their owner alone unless told otherwise; the result is a file like any.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(io)?;
+
+    let layout = Layout::of(cloud);
+    file.write_all(layout.header(cloud).as_bytes()).map_err(io)?;
+    let block = (BUFFER / layout.stride).max(PIECE);
+    let mut buffer = vec![0; block.min(cloud.len()) * layout.stride];
+    for start in (0..cloud.len()).step_by(block) {
+        tick(progress, start as f32 / cloud.len() as f32)?;
+        let records = &mut buffer[..block.min(cloud.len() - start) * layout.stride];
+        records
+            .par_chunks_mut(PIECE * layout.stride)
+            .enumerate()
+            .for_each(|(index, records)| layout.encode(cloud, start + index * PIECE, records));
+        file.write_all(records).map_err(io)?;
+    }
+    tick(progress, 1.0)?;
+    file.persist(path).map_err(|error| io(error.error))?;
+    Ok(())
+}
+
+/// How a record is laid out: positions, colours, fields.
+struct Layout {
+    doubles: bool,
+    names: Vec<String>,
+    stride: usize,
+}
+
+impl Layout {
+    fn of(cloud: &PointCloud) -> Self {
+        let doubles = cloud.origin() != glam::DVec3::ZERO;
+        let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
+        let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 3 } else { 0 } + fields;
+        Self { doubles, names: property_names(cloud.fields()), stride }
+    }
+
+    fn header(&self, cloud: &PointCloud) -> String {
+        let mut header = String::from("ply\nformat binary_little_endian 1.0\n");
+        header += match cloud.axes() {
+            Some(Axes::ZUp) => "comment axes z-up\n",
+            Some(Axes::YUp) => "comment axes y-up\n",
+            Some(Axes::Camera) => "comment axes camera\n",
+            None => "",
+        };
+        header += &format!("element vertex {}\n", cloud.len());
+        for axis in ["x", "y", "z"] {
+            header += &format!("property {} {axis}\n", if self.doubles { "double" } else { "float" });
+        }
+        if cloud.colors().is_some() {
+            header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+        }
+        for (field, name) in cloud.fields().iter().zip(&self.names) {
+            header += &format!("property {} {name}\n", scalar(&field.values).0);
+        }
+        header + "end_header\n"
+    }
+
+    /// Encodes as many points from `first` on as there is room for.
+    fn encode(&self, cloud: &PointCloud, first: usize, records: &mut [u8]) {
+        let range = first..first + records.len() / self.stride;
+        let mut at = 0;
+        if self.doubles {
+            let world = range.clone().map(|i| cloud.world_position(i).to_array().map(f64::to_le_bytes));
+            self.place(records, &mut at, world.map(|bytes| bytemuck::cast::<_, [u8; 24]>(bytes)));
+        } else {
+            let positions = cloud.positions()[range.clone()].iter();
+            let bytes = positions.map(|position| bytemuck::cast::<_, [u8; 12]>(position.map(f32::to_le_bytes)));
+            self.place(records, &mut at, bytes);
+        }
+        if let Some(colors) = cloud.colors() {
+            self.place(records, &mut at, colors[range.clone()].iter().copied());
+        }
+        for field in cloud.fields() {
+            each_type!(&field.values, v => {
+                self.place(records, &mut at, v[range.clone()].iter().map(|value| value.to_le_bytes()));
+            });
+        }
+    }
+
+    /// Puts one value into every record at byte `at`, and moves `at` behind it.
+    fn place<const LEN: usize>(&self, records: &mut [u8], at: &mut usize, values: impl Iterator<Item = [u8; LEN]>) {
+        for (record, value) in records.chunks_exact_mut(self.stride).zip(values) {
+            record[*at..*at + LEN].copy_from_slice(&value);
+        }
+        *at += LEN;
+    }
+}
+
+/// PLY's name and size of the values' type.
+fn scalar(values: &FieldValues) -> (&'static str, usize) {
+    match values {
+        FieldValues::I8(_) => ("char", 1),
+        FieldValues::U8(_) => ("uchar", 1),
+        FieldValues::I16(_) => ("short", 2),
+        FieldValues::U16(_) => ("ushort", 2),
+        FieldValues::I32(_) => ("int", 4),
+        FieldValues::U32(_) => ("uint", 4),
+        FieldValues::F32(_) => ("float", 4),
+        FieldValues::F64(_) => ("double", 8),
+    }
+}
+
+/// Names without blanks, all different, none of them a coordinate's or a colour's.
+fn property_names(fields: &[Field]) -> Vec<String> {
+    let mut taken: Vec<String> = ["x", "y", "z", "red", "green", "blue"].map(String::from).into();
+    for field in fields {
+        let blank = |c: char| c.is_whitespace() || c.is_control();
+        let mut name = field.name.replace(blank, "_");
+        while name.is_empty() || taken.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
+            name.push('_');
+        }
+        taken.push(name);
+    }
+    taken.split_off(6)
+}

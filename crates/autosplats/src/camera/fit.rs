@@ -1,0 +1,220 @@
+//! A camera that shows a whole cloud, for those who name none.
+
+use autosplats_cloud::{Axes, PointCloud};
+use glam::DVec3;
+
+use super::{Camera, Projection};
+use crate::Error;
+
+/// Points looked at: enough for percentiles, few enough to cost nothing.
+const SAMPLES: usize = 100_000;
+/// Share of the points at either end of each axis that may be outliers.
+const TRIM: f64 = 0.005;
+/// Trimmed ends come back if they reach no further than this part of the extent of the rest.
+const KEEP: f64 = 0.2;
+/// Share of the picture left free at each side.
+const BORDER: f64 = 0.04;
+
+/// Where to stand in relation to the cloud.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ViewDirection {
+    /// The sensor's own view for points in a camera's frame, otherwise [`Iso`](Self::Iso).
+    #[default]
+    Auto,
+    /// From the front, half right and above.
+    Iso,
+    /// From the front: -Y where Z is up, +Z where Y is up.
+    Front,
+    /// From behind.
+    Back,
+    /// From the left hand of somebody at the front.
+    Left,
+    /// From the right hand of somebody at the front.
+    Right,
+    /// From above, the front at the lower edge.
+    Top,
+    /// From below, the front at the upper edge.
+    Bottom,
+}
+
+/// Right, front (towards the viewer) and up of a convention.
+fn frame(axes: Axes) -> [DVec3; 3] {
+    match axes {
+        Axes::ZUp => [DVec3::X, DVec3::NEG_Y, DVec3::Z],
+        Axes::YUp => [DVec3::X, DVec3::Z, DVec3::Y],
+        Axes::Camera => [DVec3::X, DVec3::NEG_Z, DVec3::NEG_Y],
+    }
+}
+
+/// Up in world coordinates.
+pub(crate) fn up(axes: Axes) -> DVec3 {
+    frame(axes)[2]
+}
+
+/// The axes a cloud states, or a guess from its extents: survey coordinates and flat scenes have Z up, models Y.
+pub fn guess_axes(cloud: &PointCloud) -> Axes {
+    cloud.axes().unwrap_or_else(|| {
+        let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let [low, high] = robust_range(&samples, axis);
+            high - low
+        });
+        let flat = z < 0.35 * x.max(y) && z < x.min(y);
+        if flat || cloud.origin() != DVec3::ZERO { Axes::ZUp } else { Axes::YUp }
+    })
+}
+
+impl Camera {
+    /// A camera that sees all of `cloud` from `direction`, but for a few points far from the others.
+    ///
+    /// `aspect` is width over height. With an orthographic `projection` its height is replaced by the one that fits; with
+    /// a perspective one the field of view is kept, but for the sensor's own view, which takes the one that fits.
+    ///
+    /// # Errors
+    /// [`Error::NothingVisible`] if the cloud has no finite point, [`Error::Camera`] if the projection is invalid.
+    pub fn fit(
+        cloud: &PointCloud,
+        axes: Axes,
+        direction: ViewDirection,
+        aspect: f64,
+        projection: Projection,
+    ) -> Result<Self, Error> {
+        let [right, front, up] = frame(axes);
+        let sensor = axes == Axes::Camera && direction == ViewDirection::Auto;
+        let (to_viewer, picture_up) = match direction {
+            ViewDirection::Auto if sensor => (front, up),
+            ViewDirection::Auto | ViewDirection::Iso => (front + 0.62 * right + 0.55 * up, up),
+            ViewDirection::Front => (front, up),
+            ViewDirection::Back => (-front, up),
+            ViewDirection::Left => (-right, up),
+            ViewDirection::Right => (right, up),
+            ViewDirection::Top => (up, -front),
+            ViewDirection::Bottom => (-up, front),
+        };
+        let mut camera = Self { eye: to_viewer, look_at: DVec3::ZERO, up: picture_up, projection };
+        let axes = camera.axes()?;
+        let forward = axes[2];
+        let samples = samples(cloud, axes);
+        let ranges = [0, 1, 2].map(|axis| robust_range(&samples, axis));
+        let kept: Vec<DVec3> =
+            samples.into_iter().filter(|p| (0..3).all(|i| (ranges[i][0]..=ranges[i][1]).contains(&p[i]))).collect();
+        if kept.is_empty() {
+            return Err(Error::NothingVisible("the cloud has no point with finite coordinates".into()));
+        }
+        let middle = ranges.map(|[low, high]| 0.5 * (low + high));
+        let extent = ranges.map(|[low, high]| high - low);
+        // All points in one place still need a picture of some size.
+        let least = (1e-6 * cloud.origin().abs().max_element()).max(1e-3);
+        let extent = extent.map(|e| e.max(if extent == [0.0; 3] { least } else { 0.0 }));
+        let to_world = |p: [f64; 3]| cloud.origin() + axes[0] * p[0] + axes[1] * p[1] + axes[2] * p[2];
+        let half_room = 0.5 - BORDER;
+        camera.look_at = to_world(middle);
+
+        if sensor {
+            // The sensor is at the world's origin and saw everything there is from there.
+            let depth = middle[2].max(1e-6);
+            let sensor_offset = axes.map(|axis| -axis.dot(cloud.origin()));
+            let ahead = kept.iter().filter(|p| p.z - sensor_offset[2] > 0.1 * depth);
+            let slope = ahead.fold(0.0f64, |slope, p| {
+                let [x, y, z] = [0, 1, 2].map(|i| p[i] - sensor_offset[i]);
+                slope.max((y / z).abs()).max((x / z).abs() / aspect)
+            });
+            camera.eye = DVec3::ZERO;
+            camera.look_at = forward * depth;
+            let fov = 2.0 * (slope * 0.5 / half_room).atan().to_degrees();
+            camera.projection = Projection::PerspectiveFovDeg(fov.clamp(1.0, 120.0));
+            return Ok(camera);
+        }
+        let distance = match &mut camera.projection {
+            Projection::OrthographicHeight(height) => {
+                *height = (extent[1] / (2.0 * half_room)).max(extent[0] / (2.0 * half_room * aspect)).max(1e-12);
+                // In front of everything, trimmed points included as far as they are near.
+                2.0 * extent[2] + *height
+            }
+            Projection::PerspectiveFovDeg(fov) => {
+                let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
+                let distance = kept.iter().fold(0.0f64, |distance, p| {
+                    let [x, y, z] = [0, 1, 2].map(|i| p[i] - middle[i]);
+                    distance.max(y.abs() / slope - z).max(x.abs() / (slope * aspect) - z)
+                });
+                distance.max(0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * 0.05)
+            }
+        };
+        camera.eye = camera.look_at - forward * distance;
+        Ok(camera)
+    }
+}
+
+/// Finite positions about the cloud's origin along `axes`, evenly picked.
+fn samples(cloud: &PointCloud, axes: [DVec3; 3]) -> Vec<DVec3> {
+    let positions = cloud.positions();
+    let step = positions.len().div_ceil(SAMPLES).max(1);
+    let finite = positions.iter().step_by(step).map(|&p| DVec3::from(p.map(f64::from))).filter(|p| p.is_finite());
+    finite.map(|p| DVec3::from(axes.map(|axis| axis.dot(p)))).collect()
+}
+
+/// The range along `axis` without outliers; (0, 0) for no points.
+fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
+    let mut values: Vec<f64> = samples.iter().map(|p| p[axis]).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let (Some(&first), Some(&last)) = (values.first(), values.last()) else { return [0.0; 2] };
+    let trim = (values.len() as f64 * TRIM) as usize;
+    let [low, high] = [values[trim], values[values.len() - 1 - trim]];
+    let margin = KEEP * (high - low);
+    let nearest = |bound: f64| {
+        let inside = values.partition_point(|&v| v < bound);
+        values[inside.min(values.len() - 1)]
+    };
+    let furthest = |bound: f64| values[values.partition_point(|&v| v <= bound).max(1) - 1];
+    [
+        if first < low - margin { nearest(low - margin) } else { first },
+        if last > high + margin { furthest(high + margin) } else { last },
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ball(extra: &[[f32; 3]]) -> PointCloud {
+        let golden = 2.399963f32;
+        let mut positions: Vec<[f32; 3]> = (0..2000)
+            .map(|i| {
+                let z = 1.0 - (i as f32 + 0.5) / 1000.0;
+                let (sin, cos) = (i as f32 * golden).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                [r * cos, r * sin, z]
+            })
+            .collect();
+        positions.extend_from_slice(extra);
+        PointCloud::new(DVec3::ZERO, positions)
+    }
+
+    #[test]
+    fn far_outliers_do_not_shrink_the_object() {
+        let projection = Projection::PerspectiveFovDeg(40.0);
+        let distance = |cloud: &PointCloud| {
+            let camera = Camera::fit(cloud, Axes::ZUp, ViewDirection::Front, 1.5, projection).expect("a fit");
+            (camera.eye - camera.look_at).length()
+        };
+        let clean = distance(&ball(&[]));
+        let littered = distance(&ball(&[[1e6, 0.0, 0.0], [0.0, -3e5, 7.0], [f32::NAN, 0.0, 0.0]]));
+        assert!((littered / clean - 1.0).abs() < 0.01, "{littered} is not about {clean}");
+    }
+
+    #[test]
+    fn all_points_lie_in_the_picture() {
+        let cloud = ball(&[]);
+        for direction in [ViewDirection::Iso, ViewDirection::Top, ViewDirection::Left, ViewDirection::Bottom] {
+            for projection in [Projection::PerspectiveFovDeg(60.0), Projection::OrthographicHeight(1.0)] {
+                let camera = Camera::fit(&cloud, Axes::YUp, direction, 0.5, projection).expect("a fit");
+                let view = camera.view(DVec3::ZERO, [100, 200]).expect("a view");
+                for &position in cloud.positions() {
+                    let [x, y] = view.to_pixel(view.to_view(position));
+                    assert!((0.0..100.0).contains(&x) && (0.0..200.0).contains(&y), "{direction:?}: {x}, {y}");
+                }
+            }
+        }
+    }
+}

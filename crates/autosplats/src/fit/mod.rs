@@ -1,0 +1,39 @@
+//! Fit: moments to surfels, by the eigenvectors of the covariance [Paper, §6].
+//!
+//! # How it works
+//! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, sixteen matrices at a time:
+//! a fixed number of additions, multiplications and square roots without branches, which converges from any start and
+//! keeps the axes orthogonal. The axis of the least eigenvalue is the normal, turned towards the eye. The splat radius is
+//! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average.
+
+mod cpu;
+mod eigen;
+
+pub(crate) use cpu::{FitRules, fit};
+
+/// An oriented disc in view space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub(crate) struct Surfel {
+    /// The point itself, view space.
+    pub(crate) center: [f32; 3],
+    /// Semi-minor axis, world units; 0 if the point was discarded.
+    pub(crate) radius: f32,
+    /// Unit normal towards the eye, view space.
+    pub(crate) normal: [f32; 3],
+    /// Distance to the furthest neighbour, world units.
+    pub(crate) k_radius: f32,
+    /// Unit direction of the semi-major axis, view space, in the disc's plane.
+    pub(crate) major_axis: [f32; 3],
+    /// Semi-major over semi-minor axis; 1 for circles.
+    pub(crate) major_ratio: f32,
+    /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
+    pub(crate) curvature: f32,
+    /// Pixel column in the low, row in the high 16 bits.
+    pub(crate) pixel: u32,
+    /// Index in the cloud.
+    pub(crate) source: u32,
+}
+
+/// The surfels of a list of screen points, in that list's order.
+pub(crate) type Surfels = Vec<Surfel>;

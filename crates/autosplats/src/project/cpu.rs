@@ -1,0 +1,249 @@
+//! Projection on the CPU.
+
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+
+use autosplats_cloud::PointCloud;
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{DensityGrid, Dropped, ScreenCells, ScreenPoint, ScreenPoints};
+use crate::camera::View;
+
+/// Points projected per task.
+const CHUNK: usize = 16 * 1024;
+/// Points transformed at a time.
+const LANES: usize = 16;
+/// Key of a pixel that no point projects to.
+const EMPTY: u64 = u64::MAX;
+/// A strip is this many mean distances between screen points high: with one strip more above and below, sixteen points
+/// of a strip see their ten nearest neighbours among about a hundred candidates.
+const STRIP_SPACINGS: f32 = 3.0;
+/// Side in pixels of the blocks that tell covered from empty screen when the density is measured.
+const OCCUPANCY_PX: usize = 16;
+
+/// Projects clouds; keeps its buffers from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct Projector {
+    /// Per pixel `depth bits << 32 | point index`: positive floats order as their bits do.
+    keys: Vec<AtomicU64>,
+    screen: ScreenPoints,
+}
+
+impl Projector {
+    /// Projects `cloud`, which has fewer than 2³² points, for `view`; the density grid holds about `k` points a cell.
+    pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, k: u32, grid_culling: bool) -> &ScreenPoints {
+        let width = view.width as usize;
+        self.screen.dropped = nearest_per_pixel(cloud.positions(), view, &mut self.keys);
+        let spacing_px = mean_spacing(&self.keys, width);
+        compact(cloud.positions(), view, &self.keys, spacing_px, &mut self.screen);
+        measure_density(&self.keys, view, spacing_px, k, &mut self.screen.density);
+        split_by_depth(view, grid_culling, &mut self.screen);
+        &self.screen
+    }
+}
+
+/// Fills `keys` with the nearest point of each pixel.
+fn nearest_per_pixel(positions: &[[f32; 3]], view: &View, keys: &mut Vec<AtomicU64>) -> Dropped {
+    let pixels = view.width as usize * view.height as usize;
+    keys.resize_with(pixels, AtomicU64::default);
+    keys.par_chunks_mut(1 << 16).for_each(|keys| keys.iter_mut().for_each(|key| *key.get_mut() = EMPTY));
+    let keys = keys.as_slice();
+    let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
+    positions.par_chunks(CHUNK).enumerate().for_each(|(chunk, positions)| {
+        let dropped = project_chunk(positions, (chunk * CHUNK) as u32, view, keys);
+        not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
+        behind.fetch_add(dropped.behind, Ordering::Relaxed);
+        outside.fetch_add(dropped.outside, Ordering::Relaxed);
+    });
+    let [not_finite, behind, outside] = [not_finite, behind, outside].map(AtomicUsize::into_inner);
+    Dropped { not_finite, behind, outside }
+}
+
+/// Where a point goes: a pixel index, or why nowhere.
+const NOT_FINITE: u32 = u32::MAX;
+const BEHIND: u32 = u32::MAX - 1;
+const OUTSIDE: u32 = u32::MAX - 2;
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
+))]
+fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, keys: &[AtomicU64]) -> Dropped {
+    let mut dropped = Dropped::default();
+    let mut pixel = [0u32; LANES];
+    let mut depth = [0f32; LANES];
+    for (group, positions) in positions.chunks(LANES).enumerate() {
+        if let Ok(positions) = <&[[f32; 3]; LANES]>::try_from(positions) {
+            for lane in 0..LANES {
+                (pixel[lane], depth[lane]) = project_point(positions[lane], view);
+            }
+        } else {
+            for (lane, &position) in positions.iter().enumerate() {
+                (pixel[lane], depth[lane]) = project_point(position, view);
+            }
+        }
+        for lane in 0..positions.len() {
+            match pixel[lane] {
+                NOT_FINITE => dropped.not_finite += 1,
+                BEHIND => dropped.behind += 1,
+                OUTSIDE => dropped.outside += 1,
+                pixel => {
+                    let index = first + (group * LANES + lane) as u32;
+                    let key = u64::from(depth[lane].to_bits()) << 32 | u64::from(index);
+                    // Most points lose; a plain load tells them so without taking the cache line from other threads.
+                    let cell = &keys[pixel as usize];
+                    if key < cell.load(Ordering::Relaxed) {
+                        cell.fetch_min(key, Ordering::Relaxed);
+                    }
+                }
+            }
+        }
+    }
+    dropped
+}
+
+/// Pixel index and depth of one point, without branches.
+#[inline(always)]
+fn project_point(position: [f32; 3], view: &View) -> (u32, f32) {
+    let [x, y, z] = view.to_view(position).to_array();
+    let [px, py] = view.to_pixel(Vec3::new(x, y, z));
+    // Inside the image the coordinates are positive, so that truncation is rounding down.
+    let inside = (px >= 0.0) & (py >= 0.0) & (px < view.width as f32) & (py < view.height as f32);
+    let pixel = (py as u32).wrapping_mul(view.width).wrapping_add(px as u32);
+    let pixel = if inside { pixel } else { OUTSIDE };
+    let pixel = if z > view.near { pixel } else { BEHIND };
+    // Finite coordinates so large that their transform is not count as not finite too.
+    let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
+    (if finite { pixel } else { NOT_FINITE }, z)
+}
+
+fn is_owned(key: &AtomicU64) -> bool {
+    key.load(Ordering::Relaxed) != EMPTY
+}
+
+/// Mean distance in pixels between screen points where there are any.
+// Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
+fn mean_spacing(keys: &[AtomicU64], width: usize) -> f32 {
+    let (points, blocks) = keys
+        .par_chunks(width * OCCUPANCY_PX)
+        .map(|rows| {
+            let mut occupied = vec![0usize; width.div_ceil(OCCUPANCY_PX)];
+            for row in rows.chunks(width) {
+                for (block, keys) in row.chunks(OCCUPANCY_PX).enumerate() {
+                    occupied[block] += keys.iter().filter(|key| is_owned(key)).count();
+                }
+            }
+            (occupied.iter().sum(), occupied.iter().filter(|&&n| n > 0).count())
+        })
+        .reduce(|| (0, 0), |a: (usize, usize), b| (a.0 + b.0, a.1 + b.1));
+    ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt().max(1.0)
+}
+
+/// Lists the owners of pixels in cell order.
+fn compact(positions: &[[f32; 3]], view: &View, keys: &[AtomicU64], spacing_px: f32, screen: &mut ScreenPoints) {
+    let [width, height] = [view.width as usize, view.height as usize];
+    let strip_px = ((STRIP_SPACINGS * spacing_px).round() as usize).clamp(1, 256);
+    let strips = height.div_ceil(strip_px);
+    let ScreenPoints { points, source, cells, .. } = screen;
+    *cells = ScreenCells { strip_px, columns: width, start: std::mem::take(&mut cells.start) };
+    cells.start.resize(strips * width + 1, 0);
+
+    // Points of each cell first, then where each cell begins.
+    let strip_keys = |strip: usize| &keys[strip * strip_px * width..height.min((strip + 1) * strip_px) * width];
+    let strip_len: Vec<u32> = cells.start[..strips * width]
+        .par_chunks_mut(width)
+        .enumerate()
+        .map(|(strip, start)| {
+            start.fill(0);
+            for row in strip_keys(strip).chunks(width) {
+                for (count, key) in start.iter_mut().zip(row) {
+                    *count += u32::from(is_owned(key));
+                }
+            }
+            let mut sum = 0;
+            for count in start {
+                sum += std::mem::replace(count, sum);
+            }
+            sum
+        })
+        .collect();
+    let total = strip_len.iter().sum::<u32>() as usize;
+    points.resize(total, ScreenPoint::default());
+    source.resize(total, 0);
+    cells.start[strips * width] = total as u32;
+
+    let mut first = 0;
+    let mut tasks = Vec::with_capacity(strips);
+    let (mut points, mut source) = (points.as_mut_slice(), source.as_mut_slice());
+    for (strip, start) in cells.start[..strips * width].chunks_mut(width).enumerate() {
+        let len = strip_len[strip] as usize;
+        let strip_points = points.split_off_mut(..len).unwrap_or_default();
+        let strip_source = source.split_off_mut(..len).unwrap_or_default();
+        tasks.push((strip, first, start, strip_points, strip_source));
+        first += len as u32;
+    }
+    tasks.into_par_iter().for_each(|(strip, first, start, points, source)| {
+        start.iter_mut().for_each(|cell| *cell += first);
+        let keys = strip_keys(strip);
+        let mut next = 0;
+        for x in 0..width {
+            for (row, y) in (strip * strip_px..).zip(keys.chunks(width)).map(|(y, row)| (row, y)) {
+                let key = row[x].load(Ordering::Relaxed);
+                if key != EMPTY {
+                    let index = key as u32;
+                    let position_view = view.to_view(positions[index as usize]).to_array();
+                    points[next] = ScreenPoint { position_view, pixel: (y << 16 | x) as u32 };
+                    source[next] = index;
+                    next += 1;
+                }
+            }
+        }
+    });
+}
+
+/// Counts points and finds the nearest depth per cell of about `k` points.
+fn measure_density(keys: &[AtomicU64], view: &View, spacing_px: f32, k: u32, density: &mut DensityGrid) {
+    let [width, height] = [view.width as usize, view.height as usize];
+    let cell_px = ((spacing_px * (k as f32).sqrt()).round() as usize).max(2);
+    let columns = width.div_ceil(cell_px);
+    let cells = columns * height.div_ceil(cell_px);
+    density.cell_px = cell_px;
+    density.columns = columns;
+    density.count.resize(cells, 0);
+    density.nearest.resize(cells, f32::INFINITY);
+    let rows = density.count.par_chunks_mut(columns).zip(density.nearest.par_chunks_mut(columns));
+    rows.zip(keys.par_chunks(width * cell_px)).for_each(|((count, nearest), keys)| {
+        count.fill(0);
+        nearest.fill(f32::INFINITY);
+        for row in keys.chunks(width) {
+            for (cell, keys) in row.chunks(cell_px).enumerate() {
+                let mut least = EMPTY;
+                for key in keys {
+                    let key = key.load(Ordering::Relaxed);
+                    count[cell] += u32::from(key != EMPTY);
+                    least = least.min(key);
+                }
+                if least != EMPTY {
+                    nearest[cell] = nearest[cell].min(f32::from_bits((least >> 32) as u32));
+                }
+            }
+        }
+    });
+}
+
+/// Puts back the points further behind the nearest of their cell than the cell is wide [Paper, §7, Grid Culling].
+fn split_by_depth(view: &View, grid_culling: bool, screen: &mut ScreenPoints) {
+    let ScreenPoints { points, density, active, passive, .. } = screen;
+    active.clear();
+    passive.clear();
+    if !grid_culling {
+        active.extend(0..points.len() as u32);
+        return;
+    }
+    let cell_px = density.cell_px as f32;
+    let limit: Vec<f32> = density.nearest.iter().map(|&depth| depth + cell_px * view.pixel_size(depth)).collect();
+    for (index, point) in (0..).zip(&*points) {
+        let hidden = point.position_view[2] > limit[density.cell(point.pixel_xy())];
+        if hidden { passive.push(index) } else { active.push(index) }
+    }
+}

@@ -1,0 +1,105 @@
+//! Project: every point to its pixel, the nearest wins [Paper, §3, §5.1, §7].
+//!
+//! # How it works
+//! A pixel keeps the smallest of (depth, point index), so ties go to the lower index. What survives, the *screen points*,
+//! is compacted into a list ordered by screen cell, for the search to read its surroundings in few contiguous runs: the
+//! screen is cut into strips a few pixels high, a cell is one pixel wide and a strip high, and cells follow each other
+//! along the strip. Any sixteen neighbours in that list lie close together on the screen, whatever the local density.
+//!
+//! A coarser grid, about k screen points to a cell, counts points for the first search radius (§5.1) and holds the
+//! nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
+
+mod cpu;
+
+pub(crate) use cpu::Projector;
+
+use crate::camera::View;
+
+/// A projected point: one that owns its pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub(crate) struct ScreenPoint {
+    /// View space (x right, y down, z forward), world units.
+    pub(crate) position_view: [f32; 3],
+    /// Pixel column in the low, row in the high 16 bits.
+    pub(crate) pixel: u32,
+}
+
+impl ScreenPoint {
+    /// Pixel column and row.
+    #[inline(always)]
+    pub(crate) fn pixel_xy(&self) -> [usize; 2] {
+        [(self.pixel & 0xffff) as usize, (self.pixel >> 16) as usize]
+    }
+}
+
+/// The screen points of one frame in cell order.
+#[derive(Debug, Default)]
+pub(crate) struct ScreenPoints {
+    pub(crate) points: Vec<ScreenPoint>,
+    /// Index in the cloud of each screen point.
+    pub(crate) source: Vec<u32>,
+    pub(crate) cells: ScreenCells,
+    pub(crate) density: DensityGrid,
+    /// Screen points to reconstruct first, ascending.
+    pub(crate) active: Vec<u32>,
+    /// Screen points probably hidden, ascending; empty without grid culling.
+    pub(crate) passive: Vec<u32>,
+    pub(crate) dropped: Dropped,
+}
+
+/// Points that own no pixel because they cannot, by reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Dropped {
+    pub(crate) not_finite: usize,
+    pub(crate) behind: usize,
+    pub(crate) outside: usize,
+}
+
+/// Where in the list of screen points each cell begins.
+#[derive(Debug, Default)]
+pub(crate) struct ScreenCells {
+    /// Height of a strip in pixels.
+    pub(crate) strip_px: usize,
+    /// Image width: cells in a strip.
+    pub(crate) columns: usize,
+    /// First screen point of each cell, strip by strip, and the number of points at the end.
+    pub(crate) start: Vec<u32>,
+}
+
+impl ScreenCells {
+    /// The screen points of strip `strip` in pixel columns `x0..=x1`: they are contiguous.
+    #[inline(always)]
+    pub(crate) fn run(&self, strip: usize, x0: usize, x1: usize) -> std::ops::Range<usize> {
+        let row = strip * self.columns;
+        self.start[row + x0] as usize..self.start[row + x1 + 1] as usize
+    }
+}
+
+/// The low-resolution grid of §5.1: square cells of about k screen points.
+#[derive(Debug, Default)]
+pub(crate) struct DensityGrid {
+    /// Side of a cell in pixels.
+    pub(crate) cell_px: usize,
+    pub(crate) columns: usize,
+    /// Screen points in each cell.
+    pub(crate) count: Vec<u32>,
+    /// Depth of the nearest point in each cell; infinite in an empty one.
+    pub(crate) nearest: Vec<f32>,
+}
+
+impl DensityGrid {
+    #[inline(always)]
+    fn cell(&self, [x, y]: [usize; 2]) -> usize {
+        y / self.cell_px * self.columns + x / self.cell_px
+    }
+
+    /// First search radius of a point in world units: that of the circle which holds k points at the density of the
+    /// point's cell [Paper, §5.1].
+    #[inline(always)]
+    pub(crate) fn initial_radius(&self, point: &ScreenPoint, k: u32, view: &View) -> f32 {
+        let area_px = (self.cell_px * self.cell_px) as f32;
+        let count = self.count[self.cell(point.pixel_xy())] as f32;
+        (area_px * k as f32 / (std::f32::consts::PI * count)).sqrt() * view.pixel_size(point.position_view[2])
+    }
+}

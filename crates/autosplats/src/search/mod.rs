@@ -1,0 +1,125 @@
+//! Search: the k nearest screen points of each screen point, summed up in moments [Paper, §4, §5].
+//!
+//! Every engine answers the same question, stated here without iterations so that the answer depends on the screen points
+//! alone. For point P with first search radius r̃₀ (§5.1) and the distances d₁ ≤ d₂ ≤ … to the other screen points:
+//!
+//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√k^e0, the radius after e0 expansions that met nothing;
+//! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
+//!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ;
+//! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
+//! - *bound*: an engine need not read more than [`MAX_CANDIDATES`] screen points for P. A search that would have to keeps
+//!   the neighbours it is already sure of, is clamped and counted as bounded. So a cloud of nothing but outliers costs a
+//!   bounded time per point.
+
+pub(crate) mod screen_grid;
+
+/// Neighbourhoods that share a [`NeighborhoodBlock`].
+pub(crate) const LANES: usize = 16;
+
+/// Screen points an engine reads for one point before it may settle for fewer than k neighbours.
+pub(crate) const MAX_CANDIDATES: usize = 4096;
+
+/// One value per neighbourhood of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub(crate) struct Lanes(pub(crate) [f32; LANES]);
+
+/// Sixteen neighbourhoods, side by side for SIMD. Sums are taken about the point itself, which is not counted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub(crate) struct NeighborhoodBlock {
+    /// Neighbours; 0 if the point is an outlier.
+    pub(crate) count: Lanes,
+    /// Distance to the furthest neighbour, world units.
+    pub(crate) k_radius: Lanes,
+    /// Σ(q - p), view space.
+    pub(crate) offset: [Lanes; 3],
+    /// Σ(q - p)(q - p)ᵀ: xx, xy, xz, yy, yz, zz.
+    pub(crate) second: [Lanes; 6],
+}
+
+impl Default for Lanes {
+    fn default() -> Self {
+        Self([0.0; LANES])
+    }
+}
+
+impl Default for NeighborhoodBlock {
+    fn default() -> Self {
+        let zero = Lanes::default();
+        Self { count: zero, k_radius: zero, offset: [zero; 3], second: [zero; 6] }
+    }
+}
+
+/// Neighbourhoods of a list of screen points, in that list's order.
+#[derive(Debug, Default)]
+pub(crate) struct Neighborhoods {
+    /// The last block is filled up with copies of neighbourhoods.
+    pub(crate) blocks: Vec<NeighborhoodBlock>,
+    pub(crate) counts: SearchCounts,
+}
+
+/// What became of the points searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct SearchCounts {
+    pub(crate) outliers: usize,
+    pub(crate) clamped: usize,
+    pub(crate) bounded: usize,
+}
+
+impl std::ops::Add for SearchCounts {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            outliers: self.outliers + other.outliers,
+            clamped: self.clamped + other.clamped,
+            bounded: self.bounded + other.bounded,
+        }
+    }
+}
+
+/// The question put to an engine.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SearchRules {
+    pub(crate) k: u32,
+    /// e0; `None` keeps points without neighbours.
+    pub(crate) outlier_expansions: Option<u32>,
+    /// λ; `None` bridges any gap.
+    pub(crate) gap_factor: Option<f32>,
+}
+
+/// How a neighbourhood ends before its k-th neighbour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum EarlyEnd {
+    /// No neighbour is near enough.
+    Outlier,
+    /// A gap follows this many neighbours.
+    Gap(usize),
+}
+
+impl SearchRules {
+    /// Radius within which a point must have a neighbour.
+    #[inline(always)]
+    pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
+        self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * (self.k as f32).powf(0.5 * e0 as f32))
+    }
+
+    /// Applies the rules to the squared distances, ascending and complete up to distance `known`.
+    ///
+    /// `None` says that no rule ends the neighbourhood within `known`.
+    pub(crate) fn early_end(&self, squared: &[f32], initial_radius: f32, known: f32) -> Option<EarlyEnd> {
+        let nearest = squared.first().map_or(known, |d| d.sqrt());
+        if nearest > self.outlier_radius(initial_radius) {
+            return Some(EarlyEnd::Outlier);
+        }
+        let growth = self.gap_factor?.sqrt();
+        for neighbors in 1..=squared.len().min(self.k as usize - 1) {
+            let reach = growth * squared[neighbors - 1].sqrt().max(initial_radius);
+            let next = squared.get(neighbors).map_or(known, |d| d.sqrt());
+            if next > reach {
+                return Some(EarlyEnd::Gap(neighbors));
+            }
+        }
+        None
+    }
+}

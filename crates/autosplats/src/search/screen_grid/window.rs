@@ -1,0 +1,96 @@
+//! Windows: rectangles of the screen, and the screen points in them.
+
+use std::ops::Range;
+
+use crate::camera::View;
+use crate::project::ScreenCells;
+
+/// Added to projected bounds in pixels, against the rounding of projected coordinates.
+const MARGIN_PX: f32 = 0.02;
+
+/// A rectangle of pixels, all four sides included; as floats, because bounds are compared sixteen at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Window {
+    pub(super) x0: f32,
+    pub(super) x1: f32,
+    pub(super) y0: f32,
+    pub(super) y1: f32,
+}
+
+impl Window {
+    /// Contains nothing; the neutral element of [`union`](Self::union).
+    pub(super) const EMPTY: Self = Self { x0: f32::MAX, x1: -1.0, y0: f32::MAX, y1: -1.0 };
+
+    /// The pixels that points within `radius` of `center` (view space) can project to.
+    #[inline(always)]
+    pub(super) fn of_sphere(center: [f32; 3], radius: f32, view: &View) -> Self {
+        let [x, y, z] = center;
+        let [right, bottom] = [view.width as f32 - 1.0, view.height as f32 - 1.0];
+        let (mut x0, mut x1, mut y0, mut y1);
+        if view.perspective {
+            [x0, x1] = tangents(x, z, radius);
+            [y0, y1] = tangents(y, z, radius);
+        } else {
+            [x0, x1, y0, y1] = [x - radius, x + radius, y - radius, y + radius];
+        }
+        x0 = (x0 * view.focal_px + 0.5 * view.width as f32 - MARGIN_PX).floor();
+        x1 = (x1 * view.focal_px + 0.5 * view.width as f32 + MARGIN_PX).floor();
+        y0 = (y0 * view.focal_px + 0.5 * view.height as f32 - MARGIN_PX).floor();
+        y1 = (y1 * view.focal_px + 0.5 * view.height as f32 + MARGIN_PX).floor();
+        // A sphere around the eye's plane projects everywhere.
+        let bounded = !view.perspective | (z > 1.0001 * radius);
+        Self {
+            x0: if bounded & (x0 > 0.0) { x0 } else { 0.0 },
+            x1: if bounded & (x1 < right) { x1 } else { right },
+            y0: if bounded & (y0 > 0.0) { y0 } else { 0.0 },
+            y1: if bounded & (y1 < bottom) { y1 } else { bottom },
+        }
+    }
+
+    pub(super) fn union(self, other: Self) -> Self {
+        Self {
+            x0: self.x0.min(other.x0),
+            x1: self.x1.max(other.x1),
+            y0: self.y0.min(other.y0),
+            y1: self.y1.max(other.y1),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn contains(&self, other: &Self) -> bool {
+        (self.x0 <= other.x0) & (self.x1 >= other.x1) & (self.y0 <= other.y0) & (self.y1 >= other.y1)
+    }
+
+    /// Whether it is the whole picture.
+    pub(super) fn is_all(&self, view: &View) -> bool {
+        self.contains(&Self { x0: 0.0, x1: view.width as f32 - 1.0, y0: 0.0, y1: view.height as f32 - 1.0 })
+    }
+
+    /// The window with its upper and lower side moved outwards to strip borders: what is read anyway.
+    pub(super) fn to_strips(self, cells: &ScreenCells, view: &View) -> Self {
+        let strip_px = cells.strip_px as f32;
+        Self {
+            y0: (self.y0 / strip_px).floor() * strip_px,
+            y1: ((self.y1 / strip_px).floor() * strip_px + strip_px - 1.0).min(view.height as f32 - 1.0),
+            ..self
+        }
+    }
+
+    /// The runs of screen points in the window, strip by strip.
+    pub(super) fn runs<'a>(&self, cells: &'a ScreenCells) -> impl Iterator<Item = Range<usize>> + use<'a> {
+        let [x0, x1, y0, y1] = [self.x0, self.x1, self.y0, self.y1].map(|pixel| pixel as usize);
+        (y0 / cells.strip_px..=y1 / cells.strip_px).map(move |strip| cells.run(strip, x0, x1))
+    }
+
+    /// Number of screen points in the window.
+    pub(super) fn candidates(&self, cells: &ScreenCells) -> usize {
+        self.runs(cells).map(|run| run.len()).sum()
+    }
+}
+
+/// Slopes of the two lines through the eye that touch the circle of `radius` about (x, z), which lies in front of it.
+#[inline(always)]
+fn tangents(x: f32, z: f32, radius: f32) -> [f32; 2] {
+    let length = (x * x + z * z - radius * radius).max(0.0).sqrt();
+    [(x * length - radius * z) / (z * length + radius * x), (x * length + radius * z) / (z * length - radius * x)]
+}

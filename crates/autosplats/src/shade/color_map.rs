@@ -1,0 +1,53 @@
+//! Colour maps: a value in its range to a colour.
+
+use super::linear;
+use crate::renderer::ColorMap;
+
+/// Steps of a table: finer than 8 bits a channel can show.
+const STEPS: usize = 1024;
+/// Ends and middle of [`ColorMap::Reds`], sRGB.
+const REDS: [[f32; 3]; 4] = [[205.0, 208.0, 212.0], [240.0, 190.0, 130.0], [225.0, 80.0, 50.0], [140.0, 0.0, 20.0]];
+
+/// A colour map over a range of values, tabulated in linear colours.
+pub(super) struct Scale {
+    colors: Vec<[f32; 3]>,
+    range: [f32; 2],
+}
+
+impl Scale {
+    pub(super) fn new(map: ColorMap, range: [f32; 2]) -> Self {
+        let colors = (0..STEPS).map(|step| color(map, step as f64 / (STEPS - 1) as f64).map(linear)).collect();
+        Self { colors, range }
+    }
+
+    /// Values at the two ends.
+    pub(super) fn range(&self) -> [f32; 2] {
+        self.range
+    }
+
+    /// The linear colour of `value`: values beyond the ends get the colours of the ends, values that are unknown (NaN)
+    /// the lower one; a range of no width is all middle.
+    pub(super) fn color(&self, value: f32) -> [f32; 3] {
+        let [low, high] = self.range;
+        let t = if high > low { (value - low) / (high - low) } else { 0.5 };
+        self.colors[(t.clamp(0.0, 1.0) * (STEPS - 1) as f32 + 0.5) as usize]
+    }
+}
+
+/// The sRGB colour, 0 to 1, at `t`, 0 to 1.
+fn color(map: ColorMap, t: f64) -> [f32; 3] {
+    let gradient = match map {
+        ColorMap::Viridis => colorous::VIRIDIS,
+        ColorMap::Inferno => colorous::INFERNO,
+        ColorMap::Turbo => colorous::TURBO,
+        ColorMap::Gray => return [t as f32; 3],
+        ColorMap::Reds => {
+            let at = t as f32 * (REDS.len() - 1) as f32;
+            let segment = (at as usize).min(REDS.len() - 2);
+            let part = at - segment as f32;
+            return std::array::from_fn(|i| (REDS[segment][i] * (1.0 - part) + REDS[segment + 1][i] * part) / 255.0);
+        }
+    };
+    let color = gradient.eval_continuous(t);
+    [color.r, color.g, color.b].map(|channel| f32::from(channel) / 255.0)
+}

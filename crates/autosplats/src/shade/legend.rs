@@ -1,0 +1,95 @@
+//! The legend: a colour bar with its range, drawn into the picture.
+
+use font8x8::UnicodeFonts as _;
+
+use super::Image;
+use super::color_map::Scale;
+
+/// Labels along the bar, both ends included.
+const LABELS: usize = 5;
+/// Side of a character in font pixels.
+const GLYPH: usize = 8;
+const INK: [u8; 4] = [240, 240, 240, 255];
+const SHADE: [u8; 4] = [24, 26, 30, 255];
+
+/// Draws the legend at the right edge; in a picture too small for one, nothing.
+pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, encode: impl Fn(f32) -> u8) {
+    let [width, height] = [image.width as usize, image.height as usize];
+    // One font pixel is this many picture pixels.
+    let unit = (height / 400).max(1);
+    let line = (GLYPH + 4) * unit;
+    let [low, high] = scale.range();
+    let labels: Vec<String> =
+        (0..LABELS).map(|i| number(high + (low - high) * i as f32 / (LABELS - 1) as f32, high - low)).collect();
+    let text_width = labels.iter().map(String::len).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;
+    let bar_width = 14 * unit;
+    let panel_width = (bar_width + text_width + 5 * line / 2).max(0);
+    let bar_height = height / 2;
+    let panel_height = bar_height + 3 * line;
+    if panel_width + line > width || panel_height + line > height || bar_height < LABELS * line {
+        return;
+    }
+    let [x0, y0] = [width - panel_width - line, (height - panel_height) / 2];
+    for y in y0..y0 + panel_height {
+        for pixel in &mut image.pixels[y * width + x0..][..panel_width] {
+            *pixel = if pixel[3] == 0 { [SHADE[0], SHADE[1], SHADE[2], 190] } else { blend(*pixel, SHADE) };
+        }
+    }
+    let x = x0 + line / 2;
+    let top = y0 + 2 * line;
+    text(image, title, [x, y0 + line / 2], unit);
+    for y in 0..bar_height {
+        let t = 1.0 - (y as f32 + 0.5) / bar_height as f32;
+        let [r, g, b] = scale.color(low + (high - low) * t).map(&encode);
+        image.pixels[(top + y) * width + x..][..bar_width].fill([r, g, b, 255]);
+    }
+    for (i, label) in labels.iter().enumerate() {
+        let y = top + (bar_height - 1) * i / (LABELS - 1);
+        image.pixels[y * width + x + bar_width..][..3 * unit].fill(INK);
+        text(image, label, [x + bar_width + 5 * unit, y - GLYPH * unit / 2], unit);
+    }
+}
+
+/// A value with the digits that tell it apart within a range of this width.
+fn number(value: f32, range: f32) -> String {
+    let largest = value.abs().max(range);
+    if largest != 0.0 && !(1e-4..1e7).contains(&largest) {
+        return format!("{value:.2e}");
+    }
+    let digits = if range > 0.0 { (2.0 - range.log10()).ceil().clamp(0.0, 6.0) as usize } else { 3 };
+    format!("{value:.digits$}")
+}
+
+fn blend(below: [u8; 4], above: [u8; 4]) -> [u8; 4] {
+    // Three quarters of the panel: text stays readable on any picture.
+    let mix = |i: usize| ((u16::from(below[i]) + 3 * u16::from(above[i])) / 4) as u8;
+    [mix(0), mix(1), mix(2), 255]
+}
+
+fn text(image: &mut Image, text: &str, [x0, y0]: [usize; 2], unit: usize) {
+    let width = image.width as usize;
+    for (column, character) in text.chars().enumerate() {
+        let glyph = font8x8::BASIC_FONTS.get(character).or_else(|| font8x8::BASIC_FONTS.get('?')).unwrap_or_default();
+        for (row, bits) in glyph.into_iter().enumerate() {
+            for bit in (0..GLYPH).filter(|bit| bits >> bit & 1 == 1) {
+                for y in 0..unit {
+                    let start = (y0 + row * unit + y) * width + x0 + (column * GLYPH + bit) * unit;
+                    image.pixels[start..start + unit].fill(INK);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_have_the_digits_that_matter() {
+        assert_eq!(number(406_123.25, 80.0), "406123.2", "large values of a small range");
+        assert_eq!(number(0.0312, 0.05), "0.0312", "small values");
+        assert_eq!(number(3e-9, 5e-9), "3.00e-9", "tiny values");
+        assert_eq!(number(7.0, 0.0), "7.000", "no range");
+    }
+}

@@ -1,0 +1,54 @@
+//! Shade: the visible surface in, an image out [Paper, §7].
+//!
+//! # How it works
+//! Each covered pixel has a base colour: that of the points, one tone, or a value (height, depth, a scalar field …) looked
+//! up in a colour map over its range. It is multiplied by the light that its normal catches from a key light over the
+//! viewer's left shoulder, a weak fill light from the right and a sky brighter above than below; since normals face the
+//! eye, both sides of a surface are lit alike. Eye-dome lighting darkens pixels beside nearer ones. Colours are linear
+//! until the last step, which encodes them as sRGB.
+
+mod classes;
+mod color_map;
+mod cpu;
+mod legend;
+
+pub(crate) use classes::class_colors;
+pub(crate) use cpu::{Scene, shade};
+
+/// An image, rows from the top.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Image {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// sRGB and straight alpha, 8 bits a channel.
+    pub pixels: Vec<[u8; 4]>,
+}
+
+/// Linear value, 0 to 1, of an sRGB value 0 to 1.
+pub(crate) fn linear(srgb: f32) -> f32 {
+    if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
+/// sRGB value, 0 to 1, of a linear value 0 to 1.
+fn srgb(linear: f32) -> f32 {
+    if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Linear values of the 256 steps of an 8-bit sRGB channel.
+pub(crate) fn linear_steps() -> [f32; 256] {
+    std::array::from_fn(|step| linear(step as f32 / 255.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_round_trip() {
+        for (step, value) in linear_steps().into_iter().enumerate() {
+            assert_eq!((srgb(value) * 255.0).round() as usize, step, "step {step} does not come back");
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Splatting on the CPU, tile by tile.
+
+use rayon::prelude::*;
+
+use super::attributes::{Attributes, TileSums};
+use super::bins::Run;
+use super::raster::{draw_attributes, draw_depth};
+use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
+use crate::camera::View;
+use crate::fit::Surfel;
+
+/// Surfels in a run.
+const RUN: usize = 16 * 1024;
+
+/// Draws surfels; keeps its buffers from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct Splatter {
+    runs: Vec<Run>,
+    /// Runs in use this frame.
+    used: usize,
+    /// Depth per pixel, pushed back by ε, tile by tile.
+    depth: Vec<f32>,
+    /// The depth map before the last refinement.
+    previous: Vec<f32>,
+    layers: GBuffer,
+}
+
+impl Splatter {
+    /// Forgets the last frame and clears the depth map.
+    pub(crate) fn begin(&mut self, view: &View) {
+        self.used = 0;
+        clear(&mut self.depth, view);
+    }
+
+    /// Visibility pass: draws the surfels from index `first` on into the depth map [Paper, §7].
+    pub(crate) fn add(&mut self, surfels: &[Surfel], first: usize, view: &View) {
+        let before = self.used;
+        let added = surfels[first..].par_chunks(RUN);
+        self.used += added.len();
+        if self.runs.len() < self.used {
+            self.runs.resize_with(self.used, Run::default);
+        }
+        let runs = &mut self.runs[before..self.used];
+        added.zip(&mut *runs).enumerate().for_each(|(index, (surfels, run))| {
+            run.set_up(first + index * RUN, surfels, view);
+        });
+        draw_depth_map(runs, view, &mut self.depth);
+    }
+
+    /// Whether a point at this pixel and depth lies behind the depth map.
+    pub(crate) fn hides(&self, [x, y]: [usize; 2], depth: f32, view: &View) -> bool {
+        depth > self.depth[tiled_index(view.width as usize, x, y)]
+    }
+
+    /// Redraws the depth map with only those surfels whose point it does not hide [Paper, §7, Depth Refinement].
+    pub(crate) fn refine(&mut self, surfels: &[Surfel], view: &View) {
+        std::mem::swap(&mut self.depth, &mut self.previous);
+        clear(&mut self.depth, view);
+        let runs = &mut self.runs[..self.used];
+        let depth = &self.previous;
+        runs.par_iter_mut().for_each(|run| {
+            let splats = run.splats.iter().zip(&surfels[run.first..]);
+            for (alive, (splat, surfel)) in run.alive.iter_mut().zip(splats) {
+                let [x, y] = [surfel.pixel & 0xffff, surfel.pixel >> 16].map(|pixel| pixel as usize);
+                let hidden = surfel.center[2] > depth[tiled_index(view.width as usize, x, y)];
+                *alive = !splat.covers_nothing() & !hidden;
+            }
+        });
+        draw_depth_map(runs, view, &mut self.depth);
+    }
+
+    /// Attribute pass: the weighted mean of all living surfels within ε of the depth map [Paper, §7].
+    pub(crate) fn attributes(&mut self, surfels: &[Surfel], view: &View, attributes: &Attributes<'_>) -> &GBuffer {
+        let Self { runs, used, depth, layers, .. } = self;
+        layers.resize(view, depth.len(), attributes);
+        let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).enumerate();
+        tiles.for_each_init(TileSums::default, |sums, (tile, (mut layers, depth))| {
+            sums.clear(attributes);
+            for run in &runs[..*used] {
+                draw_attributes(run, surfels, tile, origin(tile, view), view, depth, attributes, sums);
+            }
+            sums.normalize(attributes, &mut layers);
+        });
+        layers
+    }
+}
+
+/// Sizes a depth map for `view` and fills it with infinity.
+fn clear(depth: &mut Vec<f32>, view: &View) {
+    let tiles = tile_columns(view.width as usize) * tile_columns(view.height as usize);
+    depth.resize(tiles * TILE_AREA, f32::INFINITY);
+    depth.par_chunks_mut(TILE_AREA).for_each(|tile| tile.fill(f32::INFINITY));
+}
+
+/// Upper left pixel of `tile`.
+fn origin(tile: usize, view: &View) -> [usize; 2] {
+    let columns = tile_columns(view.width as usize);
+    [tile % columns * TILE, tile / columns * TILE]
+}
+
+/// Draws the depth of all living splats of `runs`, tile by tile.
+fn draw_depth_map(runs: &[Run], view: &View, depth: &mut [f32]) {
+    depth.par_chunks_mut(TILE_AREA).enumerate().for_each(|(tile, depth)| {
+        for run in runs {
+            draw_depth(run, tile, origin(tile, view), view, depth);
+        }
+    });
+}

@@ -1,0 +1,75 @@
+//! Splat: surfels in, the visible surface per pixel out [Paper, §7].
+
+//!
+//! # How it works
+//! A splat is weighted by a Gaussian over its disc and drawn at least as a dot a pixel wide. First every splat writes its
+//! depth, pushed back by ε, and the nearest stays (*visibility*). Splats whose own point that map hides are artefacts of
+//! neighbourhoods cut short by occlusion; twice the map is drawn again without them (*refinement*). Then the splats left
+//! add their weighted attributes wherever they lie in front of the map, that is within ε of the surface (*attributes*),
+//! and the sums are divided by the weights (*normalize*).
+//!
+//! Splats are sorted into tiles of [`TILE`]² pixels. A tile is drawn by one thread, in its cache, splat after splat in the
+//! order of the list, so that sums come out the same for any number of threads.
+
+mod attributes;
+mod bins;
+mod cpu;
+mod raster;
+mod setup;
+
+pub(crate) use attributes::{Attributes, PointColors};
+pub(crate) use cpu::Splatter;
+
+/// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
+pub const TILE: usize = 64;
+/// Pixels in a tile.
+pub(crate) const TILE_AREA: usize = TILE * TILE;
+
+/// The visible surface, a value per pixel and layer.
+///
+/// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work;
+/// [`index`](Self::index) finds a pixel. A layer that was not asked for is empty.
+#[derive(Clone, Debug, Default)]
+pub struct GBuffer {
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+    /// Sum of kernel weights; 0 where no surface is.
+    pub weight: Vec<f32>,
+    /// Depth along the viewing axis in world units; infinite where no surface is.
+    pub depth: Vec<f32>,
+    /// Unit normal towards the eye, view space (x right, y down, z forward); zero where no surface is.
+    pub normal: Vec<[f32; 3]>,
+    /// Index of the source point of the heaviest splat; `u32::MAX` where no surface is.
+    pub point: Vec<u32>,
+    /// Colour of the points, linear RGB, 0 to 1.
+    pub color: Vec<[f32; 3]>,
+    /// The scalar field that was asked for, averaged.
+    pub scalar: Vec<f32>,
+    /// Splat radius in world units.
+    pub radius: Vec<f32>,
+    /// k-radius in world units.
+    pub k_radius: Vec<f32>,
+    /// Surface variation, 0 to 1/3.
+    pub curvature: Vec<f32>,
+}
+
+impl GBuffer {
+    /// Where pixel (x, y) lies in each layer.
+    #[inline(always)]
+    pub fn index(&self, x: usize, y: usize) -> usize {
+        tiled_index(self.width as usize, x, y)
+    }
+}
+
+/// Tiles in a row of an image `width` pixels wide.
+pub(crate) const fn tile_columns(width: usize) -> usize {
+    width.div_ceil(TILE)
+}
+
+/// Where pixel (x, y) of an image `width` pixels wide lies in a layer stored tile by tile.
+#[inline(always)]
+pub(crate) const fn tiled_index(width: usize, x: usize, y: usize) -> usize {
+    (y / TILE * tile_columns(width) + x / TILE) * TILE_AREA + (y % TILE) * TILE + x % TILE
+}

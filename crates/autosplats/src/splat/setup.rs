@@ -1,0 +1,143 @@
+//! Splat set-up: a surfel made ready to be drawn over its pixels.
+//!
+//! # How it works
+//! With (dx, dy) the offset of a pixel's centre from the projected surfel centre, a plane seen in perspective has an inverse
+//! depth that is linear in (dx, dy), and so have the coordinates within the disc once divided by depth. Seen in parallel,
+//! depth and disc coordinates themselves are linear. So a splat is a few gradients, and a pixel costs a few
+//! multiplications and at most one division.
+
+use crate::camera::View;
+use crate::fit::Surfel;
+
+/// Radius in pixels of the dot that is always drawn around a surfel's centre, so that a splat smaller than a pixel or
+/// seen from its edge still covers the pixel of its point: the low-pass filter of [BHZK05]. The furthest that a pixel's
+/// centre can be from a point in the pixel is √½.
+pub(super) const DOT_RADIUS_PX: f32 = 0.75;
+/// Discs that face the eye less than this (cosine) are drawn as dots: their gradients are no longer numbers to trust.
+const GRAZING: f32 = 0.01;
+/// Depth tolerance ε in splat radii: layers of one surface blend, layers further apart occlude.
+const EPSILON_RADII: f32 = 1.0;
+/// A splat reaches at most this part of the way to the eye.
+const NEAREST: f32 = 0.5;
+
+/// A surfel ready to be drawn.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Splat {
+    /// Projected centre in pixels.
+    pub(super) center_px: [f32; 2],
+    /// Depth of the centre.
+    pub(super) depth: f32,
+    /// Furthest that the disc's depth is from the centre's.
+    pub(super) depth_reach: f32,
+    /// ε in world units.
+    pub(super) epsilon: f32,
+    /// Gradient of inverse depth (perspective) or depth (orthographic) per pixel.
+    pub(super) plane: [f32; 2],
+    /// Gradients of the two disc coordinates, divided by depth in perspective; the disc is where u² + v² ≤ 1.
+    pub(super) u: [f32; 2],
+    pub(super) v: [f32; 2],
+    /// Pixels that may be covered, both ends included; x0 > x1 if none.
+    pub(super) x: [u16; 2],
+    pub(super) y: [u16; 2],
+}
+
+impl Splat {
+    /// Covers nothing.
+    const NONE: Self = Self {
+        center_px: [0.0; 2],
+        depth: 0.0,
+        depth_reach: 0.0,
+        epsilon: 0.0,
+        plane: [0.0; 2],
+        u: [0.0; 2],
+        v: [0.0; 2],
+        x: [1, 0],
+        y: [1, 0],
+    };
+
+    #[inline(always)]
+    pub(super) fn new(surfel: &Surfel, view: &View) -> Self {
+        let [cx, cy, cz] = surfel.center;
+        let [nx, ny, nz] = surfel.normal;
+        let a = surfel.major_axis;
+        let b = [ny * a[2] - nz * a[1], nz * a[0] - nx * a[2], nx * a[1] - ny * a[0]];
+        let most = if view.perspective { NEAREST * cz } else { f32::INFINITY };
+        let minor = surfel.radius.min(most);
+        let major = (surfel.radius * surfel.major_ratio).min(most);
+        if !(minor > 0.0) {
+            return Self::NONE;
+        }
+
+        let focal = view.focal_px;
+        let [a_scale, b_scale] = [1.0 / (focal * major), 1.0 / (focal * minor)];
+        let (facing, least_facing, plane, u, v);
+        if view.perspective {
+            let dot = |p: [f32; 3]| p[0] * cx + p[1] * cy + p[2] * cz;
+            facing = dot(surfel.normal);
+            least_facing = GRAZING * (cx * cx + cy * cy + cz * cz).sqrt();
+            plane = [nx / (focal * facing), ny / (focal * facing)];
+            let [a_shear, b_shear] = [dot(a) / facing, dot(b) / facing];
+            u = [(a[0] - nx * a_shear) * a_scale, (a[1] - ny * a_shear) * a_scale];
+            v = [(b[0] - nx * b_shear) * b_scale, (b[1] - ny * b_shear) * b_scale];
+        } else {
+            facing = nz;
+            least_facing = GRAZING;
+            plane = [-nx / (focal * nz), -ny / (focal * nz)];
+            let [a_shear, b_shear] = [a[2] / nz, b[2] / nz];
+            u = [(a[0] - nx * a_shear) * a_scale, (a[1] - ny * a_shear) * a_scale];
+            v = [(b[0] - nx * b_shear) * b_scale, (b[1] - ny * b_shear) * b_scale];
+        }
+        let grazing = !(facing.abs() > least_facing);
+        // Drawn as the dot alone.
+        let per_dot = 1.0 / (DOT_RADIUS_PX * if view.perspective { cz } else { 1.0 });
+        let [plane, u, v] = if grazing { [[0.0; 2], [per_dot, 0.0], [0.0, per_dot]] } else { [plane, u, v] };
+
+        let [axis_a, axis_b] = [a.map(|c| c * major), b.map(|c| c * minor)];
+        let center_px = view.to_pixel(surfel.center.into());
+        let x = extent(0, surfel.center, axis_a, axis_b, center_px[0], view.width, view);
+        let y = extent(1, surfel.center, axis_a, axis_b, center_px[1], view.height, view);
+        Self {
+            center_px,
+            depth: cz,
+            depth_reach: (axis_a[2] * axis_a[2] + axis_b[2] * axis_b[2]).sqrt(),
+            epsilon: EPSILON_RADII * minor,
+            plane,
+            u,
+            v,
+            x,
+            y,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn covers_nothing(&self) -> bool {
+        self.x[0] > self.x[1] || self.y[0] > self.y[1]
+    }
+}
+
+/// First and last pixel along `axis` whose centre the disc or its dot may cover.
+#[inline(always)]
+fn extent(axis: usize, center: [f32; 3], a: [f32; 3], b: [f32; 3], center_px: f32, size: u32, view: &View) -> [u16; 2] {
+    let [c, cz] = [center[axis], center[2]];
+    let squared = a[axis] * a[axis] + b[axis] * b[axis];
+    let (low, high);
+    if view.perspective {
+        // The lines of sight s = x/z that touch the ellipse c + a·cos + b·sin: (c - s·cz)² = (a - s·az)² + (b - s·bz)².
+        let qa = cz * cz - a[2] * a[2] - b[2] * b[2];
+        let qb = c * cz - a[axis] * a[2] - b[axis] * b[2];
+        let qc = c * c - squared;
+        let root = (qb * qb - qa * qc).max(0.0).sqrt();
+        (low, high) = ((qb - root) / qa, (qb + root) / qa);
+    } else {
+        let reach = squared.sqrt();
+        (low, high) = (c - reach, c + reach);
+    }
+    let middle = 0.5 * size as f32;
+    // Pixel i is covered if its centre i + ½ lies within.
+    let low = (low * view.focal_px + middle).min(center_px - DOT_RADIUS_PX) - 0.5;
+    let high = (high * view.focal_px + middle).max(center_px + DOT_RADIUS_PX) - 0.5;
+    // Casts from float saturate; an extent beside the picture must become an empty one.
+    let first = low.ceil().max(0.0);
+    let last = high.floor().min(size as f32 - 1.0);
+    if first <= last { [first as u16, last as u16] } else { [1, 0] }
+}
