@@ -81,7 +81,7 @@ pub(crate) struct CameraArgs {
     /// Direction to look from, at a distance that shows everything but far outliers [default: iso, or the sensor's
     /// own view where the points are in a camera's frame]
     #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
-    pub(crate) view: Option<View>,
+    pub(crate) view: Option<Side>,
     /// Position of the eye in world coordinates
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "camera")]
     pub(crate) eye: Option<DVec3>,
@@ -159,9 +159,9 @@ pub(crate) struct LookArgs {
     /// Values at the two ends of the colour map [default: 1st and 99th percentile of the picture]
     #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
     pub(crate) range: Option<[f32; 2]>,
-    /// Colours of scalar values
-    #[arg(long, value_enum, default_value = "viridis")]
-    pub(crate) color_map: Map,
+    /// Colours of scalar values [default: reds for radii, gray for intensity, viridis for the rest]
+    #[arg(long, value_enum)]
+    pub(crate) color_map: Option<Map>,
     /// Draw the colour map and its range into the picture
     #[arg(long)]
     pub(crate) legend: bool,
@@ -222,7 +222,7 @@ pub(crate) struct DemoArgs {
 
 /// Where to look from.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum View {
+pub(crate) enum Side {
     Iso,
     Front,
     Back,
@@ -265,4 +265,5 @@ pub(crate) enum Map {
     Inferno,
     Turbo,
     Gray,
+    Reds,
 }

@@ -34,11 +34,11 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
         let cloud = inputs.read(run.quiet)?;
         let started = Instant::now();
         let bar = Bar::spinner(&format!("rendering {input}"), run.quiet);
-        let camera = scene_camera(scene, None);
+        let camera = scene_camera(scene);
         let frame = renderer.render(&cloud, &camera, SIZE, &Settings::default()).map_err(render_failure)?;
         drop(bar);
         let seconds = started.elapsed().as_secs_f64();
-        write_file(&path, |writer| write_png(&frame.image, false, writer))?;
+        write_file(&path, |writer| write_png(frame.image, false, writer))?;
 
         print_line(&path.display().to_string())?;
         if !run.quiet {

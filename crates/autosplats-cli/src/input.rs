@@ -7,7 +7,7 @@ use autosplats_cloud::glam::{DMat4, DVec4};
 use autosplats_cloud::{Error, PointCloud, Progress as _, Scene};
 
 use crate::device::check_memory;
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, suggest};
 use crate::progress::Bar;
 
 /// What begins the name of a generated scene.
@@ -99,7 +99,7 @@ impl Inputs {
 impl Input {
     fn new(name: &str) -> Result<Self, Failure> {
         let source = if name.starts_with(SCENE_PREFIX) {
-            let (scene, count) = Scene::parse(name).map_err(Failure::usage)?;
+            let (scene, count) = Scene::parse(name).map_err(unknown_scene)?;
             Source::Scene(scene, count)
         } else {
             let path = PathBuf::from(name);
@@ -145,6 +145,15 @@ impl Input {
             }
         }
     }
+}
+
+fn unknown_scene(error: Error) -> Failure {
+    Failure::usage(match error {
+        Error::UnknownScene { given, .. } => {
+            format!("no scene is called '{given}'; {}", suggest(&given, Scene::names().map(|(name, _)| name)))
+        }
+        other => other.to_string(),
+    })
 }
 
 /// What failing to read is to the caller of the program.

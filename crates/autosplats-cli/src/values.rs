@@ -2,11 +2,8 @@
 
 use std::str::FromStr;
 
-use autosplats::{Background, ColorMode};
+use autosplats::{Background, ColorMode, MAX_SIDE};
 use autosplats_cloud::glam::DVec3;
-
-/// Largest width or height of a picture.
-pub(crate) const MAX_SIDE: u32 = 16384;
 
 /// The colour modes by name; any other name is a field's.
 pub(crate) const COLOR_MODES: [&str; 11] = [

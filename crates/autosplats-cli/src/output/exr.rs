@@ -12,7 +12,7 @@ use exr::prelude::{Encoding, Image, SpecificChannels, Vec2, WritableImage as _};
 /// `kradius` and `curvature` are the splats', and `index` (whole numbers) says which point lies there; `u32::MAX` is
 /// none.
 pub(crate) fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: &mut (impl Write + Seek)) -> Result<()> {
-    let (image, layers) = (&frame.image, frame.layers);
+    let Frame { image, layers, .. } = *frame;
     let [right, down, forward] = camera.axes().map_err(Error::other)?.map(|axis| axis.as_vec3());
     let linear: Vec<f32> = (0..=255u8).map(linear_from_srgb).collect();
     let pixel = |Vec2(x, y): Vec2<usize>| {

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::DVec3;
-use autosplats_cloud::{Axes, PointCloud, Scene};
+use autosplats_cloud::{Axes, PointCloud, Scene, View};
 
 use super::render_failure;
-use crate::args::{AxesChoice, CameraArgs, View};
+use crate::args::{AxesChoice, CameraArgs, Side};
 use crate::exit::{Exit, Failure};
 use crate::output::write_file;
 use crate::values::Ortho;
@@ -34,7 +34,7 @@ enum Place {
     /// Where the flags say; what they leave open comes from the points.
     Eye { eye: DVec3, look_at: Option<DVec3>, up: Option<DVec3> },
     /// So that everything is seen from a side.
-    Fitted(Option<View>),
+    Fitted(Option<Side>),
 }
 
 impl CameraJob {
@@ -69,64 +69,62 @@ impl CameraJob {
         scene: Option<&Scene>,
         size: [u32; 2],
     ) -> Result<(Camera, Axes), Failure> {
-        let axes = self.axes.or(cloud.axes()).unwrap_or_else(|| guess_axes(cloud));
+        let axes = self.axes.unwrap_or_else(|| guess_axes(cloud));
         let fitted = |view| {
             let aspect = f64::from(size[0]) / f64::from(size[1]);
-            let fov_deg = self.fov_deg.unwrap_or(DEFAULT_FOV_DEG);
-            Camera::fit(cloud, axes, direction(view), aspect, fov_deg).map_err(render_failure)
+            Camera::fit(cloud, axes, direction(view), aspect, self.projection()).map_err(render_failure)
         };
-        let camera = match self.place {
+        let mut camera = match self.place {
             Place::File(_, camera) => return Ok((camera, axes)),
-            Place::Eye { eye, look_at: Some(look_at), up: Some(up) } => {
-                Camera { eye, look_at, up, projection: self.projection(DEFAULT_FOV_DEG) }
-            }
             Place::Eye { eye, look_at, up } => {
-                let fitted = fitted(None)?;
-                let look_at = look_at.unwrap_or(fitted.look_at);
+                let look_at = look_at.map_or_else(|| fitted(None).map(|fitted| fitted.look_at), Ok)?;
                 let up = up.unwrap_or_else(|| upward(axes, look_at - eye));
-                Camera { eye, look_at, up, projection: self.projection(DEFAULT_FOV_DEG) }
+                let projection = match self.ortho {
+                    Some(Ortho(None)) => fitted(None)?.projection,
+                    _ => self.projection(),
+                };
+                Camera { eye, look_at, up, projection }
             }
-            Place::Fitted(view) => match (view, scene) {
-                (None, Some(scene)) if self.ortho.is_none() => scene_camera(scene, self.fov_deg),
+            Place::Fitted(view) => match scene {
+                Some(scene) if view.is_none() && self.ortho.is_none() => scene_camera(scene),
                 _ => fitted(view)?,
             },
         };
-        let camera = self.with_ortho(camera);
+        // What was asked for in numbers holds, whatever fits.
+        match (self.fov_deg, self.ortho) {
+            (Some(fov), _) => camera.projection = Projection::PerspectiveFovDeg(fov),
+            (_, Some(Ortho(Some(height)))) => camera.projection = Projection::OrthographicHeight(height),
+            _ => {}
+        }
         camera.axes().map_err(render_failure)?;
         Ok((camera, axes))
     }
 
-    fn projection(&self, fov_deg: f64) -> Projection {
-        Projection::PerspectiveFovDeg(self.fov_deg.unwrap_or(fov_deg))
-    }
-
-    /// Makes a perspective camera orthographic if asked: of the height given, or of what it shows at its target.
-    fn with_ortho(&self, camera: Camera) -> Camera {
-        let (Some(Ortho(height)), Projection::PerspectiveFovDeg(fov)) = (self.ortho, camera.projection) else {
-            return camera;
-        };
-        let shown = 2.0 * (camera.look_at - camera.eye).length() * (0.5 * fov.to_radians()).tan();
-        Camera { projection: Projection::OrthographicHeight(height.unwrap_or(shown)), ..camera }
+    /// What the flags ask for; heights that are to be fitted are 1.
+    fn projection(&self) -> Projection {
+        match self.ortho {
+            Some(Ortho(height)) => Projection::OrthographicHeight(height.unwrap_or(1.0)),
+            None => Projection::PerspectiveFovDeg(self.fov_deg.unwrap_or(DEFAULT_FOV_DEG)),
+        }
     }
 }
 
 /// The camera a scene was made for.
-pub(crate) fn scene_camera(scene: &Scene, fov_deg: Option<f64>) -> Camera {
-    let view = scene.view();
-    let projection = Projection::PerspectiveFovDeg(fov_deg.unwrap_or(view.fov_degrees));
-    Camera { eye: view.eye, look_at: view.look_at, up: view.up, projection }
+pub(crate) fn scene_camera(scene: &Scene) -> Camera {
+    let View { eye, look_at, up, fov_degrees } = scene.view();
+    Camera { eye, look_at, up, projection: Projection::PerspectiveFovDeg(fov_degrees) }
 }
 
-fn direction(view: Option<View>) -> ViewDirection {
-    match view {
+fn direction(side: Option<Side>) -> ViewDirection {
+    match side {
         None => ViewDirection::Auto,
-        Some(View::Iso) => ViewDirection::Iso,
-        Some(View::Front) => ViewDirection::Front,
-        Some(View::Back) => ViewDirection::Back,
-        Some(View::Left) => ViewDirection::Left,
-        Some(View::Right) => ViewDirection::Right,
-        Some(View::Top) => ViewDirection::Top,
-        Some(View::Bottom) => ViewDirection::Bottom,
+        Some(Side::Iso) => ViewDirection::Iso,
+        Some(Side::Front) => ViewDirection::Front,
+        Some(Side::Back) => ViewDirection::Back,
+        Some(Side::Left) => ViewDirection::Left,
+        Some(Side::Right) => ViewDirection::Right,
+        Some(Side::Top) => ViewDirection::Top,
+        Some(Side::Bottom) => ViewDirection::Bottom,
     }
 }
 

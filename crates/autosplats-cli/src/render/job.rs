@@ -64,6 +64,19 @@ impl Job {
         self.settings.shading.background == Background::Transparent
     }
 
+    /// Refuses a cloud that is smaller than the neighbourhoods asked for.
+    pub(super) fn check_neighbors(&self, cloud: &PointCloud) -> Result<(), Failure> {
+        let (points, k) = (cloud.len(), self.settings.reconstruction.k);
+        match points {
+            0 | 1 => Err(Failure::new(Exit::Input, format!("{points} points make no surface"))),
+            _ if points <= k as usize => Err(Failure::new(
+                Exit::Input,
+                format!("{points} points are too few for {k} neighbours each; use -k {} or less", points - 1),
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// Refuses a colour mode that the points do not have what it needs for.
     pub(super) fn check_color(&self, cloud: &PointCloud) -> Result<(), Failure> {
         let fields = || cloud.fields().iter().map(|field| field.name.as_str());
@@ -100,12 +113,13 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
     let shading = Shading {
         color: look.color,
         range: look.range,
-        color_map: match look.color_map {
+        color_map: look.color_map.map(|map| match map {
             Map::Viridis => ColorMap::Viridis,
             Map::Inferno => ColorMap::Inferno,
             Map::Turbo => ColorMap::Turbo,
             Map::Gray => ColorMap::Gray,
-        },
+            Map::Reds => ColorMap::Reds,
+        }),
         legend: look.legend,
         lighting: !look.no_lighting,
         eye_dome: look.eye_dome,

@@ -15,21 +15,12 @@ use crate::exit::{Exit, Failure};
 pub(super) struct Report<'a> {
     version: &'static str,
     size: [u32; 2],
-    counts: PrintedCounts,
+    counts: Counts,
     device: &'a Device,
     axes: &'static str,
     camera: Camera,
     outputs: Vec<Written>,
     timings_ms: PrintedTimings,
-}
-
-/// [`Counts`], and the sum that most callers want.
-#[derive(Debug, Serialize)]
-struct PrintedCounts {
-    #[serde(flatten)]
-    counts: Counts,
-    /// Points that own no pixel because they cannot: not finite, behind the eye, or outside.
-    dropped: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -57,12 +48,10 @@ impl<'a> Report<'a> {
         written: Vec<(PathBuf, u64)>,
         [read, write]: [f64; 2],
     ) -> Self {
-        let counts = frame.counts;
-        let dropped = counts.not_finite + counts.behind + counts.outside;
         Self {
             version: env!("CARGO_PKG_VERSION"),
             size: job.size,
-            counts: PrintedCounts { counts, dropped },
+            counts: frame.counts,
             device,
             axes: match axes {
                 Axes::ZUp => "z-up",
@@ -84,13 +73,12 @@ impl<'a> Report<'a> {
     /// One line on standard error.
     pub(super) fn summarize(&self) {
         let names: Vec<_> = self.outputs.iter().map(|written| written.path.display().to_string()).collect();
-        let PrintedCounts { counts, .. } = &self.counts;
         let PrintedTimings { read, stages, write } = &self.timings_ms;
         eprintln!(
             "{}: {} points, {} visible; read {read:.0} ms, frame {:.0} ms, write {write:.0} ms",
             names.join(", "),
-            counts.points,
-            counts.visible,
+            self.counts.points,
+            self.counts.visible,
             stages.frame
         );
     }

@@ -51,8 +51,9 @@ impl Folder {
     /// The names of everything in it, in order.
     pub(crate) fn list(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).expect("the temporary folder can be read");
-        let mut names: Vec<_> =
-            entries.map(|entry| entry.expect("an entry can be read").file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<_> = entries
+            .map(|entry| entry.expect("an entry can be read").file_name().to_string_lossy().into_owned())
+            .collect();
         names.sort();
         names
     }
