@@ -92,10 +92,10 @@ pub(crate) struct CameraArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, requires = "eye")]
     pub(crate) up: Option<DVec3>,
     /// Vertical field of view in degrees [default: 40]
-    #[arg(long, value_name = "DEGREES", value_parser = values::fov, conflicts_with_all = ["ortho", "camera"])]
+    #[arg(long, value_name = "DEGREES", value_parser = values::fov, allow_negative_numbers = true, conflicts_with_all = ["ortho", "camera"])]
     pub(crate) fov: Option<f64>,
     /// Orthographic picture, so many world units high; 'fit' shows everything
-    #[arg(long, value_name = "HEIGHT", value_parser = values::ortho, conflicts_with = "camera")]
+    #[arg(long, value_name = "HEIGHT", value_parser = values::ortho, allow_negative_numbers = true, conflicts_with = "camera")]
     pub(crate) ortho: Option<Ortho>,
     /// Take the camera from a file that --save-camera wrote
     #[arg(long, value_name = "FILE")]
@@ -115,7 +115,7 @@ pub(crate) struct CameraArgs {
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
     /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother
-    #[arg(short, value_name = "COUNT", default_value_t = 10)]
+    #[arg(short, value_name = "COUNT", default_value_t = 10, allow_negative_numbers = true)]
     pub(crate) k: u32,
     /// How the neighbours are found
     #[arg(long, value_enum, default_value = "screen-grid")]
@@ -124,19 +124,31 @@ pub(crate) struct SurfaceArgs {
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) backend: Backend,
     /// Expansions of its first search radius after which a point without a neighbour is dropped as an outlier, 0 to 8
-    #[arg(long, value_name = "COUNT", default_value_t = 3, conflicts_with = "keep_outliers")]
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = 3,
+        allow_negative_numbers = true,
+        conflicts_with = "keep_outliers"
+    )]
     pub(crate) e0: u32,
     /// Keep points that have no neighbour
     #[arg(long)]
     pub(crate) keep_outliers: bool,
     /// How much emptier the surroundings have to become for a group of points to end there, above 1
-    #[arg(long, value_name = "FACTOR", default_value_t = 4.0, conflicts_with = "bridge_gaps")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value_t = 4.0,
+        allow_negative_numbers = true,
+        conflicts_with = "bridge_gaps"
+    )]
     pub(crate) gap_factor: f32,
     /// Look for all k neighbours across any gap
     #[arg(long)]
     pub(crate) bridge_gaps: bool,
     /// Factor on the size of every splat, 0.01 to 100
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
     pub(crate) splat_scale: f32,
     /// Draw ellipses that follow the spread of the neighbours, instead of circles
     #[arg(long)]
@@ -169,7 +181,7 @@ pub(crate) struct LookArgs {
     #[arg(long)]
     pub(crate) no_lighting: bool,
     /// Strength of eye-dome lighting, the darkening at depth steps, 0 to 10
-    #[arg(long, value_name = "STRENGTH", default_value_t = 0.0)]
+    #[arg(long, value_name = "STRENGTH", default_value_t = 0.0, allow_negative_numbers = true)]
     pub(crate) eye_dome: f32,
     /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
     #[arg(long, value_name = "COLOR", value_parser = values::background)]

@@ -26,8 +26,8 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let cloud = job.inputs.read(job.quiet)?;
     let read = milliseconds_since(started);
 
-    job.check_neighbors(&cloud)?;
     job.check_color(&cloud)?;
+    job.check_neighbors(&cloud)?;
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
