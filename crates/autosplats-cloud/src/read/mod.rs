@@ -123,6 +123,12 @@ impl Job<'_> {
     }
 }
 
+/// A piece of a file as it may stand in a message: short, and without characters that would act on a terminal.
+fn shown(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
+    text.chars().flat_map(char::escape_debug).collect()
+}
+
 /// The whole content of a file: mapped, or read where there is nothing to map, as for a pipe.
 enum Bytes {
     Mapped(memmap2::Mmap),

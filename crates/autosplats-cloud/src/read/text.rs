@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::{
-    Job,
+    Job, shown,
     table::{Part, Scalar, reserve},
 };
 use crate::Error;
@@ -138,11 +138,9 @@ impl Rows<'_> {
         }
         match values.next() {
             None => Ok(()),
-            Some(value) => Err(format!(
-                "more values than the {} a point has, from '{}' on",
-                self.tokens.len(),
-                String::from_utf8_lossy(&value[..value.len().min(40)])
-            )),
+            Some(value) => {
+                Err(format!("more values than the {} a point has, from '{}' on", self.tokens.len(), shown(value)))
+            }
         }
     }
 }
@@ -191,7 +189,7 @@ pub(super) fn number(value: &[u8]) -> Result<f64, String> {
         if lower.starts_with(b"-nan") || lower.starts_with(b"nan(") || lower.windows(2).any(|pair| pair == b"#q") {
             return Ok(f64::NAN);
         }
-        Err(format!("'{}' is no number", String::from_utf8_lossy(&value[..value.len().min(40)])))
+        Err(format!("'{}' is no number", shown(value)))
     })
 }
 

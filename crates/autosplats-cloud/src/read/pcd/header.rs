@@ -1,7 +1,7 @@
 //! The header of a PCD file.
 
 use super::super::{
-    Job,
+    Job, shown,
     table::Scalar,
     text::{after_line_end, line_end},
 };
@@ -58,7 +58,7 @@ impl Header {
             let Some((keyword, values)) = words.split_first() else { continue };
             let number = || {
                 let value = values.first().map_or("", String::as_str);
-                value.parse::<usize>().map_err(|_| fail(format!("{keyword} '{value}' is no count")))
+                value.parse::<usize>().map_err(|_| fail(format!("{keyword} '{}' is no count", shown(value.as_bytes()))))
             };
             match keyword.to_ascii_uppercase().as_str() {
                 "VERSION" => {}
@@ -77,12 +77,14 @@ impl Header {
                     Some("ascii") => break (Encoding::Ascii, place),
                     Some("binary") => break (Encoding::Binary, place),
                     Some("binary_compressed") => break (Encoding::Compressed, place),
-                    other => return Err(fail(format!("unknown DATA '{}'", other.unwrap_or_default()))),
+                    other => {
+                        return Err(fail(format!("unknown DATA '{}'", shown(other.unwrap_or_default().as_bytes()))));
+                    }
                 },
                 word if word.starts_with('#') => {}
                 word => {
-                    let shown: String = word.chars().take(40).collect();
-                    let what = format!("'{shown}' is no word of a PCD header; if the file is plain text, name it .xyz");
+                    let word = shown(word.as_bytes());
+                    let what = format!("'{word}' is no word of a PCD header; if the file is plain text, name it .xyz");
                     return Err(fail(what));
                 }
             }
@@ -97,8 +99,11 @@ impl Header {
         }
         let fields =
             names.into_iter().zip(sizes.iter().zip(&types)).zip(&counts).map(|((name, (size, kind)), count)| {
-                let scalar = scalar_of(kind, size).ok_or_else(|| fail(format!("no type {kind} of {size} bytes")))?;
-                let count = count.parse().map_err(|_| fail(format!("COUNT '{count}' is no count")))?;
+                let scalar = scalar_of(kind, size).ok_or_else(|| {
+                    fail(format!("no type {} of {} bytes", shown(kind.as_bytes()), shown(size.as_bytes())))
+                })?;
+                let count =
+                    count.parse().map_err(|_| fail(format!("COUNT '{}' is no count", shown(count.as_bytes()))))?;
                 Ok(Field { name, scalar, count })
             });
         let fields = fields.collect::<Result<_, Error>>()?;

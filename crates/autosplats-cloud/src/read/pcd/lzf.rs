@@ -63,7 +63,7 @@ mod tests {
 
     fn run(input: &[u8], limit: usize) -> Result<Vec<u8>, (usize, &'static str)> {
         let mut output = Vec::new();
-        let Ok(result) = decompress(input, limit, &mut output, |_| Ok::<(), ()>(()));
+        let Ok(result) = decompress(input, limit, &mut output, |_| Ok::<(), std::convert::Infallible>(()));
         result.map(|()| output)
     }
 

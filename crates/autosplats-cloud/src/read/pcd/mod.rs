@@ -72,7 +72,7 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
         if field.count != 1 || field.name == "_" {
             // A line cannot be shorter than its values, which bounds what the header can ask for.
             if field.count > job.bytes.len().saturating_sub(tokens.len()) {
-                return Err(job.malformed("header", format!("{} values of '{}' a point", field.count, field.name)));
+                return Err(job.malformed("header", format!("a point of {} values", field.count)));
             }
             tokens.extend(std::iter::repeat_n(Token::Skip, field.count));
             continue;

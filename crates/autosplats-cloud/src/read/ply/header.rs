@@ -1,6 +1,6 @@
 //! The header of a PLY file.
 
-use super::super::{Job, table::Scalar, text};
+use super::super::{Job, shown, table::Scalar, text};
 use crate::{Axes, Error};
 
 /// How the values after the header are written.
@@ -85,14 +85,20 @@ impl Header {
                         Some("ascii") => Encoding::Ascii,
                         Some("binary_little_endian") => Encoding::Little,
                         Some("binary_big_endian") => Encoding::Big,
-                        other => return Err(fail(format!("unknown format '{}'", other.unwrap_or_default()))),
+                        other => {
+                            return Err(fail(format!(
+                                "unknown format '{}'",
+                                shown(other.unwrap_or_default().as_bytes())
+                            )));
+                        }
                     });
                 }
                 Some("element") => {
                     let (Some(name), Some(count)) = (words.next(), words.next()) else {
                         return Err(fail("an element needs a name and a count".into()));
                     };
-                    let count = count.parse().map_err(|_| fail(format!("'{count}' is no count")))?;
+                    let count =
+                        count.parse().map_err(|_| fail(format!("'{}' is no count", shown(count.as_bytes()))))?;
                     elements.push(Element { name: name.into(), count, properties: Vec::new() });
                 }
                 Some("property") => {
@@ -101,8 +107,7 @@ impl Header {
                 }
                 Some("end_header") => break,
                 Some(other) => {
-                    let shown: String = other.chars().take(40).collect();
-                    return Err(fail(format!("unknown word '{shown}' in the header")));
+                    return Err(fail(format!("unknown word '{}' in the header", shown(other.as_bytes()))));
                 }
             }
         }
@@ -125,7 +130,7 @@ fn property<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<Property, S
         if word == "list" {
             Ok(None)
         } else {
-            scalar_of(word).map(Some).ok_or_else(|| format!("unknown type '{word}'"))
+            scalar_of(word).map(Some).ok_or_else(|| format!("unknown type '{}'", shown(word.as_bytes())))
         }
     };
     let nested = "a list of lists";

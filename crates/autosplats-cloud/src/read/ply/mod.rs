@@ -4,7 +4,7 @@ mod header;
 
 use self::header::{Element, Encoding, Header};
 use super::{
-    Job,
+    Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, Token},
 };
@@ -140,7 +140,7 @@ fn walk(
             job.tick(PACKING.len * record as f32 / element.count as f32)?;
         }
         let fail = |what: &str| {
-            let name = &element.name;
+            let name = shown(element.name.as_bytes());
             job.malformed(format!("byte {at}"), format!("{what} in {name} {} of {}", record + 1, element.count))
         };
         let cut = || fail("the file ends, it is cut off or damaged; copy it again;");

@@ -1,0 +1,155 @@
+//! Files cut at any place, with any bytes changed, and with headers that lie: an error or points, quickly, never a
+//! panic.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use autosplats_cloud::{PointCloud, read, write_ply};
+use common::{Random, error, las_bytes, pcd_bytes, read_bytes, rich_cloud};
+
+/// Far above what any of these small files takes, far below what a loop over a claimed count would.
+const LIMIT: Duration = Duration::from_secs(5);
+
+const POINTS: usize = 300;
+
+/// One small file of every format and encoding.
+fn samples() -> Vec<(&'static str, Vec<u8>)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    write_ply(&rich_cloud(POINTS), &path, &()).unwrap();
+    let rows: String = rich_cloud(POINTS).positions().iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let header =
+        "element vertex 300\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nend_header\n";
+    let mut lists = b"ply\nformat binary_big_endian 1.0\nelement vertex 300\nproperty list uint uchar ids\n".to_vec();
+    lists.extend(b"property float x\nproperty float y\nproperty float z\nend_header\n");
+    for i in 0..POINTS as u32 {
+        lists.extend((i % 4).to_be_bytes());
+        lists.extend(vec![7; i as usize % 4]);
+        lists.extend([i as f32, 0.5, 1.0].map(f32::to_be_bytes).as_flattened());
+    }
+    vec![
+        ("a.ply", std::fs::read(&path).unwrap()),
+        ("b.ply", format!("ply\nformat ascii 1.0\n{header}{rows}").into_bytes()),
+        ("c.ply", lists),
+        ("a.las", las_bytes((1, 2), 3, false, POINTS)),
+        ("b.las", las_bytes((1, 4), 7, false, POINTS)),
+        ("a.laz", las_bytes((1, 2), 3, true, POINTS)),
+        ("b.laz", las_bytes((1, 4), 8, true, POINTS)),
+        ("a.pcd", pcd_bytes("ascii", POINTS)),
+        ("b.pcd", pcd_bytes("binary", POINTS)),
+        ("c.pcd", pcd_bytes("binary_compressed", POINTS)),
+        ("a.xyz", rows.clone().into_bytes()),
+        ("a.pts", format!("{POINTS}\n{rows}").into_bytes()),
+        ("a.csv", format!("x,y,z\n{}", rows.replace(' ', ",")).into_bytes()),
+    ]
+}
+
+/// Reads what may be broken. A panic fails the test by itself; here time and sanity are checked.
+fn survive(name: &str, what: &str, bytes: &[u8]) -> Option<PointCloud> {
+    let start = Instant::now();
+    let result = read_bytes(name, bytes);
+    assert!(start.elapsed() < LIMIT, "{name}, {what}: took {:?}", start.elapsed());
+    match result {
+        Ok(cloud) => {
+            assert!(cloud.len() <= bytes.len(), "{name}, {what}: more points than bytes");
+            Some(cloud)
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(!message.contains(char::is_control), "{name}, {what}: one line of plain text: {message:?}");
+            None
+        }
+    }
+}
+
+#[test]
+fn whole_samples_are_read() {
+    for (name, bytes) in samples() {
+        assert_eq!(survive(name, "whole", &bytes).map(|cloud| cloud.len()), Some(POINTS), "{name}");
+    }
+}
+
+#[test]
+fn files_cut_anywhere() {
+    for (name, bytes) in samples() {
+        let header = 0..bytes.len().min(600);
+        let body = (0..60).map(|i| bytes.len() * i / 60);
+        for len in header.chain(body).chain(bytes.len() - 8..bytes.len()) {
+            let cloud = survive(name, &format!("cut after {len} bytes"), &bytes[..len]);
+            // Bare rows do not say how many there should be; every other format does. The last line feed is no loss,
+            // nor is what LAZ has after its points, nor a digit of the last number.
+            let counted = !matches!(name, "a.xyz" | "a.csv") && len + 20 < bytes.len() && !name.ends_with("laz");
+            assert!(!counted || cloud.is_none(), "{name}, cut after {len} of {} bytes: was read", bytes.len());
+        }
+    }
+}
+
+#[test]
+fn files_with_changed_bytes() {
+    let mut random = Random(5);
+    for (name, bytes) in samples() {
+        for round in 0..400 {
+            let mut changed = bytes.clone();
+            // Headers and the ends of files, where tables are, are worth more tries than coordinates.
+            let range = [bytes.len(), bytes.len().min(400), 60][round % 3];
+            for _ in 0..=random.below(4) {
+                let at = if round % 3 == 2 { bytes.len() - 1 - random.below(range) } else { random.below(range) };
+                changed[at] = [random.next() as u8, 0, 0xff, changed[at] ^ 1 << random.below(8)][random.below(4)];
+            }
+            survive(name, &format!("change {round}"), &changed);
+        }
+    }
+}
+
+#[test]
+fn every_byte_of_binary_headers_at_its_extremes() {
+    for (name, bytes) in samples().into_iter().filter(|(name, _)| name.contains(".la")) {
+        for at in 0..480 {
+            for value in [0, 0x7f, 0x80, 0xff] {
+                let mut changed = bytes.clone();
+                changed[at] = value;
+                survive(name, &format!("byte {at} is {value}"), &changed);
+            }
+        }
+    }
+}
+
+#[test]
+fn headers_that_lie_allocate_nothing() {
+    let vertex = "property float x\nproperty float y\nproperty float z\n";
+    for count in ["4000000000", "18446744073709551615", "1537228672809129302"] {
+        for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            let text = format!("ply\nformat {format} 1.0\nelement vertex {count}\n{vertex}end_header\n1 2 3\n");
+            error("a.ply", text.as_bytes());
+            let list = format!("ply\nformat {format} 1.0\nelement face {count}\nproperty list uint double ids\n");
+            error("b.ply", format!("{list}element vertex 1\n{vertex}end_header\n1 2 3\n").as_bytes());
+            let list = format!("ply\nformat {format} 1.0\nelement vertex {count}\nproperty list uint double ids\n");
+            error("c.ply", format!("{list}{vertex}end_header\n9 9 9 9 9 9 9 9 9 9 9 9 9 9 9 9").as_bytes());
+        }
+        for data in ["ascii", "binary", "binary_compressed"] {
+            let header = |count: &str, points: &str| {
+                format!(
+                    "VERSION .7\nFIELDS x y z h\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 {count}\nPOINTS {points}\n\
+                     DATA {data}\n1 2 3 4 5 6 7 8 9\n"
+                )
+            };
+            error("a.pcd", header("1", count).as_bytes());
+            error("b.pcd", header(count, "1").as_bytes());
+        }
+        error("a.pts", format!("{count}\n1 2 3\n").as_bytes());
+    }
+    let many: String = (0..200_000).map(|i| format!("property float p{i}\n")).collect();
+    let start = Instant::now();
+    error("d.ply", format!("ply\nformat ascii 1.0\nelement vertex 0\n{many}end_header\n").as_bytes());
+    assert!(start.elapsed() < LIMIT, "a header of 200,000 properties is refused at once");
+}
+
+#[test]
+fn folders_and_missing_files_are_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(read(folder.path(), &()).is_err(), "a folder");
+    assert!(read(&folder.path().join("missing.ply"), &()).is_err(), "a missing file");
+}
