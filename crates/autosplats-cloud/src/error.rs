@@ -24,4 +24,23 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// No made-up scene has this name.
+    #[error("no scene is called {given:?}; there are:{known}")]
+    UnknownScene {
+        /// Name asked for.
+        given: String,
+        /// The names there are, a line each.
+        known: String,
+    },
+    /// A made-up scene cannot be had like this.
+    #[error("scene {given:?}: {why}")]
+    BadScene {
+        /// What was asked for.
+        given: String,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// The caller asked to stop.
+    #[error("cancelled")]
+    Cancelled,
 }

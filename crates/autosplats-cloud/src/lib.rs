@@ -4,8 +4,10 @@
 
 mod cloud;
 mod error;
+mod source;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud};
 pub use error::Error;
+pub use source::scene::{Hit, Scene, View};
 /// The vector library of the public interface.
 pub use glam;
