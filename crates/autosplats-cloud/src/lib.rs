@@ -7,6 +7,7 @@ mod error;
 mod merge;
 mod progress;
 mod read;
+mod source;
 mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud};
@@ -15,4 +16,5 @@ pub use error::Error;
 pub use glam;
 pub use progress::Progress;
 pub use read::read;
+pub use source::scene::{Hit, Scene, View};
 pub use write::write_ply;
