@@ -68,7 +68,7 @@ impl Job {
     pub(super) fn check_neighbors(&self, cloud: &PointCloud) -> Result<(), Failure> {
         let (points, k) = (cloud.len(), self.settings.reconstruction.k);
         match points {
-            0 | 1 => Err(Failure::new(Exit::Input, format!("{points} points make no surface"))),
+            0 | 1 => Err(Failure::new(Exit::Input, "one point makes no surface")),
             _ if points <= k as usize => Err(Failure::new(
                 Exit::Input,
                 format!("{points} points are too few for {k} neighbours each; use -k {} or less", points - 1),
