@@ -1,6 +1,6 @@
-//! Points per second from files in the page cache: `cargo bench -p autosplats-cloud --bench read [-- POINTS]`.
+//! Points per second from files in the page cache: `cargo bench -p autosplats-cloud --bench read [-- POINTS | FILE...]`.
 //!
-//! Each file is written once and read five times; the best is printed, as the others contain what else the computer did.
+//! Without files, some are generated. Each file is written once and read five times; the best is printed, as the others contain what else the computer did.
 
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run should say so and stop")]
 
@@ -9,7 +9,13 @@ use std::{path::Path, time::Instant};
 use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, read, write_ply};
 
 fn main() {
-    let points = std::env::args().skip(1).find_map(|arg| arg.parse().ok()).unwrap_or(10_000_000);
+    // Cargo adds --bench.
+    let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
+    let points = match args.first().map(|arg| arg.parse()) {
+        Some(Err(_)) => return args.iter().for_each(|file| time(file.as_ref(), file)),
+        Some(Ok(points)) => points,
+        None => 10_000_000,
+    };
     let folder = tempfile::tempdir().unwrap();
     println!("{points} points, {} threads", std::thread::available_parallelism().unwrap());
 

@@ -87,7 +87,7 @@ impl FieldValues {
     /// # Panics
     /// If `index` is not below [`len`](Self::len).
     pub fn get(&self, index: usize) -> f64 {
-        #[allow(clippy::cast_lossless, reason = "one of the eight types is f64 itself")]
+        #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the eight types is f64 itself")]
         {
             each_type!(self, v => v[index] as f64)
         }

@@ -89,7 +89,7 @@ fn common_field(parts: &[(PointCloud, DMat4)], name: &str) -> Option<Field> {
         };
     }
     let joined = join!(U8, I8, U16, I16, U32, I32, F32, F64);
-    #[allow(clippy::cast_lossless, reason = "one of the eight types is f64 itself")]
+    #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the eight types is f64 itself")]
     let widened =
         |values: &FieldValues| -> Vec<f64> { each_type!(values, v => v.iter().map(|&value| value as f64).collect()) };
     let values = joined.unwrap_or_else(|| FieldValues::F64(all.iter().copied().flat_map(widened).collect()));

@@ -4,6 +4,8 @@
 
 mod common;
 
+use std::sync::Mutex;
+
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Progress, glam::DVec3, read, write_ply};
 use common::{colors, error, las_bytes, pcd_bytes, positions, read_bytes, rich_cloud};
 
@@ -185,7 +187,7 @@ fn colours_of_every_width() {
 fn far_coordinates_get_an_origin() {
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n";
     let doubles = "property double x\nproperty double y\nproperty double z\nend_header\n";
-    let world = [[400_000.125, 5_400_000.0625, 1.0], [400_001.0, 5_400_002.001, 2.5], [f64::NAN, 0.0, 0.0]];
+    let world = [[400_000.125, 5_400_000.25, 1.0], [400_001.0, 5_400_002.001, 2.5], [f64::NAN, 0.0, 0.0]];
     let mut bytes = format!("{header}{doubles}").into_bytes();
     world.iter().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
     let cloud = read_bytes("a.ply", &bytes).unwrap();
@@ -353,4 +355,64 @@ fn errors_name_place_and_remedy() {
     check("a.laz", b"nothing", &["byte 0", "LASF"]);
     let las = las_bytes((1, 2), 0, false, 100);
     check("a.las", &las[..las.len() - 1], &["99 of 100 points", "copy"]);
+}
+
+/// Notes what is reported, and cancels once that has come so far.
+struct Watch {
+    stop_at: f32,
+    reported: Mutex<Vec<f32>>,
+}
+
+impl Progress for Watch {
+    fn report(&self, fraction: f32) {
+        self.reported.lock().unwrap().push(fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.reported.lock().unwrap().last().is_some_and(|&last| last >= self.stop_at)
+    }
+}
+
+#[test]
+fn progress_rises_and_cancelling_ends_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("written.ply");
+    let count = 600_000;
+    write_ply(&rich_cloud(count), &path, &()).unwrap();
+    let rows: String = positions(count).iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let header = "ply\nformat ascii 1.0\nelement vertex 600000\nproperty float x\nproperty float y\nproperty float z\n";
+    // A list before the vertices and one in them.
+    let mut lists =
+        b"ply\nformat binary_little_endian 1.0\nelement face 100000\nproperty list uchar uchar a\n".to_vec();
+    lists.extend(b"element vertex 100000\nproperty float x\nproperty float y\nproperty float z\n");
+    lists.extend(b"property list uchar uchar b\nend_header\n");
+    lists.extend(vec![0; 100_000]);
+    lists.extend(vec![0; 1_300_000]);
+    let files = [
+        ("ascii.ply", format!("{header}end_header\n{rows}").into_bytes()),
+        ("lists.ply", lists),
+        ("a.xyz", rows.into_bytes()),
+        ("a.las", las_bytes((1, 2), 3, false, count)),
+        ("a.laz", las_bytes((1, 4), 7, true, count)),
+        ("a.pcd", pcd_bytes("binary_compressed", count)),
+    ];
+    let mut paths = vec![path];
+    for (name, bytes) in files {
+        paths.push(folder.path().join(name));
+        std::fs::write(&paths[paths.len() - 1], bytes).unwrap();
+    }
+    for path in paths {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let watch = Watch { stop_at: 2.0, reported: Mutex::default() };
+        read(&path, &watch).unwrap_or_else(|error| panic!("{error}"));
+        let reported = watch.reported.into_inner().unwrap();
+        assert!(reported.is_sorted(), "{name}: progress never falls: {reported:?}");
+        assert_eq!((reported[0], reported[reported.len() - 1]), (0.0, 1.0), "{name}: from nothing to all");
+        assert!(reported.iter().any(|fraction| (0.1..0.9).contains(fraction)), "{name}: and between: {reported:?}");
+
+        let watch = Watch { stop_at: 0.1, reported: Mutex::default() };
+        assert!(matches!(read(&path, &watch), Err(Error::Cancelled)), "{name}: cancelled on the way");
+        let last = watch.reported.into_inner().unwrap().pop().unwrap();
+        assert!(last < 1.0, "{name}: and at once, not at the end");
+    }
 }

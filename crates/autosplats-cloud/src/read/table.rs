@@ -144,7 +144,7 @@ impl Table<'_> {
     /// Every value that will be read lies within the bytes. Readers check this with better words; this is the backstop.
     fn check_size(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
         let fits = |column: &Column| {
-            let last = self.count.checked_sub(1).unwrap_or_default().checked_mul(column.stride)?;
+            let last = self.count.saturating_sub(1).checked_mul(column.stride)?;
             let end = last.checked_add(column.offset)?.checked_add(column.scalar.size())?;
             (end <= self.bytes.len()).then_some(())
         };

@@ -104,7 +104,7 @@ impl Rows<'_> {
         while at < text.len() {
             let end = line_end(text, at);
             let line = text[at..end].trim_ascii();
-            if !is_blank(line) && !(self.counts_between && is_count(line)) {
+            if !(is_blank(line) || self.counts_between && is_count(line)) {
                 let len = piece.records.len();
                 if let Err(what) = self.parse_row(line, &mut piece.records) {
                     piece.records.truncate(len);
@@ -145,6 +145,7 @@ impl Rows<'_> {
     }
 }
 
+#[allow(clippy::cast_lossless, reason = "64-bit integers among the types have no lossless way")]
 fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), String> {
     macro_rules! integer {
         ($type:ty) => {{

@@ -93,7 +93,7 @@ impl Layout {
         let mut at = 0;
         if self.doubles {
             let world = range.clone().map(|i| cloud.world_position(i).to_array().map(f64::to_le_bytes));
-            self.place(records, &mut at, world.map(|bytes| bytemuck::cast::<_, [u8; 24]>(bytes)));
+            self.place(records, &mut at, world.map(bytemuck::cast::<_, [u8; 24]>));
         } else {
             let positions = cloud.positions()[range.clone()].iter();
             let bytes = positions.map(|position| bytemuck::cast::<_, [u8; 12]>(position.map(f32::to_le_bytes)));

@@ -95,7 +95,7 @@ fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Eleme
         stride += property.scalar.size();
     }
     let mut records = Vec::new();
-    walk(job, header, vertex, start, |bytes| {
+    walk(job, header, vertex, start, PACKING, |bytes| {
         reserve(&mut records, bytes.len(), "points with lists")?;
         records.extend_from_slice(bytes);
         Ok(())
@@ -117,7 +117,7 @@ fn skip(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) ->
     for element in before {
         at = match element.stride() {
             Some(stride) => element.count.checked_mul(stride).and_then(|len| at.checked_add(len)),
-            None => Some(walk(job, header, element, at, |_| Ok(()))?),
+            None => Some(walk(job, header, element, at, Part { start: 0.0, len: 0.0 }, |_| Ok(()))?),
         }
         .filter(|&end| end <= job.bytes.len())
         .ok_or_else(|| cut_off(job, vertex))?;
@@ -132,12 +132,13 @@ fn walk(
     header: &Header,
     element: &Element,
     start: usize,
+    part: Part,
     mut keep: impl FnMut(&[u8]) -> Result<(), Error>,
 ) -> Result<usize, Error> {
     let mut at = start;
     for record in 0..element.count {
         if record % (1 << 14) == 0 {
-            job.tick(PACKING.len * record as f32 / element.count as f32)?;
+            job.tick(part.start + part.len * record as f32 / element.count as f32)?;
         }
         let fail = |what: &str| {
             let name = shown(element.name.as_bytes());
