@@ -73,6 +73,9 @@ struct Node {
     seam: Seam,
     paint: Paint,
     group: u16,
+    /// Solids next to each other with the same number are one chain: put together without a seam first, so that the
+    /// seam to the rest does not swell where they meet.
+    chain: u16,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -106,33 +109,35 @@ impl Body {
         self
     }
 
-    fn add(&mut self, op: Op, radius: f64, shape: Shape) -> &mut Self {
+    fn add(&mut self, op: Op, radius: f64, shape: Shape, linked: bool) -> &mut Self {
+        let before = self.nodes.last().map_or(0, |node| node.chain);
+        let chain = if linked { before } else { before.wrapping_add(1) };
         let group = u16::try_from(self.groups.len() - 1).expect("bodies have fewer than 65536 groups");
         let shape = shape.mapped(&self.frame);
         let seam = Seam::new(radius * self.frame.scale);
-        self.nodes.push(Node { shape, op, seam, paint: self.paint, group });
+        self.nodes.push(Node { shape, op, seam, paint: self.paint, group, chain });
         self
     }
 
     /// Adds `shape` to the group.
     pub(super) fn join(&mut self, radius: f64, shape: Shape) -> &mut Self {
-        self.add(Op::Join, radius, shape)
+        self.add(Op::Join, radius, shape, false)
     }
 
     /// Takes `shape` away from the group.
     pub(super) fn cut(&mut self, radius: f64, shape: Shape) -> &mut Self {
-        self.add(Op::Cut, radius, shape)
+        self.add(Op::Cut, radius, shape, false)
     }
 
     /// Keeps of the group only what lies in `shape`.
     pub(super) fn clip(&mut self, radius: f64, shape: Shape) -> &mut Self {
-        self.add(Op::Clip, radius, shape)
+        self.add(Op::Clip, radius, shape, false)
     }
 
     /// Joins a chain of round cones through `points` (position, radius).
     pub(super) fn strand(&mut self, radius: f64, points: &[(DVec3, f64)]) -> &mut Self {
-        for pair in points.windows(2) {
-            self.join(radius, Shape::cone(pair[0].0, pair[1].0, pair[0].1, pair[1].1));
+        for (i, pair) in points.windows(2).enumerate() {
+            self.add(Op::Join, radius, Shape::cone(pair[0].0, pair[1].0, pair[0].1, pair[1].1), i > 0);
         }
         self
     }
@@ -155,38 +160,47 @@ impl Body {
     /// Signed distance bound at `p`, where only the solids in `list` matter.
     #[inline]
     pub(super) fn distance(&self, p: DVec3, list: &[u16]) -> f64 {
-        let mut total = f64::INFINITY;
-        let mut part = f64::INFINITY;
-        let mut current = u16::MAX;
-        for &id in list {
+        let Some((&first, rest)) = list.split_first() else { return f64::INFINITY };
+        let (mut total, mut part) = (f64::INFINITY, f64::INFINITY);
+        let mut last = &self.nodes[usize::from(first)];
+        let mut link = last.shape.distance(p);
+        for &id in rest {
             let node = &self.nodes[usize::from(id)];
-            if node.group != current {
-                if current != u16::MAX {
-                    let group = &self.groups[usize::from(current)];
-                    total = group.seam.apply(group.op, total, part);
-                }
-                current = node.group;
+            let d = node.shape.distance(p);
+            if node.chain == last.chain {
+                link = link.min(d);
+                continue;
+            }
+            part = last.seam.apply(last.op, part, link);
+            link = d;
+            if node.group != last.group {
+                let group = &self.groups[usize::from(last.group)];
+                total = group.seam.apply(group.op, total, part);
                 part = f64::INFINITY;
             }
-            part = node.seam.apply(node.op, part, node.shape.distance(p));
+            last = node;
         }
-        if current == u16::MAX {
-            return total;
-        }
-        let group = &self.groups[usize::from(current)];
+        part = last.seam.apply(last.op, part, link);
+        let group = &self.groups[usize::from(last.group)];
         group.seam.apply(group.op, total, part)
+    }
+
+    /// The list cut where the group, or the chain, changes.
+    fn runs<'a>(&'a self, list: &'a [u16], key: impl Fn(&Node) -> u16 + 'a) -> impl Iterator<Item = &'a [u16]> {
+        list.chunk_by(move |&a, &b| key(&self.nodes[usize::from(a)]) == key(&self.nodes[usize::from(b)]))
     }
 
     /// Colour and zone of the surface at `p`; `world` is where `p` lies before any folding of space.
     pub(super) fn paint(&self, p: DVec3, world: DVec3, list: &[u16]) -> ([f32; 3], usize) {
         let mix = |a: [f32; 3], b: [f32; 3], t: f32| -> [f32; 3] { std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t) };
         let (mut total, mut total_rgb, mut zone) = (f64::INFINITY, [0.5; 3], 0);
-        for run in list.chunk_by(|&a, &b| self.nodes[usize::from(a)].group == self.nodes[usize::from(b)].group) {
+        for run in self.runs(list, |node| node.group) {
             let group = &self.groups[usize::from(self.nodes[usize::from(run[0])].group)];
             let (mut part, mut part_rgb) = (f64::INFINITY, [0.5; 3]);
-            for &id in run {
+            for chain in self.runs(run, |node| node.chain) {
+                let distances = chain.iter().map(|&id| (self.nodes[usize::from(id)].shape.distance(p), id));
+                let Some((d, id)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
                 let node = &self.nodes[usize::from(id)];
-                let d = node.shape.distance(p);
                 let share = node.seam.blend(node.op, part, d);
                 if share > 0.0 {
                     part_rgb = mix(part_rgb, node.paint.rgb(world), share);
@@ -209,19 +223,30 @@ impl Body {
         kept.clear();
         let slack = 2.0 * radius;
         let mut total = f64::INFINITY;
-        for run in list.chunk_by(|&a, &b| self.nodes[usize::from(a)].group == self.nodes[usize::from(b)].group) {
+        for run in self.runs(list, |node| node.group) {
             let start = kept.len();
             let mut part = f64::INFINITY;
-            for &id in run {
-                let node = &self.nodes[usize::from(id)];
-                let d = node.shape.distance(center);
+            for chain in self.runs(run, |node| node.chain) {
+                let node = &self.nodes[usize::from(chain[0])];
+                let link = kept.len();
+                let mut d = f64::INFINITY;
+                for &id in chain {
+                    let next = self.nodes[usize::from(id)].shape.distance(center);
+                    if next < d + slack {
+                        if d >= next + slack {
+                            kept.truncate(link);
+                        }
+                        kept.push(id);
+                        d = d.min(next);
+                    }
+                }
                 if part < f64::INFINITY && node.seam.spares(node.op, part, d, slack) {
+                    kept.truncate(link);
                     continue;
                 }
                 if node.op == Op::Join && node.seam.spares(Op::Join, d, part, slack) {
-                    kept.truncate(start);
+                    kept.drain(start..link);
                 }
-                kept.push(id);
                 part = node.seam.apply(node.op, part, d);
             }
             let Group { op, seam, .. } = self.groups[usize::from(self.nodes[usize::from(run[0])].group)];

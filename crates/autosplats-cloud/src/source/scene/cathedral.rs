@@ -45,7 +45,7 @@ pub(super) fn scene() -> Model {
     pews(&mut body);
     end(&mut body);
     let fold = Fold::Bays { half_bay: HALF_BAY, last: LAST };
-    let tree = Octree::new(body, fold, DVec3::new(0.0, 0.0, -1.0), 24.0, 9);
+    let tree = Octree::new(body, fold, DVec3::new(0.0, 0.0, -1.0), 24.0, 8);
     let stations = [
         DVec3::new(-14.2, 0.12, 1.75),
         DVec3::new(0.4, -0.15, 1.75),
@@ -76,11 +76,11 @@ fn along_y(from: f64, to: f64, floor: f64, half_width: f64, spring: f64, radius:
 
 /// The vaults' inner faces, `inset` metres into the room.
 fn nave_vault(inset: f64) -> [Shape; 2] {
-    [along_x(0.0, 0.0, NAVE - inset, 10.6, 6.9 - inset), along_y(-5.2, 5.2, 9.75, 2.72 - inset, 13.3, 4.1 - inset)]
+    [along_x(0.0, -0.1, NAVE - inset, 10.6, 6.9 - inset), along_y(-5.2, 5.2, 9.75, 2.72 - inset, 13.3, 4.1 - inset)]
 }
 
 fn aisle_vault(inset: f64) -> [Shape; 2] {
-    [along_x(7.45, 0.0, 2.05 - inset, 5.3, 2.9 - inset), along_y(5.0, OUTER - 0.05, 0.0, 2.62 - inset, 5.3, 3.25 - inset)]
+    [along_x(7.45, -0.1, 2.05 - inset, 5.3, 2.9 - inset), along_y(5.0, OUTER - 0.05, -0.1, 2.62 - inset, 5.3, 3.25 - inset)]
 }
 
 /// The stone, and the large spaces in it.
@@ -94,10 +94,10 @@ fn mass(body: &mut Body) {
     }
     body.paint = STONE;
     // The arcade, in two orders, and the room around the columns below it.
-    body.cut(0.0, along_y(ARCADE - 0.6, ARCADE + 0.6, 0.0, 2.15, 5.3, 3.0));
-    body.cut(0.0, along_y(ARCADE - 0.6, ARCADE - 0.18, 0.0, 2.38, 5.3, 3.2));
-    body.cut(0.0, along_y(ARCADE + 0.18, ARCADE + 0.6, 0.0, 2.38, 5.3, 3.2));
-    body.cut(0.0, block([-1.0, ARCADE - 0.6, 0.0], [END, ARCADE + 0.6, 5.15], 0.0));
+    body.cut(0.0, along_y(ARCADE - 0.6, ARCADE + 0.6, -0.1, 2.15, 5.3, 3.0));
+    body.cut(0.0, along_y(ARCADE - 0.6, ARCADE - 0.18, -0.1, 2.38, 5.3, 3.2));
+    body.cut(0.0, along_y(ARCADE + 0.18, ARCADE + 0.6, -0.1, 2.38, 5.3, 3.2));
+    body.cut(0.0, block([-1.0, ARCADE - 0.6, -0.1], [END, ARCADE + 0.6, 5.15], 0.0));
     // The gallery above the arcade: niches, three to a half bay.
     for x in [0.5, 1.5] {
         let at = Placement::at(DVec3::new(x, NAVE, 8.95));
@@ -218,7 +218,7 @@ fn mouldings(body: &mut Body) {
         }
     }
     let p = |z: f64| DVec3::new(HALF_BAY, NAVE - 0.05, z);
-    body.join(0.05, Shape::cone(p(5.75), p(6.1), 0.12, 0.34));
+    body.join(0.05, Shape::cone(p(5.62), p(6.02), 0.06, 0.25));
     body.join(0.02, block([HALF_BAY - 0.55, NAVE - 0.40, 10.74], [HALF_BAY + 0.55, NAVE + 0.2, 10.90], 0.04));
     // Half columns on the outer wall.
     body.group(Op::Join, 0.03);

@@ -155,7 +155,7 @@ fn skirt(body: &mut Body, waist: DVec3, hips: DMat3, a: f64) {
     let hem = waist + axis * 0.50 + DVec3::new(-0.05 * (a - 0.9).sin(), 0.02, 0.0);
     body.group(Op::Join, 0.012);
     body.paint = CLOTH;
-    body.join(0.0, Shape::cone(waist, hem, 0.105, 0.30));
+    body.join(0.0, Shape::cone(waist, hem, 0.105, 0.325));
     for i in 0..FOLDS {
         let angle = TAU * f64::from(i) / f64::from(FOLDS);
         let at = |radius: f64, down: f64, lag: f64| {
@@ -173,8 +173,8 @@ fn skirt(body: &mut Body, waist: DVec3, hips: DMat3, a: f64) {
     }
     let down = hem - waist;
     body.cut(0.012, Shape::HalfSpace { normal: -down.normalize(), offset: -down.normalize().dot(hem + axis * 0.012) });
-    let lining = (waist + down * 0.55, hem + down * 0.3);
-    body.cut(0.02, Shape::cone(lining.0, lining.1, 0.11, 0.345));
+    let lining = (waist + down * 0.62, hem + down * 0.3);
+    body.cut(0.02, Shape::cone(lining.0, lining.1, 0.11, 0.30));
     body.group(Op::Join, 0.006);
     body.paint = SASH;
     let band = Placement { origin: waist + hips * DVec3::new(0.0, 0.002, -0.012), axes: hips };

@@ -28,7 +28,7 @@ pub(super) fn scene() -> Model {
     pedestal(&mut body);
     body.frame = Similarity { placement: Placement::at(DVec3::new(0.0, 0.0, 0.98)), scale: 1.12 };
     figure(&mut body);
-    let tree = Octree::new(body, Fold::None, DVec3::new(-1.7, -1.7, -0.1), 3.4, 9);
+    let tree = Octree::new(body, Fold::None, DVec3::new(-1.7, -1.7, -0.1), 3.4, 8);
     Model { tree, points: Points::Strewn(vec![1.0]) }
 }
 
@@ -86,9 +86,9 @@ fn robe(body: &mut Body) {
         let points = [
             (at(0.128, 0.098, 1.075, 0.0), 0.010),
             (at(0.175, 0.132, 0.93, 0.02 * whim(i, 3)), 0.014 * deep),
-            (at(0.190, 0.142, 0.72, 0.04 * whim(i, 4)) + DVec3::Y * push, 0.019 * deep),
-            (at(0.207, 0.162, 0.45, 0.07 * whim(i, 5)) + DVec3::Y * push, 0.023 * deep),
-            (at(0.235, 0.196, 0.20, 0.09 * whim(i, 6)), 0.028 * deep),
+            (at(0.190, 0.142, 0.72 + 0.05 * whim(i, 12), 0.04 * whim(i, 4)) + DVec3::Y * push, 0.019 * deep),
+            (at(0.207, 0.162, 0.45 + 0.06 * whim(i, 13), 0.07 * whim(i, 5)) + DVec3::Y * push, 0.023 * deep),
+            (at(0.235, 0.196, 0.20 + 0.04 * whim(i, 14), 0.09 * whim(i, 6)), 0.028 * deep),
             (at(0.270, 0.235, 0.035, 0.10 * whim(i, 7)) + DVec3::new(cos, sin, 0.0) * 0.015, 0.033 * deep),
         ];
         body.strand(0.02, &points);
@@ -136,31 +136,32 @@ fn robe(body: &mut Body) {
 /// The mantle: from the left shoulder across the chest to the right hip, and down the back.
 fn mantle(body: &mut Body) {
     body.group(Op::Join, 0.010);
-    for i in 0..9 {
-        let s = f64::from(i) / 8.0;
+    for i in 0..8 {
+        let s = f64::from(i) / 7.0;
         let sag = 0.012 * whim(i, 20);
+        let deep = 1.0 + 0.25 * whim(i, 23);
         let points = [
-            (DVec3::new(0.185 - 0.05 * s, 0.07 - 0.03 * s, 1.43 + 0.035 * s), 0.018),
-            (DVec3::new(0.165 - 0.075 * s, -0.07, 1.435 - 0.01 * s), 0.017),
-            (DVec3::new(0.115 - 0.075 * s, -0.142 + 0.02 * s, 1.32 + 0.02 * s), 0.016),
-            (DVec3::new(0.02 - 0.05 * s, -0.142 + 0.02 * s, 1.16 + 0.055 * s + sag), 0.017),
-            (DVec3::new(-0.10 - 0.025 * s, -0.115, 1.005 + 0.075 * s + sag), 0.019),
-            (DVec3::new(-0.185, -0.02, 0.90 + 0.09 * s + sag), 0.020),
-            (DVec3::new(-0.14, 0.12, 0.87 + 0.10 * s), 0.019),
+            (DVec3::new(0.185 - 0.05 * s, 0.07 - 0.03 * s, 1.43 + 0.035 * s), 0.0125 * deep),
+            (DVec3::new(0.165 - 0.075 * s, -0.07, 1.435 - 0.01 * s), 0.0115 * deep),
+            (DVec3::new(0.115 - 0.075 * s, -0.142 + 0.02 * s, 1.32 + 0.02 * s), 0.0105 * deep),
+            (DVec3::new(0.02 - 0.05 * s, -0.142 + 0.02 * s, 1.16 + 0.055 * s + sag), 0.0115 * deep),
+            (DVec3::new(-0.10 - 0.025 * s, -0.115, 1.005 + 0.075 * s + sag), 0.0135 * deep),
+            (DVec3::new(-0.185, -0.02, 0.90 + 0.09 * s + sag), 0.0145 * deep),
+            (DVec3::new(-0.14, 0.12, 0.87 + 0.10 * s), 0.0135 * deep),
         ];
-        body.strand(0.012, &points);
+        body.strand(0.008, &points);
     }
     // What hangs down in front of the right hip, over the bundle.
-    for i in 0..7 {
-        let s = f64::from(i) / 6.0;
-        let x = -0.20 + 0.10 * s;
+    for i in 0..6 {
+        let s = f64::from(i) / 5.0;
+        let x = -0.21 + 0.12 * s;
         let points = [
-            (DVec3::new(x, -0.10 - 0.03 * s, 0.99 - 0.03 * s), 0.017),
-            (DVec3::new(x - 0.035 + 0.02 * s, -0.145 - 0.035 * s, 0.80), 0.020),
-            (DVec3::new(x - 0.04 + 0.02 * s, -0.165 - 0.03 * s, 0.62 - 0.05 * (i % 2) as f64), 0.024),
-            (DVec3::new(x - 0.05 + 0.03 * s, -0.172 - 0.03 * s, 0.50 - 0.10 * s - 0.03 * (i % 2) as f64), 0.021),
+            (DVec3::new(x, -0.10 - 0.03 * s, 0.99 - 0.03 * s), 0.012),
+            (DVec3::new(x - 0.035 + 0.02 * s, -0.145 - 0.035 * s, 0.80), 0.014),
+            (DVec3::new(x - 0.04 + 0.02 * s, -0.165 - 0.03 * s, 0.62 - 0.05 * (i % 2) as f64), 0.017),
+            (DVec3::new(x - 0.05 + 0.03 * s, -0.172 - 0.03 * s, 0.50 - 0.10 * s - 0.03 * (i % 2) as f64), 0.016),
         ];
-        body.strand(0.022, &points);
+        body.strand(0.014, &points);
     }
     body.group(Op::Join, 0.02);
     for i in 0..15 {
