@@ -104,20 +104,40 @@ fn more_than_fits_into_memory() {
     folder.fail(&arguments, 6, &["memory"]);
 }
 
+/// Starts a command, presses Ctrl-C when `ready`, and expects a clean end.
 #[cfg(unix)]
-#[test]
-fn interrupted() {
+fn interrupt(arguments: &[&str], ready: impl Fn(&Folder) -> bool) {
     use std::process::{Command, Stdio};
-    use std::time::Duration;
 
     let folder = Folder::new();
-    let mut command = folder.command(&["convert", "scene:cathedral:100M", "out.ply"]);
-    let child = command.stderr(Stdio::piped()).spawn().expect("the command starts");
-    std::thread::sleep(Duration::from_millis(700));
+    let mut child = folder.command(arguments).stderr(Stdio::piped()).spawn().expect("the command starts");
+    while !ready(&folder) {
+        let ended = child.try_wait().expect("the command can be asked");
+        assert_eq!(ended, None, "{arguments:?} still runs");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill starts");
     assert!(sent.success(), "the signal was sent");
     let output = child.wait_with_output().expect("the command ends");
-    assert_eq!(output.status.code(), Some(130), "it ended because of the signal");
+    assert_eq!(output.status.code(), Some(130), "{arguments:?} ended because of the signal");
     assert!(String::from_utf8_lossy(&output.stderr).contains("interrupted"), "it says so");
     assert_eq!(folder.list(), Vec::<String>::new(), "it leaves nothing behind");
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_while_reading() {
+    let start = std::time::Instant::now();
+    interrupt(&["convert", "scene:cathedral:100M", "out.ply"], |_| start.elapsed().as_secs_f64() > 0.7);
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_while_writing() {
+    use std::fs::metadata;
+
+    let has_begun = |folder: &Folder| {
+        folder.list().iter().any(|name| metadata(folder.path(name)).is_ok_and(|metadata| metadata.len() > 100_000))
+    };
+    interrupt(&["render", "scene:figure:20K", "-o", "out.exr", "--size", "3000x3000"], has_begun);
 }

@@ -4,7 +4,7 @@ mod exr;
 mod png;
 
 use std::fs::{File, metadata};
-use std::io::{BufWriter, ErrorKind, Write as _, stdout};
+use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
@@ -40,10 +40,10 @@ pub(crate) fn check_target<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a
 /// Writes a file through `write`; returns its size.
 pub(crate) fn write_file(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
+    write: impl FnOnce(&mut BufWriter<Stoppable<'_>>) -> std::io::Result<()>,
 ) -> Result<u64, Failure> {
     replace_file(path, |temporary| {
-        let mut writer = BufWriter::with_capacity(1 << 18, temporary.as_file_mut());
+        let mut writer = BufWriter::with_capacity(1 << 18, Stoppable(temporary.as_file_mut()));
         write(&mut writer).and_then(|()| writer.flush()).map_err(|error| cannot_write(path, &error))
     })
 }
@@ -65,6 +65,29 @@ pub(crate) fn replace_file(
     filled?;
     temporary.persist(&target).map_err(|error| cannot_write(path, &error.error))?;
     metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error))
+}
+
+/// A file that takes no more once Ctrl-C was pressed, so that a long write ends early.
+pub(crate) struct Stoppable<'a>(&'a mut File);
+
+impl Write for Stoppable<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        if interrupt::requested() {
+            // Not `ErrorKind::Interrupted`, which callers answer by trying again.
+            return Err(std::io::Error::other("interrupted"));
+        }
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl Seek for Stoppable<'_> {
+    fn seek(&mut self, position: SeekFrom) -> std::io::Result<u64> {
+        self.0.seek(position)
+    }
 }
 
 /// A line of data on standard output. Nobody reading it any more is no error.
