@@ -29,6 +29,7 @@ mod project;
 mod renderer;
 mod search;
 mod shade;
+mod simd;
 mod splat;
 
 pub use autosplats_cloud as cloud;

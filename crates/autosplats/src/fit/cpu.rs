@@ -1,5 +1,7 @@
 //! The fit on the CPU: sixteen covariances at a time.
 
+use glam::Vec3;
+use pulp::Simd;
 use rayon::prelude::*;
 
 use super::eigen::eigen;
@@ -7,6 +9,7 @@ use super::{Surfel, Surfels};
 use crate::camera::View;
 use crate::project::ScreenPoints;
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods};
+use crate::simd::F32s;
 
 /// Blocks per task.
 const TASK_BLOCKS: usize = 64;
@@ -46,110 +49,109 @@ pub(crate) fn fit(
     });
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
-))]
-fn fit_blocks(
-    screen: &ScreenPoints,
-    queries: &[u32],
-    blocks: &[NeighborhoodBlock],
-    view: &View,
-    rules: &FitRules,
-    out: &mut [Surfel],
+#[pulp::with_simd(fit_blocks = pulp::Arch::new())]
+#[inline(always)]
+fn fit_blocks_with<'a, S: Simd>(
+    simd: S,
+    screen: &'a ScreenPoints,
+    queries: &'a [u32],
+    blocks: &'a [NeighborhoodBlock],
+    view: &'a View,
+    rules: &'a FitRules,
+    out: &'a mut [Surfel],
 ) {
     for ((out, queries), block) in out.chunks_mut(LANES).zip(queries.chunks(LANES)).zip(blocks) {
-        let covariance = covariance(block);
-        let eigen = eigen(&covariance);
+        let mut fitted = Fitted::default();
+        for vector in 0..LANES / S::F32_LANES {
+            fitted.fit(simd, block, vector);
+        }
         for (lane, (surfel, &query)) in out.iter_mut().zip(queries).enumerate() {
             let point = &screen.points[query as usize];
-            let values = eigen.values.map(|value| value.0[lane]);
-            let axis = |i: usize| eigen.vectors[i].map(|axis: Lanes| axis.0[lane]);
-            let neighborhood = Neighborhood {
-                count: block.count.0[lane],
-                k_radius: block.k_radius.0[lane],
-                values,
-                normal: axis(0),
-                major_axis: axis(2),
-            };
-            *surfel = neighborhood.surfel(point.position_view, view, rules);
+            *surfel = fitted.surfel(lane, block, point.position_view, view, rules);
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
         }
     }
 }
 
-/// Covariance of the point and its neighbours about their mean [Paper, Eq. 1, 2].
-// Differs from the paper: it is divided by the count and the k-radius, which changes no axis and no ratio.
-#[inline(always)]
-fn covariance(block: &NeighborhoodBlock) -> [Lanes; 6] {
-    let mut covariance = [Lanes::default(); 6];
-    for lane in 0..LANES {
-        // The point itself is one of the points fitted; it adds nothing to sums about itself.
-        let share = 1.0 / (block.count.0[lane] + 1.0);
-        // In units of the k-radius nothing over- or underflows, whatever the cloud's unit.
-        let unit = 1.0 / block.k_radius.0[lane].max(f32::MIN_POSITIVE);
-        let mean = block.offset.map(|axis| axis.0[lane] * unit * share);
-        for (term, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
-            covariance[term].0[lane] = block.second[term].0[lane] * unit * unit * share - mean[i] * mean[j];
+/// Principal axes of sixteen neighbourhoods.
+#[derive(Default)]
+struct Fitted {
+    /// Eigenvalues, ascending, in units of the squared k-radius.
+    values: [Lanes; 3],
+    normal: [Lanes; 3],
+    major_axis: [Lanes; 3],
+}
+
+impl Fitted {
+    /// Diagonalises the covariances of the `vector`-th part of `block`.
+    #[inline(always)]
+    fn fit<S: Simd>(&mut self, simd: S, block: &NeighborhoodBlock, vector: usize) {
+        let eigen = eigen(simd, covariance(simd, block, vector));
+        for i in 0..3 {
+            eigen.values[i].store(&mut self.values[i].0, vector);
+            eigen.vectors[0][i].store(&mut self.normal[i].0, vector);
+            eigen.vectors[2][i].store(&mut self.major_axis[i].0, vector);
         }
     }
-    covariance
-}
 
-/// One neighbourhood with its principal axes.
-struct Neighborhood {
-    count: f32,
-    k_radius: f32,
-    /// Eigenvalues, ascending.
-    values: [f32; 3],
-    normal: [f32; 3],
-    major_axis: [f32; 3],
-}
-
-impl Neighborhood {
     #[inline(always)]
-    fn surfel(&self, center: [f32; 3], view: &View, rules: &FitRules) -> Surfel {
-        let Self { count, k_radius, values, .. } = *self;
+    fn surfel(
+        &self,
+        lane: usize,
+        block: &NeighborhoodBlock,
+        center: [f32; 3],
+        view: &View,
+        rules: &FitRules,
+    ) -> Surfel {
+        let of_lane = |lanes: &[Lanes; 3]| [lanes[0].0[lane], lanes[1].0[lane], lanes[2].0[lane]];
+        let [least, middle, largest] = of_lane(&self.values);
+        let [count, k_radius] = [block.count.0[lane], block.k_radius.0[lane]];
         let to_eye = if view.perspective { center.map(|c| -c) } else { [0.0, 0.0, -1.0] };
-        let [least, middle, largest] = values;
+        let (mut normal, mut major_axis) = (of_lane(&self.normal), of_lane(&self.major_axis));
         let plane = middle > LINE * largest;
-        let normal = if plane { self.normal } else { facing(to_eye, self.major_axis, largest > 0.0) };
-        // Any tangent does for a circle.
-        let major_axis = if plane { self.major_axis } else { tangent(normal) };
-        let normal = if dot(normal, to_eye) < 0.0 { normal.map(|c| -c) } else { normal };
-        let lone = if rules.keep_lone { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
-        let radius = if count > 0.0 { rules.splat_scale * 2.0 * k_radius / count.sqrt() } else { lone };
-        let ellipse = rules.ellipses & plane & (middle > 0.0);
+        if !plane {
+            normal = facing(to_eye, major_axis, largest > 0.0);
+            // Any tangent does for a circle.
+            major_axis = Vec3::from(normal).any_orthonormal_vector().to_array();
+        }
+        let away = normal[0] * to_eye[0] + normal[1] * to_eye[1] + normal[2] * to_eye[2] < 0.0;
         let sum = least.max(0.0) + middle + largest;
+        let lone = if rules.keep_lone { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
             center,
-            radius,
-            normal,
+            radius: if count > 0.0 { rules.splat_scale * 2.0 * k_radius / count.sqrt() } else { lone },
+            normal: if away { normal.map(|c| -c) } else { normal },
             k_radius,
             major_axis,
-            major_ratio: if ellipse { (largest / middle).min(LONGEST) } else { 1.0 },
-            curvature: if sum > 0.0 { (least / sum).max(0.0) } else { 0.0 },
+            major_ratio: if rules.ellipses & plane { (largest / middle).min(LONGEST) } else { 1.0 },
+            curvature: if sum > 0.0 { least.max(0.0) / sum } else { 0.0 },
             ..Surfel::default()
         }
     }
 }
 
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2].
+// Differs from the paper: it is divided by the count and the squared k-radius, which changes no axis and no ratio, and
+// lets nothing over- or underflow whatever the cloud's unit.
+#[inline(always)]
+fn covariance<S: Simd>(simd: S, block: &NeighborhoodBlock, vector: usize) -> [F32s<S>; 6] {
+    let load = |lanes: &Lanes| F32s::load(simd, &lanes.0, vector);
+    let [one, least] = [1.0, f32::MIN_POSITIVE].map(|value| F32s::splat(simd, value));
+    // The point itself is one of the points fitted; it adds nothing to sums about itself.
+    let share = one / (load(&block.count) + one);
+    let unit = one / load(&block.k_radius).max(least);
+    let mean = [0, 1, 2].map(|axis: usize| load(&block.offset[axis]) * unit * share);
+    let second = [0, 1, 2, 3, 4, 5].map(|term: usize| load(&block.second[term]) * unit * unit * share);
+    let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+    [0, 1, 2, 3, 4, 5].map(|term: usize| second[term] - mean[pairs[term].0] * mean[pairs[term].1])
 }
 
 /// The unit normal of a neighbourhood that is no plane: as much towards the eye as its line allows.
 #[cold]
 fn facing(to_eye: [f32; 3], line: [f32; 3], has_line: bool) -> [f32; 3] {
-    let to_eye = glam::Vec3::from(to_eye).normalize_or(glam::Vec3::NEG_Z);
-    let line = glam::Vec3::from(line);
+    let to_eye = Vec3::from(to_eye).normalize_or(Vec3::NEG_Z);
+    let line = Vec3::from(line);
     let across = to_eye - line * line.dot(to_eye);
     (if has_line { across.normalize_or(line.any_orthonormal_vector()) } else { to_eye }).to_array()
-}
-
-/// Some unit vector orthogonal to `normal`.
-#[cold]
-fn tangent(normal: [f32; 3]) -> [f32; 3] {
-    glam::Vec3::from(normal).any_orthonormal_vector().to_array()
 }

@@ -1,86 +1,87 @@
-//! Eigenvectors of symmetric 3×3 matrices, sixteen at a time.
+//! Eigenvectors of symmetric 3×3 matrices, a SIMD vector of matrices at a time.
 
-use crate::search::{LANES, Lanes};
+use pulp::Simd;
+
+use crate::simd::F32s;
 
 /// Cyclic Jacobi converges quadratically: after four sweeps the off-diagonal of a 3×3 matrix is below f32's rounding.
 const SWEEPS: usize = 4;
 
-/// Sixteen symmetric matrices as xx, xy, xz, yy, yz, zz.
-pub(super) type SymmetricLanes = [Lanes; 6];
-
-/// Eigenvalues, ascending, and the unit eigenvectors that belong to them, sixteen of each.
-pub(super) struct Eigen {
-    pub(super) values: [Lanes; 3],
+/// Eigenvalues, ascending, and the unit eigenvectors that belong to them.
+pub(super) struct Eigen<S: Simd> {
+    pub(super) values: [F32s<S>; 3],
     /// `vectors[i][axis]`.
-    pub(super) vectors: [[Lanes; 3]; 3],
+    pub(super) vectors: [[F32s<S>; 3]; 3],
 }
 
-/// Diagonalises sixteen symmetric matrices.
+/// Diagonalises symmetric matrices, given as xx, xy, xz, yy, yz, zz.
 #[inline(always)]
-pub(super) fn eigen(matrix: &SymmetricLanes) -> Eigen {
-    let mut values = [Lanes::default(); 3];
-    let mut vectors = [[Lanes::default(); 3]; 3];
-    for lane in 0..LANES {
-        let [xx, xy, xz, yy, yz, zz] = [0, 1, 2, 3, 4, 5].map(|term: usize| matrix[term].0[lane]);
-        let mut d = [xx, yy, zz];
-        // Off-diagonal entries by the axis they leave out.
-        let mut o = [yz, xz, xy];
-        let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        for _ in 0..SWEEPS {
-            rotate::<0, 1, 2>(&mut d, &mut o, &mut v);
-            rotate::<0, 2, 1>(&mut d, &mut o, &mut v);
-            rotate::<1, 2, 0>(&mut d, &mut o, &mut v);
-        }
-        order::<0, 1>(&mut d, &mut v);
-        order::<1, 2>(&mut d, &mut v);
-        order::<0, 1>(&mut d, &mut v);
-        for i in 0..3 {
-            values[i].0[lane] = d[i];
-            for axis in 0..3 {
-                vectors[i][axis].0[lane] = v[i][axis];
-            }
+pub(super) fn eigen<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: [F32s<S>; 6]) -> Eigen<S> {
+    let [zero, one] = [0.0, 1.0].map(|value| F32s::splat(simd, value));
+    let mut matrix = Rotated {
+        diagonal: [xx, yy, zz],
+        rest: [yz, xz, xy],
+        vectors: [[one, zero, zero], [zero, one, zero], [zero, zero, one]],
+    };
+    for _ in 0..SWEEPS {
+        matrix.rotate::<0, 1, 2>(simd);
+        matrix.rotate::<0, 2, 1>(simd);
+        matrix.rotate::<1, 2, 0>(simd);
+    }
+    matrix.order::<0, 1>();
+    matrix.order::<1, 2>();
+    matrix.order::<0, 1>();
+    Eigen { values: matrix.diagonal, vectors: matrix.vectors }
+}
+
+/// A matrix on its way to the diagonal.
+struct Rotated<S: Simd> {
+    diagonal: [F32s<S>; 3],
+    /// Entries off the diagonal, by the axis they leave out.
+    rest: [F32s<S>; 3],
+    vectors: [[F32s<S>; 3]; 3],
+}
+
+impl<S: Simd> Rotated<S> {
+    /// One Jacobi rotation that zeroes the entry (P, Q); R is the third axis.
+    #[inline(always)]
+    fn rotate<const P: usize, const Q: usize, const R: usize>(&mut self, simd: S) {
+        let [zero, half, one] = [0.0, 0.5, 1.0].map(|value| F32s::splat(simd, value));
+        let least = F32s::splat(simd, f32::MIN_POSITIVE);
+        let pq = self.rest[R];
+        let difference = half * (self.diagonal[Q] - self.diagonal[P]);
+        // tan of the smaller angle: sign(δ)·a/(|δ| + √(δ² + a²)); for a zero entry the least divisor makes it 0.
+        let length = (difference * difference + pq * pq).sqrt();
+        let signed = difference.less(zero).select(zero - pq, pq);
+        let tan = signed / (difference.abs() + length).max(least);
+        let cos = one / (one + tan * tan).sqrt();
+        let sin = tan * cos;
+        self.diagonal[P] = self.diagonal[P] - tan * pq;
+        self.diagonal[Q] = self.diagonal[Q] + tan * pq;
+        self.rest[R] = zero;
+        // (P, R) leaves out Q, (Q, R) leaves out P.
+        let [pr, qr] = [self.rest[Q], self.rest[P]];
+        self.rest[Q] = cos * pr - sin * qr;
+        self.rest[P] = sin * pr + cos * qr;
+        for axis in 0..3 {
+            let [p, q] = [self.vectors[P][axis], self.vectors[Q][axis]];
+            self.vectors[P][axis] = cos * p - sin * q;
+            self.vectors[Q][axis] = sin * p + cos * q;
         }
     }
-    Eigen { values, vectors }
-}
 
-/// One Jacobi rotation that zeroes the entry (P, Q); R is the third axis.
-#[inline(always)]
-fn rotate<const P: usize, const Q: usize, const R: usize>(d: &mut [f32; 3], o: &mut [f32; 3], v: &mut [[f32; 3]; 3]) {
-    // The entry (P, Q) is the one that leaves out R, and so on.
-    let apq = o[R];
-    let difference = 0.5 * (d[Q] - d[P]);
-    // tan of the smaller rotation angle: sign(θ)·a/(|δ| + √(δ² + a²)); a zero entry gives 0 through the least divisor.
-    let length = (difference * difference + apq * apq).sqrt();
-    let signed = if difference < 0.0 { -apq } else { apq };
-    let t = signed / (difference.abs() + length).max(f32::MIN_POSITIVE);
-    let c = 1.0 / (1.0 + t * t).sqrt();
-    let s = t * c;
-    d[P] -= t * apq;
-    d[Q] += t * apq;
-    o[R] = 0.0;
-    // (P, R) leaves out Q, (Q, R) leaves out P.
-    let [apr, aqr] = [o[Q], o[P]];
-    o[Q] = c * apr - s * aqr;
-    o[P] = s * apr + c * aqr;
-    for axis in 0..3 {
-        let [vp, vq] = [v[P][axis], v[Q][axis]];
-        v[P][axis] = c * vp - s * vq;
-        v[Q][axis] = s * vp + c * vq;
-    }
-}
-
-/// Swaps two eigenpairs that are out of order.
-#[inline(always)]
-fn order<const A: usize, const B: usize>(d: &mut [f32; 3], v: &mut [[f32; 3]; 3]) {
-    let swap = d[A] > d[B];
-    let [a, b] = [d[A], d[B]];
-    d[A] = if swap { b } else { a };
-    d[B] = if swap { a } else { b };
-    for axis in 0..3 {
-        let [a, b] = [v[A][axis], v[B][axis]];
-        v[A][axis] = if swap { b } else { a };
-        v[B][axis] = if swap { a } else { b };
+    /// Swaps two eigenpairs that are out of order.
+    #[inline(always)]
+    fn order<const A: usize, const B: usize>(&mut self) {
+        let swap = self.diagonal[B].less(self.diagonal[A]);
+        let [a, b] = [self.diagonal[A], self.diagonal[B]];
+        self.diagonal[A] = swap.select(b, a);
+        self.diagonal[B] = swap.select(a, b);
+        for axis in 0..3 {
+            let [a, b] = [self.vectors[A][axis], self.vectors[B][axis]];
+            self.vectors[A][axis] = swap.select(b, a);
+            self.vectors[B][axis] = swap.select(a, b);
+        }
     }
 }
 
@@ -88,7 +89,25 @@ fn order<const A: usize, const B: usize>(d: &mut [f32; 3], v: &mut [[f32; 3]; 3]
 mod tests {
     use super::*;
 
-    /// A·v = λ·v for each pair, unit orthogonal vectors, values ascending: no sign or order ambiguity to compare around.
+    /// Diagonalises one matrix on the narrowest and on the widest vectors; both must give the same bits.
+    fn eigen_of(matrix: [f32; 6]) -> ([f32; 3], [[f32; 3]; 3]) {
+        #[pulp::with_simd(widest = pulp::Arch::new())]
+        #[inline(always)]
+        fn widest_with<S: Simd>(simd: S, matrix: [f32; 6]) -> ([f32; 3], [[f32; 3]; 3]) {
+            let eigen = eigen(simd, matrix.map(|entry| F32s::splat(simd, entry)));
+            let first = |vector: F32s<S>| {
+                let mut lanes = [0.0; 16];
+                vector.store(&mut lanes, 0);
+                lanes[0]
+            };
+            (eigen.values.map(first), eigen.vectors.map(|vector| vector.map(first)))
+        }
+        let result = widest(matrix);
+        assert_eq!(result, widest_with(pulp::Scalar, matrix), "the width of the vectors changes the result");
+        result
+    }
+
+    /// A·v = λ·v for each pair, unit orthogonal vectors, values ascending: no sign or order to compare around.
     #[test]
     fn reconstructs_random_matrices() {
         let mut state = 1u64;
@@ -96,44 +115,36 @@ mod tests {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
         };
-        for round in 0..200 {
-            let mut matrix = [Lanes::default(); 6];
-            for lane in 0..LANES {
-                // Gram matrices of three vectors, from flat to round.
-                let flat = 10f32.powi(-(round % 5));
-                let b: [[f32; 3]; 3] = std::array::from_fn(|_| [random(), random(), random() * flat]);
-                let gram = |i: usize, j: usize| (0..3).map(|k| b[k][i] * b[k][j]).sum::<f32>();
-                for (term, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
-                    matrix[term].0[lane] = gram(i, j);
+        for round in 0..3000 {
+            // Gram matrices of three vectors, from flat to round.
+            let flat = 10f32.powi(-(round % 5));
+            let b: [[f32; 3]; 3] = std::array::from_fn(|_| [random(), random(), random() * flat]);
+            let gram = |i: usize, j: usize| (0..3).map(|k| b[k][i] * b[k][j]).sum::<f32>();
+            let m = [gram(0, 0), gram(0, 1), gram(0, 2), gram(1, 1), gram(1, 2), gram(2, 2)];
+            let (values, vectors) = eigen_of(m);
+            let m = m.map(f64::from);
+            let a = [[m[0], m[1], m[2]], [m[1], m[3], m[4]], [m[2], m[4], m[5]]];
+            let scale = a[0][0] + a[1][1] + a[2][2];
+            for i in 0..3 {
+                let v = vectors[i].map(f64::from);
+                for row in 0..3 {
+                    let av: f64 = (0..3).map(|k| a[row][k] * v[k]).sum();
+                    // f32 rounding of some hundred operations on entries up to the trace.
+                    assert!((av - f64::from(values[i]) * v[row]).abs() < 2e-6 * scale, "round {round}: A·v is not λ·v");
                 }
-            }
-            let eigen = eigen(&matrix);
-            for lane in 0..LANES {
-                let m = matrix.map(|term| f64::from(term.0[lane]));
-                let a = [[m[0], m[1], m[2]], [m[1], m[3], m[4]], [m[2], m[4], m[5]]];
-                let scale = a[0][0] + a[1][1] + a[2][2];
-                for i in 0..3 {
-                    let v = eigen.vectors[i].map(|axis| f64::from(axis.0[lane]));
-                    let value = f64::from(eigen.values[i].0[lane]);
-                    for row in 0..3 {
-                        let av: f64 = (0..3).map(|k| a[row][k] * v[k]).sum();
-                        // f32 rounding of some hundred operations on entries up to the trace.
-                        assert!((av - value * v[row]).abs() < 2e-6 * scale, "round {round}: A·v is not λ·v");
-                    }
-                    for j in 0..3 {
-                        let dot: f64 = (0..3).map(|k| v[k] * f64::from(eigen.vectors[j][k].0[lane])).sum();
-                        assert!((dot - f64::from(i == j)).abs() < 2e-6, "round {round}: vectors {i}, {j} give {dot}");
-                    }
-                    assert!(i == 0 || eigen.values[i].0[lane] >= eigen.values[i - 1].0[lane], "values out of order");
+                for j in 0..3 {
+                    let dot: f64 = (0..3).map(|k| v[k] * f64::from(vectors[j][k])).sum();
+                    assert!((dot - f64::from(i == j)).abs() < 2e-6, "round {round}: vectors {i}, {j} give {dot}");
                 }
+                assert!(i == 0 || values[i] >= values[i - 1], "round {round}: values out of order");
             }
         }
     }
 
     #[test]
     fn zero_matrix_gives_axes() {
-        let eigen = eigen(&[Lanes::default(); 6]);
-        assert_eq!(eigen.values[2].0[3], 0.0, "no extent");
-        assert_eq!(eigen.vectors[0].map(|axis| axis.0[3]), [1.0, 0.0, 0.0], "unit axes, not NaN");
+        let (values, vectors) = eigen_of([0.0; 6]);
+        assert_eq!(values, [0.0; 3], "no extent");
+        assert_eq!(vectors[0], [1.0, 0.0, 0.0], "unit axes, not NaN");
     }
 }

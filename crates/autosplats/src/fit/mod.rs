@@ -1,7 +1,7 @@
 //! Fit: moments to surfels, by the eigenvectors of the covariance [Paper, §6].
 //!
 //! # How it works
-//! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, sixteen matrices at a time:
+//! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, a SIMD vector of matrices at a time:
 //! a fixed number of additions, multiplications and square roots without branches, which converges from any start and
 //! keeps the axes orthogonal. The axis of the least eigenvalue is the normal, turned towards the eye. The splat radius is
 //! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average.

@@ -50,7 +50,8 @@ fn nearest_per_pixel(positions: &[[f32; 3]], view: &View, keys: &mut Vec<AtomicU
     let keys = keys.as_slice();
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
     positions.par_chunks(CHUNK).enumerate().for_each(|(chunk, positions)| {
-        let dropped = project_chunk(positions, (chunk * CHUNK) as u32, view, keys);
+        let first = (chunk * CHUNK) as u32;
+        let dropped = pulp::Arch::new().dispatch(|| project_chunk(positions, first, view, keys));
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
         outside.fetch_add(dropped.outside, Ordering::Relaxed);
@@ -64,10 +65,7 @@ const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
-))]
+#[inline(always)]
 fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, keys: &[AtomicU64]) -> Dropped {
     let mut dropped = Dropped::default();
     let mut pixel = [0u32; LANES];

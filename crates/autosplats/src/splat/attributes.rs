@@ -65,9 +65,9 @@ pub(super) struct TileSums {
     pub(super) depth: Vec<f32>,
     /// One tile after the other, in the order of [`Attributes::values`].
     pub(super) channels: Vec<f32>,
-    /// Weight of the heaviest splat, and the point it comes from.
+    /// Weight of the heaviest splat, and the bits of the index of the point it comes from.
     pub(super) heaviest: Vec<f32>,
-    pub(super) point: Vec<u32>,
+    pub(super) point: Vec<f32>,
 }
 
 impl TileSums {
@@ -79,13 +79,15 @@ impl TileSums {
         self.channels.clear();
         self.channels.resize(attributes.channels() * TILE_AREA, 0.0);
         self.point.clear();
-        self.point.resize(TILE_AREA, u32::MAX);
+        self.point.resize(TILE_AREA, f32::from_bits(u32::MAX));
     }
 
     /// Normalize pass: divides sums by weights into the layers of the tile [Paper, §7].
     pub(super) fn normalize(&self, attributes: &Attributes<'_>, layers: &mut TileLayers<'_>) {
         layers.weight.copy_from_slice(&self.weight);
-        layers.point.copy_from_slice(&self.point);
+        for (layer, point) in layers.point.iter_mut().zip(&self.point) {
+            *layer = point.to_bits();
+        }
         let mut channels = self.channels.chunks_exact(TILE_AREA);
         let mut channel = || channels.next().unwrap_or_default();
         let [nx, ny, nz] = [channel(), channel(), channel()];

@@ -28,7 +28,8 @@ impl Run {
     /// Sets up the frame's surfels from index `first` on.
     pub(super) fn set_up(&mut self, first: usize, surfels: &[Surfel], view: &View) {
         self.first = first;
-        set_up_all(surfels, view, &mut self.splats);
+        let splats = &mut self.splats;
+        pulp::Arch::new().dispatch(|| set_up_all(surfels, view, splats));
         self.alive.clear();
         self.alive.extend(self.splats.iter().map(|splat| !splat.covers_nothing()));
         self.bin(tile_columns(view.width as usize));
@@ -72,12 +73,14 @@ impl Run {
         let Some(bin) = tile.checked_sub(self.first_tile).filter(|bin| bin + 1 < self.start.len()) else { return &[] };
         &self.entries[self.start[bin] as usize..self.start[bin + 1] as usize]
     }
+
+    /// The splats to be drawn into `tile`, ascending.
+    pub(super) fn living(&self, tile: usize) -> impl Iterator<Item = usize> {
+        self.tile(tile).iter().map(|&index| index as usize).filter(|&index| self.alive[index])
+    }
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
-))]
+#[inline(always)]
 fn set_up_all(surfels: &[Surfel], view: &View, splats: &mut Vec<Splat>) {
     splats.clear();
     splats.extend(surfels.iter().map(|surfel| Splat::new(surfel, view)));

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
-use super::raster::{draw_attributes, draw_depth};
+use super::raster::{Tile, draw_attributes, draw_depth};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -73,11 +73,11 @@ impl Splatter {
     pub(crate) fn attributes(&mut self, surfels: &[Surfel], view: &View, attributes: &Attributes<'_>) -> &GBuffer {
         let Self { runs, used, depth, layers, .. } = self;
         layers.resize(view, depth.len(), attributes);
-        let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).enumerate();
-        tiles.for_each_init(TileSums::default, |sums, (tile, (mut layers, depth))| {
+        let layers_by_tile = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).enumerate();
+        layers_by_tile.for_each_init(TileSums::default, |sums, (index, (mut layers, depth))| {
             sums.clear(attributes);
             for run in &runs[..*used] {
-                draw_attributes(run, surfels, tile, origin(tile, view), view, depth, attributes, sums);
+                draw_attributes(run, surfels, tile(index, view), view, depth, attributes, sums);
             }
             sums.normalize(attributes, &mut layers);
         });
@@ -92,17 +92,16 @@ fn clear(depth: &mut Vec<f32>, view: &View) {
     depth.par_chunks_mut(TILE_AREA).for_each(|tile| tile.fill(f32::INFINITY));
 }
 
-/// Upper left pixel of `tile`.
-fn origin(tile: usize, view: &View) -> [usize; 2] {
+fn tile(index: usize, view: &View) -> Tile {
     let columns = tile_columns(view.width as usize);
-    [tile % columns * TILE, tile / columns * TILE]
+    Tile { index, origin: [index % columns * TILE, index / columns * TILE] }
 }
 
 /// Draws the depth of all living splats of `runs`, tile by tile.
 fn draw_depth_map(runs: &[Run], view: &View, depth: &mut [f32]) {
-    depth.par_chunks_mut(TILE_AREA).enumerate().for_each(|(tile, depth)| {
+    depth.par_chunks_mut(TILE_AREA).enumerate().for_each(|(index, depth)| {
         for run in runs {
-            draw_depth(run, tile, origin(tile, view), view, depth);
+            draw_depth(run, tile(index, view), view, depth);
         }
     });
 }

@@ -1,4 +1,6 @@
-//! Drawing splats into one tile.
+//! Drawing splats into one tile, a SIMD vector of pixels at a time.
+
+use pulp::Simd;
 
 use super::attributes::{Attributes, CHANNELS, TileSums};
 use super::bins::Run;
@@ -6,44 +8,46 @@ use super::setup::{DOT_RADIUS_PX, Splat};
 use super::{TILE, TILE_AREA};
 use crate::camera::View;
 use crate::fit::Surfel;
+use crate::simd::F32s;
 
-/// Pixels drawn at a time. Most splats are a few pixels wide: wider groups would mostly compute what lies beside them.
-const GROUP: usize = 8;
-
-/// Draws the depth, pushed back by ε, of the living splats of `run` that touch `tile` (its upper left pixel `origin`).
-pub(super) fn draw_depth(run: &Run, tile: usize, origin: [usize; 2], view: &View, depth: &mut [f32]) {
-    if run.tile(tile).is_empty() {
-        return;
-    }
-    draw_depth_entries(&run.splats, &run.alive, run.tile(tile), origin, view.perspective, depth);
+/// A tile of the screen.
+#[derive(Clone, Copy)]
+pub(super) struct Tile {
+    pub(super) index: usize,
+    /// Its upper left pixel.
+    pub(super) origin: [usize; 2],
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
-))]
-fn draw_depth_entries(
-    splats: &[Splat],
-    alive: &[bool],
-    entries: &[u32],
-    origin: [usize; 2],
-    perspective: bool,
-    depth: &mut [f32],
-) {
-    for &entry in entries {
-        if !alive[entry as usize] {
-            continue;
-        }
-        let splat = &splats[entry as usize];
-        for_each_group(splat, origin, |at, dx, dy| {
-            let Fragments { squared, depth: fragment } = fragments(splat, dx, dy, perspective);
-            let out: &mut [f32; GROUP] = (&mut depth[at..at + GROUP]).try_into().expect("a group");
-            for i in 0..GROUP {
-                let pushed = fragment[i] + splat.epsilon;
-                let nearer = (squared[i] <= 1.0) & (pushed < out[i]);
-                out[i] = if nearer { pushed } else { out[i] };
+/// Offsets of the pixels of a vector from its first one.
+const STEPS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
+
+/// Draws the depth, pushed back by ε, of the living splats of `run` that touch `tile`.
+pub(super) fn draw_depth(run: &Run, tile: Tile, view: &View, depth: &mut [f32]) {
+    if !run.tile(tile.index).is_empty() {
+        draw_depth_entries(run, tile, view, depth);
+    }
+}
+
+#[pulp::with_simd(draw_depth_entries = pulp::Arch::new())]
+#[inline(always)]
+fn draw_depth_entries_with<'a, S: Simd>(simd: S, run: &'a Run, tile: Tile, view: &'a View, depth: &'a mut [f32]) {
+    let one = F32s::splat(simd, 1.0);
+    for splat in run.living(tile.index).map(|index| &run.splats[index]) {
+        let brush = Brush::new(simd, splat, view);
+        let epsilon = F32s::splat(simd, splat.epsilon);
+        for Row { y, x, end, dx, dy } in rows(splat, tile, S::F32_LANES) {
+            let row = &mut depth[y * TILE..][..TILE];
+            let brush = brush.row(dy);
+            let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &STEPS, 0);
+            for vector in x..end {
+                let fragment = brush.fragment(dx);
+                let pushed = fragment.depth + epsilon;
+                let before = F32s::load(simd, row, vector);
+                let nearer = fragment.squared.at_most(one).and(pushed.less(before));
+                nearer.select(pushed, before).store(row, vector);
+                dx += F32s::splat(simd, S::F32_LANES as f32);
             }
-        });
+        }
     }
 }
 
@@ -51,139 +55,191 @@ fn draw_depth_entries(
 pub(super) fn draw_attributes(
     run: &Run,
     surfels: &[Surfel],
-    tile: usize,
-    origin: [usize; 2],
+    tile: Tile,
     view: &View,
     depth: &[f32],
     attributes: &Attributes<'_>,
     sums: &mut TileSums,
 ) {
-    if run.tile(tile).is_empty() {
-        return;
+    if !run.tile(tile.index).is_empty() {
+        draw_attribute_entries(run, surfels, tile, view, depth, attributes, sums);
     }
-    let surfels = &surfels[run.first..run.first + run.splats.len()];
-    draw_attribute_entries(run, surfels, run.tile(tile), origin, view.perspective, depth, attributes, sums);
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
-))]
-fn draw_attribute_entries(
-    run: &Run,
-    surfels: &[Surfel],
-    entries: &[u32],
-    origin: [usize; 2],
-    perspective: bool,
-    depth: &[f32],
-    attributes: &Attributes<'_>,
-    sums: &mut TileSums,
+#[pulp::with_simd(draw_attribute_entries = pulp::Arch::new())]
+#[inline(always)]
+fn draw_attribute_entries_with<'a, S: Simd>(
+    simd: S,
+    run: &'a Run,
+    surfels: &'a [Surfel],
+    tile: Tile,
+    view: &'a View,
+    depth: &'a [f32],
+    attributes: &'a Attributes<'a>,
+    sums: &'a mut TileSums,
 ) {
+    let one = F32s::splat(simd, 1.0);
     let mut values = [0f32; CHANNELS];
-    for &entry in entries {
-        if !run.alive[entry as usize] {
-            continue;
-        }
-        let splat = &run.splats[entry as usize];
-        let surfel = &surfels[entry as usize];
+    for index in run.living(tile.index) {
+        let splat = &run.splats[index];
+        let surfel = &surfels[run.first + index];
         let channels = attributes.values(surfel, &mut values);
-        for_each_group(splat, origin, |at, dx, dy| {
-            let Fragments { squared, depth: fragment } = fragments(splat, dx, dy, perspective);
-            let limit: &[f32; GROUP] = (&depth[at..at + GROUP]).try_into().expect("a group");
-            let mut weight = [0f32; GROUP];
-            let mut any = false;
-            for i in 0..GROUP {
-                let visible = (squared[i] <= 1.0) & (fragment[i] <= limit[i]);
-                weight[i] = if visible { kernel(squared[i]) } else { 0.0 };
-                any |= visible;
+        let brush = Brush::new(simd, splat, view);
+        for Row { y, x, end, dx, dy } in rows(splat, tile, S::F32_LANES) {
+            let row = y * TILE..(y + 1) * TILE;
+            let brush = brush.row(dy);
+            let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &STEPS, 0);
+            for vector in x..end {
+                let fragment = brush.fragment(dx);
+                dx += F32s::splat(simd, S::F32_LANES as f32);
+                let limit = F32s::load(simd, &depth[row.clone()], vector);
+                let visible = fragment.squared.at_most(one).and(fragment.depth.at_most(limit));
+                if !visible.any() {
+                    continue;
+                }
+                let weight = visible.keep(kernel(simd, fragment.squared));
+                add(simd, &mut sums.weight[row.clone()], vector, weight);
+                add(simd, &mut sums.depth[row.clone()], vector, weight * fragment.depth);
+                for (channel, &value) in sums.channels.chunks_exact_mut(TILE_AREA).zip(&values[..channels]) {
+                    add(simd, &mut channel[row.clone()], vector, weight * F32s::splat(simd, value));
+                }
+                let heaviest = &mut sums.heaviest[row.clone()];
+                let before = F32s::load(simd, heaviest, vector);
+                let heavier = before.less(weight);
+                heavier.select(weight, before).store(heaviest, vector);
+                // Indices ride along as the bits of floats.
+                let point = &mut sums.point[row.clone()];
+                let source = F32s::splat(simd, f32::from_bits(surfel.source));
+                heavier.select(source, F32s::load(simd, point, vector)).store(point, vector);
             }
-            if !any {
-                return;
-            }
-            add(&mut sums.weight, at, &weight, 1.0);
-            let depth_sum: &mut [f32; GROUP] = (&mut sums.depth[at..at + GROUP]).try_into().expect("a group");
-            for i in 0..GROUP {
-                depth_sum[i] += weight[i] * fragment[i];
-            }
-            for (channel, &value) in sums.channels.chunks_exact_mut(TILE_AREA).zip(&values[..channels]) {
-                add(channel, at, &weight, value);
-            }
-            let heaviest: &mut [f32; GROUP] = (&mut sums.heaviest[at..at + GROUP]).try_into().expect("a group");
-            let point: &mut [u32; GROUP] = (&mut sums.point[at..at + GROUP]).try_into().expect("a group");
-            for i in 0..GROUP {
-                let heavier = weight[i] > heaviest[i];
-                heaviest[i] = if heavier { weight[i] } else { heaviest[i] };
-                point[i] = if heavier { surfel.source } else { point[i] };
-            }
-        });
+        }
     }
 }
 
 #[inline(always)]
-fn add(sum: &mut [f32], at: usize, weight: &[f32; GROUP], value: f32) {
-    let sum: &mut [f32; GROUP] = (&mut sum[at..at + GROUP]).try_into().expect("a group");
-    for i in 0..GROUP {
-        sum[i] += weight[i] * value;
-    }
+fn add<S: Simd>(simd: S, sums: &mut [f32], vector: usize, value: F32s<S>) {
+    (F32s::load(simd, sums, vector) + value).store(sums, vector);
 }
 
 /// The weight of a fragment at a squared distance 0..=1 from the centre, in radii: exp(-2·d²) but for a few percent,
 /// without the exponential.
 #[inline(always)]
-fn kernel(squared: f32) -> f32 {
-    let w = 1.0 - 0.25 * squared;
+fn kernel<S: Simd>(simd: S, squared: F32s<S>) -> F32s<S> {
+    let w = F32s::splat(simd, 1.0) - F32s::splat(simd, 0.25) * squared;
     let w = w * w;
     let w = w * w;
     w * w
 }
 
-/// Calls `draw` with each group of pixels of the tile that the splat may cover: where it lies in the tile, and the offsets
-/// of its first pixel's centre from the splat's.
+/// One row of the pixels that a splat may cover in a tile.
+struct Row {
+    /// Row in the tile.
+    y: usize,
+    /// First vector of pixels in the row, and the one after the last.
+    x: usize,
+    end: usize,
+    /// Offset of the centre of the first vector's first pixel from the splat's.
+    dx: f32,
+    dy: f32,
+}
+
 #[inline(always)]
-fn for_each_group(splat: &Splat, [x_tile, y_tile]: [usize; 2], mut draw: impl FnMut(usize, f32, f32)) {
+fn rows(splat: &Splat, tile: Tile, width: usize) -> impl Iterator<Item = Row> + use<> {
+    let [x_tile, y_tile] = tile.origin;
     let clip = |[first, last]: [u16; 2], tile: usize| {
-        let first = (first as usize).max(tile) - tile;
-        let last = (last as usize).min(tile + TILE - 1) - tile;
-        (first, last)
+        [(first as usize).max(tile) - tile, (last as usize).min(tile + TILE - 1) - tile]
     };
-    let (x0, x1) = clip(splat.x, x_tile);
-    let (y0, y1) = clip(splat.y, y_tile);
-    for y in y0..=y1 {
-        let dy = (y_tile + y) as f32 + 0.5 - splat.center_px[1];
-        for x in (x0 / GROUP * GROUP..=x1).step_by(GROUP) {
-            let dx = (x_tile + x) as f32 + 0.5 - splat.center_px[0];
-            draw(y * TILE + x, dx, dy);
+    let [x0, x1] = clip(splat.x, x_tile);
+    let [y0, y1] = clip(splat.y, y_tile);
+    let [x, end] = [x0 / width, x1 / width + 1];
+    let [cx, cy] = splat.center_px;
+    let dx = (x_tile + x * width) as f32 + 0.5 - cx;
+    (y0..=y1).map(move |y| Row { y, x, end, dx, dy: (y_tile + y) as f32 + 0.5 - cy })
+}
+
+/// A splat's gradients in vectors.
+#[derive(Clone, Copy)]
+struct Brush<S: Simd> {
+    simd: S,
+    perspective: bool,
+    /// Depth at the centre, furthest from it to either side.
+    low: F32s<S>,
+    high: F32s<S>,
+    /// Inverse depth (perspective) or depth in the current row: at the centre's column, and per column.
+    plane: Linear<S>,
+    u: Linear<S>,
+    v: Linear<S>,
+    /// Squared distance in rows from the centre.
+    dy_squared: F32s<S>,
+    splat: Splat,
+}
+
+#[derive(Clone, Copy)]
+struct Linear<S: Simd> {
+    start: F32s<S>,
+    per_x: F32s<S>,
+}
+
+impl<S: Simd> Linear<S> {
+    #[inline(always)]
+    fn at(&self, dx: F32s<S>) -> F32s<S> {
+        self.start + self.per_x * dx
+    }
+}
+
+/// A vector of pixels of a splat.
+struct Fragment<S: Simd> {
+    /// Squared distance from the centre, in radii; the splat covers up to 1.
+    squared: F32s<S>,
+    /// Depth along the viewing axis.
+    depth: F32s<S>,
+}
+
+impl<S: Simd> Brush<S> {
+    #[inline(always)]
+    fn new(simd: S, splat: &Splat, view: &View) -> Self {
+        let splat_of = |value: f32| F32s::splat(simd, value);
+        let linear = |gradient: [f32; 2]| Linear { start: splat_of(0.0), per_x: splat_of(gradient[0]) };
+        Self {
+            simd,
+            perspective: view.perspective,
+            low: splat_of(splat.depth - splat.depth_reach),
+            high: splat_of(splat.depth + splat.depth_reach),
+            plane: linear(splat.plane),
+            u: linear(splat.u),
+            v: linear(splat.v),
+            dy_squared: splat_of(0.0),
+            splat: *splat,
         }
     }
-}
 
-/// A group of pixels of a splat.
-struct Fragments {
-    /// Squared distance from the centre, in radii; the splat covers up to 1.
-    squared: [f32; GROUP],
-    /// Depth along the viewing axis.
-    depth: [f32; GROUP],
-}
-
-#[inline(always)]
-fn fragments(splat: &Splat, dx: f32, dy: f32, perspective: bool) -> Fragments {
-    let mut out = Fragments { squared: [0.0; GROUP], depth: [0.0; GROUP] };
-    let Splat { depth, depth_reach, plane, u, v, .. } = *splat;
-    let center = if perspective { 1.0 / depth } else { depth };
-    for i in 0..GROUP {
-        let dx = dx + i as f32;
-        let plane = center + (plane[0] * dx + plane[1] * dy);
-        let hit = if perspective { 1.0 / plane } else { plane };
-        let scale = if perspective { hit } else { 1.0 };
-        let [u, v] = [(u[0] * dx + u[1] * dy) * scale, (v[0] * dx + v[1] * dy) * scale];
-        let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
-        let disc = u * u + v * v;
-        out.squared[i] = if disc < dot { disc } else { dot };
-        // The dot reaches beyond the disc, where its plane is of no use.
-        let low = depth - depth_reach;
-        let high = depth + depth_reach;
-        let hit = if hit > low { hit } else { low };
-        out.depth[i] = if hit < high { hit } else { high };
+    /// The brush for the row `dy` below the centre.
+    #[inline(always)]
+    fn row(mut self, dy: f32) -> Self {
+        let Splat { depth, plane, u, v, .. } = self.splat;
+        let center = if self.perspective { 1.0 / depth } else { depth };
+        self.plane.start = F32s::splat(self.simd, center + plane[1] * dy);
+        self.u.start = F32s::splat(self.simd, u[1] * dy);
+        self.v.start = F32s::splat(self.simd, v[1] * dy);
+        self.dy_squared = F32s::splat(self.simd, dy * dy);
+        self
     }
-    out
+
+    /// The pixels `dx` right of the centre.
+    #[inline(always)]
+    fn fragment(&self, dx: F32s<S>) -> Fragment<S> {
+        let simd = self.simd;
+        let plane = self.plane.at(dx);
+        let [mut u, mut v] = [self.u.at(dx), self.v.at(dx)];
+        let mut hit = plane;
+        if self.perspective {
+            hit = F32s::splat(simd, 1.0) / plane;
+            u = u * hit;
+            v = v * hit;
+        }
+        let per_dot = F32s::splat(simd, 1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
+        let dot = (dx * dx + self.dy_squared) * per_dot;
+        // The dot reaches beyond the disc, where its plane is of no use.
+        Fragment { squared: (u * u + v * v).min(dot), depth: hit.max(self.low).min(self.high) }
+    }
 }

@@ -1,15 +1,15 @@
 //! The screen-grid search on the CPU: sixteen points at a time.
 
-use std::ops::Range;
-
+use pulp::Simd;
 use rayon::prelude::*;
 
 use super::window::Window;
 use crate::camera::View;
-use crate::project::{ScreenPoint, ScreenPoints};
+use crate::project::ScreenPoints;
 use crate::search::{
     EarlyEnd, LANES, Lanes, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts, SearchRules,
 };
+use crate::simd::F32s;
 
 /// Blocks per task: enough to hide its start, few enough to share out evenly.
 const TASK_BLOCKS: usize = 64;
@@ -17,6 +17,10 @@ const TASK_BLOCKS: usize = 64;
 const FIRST_REACH: f32 = 1.3;
 /// A radius that has to grow grows at least by this factor.
 const LEAST_GROWTH: f32 = 1.3;
+/// Candidates counted at a time, each into a sum of its own: one sum would wait for itself.
+const GROUP: usize = 4;
+/// A threshold with no more than this many candidates too many is near enough: the largest distances below it are listed.
+const SURPLUS: usize = 3;
 /// Threshold moves after which the k-th smallest distance is given up to the interval's upper end. Every other move
 /// halves the interval of floats, so that this many always suffice.
 const MOST_MOVES: usize = 80;
@@ -52,7 +56,7 @@ struct Task<'a> {
 #[derive(Default)]
 struct Scratch {
     /// The current window's screen points.
-    runs: Vec<Range<usize>>,
+    candidates: Vec<[f32; 3]>,
     /// Squared distance of each candidate to each of the sixteen points.
     squared: Vec<Lanes>,
     /// Squared distances of one lane, sorted.
@@ -71,20 +75,25 @@ struct Block {
     pending: [bool; LANES],
 }
 
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt",
-))]
-fn search_blocks(task: &Task, queries: &[u32], out: &mut [NeighborhoodBlock], scratch: &mut Scratch) -> SearchCounts {
+#[pulp::with_simd(search_blocks = pulp::Arch::new())]
+#[inline(always)]
+fn search_blocks_with<'a, S: Simd>(
+    simd: S,
+    task: &'a Task<'a>,
+    queries: &'a [u32],
+    out: &'a mut [NeighborhoodBlock],
+    scratch: &'a mut Scratch,
+) -> SearchCounts {
     let mut counts = SearchCounts::default();
     for (queries, out) in queries.chunks(LANES).zip(out) {
-        search_block(task, queries, out, scratch, &mut counts);
+        search_block(simd, task, queries, out, scratch, &mut counts);
     }
     counts
 }
 
 #[inline(always)]
-fn search_block(
+fn search_block<S: Simd>(
+    simd: S,
     task: &Task,
     queries: &[u32],
     out: &mut NeighborhoodBlock,
@@ -95,13 +104,13 @@ fn search_block(
     let mut block = Block::new(task, queries);
     while block.pending.contains(&true) {
         let (window, group) = block.next_window(task);
-        scratch.runs.clear();
-        scratch.runs.extend(window.runs(&screen.cells).filter(|run| !run.is_empty()));
-        let everything = window.is_all(view);
-        squared_distances(&block.position, &screen.points, &scratch.runs, &mut scratch.squared);
-        let enough = scratch.squared.len() > rules.k as usize;
+        let everything = window.is_all();
+        let candidates = gather(screen, &window, &mut scratch.candidates);
+        let padded = candidates.next_multiple_of(GROUP);
+        squared_distances(simd, &block.position, &scratch.candidates[..padded], &mut scratch.squared);
+        let enough = candidates > rules.k as usize;
         if enough {
-            kth_smallest(&scratch.squared, rules.k, &group, &mut block.threshold);
+            kth_smallest(simd, &scratch.squared, rules.k, &group, &mut block.threshold);
         }
         let inside = block.spheres_inside(&window, view);
         let mut done = [false; LANES];
@@ -159,7 +168,7 @@ fn search_block(
             };
         }
         if done.contains(&true) {
-            sum_moments(&block, &screen.points, scratch, &done, out);
+            sum_moments(simd, &block, scratch, &done, out);
             for lane in 0..LANES {
                 block.pending[lane] &= !done[lane];
             }
@@ -209,14 +218,14 @@ impl Block {
             union = union.union(window);
             first = first.or(Some((lane, window)));
         }
-        let union = union.to_strips(&screen.cells, view);
+        let union = union.grown(&screen.cells, view);
         // Points far apart share a block where the screen is sparse; what lies between them concerns none of them.
         if let Some((lane, window)) = first
             && union.candidates(&screen.cells) > 2 * MAX_CANDIDATES
         {
             let mut group = [false; LANES];
             group[lane] = true;
-            return (window.to_strips(&screen.cells, view), group);
+            return (window.grown(&screen.cells, view), group);
         }
         (union, self.pending)
     }
@@ -233,23 +242,44 @@ impl Block {
     }
 }
 
+/// Lists the screen points in `window` at the front of `candidates` and returns their number; a group of points infinitely
+/// far follows.
+#[inline(always)]
+fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>) -> usize {
+    let most = window.candidates(&screen.cells);
+    if candidates.len() < most + GROUP {
+        candidates.resize(most + GROUP, [0.0; 3]);
+    }
+    let mut len = 0;
+    for run in window.runs(&screen.cells) {
+        for point in &screen.points[run] {
+            // Written first and counted after: whether a point lies within the depths is anybody's guess.
+            candidates[len] = point.position_view;
+            let depth = point.position_view[2];
+            len += usize::from((window.near <= depth) & (depth <= window.far));
+        }
+    }
+    candidates[len..len + GROUP].fill([f32::INFINITY; 3]);
+    len
+}
+
+/// Vectors that sixteen lanes take.
+const fn vectors<S: Simd>() -> usize {
+    LANES / S::F32_LANES
+}
+
 /// Squared distances from each candidate to each of the sixteen points.
 #[inline(always)]
-fn squared_distances(position: &[Lanes; 3], points: &[ScreenPoint], runs: &[Range<usize>], squared: &mut Vec<Lanes>) {
-    let len = runs.iter().map(Range::len).sum();
+fn squared_distances<S: Simd>(simd: S, position: &[Lanes; 3], candidates: &[[f32; 3]], squared: &mut Vec<Lanes>) {
     // Every entry is overwritten below.
-    squared.resize(len, Lanes::default());
-    let [x, y, z] = *position;
-    let mut rest = squared.as_mut_slice();
-    for run in runs {
-        let (out, after) = rest.split_at_mut(run.len());
-        rest = after;
-        for (out, point) in out.iter_mut().zip(&points[run.clone()]) {
-            let [qx, qy, qz] = point.position_view;
-            for lane in 0..LANES {
-                let [dx, dy, dz] = [qx - x.0[lane], qy - y.0[lane], qz - z.0[lane]];
-                out.0[lane] = dx * dx + dy * dy + dz * dz;
-            }
+    squared.resize(candidates.len(), Lanes::default());
+    for vector in 0..vectors::<S>() {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| F32s::load(simd, &position[axis].0, vector));
+        for (out, &[qx, qy, qz]) in squared.iter_mut().zip(candidates) {
+            let dx = F32s::splat(simd, qx) - x;
+            let dy = F32s::splat(simd, qy) - y;
+            let dz = F32s::splat(simd, qz) - z;
+            (dx * dx + dy * dy + dz * dz).store(&mut out.0, vector);
         }
     }
 }
@@ -258,31 +288,33 @@ fn squared_distances(position: &[Lanes; 3], points: &[ScreenPoint], runs: &[Rang
 ///
 /// `threshold` holds first guesses; there are more than `k` candidates.
 #[inline(always)]
-fn kth_smallest(squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
+fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
     // The point itself is among the candidates, at distance 0.
-    let target = k + 1;
+    let target = (k + 1) as f32;
     let mut low = [0f32; LANES];
     let mut high = [f32::INFINITY; LANES];
-    let mut low_count = [1u32; LANES];
-    let mut high_count = [squared.len() as u32; LANES];
+    let mut low_count = [1f32; LANES];
+    let mut high_count = [f32::INFINITY; LANES];
     let mut at = *threshold;
     let mut open = *group;
+    let mut surplus = [0; LANES];
     for step in 0..MOST_MOVES {
-        let count = count_below(squared, &at);
+        let count = count_below(simd, squared, &at);
         let mut any_open = false;
         for lane in 0..LANES {
             if !open[lane] {
                 continue;
             }
-            let [t, n] = [at.0[lane], count[lane] as f32];
-            if count[lane] == target {
+            let [t, n] = [at.0[lane], count.0[lane]];
+            if (n >= target) & (n <= target + SURPLUS as f32) {
                 open[lane] = false;
+                surplus[lane] = (n - target) as usize;
                 continue;
             }
-            if count[lane] < target {
-                (low[lane], low_count[lane]) = (t, count[lane]);
+            if n < target {
+                (low[lane], low_count[lane]) = (t, n);
             } else {
-                (high[lane], high_count[lane]) = (t, count[lane]);
+                (high[lane], high_count[lane]) = (t, n);
             }
             let [below, above] = [low[lane], high[lane]];
             let [below_bits, above_bits] = [below.to_bits(), above.to_bits()];
@@ -295,8 +327,8 @@ fn kth_smallest(squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mu
             any_open = true;
             // On a surface the count grows with the area, so with the squared distance; in odd steps it need not.
             let next = if above == f32::INFINITY {
-                t * (target as f32 / n * 1.1).clamp(1.2, 4.0)
-            } else if step < 6 || step % 2 == 0 {
+                t * (target / n * 1.1).clamp(1.2, 4.0)
+            } else if step < 4 || step % 2 == 0 {
                 let share =
                     (target as f32 - 0.5 - low_count[lane] as f32) / (high_count[lane] as f32 - low_count[lane] as f32);
                 below + (above - below) * share
@@ -310,29 +342,52 @@ fn kth_smallest(squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mu
             break;
         }
     }
-    // The largest distance not above the threshold is the k-th smallest itself.
-    let mut largest = [0f32; LANES];
-    for candidate in squared {
-        for lane in 0..LANES {
-            let d = candidate.0[lane];
-            largest[lane] = if (d <= at.0[lane]) & (d > largest[lane]) { d } else { largest[lane] };
-        }
-    }
-    for lane in 0..LANES {
-        threshold.0[lane] = if group[lane] { largest[lane] } else { threshold.0[lane] };
+    let largest = largest_below(simd, squared, &at);
+    for lane in (0..LANES).filter(|&lane| group[lane]) {
+        threshold.0[lane] = largest[surplus[lane]].0[lane];
     }
 }
 
 /// How many candidates lie at or below each lane's threshold.
 #[inline(always)]
-fn count_below(squared: &[Lanes], threshold: &Lanes) -> [u32; LANES] {
-    let mut count = [0u32; LANES];
-    for candidate in squared {
-        for lane in 0..LANES {
-            count[lane] += u32::from(candidate.0[lane] <= threshold.0[lane]);
+fn count_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> Lanes {
+    let mut count = Lanes::default();
+    let one = F32s::splat(simd, 1.0);
+    for vector in 0..vectors::<S>() {
+        let threshold = F32s::load(simd, &threshold.0, vector);
+        let mut sums = [F32s::splat(simd, 0.0); GROUP];
+        for group in squared.chunks_exact(GROUP) {
+            for (sum, candidate) in sums.iter_mut().zip(group) {
+                *sum += F32s::load(simd, &candidate.0, vector).at_most(threshold).keep(one);
+            }
         }
+        let [a, b, c, d] = sums;
+        ((a + b) + (c + d)).store(&mut count.0, vector);
     }
     count
+}
+
+/// The largest squared distances at or below each lane's threshold, descending.
+#[inline(always)]
+fn largest_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lanes; SURPLUS + 1] {
+    let mut largest = [Lanes::default(); SURPLUS + 1];
+    for vector in 0..vectors::<S>() {
+        let threshold = F32s::load(simd, &threshold.0, vector);
+        let mut list = [F32s::splat(simd, 0.0); SURPLUS + 1];
+        for candidate in squared {
+            let d = F32s::load(simd, &candidate.0, vector);
+            let mut sinking = d.at_most(threshold).keep(d);
+            for entry in &mut list {
+                let above = entry.max(sinking);
+                sinking = entry.min(sinking);
+                *entry = above;
+            }
+        }
+        for (largest, entry) in largest.iter_mut().zip(list) {
+            entry.store(&mut largest.0, vector);
+        }
+    }
+    largest
 }
 
 /// Squared distances of `lane` up to distance `known`, the point itself left out, ascending.
@@ -344,46 +399,39 @@ fn sort_lane(squared: &[Lanes], lane: usize, known: f32, sorted: &mut Vec<f32>) 
 
 /// Sums the neighbours below the threshold of each lane in `done`.
 #[inline(always)]
-fn sum_moments(
-    block: &Block,
-    points: &[ScreenPoint],
-    scratch: &Scratch,
-    done: &[bool; LANES],
-    out: &mut NeighborhoodBlock,
-) {
-    let [x, y, z] = block.position;
-    let mut sum = NeighborhoodBlock::default();
-    let mut squared = scratch.squared.iter();
-    for run in &scratch.runs {
-        for (point, d) in points[run.clone()].iter().zip(squared.by_ref()) {
-            let [qx, qy, qz] = point.position_view;
-            for lane in 0..LANES {
-                // The point itself adds nothing to the sums.
-                let within = d.0[lane] <= block.threshold.0[lane];
-                let dx = if within { qx - x.0[lane] } else { 0.0 };
-                let dy = if within { qy - y.0[lane] } else { 0.0 };
-                let dz = if within { qz - z.0[lane] } else { 0.0 };
-                sum.count.0[lane] += if within { 1.0 } else { 0.0 };
-                sum.offset[0].0[lane] += dx;
-                sum.offset[1].0[lane] += dy;
-                sum.offset[2].0[lane] += dz;
-                sum.second[0].0[lane] += dx * dx;
-                sum.second[1].0[lane] += dx * dy;
-                sum.second[2].0[lane] += dx * dz;
-                sum.second[3].0[lane] += dy * dy;
-                sum.second[4].0[lane] += dy * dz;
-                sum.second[5].0[lane] += dz * dz;
+fn sum_moments<S: Simd>(simd: S, block: &Block, scratch: &Scratch, done: &[bool; LANES], out: &mut NeighborhoodBlock) {
+    let one = F32s::splat(simd, 1.0);
+    for vector in 0..vectors::<S>() {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| F32s::load(simd, &block.position[axis].0, vector));
+        let threshold = F32s::load(simd, &block.threshold.0, vector);
+        // The point itself adds nothing but to the count.
+        let mut count = F32s::splat(simd, -1.0);
+        let mut offset = [F32s::splat(simd, 0.0); 3];
+        let mut second = [F32s::splat(simd, 0.0); 6];
+        for (squared, &[qx, qy, qz]) in scratch.squared.iter().zip(&scratch.candidates) {
+            let within = F32s::load(simd, &squared.0, vector).at_most(threshold);
+            let dx = within.keep(F32s::splat(simd, qx) - x);
+            let dy = within.keep(F32s::splat(simd, qy) - y);
+            let dz = within.keep(F32s::splat(simd, qz) - z);
+            count += within.keep(one);
+            offset[0] += dx;
+            offset[1] += dy;
+            offset[2] += dz;
+            second[0] += dx * dx;
+            second[1] += dx * dy;
+            second[2] += dx * dz;
+            second[3] += dy * dy;
+            second[4] += dy * dz;
+            second[5] += dz * dz;
+        }
+        let sums = [count, threshold.sqrt()].into_iter().chain(offset).chain(second);
+        let outs = [&mut out.count, &mut out.k_radius].into_iter().chain(&mut out.offset).chain(&mut out.second);
+        for (out, sum) in outs.zip(sums) {
+            let mut lanes = Lanes::default();
+            sum.store(&mut lanes.0, vector);
+            for lane in vector * S::F32_LANES..(vector + 1) * S::F32_LANES {
+                out.0[lane] = if done[lane] { lanes.0[lane] } else { out.0[lane] };
             }
-        }
-    }
-    for lane in (0..LANES).filter(|&lane| done[lane]) {
-        out.count.0[lane] = sum.count.0[lane] - 1.0;
-        out.k_radius.0[lane] = block.threshold.0[lane].sqrt();
-        for axis in 0..3 {
-            out.offset[axis].0[lane] = sum.offset[axis].0[lane];
-        }
-        for term in 0..6 {
-            out.second[term].0[lane] = sum.second[term].0[lane];
         }
     }
 }

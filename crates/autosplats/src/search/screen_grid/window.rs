@@ -1,4 +1,4 @@
-//! Windows: rectangles of the screen, and the screen points in them.
+//! Windows: rectangles of the screen with a range of depths, and the screen points in them.
 
 use std::ops::Range;
 
@@ -8,20 +8,23 @@ use crate::project::ScreenCells;
 /// Added to projected bounds in pixels, against the rounding of projected coordinates.
 const MARGIN_PX: f32 = 0.02;
 
-/// A rectangle of pixels, all four sides included; as floats, because bounds are compared sixteen at a time.
+/// A rectangle of pixels and a range of depths, all sides included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub(super) x0: f32,
     pub(super) x1: f32,
     pub(super) y0: f32,
     pub(super) y1: f32,
+    pub(super) near: f32,
+    pub(super) far: f32,
 }
 
 impl Window {
     /// Contains nothing; the neutral element of [`union`](Self::union).
-    pub(super) const EMPTY: Self = Self { x0: f32::MAX, x1: -1.0, y0: f32::MAX, y1: -1.0 };
+    pub(super) const EMPTY: Self =
+        Self { x0: f32::MAX, x1: -1.0, y0: f32::MAX, y1: -1.0, near: f32::INFINITY, far: f32::NEG_INFINITY };
 
-    /// The pixels that points within `radius` of `center` (view space) can project to.
+    /// Where points within `radius` of `center` (view space) can be.
     #[inline(always)]
     pub(super) fn of_sphere(center: [f32; 3], radius: f32, view: &View) -> Self {
         let [x, y, z] = center;
@@ -44,6 +47,8 @@ impl Window {
             x1: if bounded & (x1 < right) { x1 } else { right },
             y0: if bounded & (y0 > 0.0) { y0 } else { 0.0 },
             y1: if bounded & (y1 < bottom) { y1 } else { bottom },
+            near: z - radius,
+            far: z + radius,
         }
     }
 
@@ -53,27 +58,37 @@ impl Window {
             x1: self.x1.max(other.x1),
             y0: self.y0.min(other.y0),
             y1: self.y1.max(other.y1),
+            near: self.near.min(other.near),
+            far: self.far.max(other.far),
         }
     }
 
     #[inline(always)]
     pub(super) fn contains(&self, other: &Self) -> bool {
+        self.contains_pixels(other) & (self.near <= other.near) & (self.far >= other.far)
+    }
+
+    #[inline(always)]
+    fn contains_pixels(&self, other: &Self) -> bool {
         (self.x0 <= other.x0) & (self.x1 >= other.x1) & (self.y0 <= other.y0) & (self.y1 >= other.y1)
     }
 
-    /// Whether it is the whole picture.
-    pub(super) fn is_all(&self, view: &View) -> bool {
-        self.contains(&Self { x0: 0.0, x1: view.width as f32 - 1.0, y0: 0.0, y1: view.height as f32 - 1.0 })
+    /// The window grown to what is read anyway: whole strips, and all depths if it is the whole picture.
+    pub(super) fn grown(mut self, cells: &ScreenCells, view: &View) -> Self {
+        let [right, bottom] = [view.width as f32 - 1.0, view.height as f32 - 1.0];
+        let strip_px = cells.strip_px as f32;
+        self.y0 = (self.y0 / strip_px).floor() * strip_px;
+        self.y1 = ((self.y1 / strip_px).floor() * strip_px + strip_px - 1.0).min(bottom);
+        let picture = Self { x0: 0.0, x1: right, y0: 0.0, y1: bottom, ..self };
+        if self.contains_pixels(&picture) {
+            [self.near, self.far] = [f32::NEG_INFINITY, f32::INFINITY];
+        }
+        self
     }
 
-    /// The window with its upper and lower side moved outwards to strip borders: what is read anyway.
-    pub(super) fn to_strips(self, cells: &ScreenCells, view: &View) -> Self {
-        let strip_px = cells.strip_px as f32;
-        Self {
-            y0: (self.y0 / strip_px).floor() * strip_px,
-            y1: ((self.y1 / strip_px).floor() * strip_px + strip_px - 1.0).min(view.height as f32 - 1.0),
-            ..self
-        }
+    /// Whether it holds every screen point.
+    pub(super) fn is_all(&self) -> bool {
+        self.far == f32::INFINITY
     }
 
     /// The runs of screen points in the window, strip by strip.
@@ -82,7 +97,7 @@ impl Window {
         (y0 / cells.strip_px..=y1 / cells.strip_px).map(move |strip| cells.run(strip, x0, x1))
     }
 
-    /// Number of screen points in the window.
+    /// Number of screen points in the window's rectangle.
     pub(super) fn candidates(&self, cells: &ScreenCells) -> usize {
         self.runs(cells).map(|run| run.len()).sum()
     }
