@@ -1,2 +1,114 @@
-//! The project's own tasks.
-fn main() {}
+//! The project's own tasks. `cargo xtask test` is everything CI runs.
+
+mod layers;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+const USAGE: &str = "\
+usage: cargo xtask test    format, lints, build, tests, documentation and the rules between crates and stages";
+
+fn main() -> ExitCode {
+    let typed: Vec<String> = std::env::args().skip(1).collect();
+    let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["test"] => test(),
+        [] | ["help" | "-h" | "--help"] => {
+            println!("{USAGE}");
+            Ok(())
+        }
+        _ => Err(anyhow::anyhow!("there is no task '{}'\n{USAGE}", typed.join(" "))),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("\nerror: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Everything a change has to pass, cheapest first.
+fn test() -> Result<()> {
+    let start = Instant::now();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")?;
+    let step = |name: &str, check: &dyn Fn() -> Result<()>| {
+        println!("\n== {name}");
+        let start = Instant::now();
+        check().with_context(|| format!("step '{name}' failed"))?;
+        println!("== {name}: {:.1} s", start.elapsed().as_secs_f64());
+        Ok::<(), anyhow::Error>(())
+    };
+    step("test data", &|| find_data(root))?;
+    step("stages import in one direction", &|| layers::check(&root.join("crates/autosplats/src")))?;
+    step("autosplats-cloud never reaches wgpu", &|| check_dependencies(root))?;
+    step("format", &|| {
+        component("fmt", "rustfmt")?;
+        cargo(root, &["fmt", "--all", "--check"]).context("cargo fmt --all puts it right")
+    })?;
+    step("lints", &|| {
+        component("clippy", "clippy")?;
+        cargo(root, &["clippy", "--locked", "--workspace", "--all-targets", "--", "-D", "warnings"])
+    })?;
+    step("build", &|| cargo(root, &["test", "--locked", "--workspace", "--no-run"]))?;
+    step("tests", &|| cargo(root, &["test", "--locked", "--workspace"]))?;
+    step("documentation", &|| {
+        let mut command = cargo_command(root);
+        run(command.args(["doc", "--locked", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+    })?;
+    println!("\nall passed in {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// The real scans that some tests read lie beside the repository, as they may not be redistributed. CI has them.
+fn find_data(root: &Path) -> Result<()> {
+    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    if folder.is_dir() {
+        println!("{}", folder.display());
+        return Ok(());
+    }
+    let absent = format!("{} is absent; AUTOSPLATS_DATA can name another folder", folder.display());
+    ensure!(std::env::var_os("CI").is_none(), "{absent}");
+    println!("{absent}. Tests on real scans are left out.");
+    Ok(())
+}
+
+/// Reading points must stay possible without a graphics stack.
+fn check_dependencies(root: &Path) -> Result<()> {
+    let mut command = cargo_command(root);
+    command.args(["tree", "--locked", "-p", "autosplats-cloud", "-e", "normal,build", "--prefix", "none"]);
+    let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "cargo tree: {}", output.status);
+    let tree = String::from_utf8(output.stdout)?;
+    ensure!(tree.starts_with("autosplats-cloud "), "cargo tree shows something else: {tree}");
+    if let Some(line) = tree.lines().find(|line| line.starts_with("wgpu")) {
+        bail!("autosplats-cloud depends on {line}");
+    }
+    println!("{} packages", tree.lines().count());
+    Ok(())
+}
+
+/// Says how to get a part of the toolchain that is not installed.
+fn component(command: &str, component: &str) -> Result<()> {
+    let found = Command::new("cargo").args([command, "--version"]).output().is_ok_and(|output| output.status.success());
+    ensure!(found, "{component} is not installed; get it by: rustup component add {component}");
+    Ok(())
+}
+
+fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {
+    run(cargo_command(root).args(arguments))
+}
+
+fn cargo_command(root: &Path) -> Command {
+    let mut command = Command::new("cargo");
+    command.current_dir(root);
+    command
+}
+
+fn run(command: &mut Command) -> Result<()> {
+    let status = command.status().context("cannot start cargo")?;
+    ensure!(status.success(), "{:?}: {status}", command.get_args().collect::<Vec<_>>());
+    Ok(())
+}

@@ -1,2 +1,77 @@
-//! The `autosplats` command.
-fn main() {}
+//! The `autosplats` command: raw point clouds to lit surfaces.
+//!
+//! Thin: [`args`] is what was typed, each command turns that into one job and hands it to the library. Data goes to
+//! standard output, everything for people to standard error.
+
+mod args;
+mod convert;
+mod demo;
+mod device;
+mod exit;
+mod input;
+mod interrupt;
+mod output;
+mod progress;
+mod render;
+mod threads;
+mod values;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory as _, Parser as _};
+
+use crate::args::{Command, CommandLine};
+use crate::exit::{Exit, Failure, suggest};
+
+fn main() -> ExitCode {
+    interrupt::install();
+    let outcome = match CommandLine::try_parse() {
+        Ok(command_line) => run(command_line),
+        // --help and --version arrive as errors too.
+        Err(answer) if !answer.use_stderr() => output::print_line(answer.render().to_string().trim_end()),
+        Err(help) if help.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            eprint!("{}", help.render());
+            return ExitCode::from(Exit::Usage as u8);
+        }
+        Err(error) => Err(Failure::usage(one_line(&error))),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure { exit, message }) => {
+            eprintln!("error: {}", message.lines().map(str::trim).collect::<Vec<_>>().join(" "));
+            ExitCode::from(exit as u8)
+        }
+    }
+}
+
+fn run(command_line: CommandLine) -> Result<(), Failure> {
+    match command_line.command {
+        Some(Command::Render(args)) => render::run(*args),
+        Some(Command::Convert(args)) => convert::run(&args),
+        Some(Command::Demo(args)) => demo::run(&args),
+        None => Err(Failure::usage(without_command(&command_line.rest))),
+    }
+}
+
+/// What to say to inputs without a command, which is a viewer's place, and to a command that is none.
+fn without_command(typed: &[String]) -> String {
+    let first = typed.first().map_or("", String::as_str);
+    if first.starts_with("scene:") || first.contains('.') || Path::new(first).exists() {
+        let inputs = typed.join(" ");
+        return format!("this version has no viewer; for a picture: autosplats render {inputs} -o out.png");
+    }
+    let commands = CommandLine::command();
+    let names = commands.get_subcommands().map(clap::Command::get_name);
+    format!("there is no command '{first}'; {} (--help explains)", suggest(first, names))
+}
+
+/// What is wrong with the command line, without the page about its usage.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let paragraphs = text.split("\n\n").filter(|part| !part.starts_with("Usage:") && !part.starts_with("For more"));
+    let what = paragraphs.collect::<Vec<_>>().join(" ");
+    let words: Vec<&str> = what.trim_start_matches("error: ").split_whitespace().collect();
+    format!("{} (--help explains)", words.join(" "))
+}

@@ -56,6 +56,22 @@ pub enum Error {
         /// Size of the request in bytes.
         bytes: usize,
     },
+    /// No made-up scene has this name.
+    #[error("no scene is called {given:?}; there are:{known}")]
+    UnknownScene {
+        /// Name asked for.
+        given: String,
+        /// The names there are, a line each.
+        known: String,
+    },
+    /// A made-up scene cannot be had like this.
+    #[error("scene {given:?}: {why}")]
+    BadScene {
+        /// What was asked for.
+        given: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// [`Progress::cancelled`](crate::Progress::cancelled) asked to stop.
     #[error("cancelled")]
     Cancelled,

@@ -21,6 +21,7 @@ mod error;
 mod merge;
 mod progress;
 mod read;
+mod source;
 mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud};
@@ -29,4 +30,5 @@ pub use error::Error;
 pub use glam;
 pub use progress::Progress;
 pub use read::read;
+pub use source::scene::{Hit, Scene, View};
 pub use write::write_ply;

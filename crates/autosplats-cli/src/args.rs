@@ -1,0 +1,281 @@
+//! The command line as it is typed. What the flags mean together is decided in [`render::job`](crate::render).
+
+use std::path::PathBuf;
+
+use autosplats::{Background, ColorMode};
+use autosplats_cloud::glam::DVec3;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::exit::EXIT_CODES;
+use crate::values::{self, Ortho};
+
+/// Turns raw point clouds into lit surfaces: no normals, no radii, no preprocessing.
+#[derive(Debug, Parser)]
+#[command(
+    name = "autosplats",
+    version,
+    arg_required_else_help = true,
+    args_conflicts_with_subcommands = true,
+    override_usage = "autosplats <COMMAND>",
+    after_help = EXIT_CODES
+)]
+pub(crate) struct CommandLine {
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+    /// Files without a command: a viewer's place.
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    pub(crate) rest: Vec<String>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render points to PNG pictures and EXR layers
+    Render(Box<RenderArgs>),
+    /// Write any input, or several as one, as a binary PLY file
+    Convert(ConvertArgs),
+    /// Render every built-in scene and say where the pictures are
+    Demo(DemoArgs),
+}
+
+const INPUT_HELP: &str = "\
+A point cloud file (.ply .las .laz .pcd .xyz .txt …), or a generated scene as scene:NAME[:COUNT], such as \
+scene:statue or scene:herd:2M. Several inputs are shown together.";
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  autosplats render scan.laz -o scan.png
+  autosplats render scan.laz -o scan.png --view top --color height --legend
+  autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
+  autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
+  autosplats render scene:cathedral:10M -o cathedral.png --eye-dome 1 --json
+  autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
+
+#[derive(Args, Debug)]
+#[command(after_help = RENDER_EXAMPLES, after_long_help = format!("{RENDER_EXAMPLES}\n\n{EXIT_CODES}"))]
+pub(crate) struct RenderArgs {
+    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP)]
+    pub(crate) inputs: Vec<String>,
+    /// Picture to write: .png (8 bit) or .exr (32-bit float: R G B A Z N.X N.Y N.Z radius kradius curvature index).
+    /// Can be given several times; an existing file is replaced
+    #[arg(short, long = "out", value_name = "FILE", required = true)]
+    pub(crate) outputs: Vec<PathBuf>,
+    /// Width and height of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
+    pub(crate) size: [u32; 2],
+    #[command(flatten)]
+    pub(crate) camera: CameraArgs,
+    #[command(flatten)]
+    pub(crate) surface: SurfaceArgs,
+    #[command(flatten)]
+    pub(crate) look: LookArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+    /// Print counts, device, camera, outputs and milliseconds per stage as one JSON object on standard output
+    #[arg(long, help_heading = "Running")]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Camera and placement")]
+pub(crate) struct CameraArgs {
+    /// Direction to look from, at a distance that shows everything but far outliers [default: iso, or the sensor's
+    /// own view where the points are in a camera's frame]
+    #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
+    pub(crate) view: Option<Side>,
+    /// Position of the eye in world coordinates
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "camera")]
+    pub(crate) eye: Option<DVec3>,
+    /// Point in the middle of the picture [default: the middle of the cloud]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, requires = "eye")]
+    pub(crate) look_at: Option<DVec3>,
+    /// Direction that is upward in the picture [default: by --axes]
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, requires = "eye")]
+    pub(crate) up: Option<DVec3>,
+    /// Vertical field of view in degrees [default: 40]
+    #[arg(long, value_name = "DEGREES", value_parser = values::fov, allow_negative_numbers = true, conflicts_with_all = ["ortho", "camera"])]
+    pub(crate) fov: Option<f64>,
+    /// Orthographic picture, so many world units high; 'fit' shows everything
+    #[arg(long, value_name = "HEIGHT", value_parser = values::ortho, allow_negative_numbers = true, conflicts_with = "camera")]
+    pub(crate) ortho: Option<Ortho>,
+    /// Take the camera from a file that --save-camera wrote
+    #[arg(long, value_name = "FILE")]
+    pub(crate) camera: Option<PathBuf>,
+    /// Write the camera of this picture as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save_camera: Option<PathBuf>,
+    /// Which way is up in the input; 'auto' goes by the file and its shape
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) axes: AxesChoice,
+    /// Place an input by a text file with a row-major 4x4 (or 3x4) matrix from its own to world coordinates
+    #[arg(long = "pose", value_name = "INPUT=FILE")]
+    pub(crate) poses: Vec<String>,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Surface")]
+pub(crate) struct SurfaceArgs {
+    /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother
+    #[arg(short, value_name = "COUNT", default_value_t = 10, allow_negative_numbers = true)]
+    pub(crate) k: u32,
+    /// How the neighbours are found
+    #[arg(long, value_enum, default_value = "screen-grid")]
+    pub(crate) engine: Engine,
+    /// What renders; 'auto' takes the best there is
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) backend: Backend,
+    /// Expansions of its first search radius after which a point without a neighbour is dropped as an outlier, 0 to 8
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = 3,
+        allow_negative_numbers = true,
+        conflicts_with = "keep_outliers"
+    )]
+    pub(crate) e0: u32,
+    /// Keep points that have no neighbour
+    #[arg(long)]
+    pub(crate) keep_outliers: bool,
+    /// How much emptier the surroundings have to become for a group of points to end there, above 1
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value_t = 4.0,
+        allow_negative_numbers = true,
+        conflicts_with = "bridge_gaps"
+    )]
+    pub(crate) gap_factor: f32,
+    /// Look for all k neighbours across any gap
+    #[arg(long)]
+    pub(crate) bridge_gaps: bool,
+    /// Factor on the size of every splat, 0.01 to 100
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
+    pub(crate) splat_scale: f32,
+    /// Draw ellipses that follow the spread of the neighbours, instead of circles
+    #[arg(long)]
+    pub(crate) ellipses: bool,
+    /// Reconstruct hidden points too
+    #[arg(long)]
+    pub(crate) no_grid_culling: bool,
+    /// Let the splats of hidden points take part in the depth of the visible surface
+    #[arg(long)]
+    pub(crate) no_depth_refinement: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Look")]
+pub(crate) struct LookArgs {
+    /// auto, rgb, plain, height, intensity, classification, normal, curvature, radius, k-radius, depth, or the name
+    /// of a field of the file (field:NAME if it is called like one of these)
+    #[arg(long, value_name = "MODE", default_value = "auto", value_parser = values::color)]
+    pub(crate) color: ColorMode,
+    /// Values at the two ends of the colour map [default: 1st and 99th percentile of the picture]
+    #[arg(long, value_name = "A..B", value_parser = values::range, allow_hyphen_values = true)]
+    pub(crate) range: Option<[f32; 2]>,
+    /// Colours of scalar values [default: reds for radii, gray for intensity, viridis for the rest]
+    #[arg(long, value_enum)]
+    pub(crate) color_map: Option<Map>,
+    /// Draw the colour map and its range into the picture
+    #[arg(long)]
+    pub(crate) legend: bool,
+    /// Show colours as they are, without light
+    #[arg(long)]
+    pub(crate) no_lighting: bool,
+    /// Strength of eye-dome lighting, the darkening at depth steps, 0 to 10
+    #[arg(long, value_name = "STRENGTH", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub(crate) eye_dome: f32,
+    /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
+    #[arg(long, value_name = "COLOR", value_parser = values::background)]
+    pub(crate) background: Option<Background>,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Running")]
+pub(crate) struct RunArgs {
+    /// Threads to use; the result does not depend on it [default: one per core]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+    /// No progress and no summary on standard error, only errors
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+const CONVERT_EXAMPLES: &str = "\
+Examples:
+  autosplats convert scan.laz scan.ply
+  autosplats convert scene:herd:10M herd.ply
+  autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt";
+
+#[derive(Args, Debug)]
+#[command(after_help = CONVERT_EXAMPLES)]
+pub(crate) struct ConvertArgs {
+    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP)]
+    pub(crate) inputs: Vec<String>,
+    /// PLY file to write
+    #[arg(value_name = "OUT.ply")]
+    pub(crate) output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Place an input by a text file with a row-major 4x4 (or 3x4) matrix from its own to world coordinates
+    #[arg(long = "pose", value_name = "INPUT=FILE")]
+    pub(crate) poses: Vec<String>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct DemoArgs {
+    /// Folder for the pictures; made if it is not there
+    #[arg(short, long, value_name = "DIR", default_value = "autosplats-demo")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+/// Where to look from.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Side {
+    Iso,
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+/// Which way is up.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum AxesChoice {
+    Auto,
+    /// Surveys, robots
+    ZUp,
+    /// Models
+    YUp,
+    /// X right, y down, z forward, seen from the origin: depth cameras
+    Camera,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Engine {
+    /// Buckets of screen points, exact
+    ScreenGrid,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Backend {
+    Auto,
+    Cpu,
+    /// Not in this version
+    #[value(hide = true)]
+    Gpu,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Map {
+    Viridis,
+    Inferno,
+    Turbo,
+    Gray,
+    Reds,
+}

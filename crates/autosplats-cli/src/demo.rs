@@ -1,0 +1,49 @@
+//! `autosplats demo`: every built-in scene from its good side.
+
+use std::fs::create_dir_all;
+use std::time::Instant;
+
+use autosplats::{Renderer, Settings};
+use autosplats_cloud::Scene;
+
+use crate::args::DemoArgs;
+use crate::exit::{Exit, Failure};
+use crate::input::Inputs;
+use crate::output::{check_target, print_line, write_file, write_png};
+use crate::progress::Bar;
+use crate::render::{render_failure, scene_camera};
+use crate::threads::start_threads;
+
+/// Pixels of each picture, the paper's.
+const SIZE: [u32; 2] = [1760, 900];
+
+/// Renders each scene into the folder and prints where it is.
+pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
+    let DemoArgs { out, run } = args;
+    start_threads(run)?;
+    create_dir_all(out)
+        .map_err(|error| Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", out.display())))?;
+    let mut renderer = Renderer::new();
+    for (name, about) in Scene::names() {
+        let path = out.join(name).with_extension("png");
+        check_target(&path, [])?;
+        let input = format!("scene:{name}");
+        let inputs = Inputs::new(std::slice::from_ref(&input), &[])?;
+        let Some(scene) = inputs.only_scene() else { continue };
+
+        let cloud = inputs.read(run.quiet)?;
+        let started = Instant::now();
+        let bar = Bar::spinner(&format!("rendering {input}"), run.quiet);
+        let camera = scene_camera(scene);
+        let frame = renderer.render(&cloud, &camera, SIZE, &Settings::default()).map_err(render_failure)?;
+        drop(bar);
+        let seconds = started.elapsed().as_secs_f64();
+        write_file(&path, |writer| write_png(frame.image, false, writer))?;
+
+        print_line(&path.display().to_string())?;
+        if !run.quiet {
+            eprintln!("  {input}: {about}; {} points in {seconds:.2} s", cloud.len());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,80 @@
+//! How the program ends: one line on standard error and a code that says what kind of trouble it was.
+
+use std::fmt::Display;
+
+/// What kind of trouble ended the program. Each kind is an exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Exit {
+    /// The command line asks for something that does not exist or does not fit together.
+    Usage = 2,
+    /// An input is missing, unreadable, malformed, or shows nothing.
+    Input = 3,
+    /// An output cannot be written.
+    Output = 4,
+    /// The backend asked for is not there.
+    Device = 5,
+    /// The task does not fit into memory.
+    Memory = 6,
+    /// The user pressed Ctrl-C.
+    Interrupted = 130,
+}
+
+/// The codes as `--help` explains them.
+pub(crate) const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  2    bad usage: an option, a scene, a field or a camera that does not exist or does not fit
+  3    bad input: a file that is missing, unreadable, malformed, without points, or not in the picture
+  4    an output cannot be written
+  5    no usable device for the backend asked for
+  6    too large for this machine's memory
+  130  interrupted (Ctrl-C); no partial file is left";
+
+/// Why a command ended early.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    /// The kind of trouble.
+    pub(crate) exit: Exit,
+    /// What happened and what to do about it, in one line.
+    pub(crate) message: String,
+}
+
+impl Failure {
+    /// A failure of a kind, with its message.
+    pub(crate) fn new(exit: Exit, message: impl Display) -> Self {
+        Self { exit, message: message.to_string() }
+    }
+
+    /// Bad usage.
+    pub(crate) fn usage(message: impl Display) -> Self {
+        Self::new(Exit::Usage, message)
+    }
+
+    /// Ctrl-C.
+    pub(crate) fn interrupted() -> Self {
+        Self::new(Exit::Interrupted, "interrupted")
+    }
+}
+
+/// Names the nearest of `known` to what was typed, or else all of them.
+pub(crate) fn suggest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let distance = |name: &&&str| strsim::osa_distance(&name.to_lowercase(), &typed.to_lowercase());
+    match known.iter().min_by_key(distance) {
+        Some(name) if distance(&name) <= 1 + typed.len() / 4 => format!("did you mean '{name}'?"),
+        _ => format!("there are: {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::suggest;
+
+    #[test]
+    fn suggestions_are_near_or_all() {
+        let known = ["height", "rgb", "Intensity"];
+        assert_eq!(suggest("hieght", known), "did you mean 'height'?", "two letters swapped");
+        assert_eq!(suggest("intensty", known), "did you mean 'Intensity'?", "letter case does not count");
+        assert_eq!(suggest("banana", known), "there are: height, rgb, Intensity", "nothing is near");
+    }
+}

@@ -1,0 +1,54 @@
+//! OpenEXR: every layer of the surface as numbers, one file.
+
+use std::io::{Error, Result, Seek, Write};
+
+use autosplats::{Camera, Frame};
+use exr::prelude::{Encoding, Image, SpecificChannels, Vec2, WritableImage as _};
+
+/// Writes the picture and the layers below it, 32 bits a channel.
+///
+/// Names are OpenEXR's customary ones: `R G B` are linear light, `A` is 1 where there is a surface and 0 elsewhere, `Z` is
+/// the depth along the viewing axis (infinite where nothing is), `N.X N.Y N.Z` the normal in world space. `radius`,
+/// `kradius` and `curvature` are the splats', and `index` (whole numbers) says which point lies there; `u32::MAX` is
+/// none.
+pub(crate) fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: &mut (impl Write + Seek)) -> Result<()> {
+    let Frame { image, layers, .. } = *frame;
+    let [right, down, forward] = camera.axes().map_err(Error::other)?.map(|axis| axis.as_vec3());
+    let linear: Vec<f32> = (0..=255u8).map(linear_from_srgb).collect();
+    let pixel = |Vec2(x, y): Vec2<usize>| {
+        let at = layers.index(x, y);
+        if !layers.depth[at].is_finite() {
+            return (0.0, 0.0, 0.0, 0.0, f32::INFINITY, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, u32::MAX);
+        }
+        let [r, g, b, _] = image.pixels[y * image.width as usize + x].map(|value| linear[usize::from(value)]);
+        let [nx, ny, nz] = layers.normal[at];
+        let normal = right * nx + down * ny + forward * nz;
+        let (radius, k_radius, curvature) = (layers.radius[at], layers.k_radius[at], layers.curvature[at]);
+        let depth = layers.depth[at];
+        (r, g, b, 1.0, depth, normal.x, normal.y, normal.z, radius, k_radius, curvature, layers.point[at])
+    };
+    let channels = SpecificChannels::build()
+        .with_channel::<f32>("R")
+        .with_channel::<f32>("G")
+        .with_channel::<f32>("B")
+        .with_channel::<f32>("A")
+        .with_channel::<f32>("Z")
+        .with_channel::<f32>("N.X")
+        .with_channel::<f32>("N.Y")
+        .with_channel::<f32>("N.Z")
+        .with_channel::<f32>("radius")
+        .with_channel::<f32>("kradius")
+        .with_channel::<f32>("curvature")
+        .with_channel::<u32>("index")
+        .with_pixel_fn(pixel);
+    let size = (image.width as usize, image.height as usize);
+    let mut picture = Image::from_encoded_channels(size, Encoding::SMALL_LOSSLESS, channels);
+    picture.layer_data.attributes.software_name = Some("autosplats".into());
+    picture.write().to_buffered(writer).map_err(Error::other)
+}
+
+/// Light of an 8-bit sRGB value, 0 to 1.
+fn linear_from_srgb(value: u8) -> f32 {
+    let value = f32::from(value) / 255.0;
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}

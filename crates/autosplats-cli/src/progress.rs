@@ -1,0 +1,80 @@
+//! Progress on standard error, for people: only on a terminal, and only for what takes longer than half a second.
+
+use std::io::{IsTerminal as _, stderr};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use autosplats_cloud::Progress;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::interrupt;
+
+const PATIENCE: Duration = Duration::from_millis(500);
+const REDRAW: Duration = Duration::from_millis(100);
+const STEPS: u64 = 1000;
+
+/// One task on the screen. It vanishes when dropped.
+pub(crate) struct Bar {
+    bar: ProgressBar,
+    /// Dropped to end the thread that draws.
+    done: Option<Sender<()>>,
+    drawing: Option<JoinHandle<()>>,
+}
+
+impl Bar {
+    /// Starts a task that [reports](Progress::report) how far it is.
+    pub(crate) fn new(task: &str, quiet: bool) -> Self {
+        Self::start(task, quiet, "{msg:30!} [{bar:40}] {percent:>3} % {eta:>4}", "=> ")
+    }
+
+    /// Starts a task that cannot say how far it is.
+    pub(crate) fn spinner(task: &str, quiet: bool) -> Self {
+        Self::start(task, quiet, "{msg:30!} {spinner} {elapsed}", "-\\|/ ")
+    }
+
+    fn start(task: &str, quiet: bool, template: &str, characters: &str) -> Self {
+        let bar =
+            ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden()).with_message(task.to_owned());
+        if quiet || !stderr().is_terminal() {
+            return Self { bar, done: None, drawing: None };
+        }
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            let spinning = template.contains("spinner");
+            bar.set_style(if spinning { style.tick_chars(characters) } else { style.progress_chars(characters) });
+        }
+        let (done, ended) = channel::<()>();
+        let shown = bar.clone();
+        let drawing = std::thread::spawn(move || {
+            let mut wait = PATIENCE;
+            while ended.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+                if wait == PATIENCE {
+                    shown.set_draw_target(ProgressDrawTarget::stderr());
+                    wait = REDRAW;
+                }
+                shown.tick();
+            }
+            shown.finish_and_clear();
+        });
+        Self { bar, done: Some(done), drawing: Some(drawing) }
+    }
+}
+
+impl Progress for Bar {
+    fn report(&self, fraction: f32) {
+        self.bar.set_position((fraction.clamp(0.0, 1.0) * STEPS as f32) as u64);
+    }
+
+    fn cancelled(&self) -> bool {
+        interrupt::requested()
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.done = None;
+        if let Some(drawing) = self.drawing.take() {
+            let _ = drawing.join();
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Which camera the flags ask for, and where that puts the eye.
+
+use std::fs::read_to_string;
+use std::io::{Error, Write as _};
+use std::path::{Path, PathBuf};
+
+use autosplats::{Camera, Projection, ViewDirection, guess_axes};
+use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{Axes, PointCloud, Scene, View};
+
+use super::render_failure;
+use crate::args::{AxesChoice, CameraArgs, Side};
+use crate::exit::{Exit, Failure};
+use crate::output::write_file;
+use crate::values::Ortho;
+
+/// Vertical field of view of a picture that asks for none, degrees.
+const DEFAULT_FOV_DEG: f64 = 40.0;
+
+/// A camera still to be placed, as that may depend on the points.
+#[derive(Debug)]
+pub(super) struct CameraJob {
+    axes: Option<Axes>,
+    fov_deg: Option<f64>,
+    ortho: Option<Ortho>,
+    place: Place,
+}
+
+/// Where the camera stands.
+#[derive(Debug)]
+enum Place {
+    /// As a file says.
+    File(PathBuf, Camera),
+    /// Where the flags say; what they leave open comes from the points.
+    Eye { eye: DVec3, look_at: Option<DVec3>, up: Option<DVec3> },
+    /// So that everything is seen from a side.
+    Fitted(Option<Side>),
+}
+
+impl CameraJob {
+    /// Understands the flags and reads `--camera`'s file.
+    pub(super) fn new(args: &CameraArgs) -> Result<Self, Failure> {
+        let axes = match args.axes {
+            AxesChoice::Auto => None,
+            AxesChoice::ZUp => Some(Axes::ZUp),
+            AxesChoice::YUp => Some(Axes::YUp),
+            AxesChoice::Camera => Some(Axes::Camera),
+        };
+        let place = match (&args.camera, args.eye) {
+            (Some(path), _) => Place::File(path.clone(), load(path)?),
+            (None, Some(eye)) => Place::Eye { eye, look_at: args.look_at, up: args.up },
+            (None, None) => Place::Fitted(args.view),
+        };
+        Ok(Self { axes, fov_deg: args.fov, ortho: args.ortho, place })
+    }
+
+    /// The file the camera comes from.
+    pub(super) fn file(&self) -> Option<&Path> {
+        match &self.place {
+            Place::File(path, _) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// Places the camera before the points, and says which way is up.
+    pub(super) fn place(
+        &self,
+        cloud: &PointCloud,
+        scene: Option<&Scene>,
+        size: [u32; 2],
+    ) -> Result<(Camera, Axes), Failure> {
+        let axes = self.axes.unwrap_or_else(|| guess_axes(cloud));
+        let fitted = |view| {
+            let aspect = f64::from(size[0]) / f64::from(size[1]);
+            Camera::fit(cloud, axes, direction(view), aspect, self.projection()).map_err(render_failure)
+        };
+        let mut camera = match self.place {
+            Place::File(_, camera) => return Ok((camera, axes)),
+            Place::Eye { eye, look_at, up } => {
+                let look_at = look_at.map_or_else(|| fitted(None).map(|fitted| fitted.look_at), Ok)?;
+                let up = up.unwrap_or_else(|| upward(axes, look_at - eye));
+                let projection = match self.ortho {
+                    Some(Ortho(None)) => fitted(None)?.projection,
+                    _ => self.projection(),
+                };
+                Camera { eye, look_at, up, projection }
+            }
+            Place::Fitted(view) => match scene {
+                Some(scene) if view.is_none() && self.ortho.is_none() => scene_camera(scene),
+                _ => fitted(view)?,
+            },
+        };
+        // What was asked for in numbers holds, whatever fits.
+        match (self.fov_deg, self.ortho) {
+            (Some(fov), _) => camera.projection = Projection::PerspectiveFovDeg(fov),
+            (_, Some(Ortho(Some(height)))) => camera.projection = Projection::OrthographicHeight(height),
+            _ => {}
+        }
+        camera.axes().map_err(render_failure)?;
+        Ok((camera, axes))
+    }
+
+    /// What the flags ask for; heights that are to be fitted are 1.
+    fn projection(&self) -> Projection {
+        match self.ortho {
+            Some(Ortho(height)) => Projection::OrthographicHeight(height.unwrap_or(1.0)),
+            None => Projection::PerspectiveFovDeg(self.fov_deg.unwrap_or(DEFAULT_FOV_DEG)),
+        }
+    }
+}
+
+/// The camera a scene was made for.
+pub(crate) fn scene_camera(scene: &Scene) -> Camera {
+    let View { eye, look_at, up, fov_degrees } = scene.view();
+    Camera { eye, look_at, up, projection: Projection::PerspectiveFovDeg(fov_degrees) }
+}
+
+fn direction(side: Option<Side>) -> ViewDirection {
+    match side {
+        None => ViewDirection::Auto,
+        Some(Side::Iso) => ViewDirection::Iso,
+        Some(Side::Front) => ViewDirection::Front,
+        Some(Side::Back) => ViewDirection::Back,
+        Some(Side::Left) => ViewDirection::Left,
+        Some(Side::Right) => ViewDirection::Right,
+        Some(Side::Top) => ViewDirection::Top,
+        Some(Side::Bottom) => ViewDirection::Bottom,
+    }
+}
+
+/// What is up in a picture taken along `sight`: the axes' own up, or their ahead where that is the line of sight.
+fn upward(axes: Axes, sight: DVec3) -> DVec3 {
+    let (up, ahead) = match axes {
+        Axes::ZUp => (DVec3::Z, DVec3::Y),
+        Axes::YUp => (DVec3::Y, DVec3::NEG_Z),
+        Axes::Camera => (DVec3::NEG_Y, DVec3::Z),
+    };
+    if sight.cross(up).length() > 1e-6 * sight.length() { up } else { ahead }
+}
+
+fn load(path: &Path) -> Result<Camera, Failure> {
+    let shown = path.display();
+    let failure = |what: &str| Failure::new(Exit::Input, format!("{shown}: {what}"));
+    let text = read_to_string(path).map_err(|error| failure(&error.to_string()))?;
+    let camera: Camera = serde_json::from_str(&text)
+        .map_err(|error| failure(&format!("not a camera as --save-camera writes it: {error}")))?;
+    camera.axes().map_err(|error| failure(&error.to_string()))?;
+    Ok(camera)
+}
+
+/// Writes a camera as JSON; returns the size of the file.
+pub(super) fn save(path: &Path, camera: &Camera) -> Result<u64, Failure> {
+    write_file(path, |writer| {
+        serde_json::to_writer_pretty(&mut *writer, camera).map_err(Error::other)?;
+        writeln!(writer)
+    })
+}

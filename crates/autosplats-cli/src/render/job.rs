@@ -1,0 +1,139 @@
+//! What the flags of `render` mean together, checked before any work is done.
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+use autosplats::{Background, ColorMap, ColorMode, Reconstruction, SearchEngine, Settings, Shading};
+use autosplats_cloud::PointCloud;
+
+use super::camera::CameraJob;
+use super::render_failure;
+use crate::args::{Backend, Engine, LookArgs, Map, RenderArgs, SurfaceArgs};
+use crate::device::check_memory;
+use crate::exit::{Exit, Failure, suggest};
+use crate::input::Inputs;
+use crate::output::{Format, Picture, check_target};
+use crate::threads::start_threads;
+use crate::values::COLOR_MODES;
+
+/// Bytes the stages and the layers of a picture take for each pixel.
+const BYTES_PER_PIXEL: u64 = 100;
+
+/// A picture to make: everything known but the points.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) inputs: Inputs,
+    pub(super) pictures: Vec<Picture>,
+    pub(super) save_camera: Option<PathBuf>,
+    pub(super) size: [u32; 2],
+    pub(super) camera: CameraJob,
+    pub(super) settings: Settings,
+    pub(super) json: bool,
+    pub(super) quiet: bool,
+}
+
+impl Job {
+    /// Checks the flags, the inputs' existence and the outputs' places.
+    pub(super) fn new(args: RenderArgs) -> Result<Self, Failure> {
+        let RenderArgs { inputs, outputs, size, camera, surface, look, run, json } = args;
+        choose_backend(surface.backend)?;
+        start_threads(&run)?;
+        let pictures = outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?;
+        let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
+        let settings = settings(&surface, look, needs_layers);
+        settings.check().map_err(render_failure)?;
+
+        let save_camera = camera.save_camera.clone();
+        let inputs = Inputs::new(&inputs, &camera.poses)?;
+        let camera = CameraJob::new(&camera)?;
+        let targets = pictures.iter().map(|picture| &picture.path).chain(&save_camera);
+        let mut seen = HashSet::new();
+        for target in targets {
+            if !seen.insert(target) {
+                return Err(Failure::usage(format!("{}: two outputs have this name", target.display())));
+            }
+            check_target(target, inputs.files().chain(camera.file()))?;
+        }
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)?;
+        Ok(Self { inputs, pictures, save_camera, size, camera, settings, json, quiet: run.quiet })
+    }
+
+    /// Whether the picture has nothing behind the surface.
+    pub(super) fn transparent(&self) -> bool {
+        self.settings.shading.background == Background::Transparent
+    }
+
+    /// Refuses a cloud that is smaller than the neighbourhoods asked for.
+    pub(super) fn check_neighbors(&self, cloud: &PointCloud) -> Result<(), Failure> {
+        let (points, k) = (cloud.len(), self.settings.reconstruction.k);
+        match points {
+            0 | 1 => Err(Failure::new(Exit::Input, "one point makes no surface")),
+            _ if points <= k as usize => Err(Failure::new(
+                Exit::Input,
+                format!("{points} points are too few for {k} neighbours each; use -k {} or less", points - 1),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses a colour mode that the points do not have what it needs for.
+    pub(super) fn check_color(&self, cloud: &PointCloud) -> Result<(), Failure> {
+        let fields = || cloud.fields().iter().map(|field| field.name.as_str());
+        let missing = match &self.settings.shading.color {
+            ColorMode::Rgb if cloud.colors().is_none() => {
+                return Err(Failure::usage("--color rgb: the points have no colours; try --color height"));
+            }
+            ColorMode::Classification => "Classification",
+            ColorMode::Field(name) => name,
+            _ => return Ok(()),
+        };
+        if cloud.field(missing).is_some() {
+            return Ok(());
+        }
+        let hint =
+            suggest(missing, COLOR_MODES.into_iter().filter(|mode| *mode != missing.to_lowercase()).chain(fields()));
+        Err(Failure::usage(format!("--color: the points have no field {missing}; {hint}")))
+    }
+}
+
+fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings {
+    let reconstruction = Reconstruction {
+        k: surface.k,
+        engine: match surface.engine {
+            Engine::ScreenGrid => SearchEngine::ScreenGrid,
+        },
+        outlier_expansions: (!surface.keep_outliers).then_some(surface.e0),
+        gap_factor: (!surface.bridge_gaps).then_some(surface.gap_factor),
+        splat_scale: surface.splat_scale,
+        ellipses: surface.ellipses,
+        grid_culling: !surface.no_grid_culling,
+        depth_refinement: !surface.no_depth_refinement,
+    };
+    let shading = Shading {
+        color: look.color,
+        range: look.range,
+        color_map: look.color_map.map(|map| match map {
+            Map::Viridis => ColorMap::Viridis,
+            Map::Inferno => ColorMap::Inferno,
+            Map::Turbo => ColorMap::Turbo,
+            Map::Gray => ColorMap::Gray,
+            Map::Reds => ColorMap::Reds,
+        }),
+        legend: look.legend,
+        lighting: !look.no_lighting,
+        eye_dome: look.eye_dome,
+        background: look.background.unwrap_or(Shading::default().background),
+    };
+    Settings { reconstruction, shading, all_layers }
+}
+
+fn choose_backend(backend: Backend) -> Result<(), Failure> {
+    match backend {
+        Backend::Auto | Backend::Cpu => Ok(()),
+        Backend::Gpu => Err(Failure::new(
+            Exit::Device,
+            "no usable device: this version has no GPU backend; leave --backend out, or use --backend cpu",
+        )),
+    }
+}

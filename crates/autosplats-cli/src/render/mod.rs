@@ -1,0 +1,106 @@
+//! `autosplats render`: read, look, draw, write, say what happened.
+
+mod camera;
+mod job;
+mod report;
+
+use std::time::Instant;
+
+use autosplats::{Camera, Counts, Error, Frame, Renderer};
+
+pub(crate) use self::camera::scene_camera;
+use self::job::Job;
+use self::report::Report;
+use crate::args::RenderArgs;
+use crate::device::Device;
+use crate::exit::{Exit, Failure};
+use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
+use crate::progress::Bar;
+
+/// Renders one picture to one file or several.
+pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
+    let job = Job::new(args)?;
+    let device = Device::cpu();
+
+    let started = Instant::now();
+    let cloud = job.inputs.read(job.quiet)?;
+    let read = milliseconds_since(started);
+
+    job.check_color(&cloud)?;
+    job.check_neighbors(&cloud)?;
+    let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
+    let cloud = cloud.with_axes(axes);
+
+    let mut renderer = Renderer::new();
+    let bar = Bar::spinner("rendering", job.quiet);
+    let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
+    drop(bar);
+    check_visible(&frame)?;
+
+    let started = Instant::now();
+    let mut written = Vec::new();
+    for picture in &job.pictures {
+        let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), job.quiet);
+        written.push((picture.path.clone(), write_picture(picture, &frame, &camera, job.transparent())?));
+    }
+    if let Some(path) = &job.save_camera {
+        written.push((path.clone(), camera::save(path, &camera)?));
+    }
+    let write = milliseconds_since(started);
+
+    let report = Report::new(&job, &device, camera, axes, &frame, written, [read, write]);
+    if job.json {
+        print_line(&report.to_json()?)?;
+    }
+    if !job.quiet {
+        report.summarize();
+    }
+    Ok(())
+}
+
+fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, alpha: bool) -> Result<u64, Failure> {
+    write_file(&picture.path, |writer| match picture.format {
+        Format::Png => write_png(frame.image, alpha, writer),
+        Format::Exr => write_exr(frame, camera, writer),
+    })
+}
+
+/// Refuses a picture without a surface.
+fn check_visible(frame: &Frame<'_>) -> Result<(), Failure> {
+    if frame.layers.weight.iter().any(|weight| *weight > 0.0) {
+        return Ok(());
+    }
+    let Counts { points, not_finite, behind, outside, visible, .. } = frame.counts;
+    let why = if visible > 0 {
+        format!("none of the {visible} visible points has a neighbour near enough; --keep-outliers shows them as dots")
+    } else {
+        format!(
+            "of {points} points {not_finite} have no finite position, {behind} are behind the eye, {outside} outside the \
+             picture; --view iso finds the rest"
+        )
+    };
+    Err(Failure::new(Exit::Input, format!("nothing to show: {why}")))
+}
+
+/// What failing to render is to the caller of the program.
+pub(crate) fn render_failure(error: Error) -> Failure {
+    match error {
+        Error::Setting { name, value, range } => Failure::usage(format!("{} {value}: it must be {range}", flag(name))),
+        Error::Camera(_) | Error::MissingAttribute { .. } | Error::ImageSize { .. } => Failure::usage(error),
+        Error::TooManyPoints(_) => Failure::new(Exit::Memory, error),
+        _ => Failure::new(Exit::Input, error),
+    }
+}
+
+/// The flag that sets a field of the settings.
+fn flag(setting: &str) -> String {
+    match setting {
+        "k" => "-k".into(),
+        "outlier_expansions" => "--e0".into(),
+        name => format!("--{}", name.replace('_', "-")),
+    }
+}
+
+fn milliseconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}

@@ -1,0 +1,163 @@
+//! The small values that options take: how they are typed and what is wrong with those that do not fit.
+
+use std::str::FromStr;
+
+use autosplats::{Background, ColorMode, MAX_SIDE};
+use autosplats_cloud::glam::DVec3;
+
+/// The colour modes by name; any other name is a field's.
+pub(crate) const COLOR_MODES: [&str; 11] = [
+    "auto",
+    "rgb",
+    "plain",
+    "height",
+    "intensity",
+    "classification",
+    "normal",
+    "curvature",
+    "radius",
+    "k-radius",
+    "depth",
+];
+
+/// `1760x900`
+pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.trim().parse().ok()?, h.trim().parse().ok()?]));
+    match sides {
+        Some(size) if size.iter().all(|side| (1..=MAX_SIDE).contains(side)) => Ok(size),
+        Some(_) => Err(format!("width and height are within 1 to {MAX_SIDE} pixels")),
+        None => Err("a size is WIDTHxHEIGHT, such as 1760x900".into()),
+    }
+}
+
+/// `1.5,-2,0`
+pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
+        _ => Err("three numbers are expected, such as 1.5,-2,0".into()),
+    }
+}
+
+/// `-2..10` or `-2,10`
+pub(crate) fn range(text: &str) -> Result<[f32; 2], String> {
+    let ends = text.split_once("..").or_else(|| text.split_once(','));
+    match ends.and_then(|(low, high)| Some([number::<f32>(low)?, number::<f32>(high)?])) {
+        Some([low, high]) if low < high => Ok([low, high]),
+        Some(_) => Err("the first number has to be the lower one".into()),
+        None => Err("two numbers are expected, such as 0..2.5 or -1,1".into()),
+    }
+}
+
+/// Vertical field of view in degrees.
+pub(crate) fn fov(text: &str) -> Result<f64, String> {
+    number(text)
+        .filter(|fov| (0.01..=170.0).contains(fov))
+        .ok_or("a field of view is within 0.01 to 170 degrees".into())
+}
+
+/// Height of an orthographic picture in world units; `None` for `fit`.
+pub(crate) fn ortho(text: &str) -> Result<Ortho, String> {
+    if text == "fit" {
+        return Ok(Ortho(None));
+    }
+    let height = number(text).filter(|height| *height > 0.0).ok_or("a height above 0 in world units, or 'fit'")?;
+    Ok(Ortho(Some(height)))
+}
+
+/// Height of an orthographic picture in world units, or as high as what there is to see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ortho(pub(crate) Option<f64>);
+
+/// `#rrggbb`, `#top,#bottom` or `transparent`
+pub(crate) fn background(text: &str) -> Result<Background, String> {
+    let hint = || "a background is '#rrggbb', '#top,#bottom' or 'transparent'".to_owned();
+    if text == "transparent" {
+        return Ok(Background::Transparent);
+    }
+    match text.split_once(',') {
+        Some((top, bottom)) => {
+            Ok(Background::Gradient(hex_color(top).ok_or_else(hint)?, hex_color(bottom).ok_or_else(hint)?))
+        }
+        None => hex_color(text).map(Background::Color).ok_or_else(hint),
+    }
+}
+
+fn hex_color(text: &str) -> Option<[u8; 3]> {
+    let digits = text.trim().strip_prefix('#')?;
+    if digits.len() != 6 || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+        return None;
+    }
+    let [_, red, green, blue] = u32::from_str_radix(digits, 16).ok()?.to_be_bytes();
+    Some([red, green, blue])
+}
+
+/// One of [`COLOR_MODES`], the name of a field, or `field:NAME` for a field that is called like a mode.
+pub(crate) fn color(text: &str) -> Result<ColorMode, String> {
+    Ok(match text {
+        "auto" => ColorMode::Auto,
+        "rgb" => ColorMode::Rgb,
+        "plain" => ColorMode::Plain,
+        "height" => ColorMode::Height,
+        "classification" => ColorMode::Classification,
+        "normal" => ColorMode::Normal,
+        "curvature" => ColorMode::Curvature,
+        "radius" => ColorMode::Radius,
+        "k-radius" => ColorMode::KRadius,
+        "depth" => ColorMode::Depth,
+        "" => return Err("a colour mode or the name of a field is expected".into()),
+        "intensity" => ColorMode::Field("Intensity".into()),
+        name => ColorMode::Field(name.strip_prefix("field:").unwrap_or(name).into()),
+    })
+}
+
+/// A finite number.
+fn number<T: FromStr + Into<f64> + Copy>(text: &str) -> Option<T> {
+    text.trim().parse::<T>().ok().filter(|&value| value.into().is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(size("1760x900"), Ok([1760, 900]), "the usual form");
+        for bad in ["0x0", "1x0", "100000x100000", "1760", "x", "-1x5", "1.5x2", ""] {
+            assert!(size(bad).is_err(), "{bad} is no size");
+        }
+    }
+
+    #[test]
+    fn vectors_and_ranges() {
+        assert_eq!(vector("1,-2.5, 3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)), "signs, exponents and blanks");
+        assert_eq!(range("-2..10"), Ok([-2.0, 10.0]), "dots");
+        assert_eq!(range("-2,-1.5"), Ok([-2.0, -1.5]), "comma");
+        for bad in ["1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0", ""] {
+            assert!(vector(bad).is_err(), "{bad} is no vector");
+        }
+        for bad in ["2..1", "1..1", "1", "nan..2", "..", "0..inf"] {
+            assert!(range(bad).is_err(), "{bad} is no range");
+        }
+    }
+
+    #[test]
+    fn backgrounds() {
+        assert_eq!(background("#0a141E"), Ok(Background::Color([10, 20, 30])), "either letter case");
+        assert_eq!(background("#000000,#ffffff"), Ok(Background::Gradient([0; 3], [255; 3])), "two colours");
+        assert_eq!(background("transparent"), Ok(Background::Transparent), "no colour");
+        for bad in ["red", "#fff", "#+12345", "#12345g", "000000", "#000000,", ""] {
+            assert!(background(bad).is_err(), "{bad} is no background");
+        }
+    }
+
+    #[test]
+    fn colors() {
+        for name in COLOR_MODES {
+            let mode = color(name);
+            let is_field = matches!(&mode, Ok(ColorMode::Field(field)) if field != "Intensity");
+            assert!(mode.is_ok() && !is_field, "{name} is a mode");
+        }
+        assert_eq!(color("field:height"), Ok(ColorMode::Field("height".into())), "a field called like a mode");
+    }
+}

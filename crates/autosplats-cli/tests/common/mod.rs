@@ -1,0 +1,127 @@
+//! Runs the built command as a user would, in a folder of its own.
+
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+/// Points on the unit sphere, evenly.
+pub(crate) const SPHERE_POINTS: usize = 6000;
+
+/// A camera in front of the unit sphere.
+pub(crate) const FRONT: [&str; 8] = ["--eye", "0,-4,0", "--look-at", "0,0,0", "--up", "0,0,1", "--fov", "40"];
+
+/// An empty folder that vanishes with the test, and the command run in it.
+pub(crate) struct Folder(tempfile::TempDir);
+
+/// What the command left behind.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    pub(crate) code: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
+}
+
+impl Folder {
+    pub(crate) fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder can be made"))
+    }
+
+    /// A folder with `sphere.ply` in it: coloured, with an intensity that grows with x.
+    pub(crate) fn with_sphere() -> Self {
+        let folder = Self::new();
+        folder.write("sphere.ply", &sphere_ply());
+        folder
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, content: &str) {
+        fs::write(self.path(name), content).expect("the temporary folder can be written");
+    }
+
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
+        fs::read(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+    }
+
+    /// The names of everything in it, in order.
+    pub(crate) fn list(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).expect("the temporary folder can be read");
+        let mut names: Vec<_> = entries
+            .map(|entry| entry.expect("an entry can be read").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_autosplats"));
+        command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
+        command
+    }
+
+    pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {
+        let Output { status, stdout, stderr } = self.command(arguments).output().expect("the command starts");
+        Outcome {
+            code: status.code(),
+            stdout: String::from_utf8(stdout).expect("standard output is UTF-8"),
+            stderr: String::from_utf8(stderr).expect("standard error is UTF-8"),
+        }
+    }
+
+    /// Runs what has to succeed.
+    pub(crate) fn succeed(&self, arguments: &[&str]) -> Outcome {
+        let outcome = self.run(arguments);
+        assert_eq!(outcome.code, Some(0), "{arguments:?}: {}", outcome.stderr);
+        outcome
+    }
+
+    /// Runs what has to fail: with this code, one line that says all of `words`, and no file more than before.
+    pub(crate) fn fail(&self, arguments: &[&str], code: i32, words: &[&str]) {
+        let before = self.list();
+        let Outcome { code: found, stdout, stderr } = self.run(arguments);
+        assert_eq!(found, Some(code), "{arguments:?}: {stderr}");
+        assert_eq!(stdout, "", "{arguments:?} fails, so there is no data");
+        assert!(stderr.starts_with("error: "), "{arguments:?}: {stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{arguments:?}: one line, not {stderr}");
+        for word in words {
+            assert!(stderr.contains(word), "{arguments:?}: '{word}' is not in {stderr}");
+        }
+        assert_eq!(self.list(), before, "{arguments:?} leaves nothing behind");
+    }
+}
+
+/// Position of point `index` of the sphere.
+pub(crate) fn sphere_point(index: usize) -> [f64; 3] {
+    let height = 1.0 - (2 * index + 1) as f64 / SPHERE_POINTS as f64;
+    let angle = index as f64 * 2.399_963_229_728_653;
+    let radius = (1.0 - height * height).sqrt();
+    [radius * angle.cos(), radius * angle.sin(), height]
+}
+
+pub(crate) fn sphere_ply() -> String {
+    let points = (0..SPHERE_POINTS).map(|index| {
+        let [x, y, z] = sphere_point(index);
+        format!("{x:.6} {y:.6} {z:.6} 200 100 50 {:.3}", 10.0 * x)
+    });
+    ply(&["float x", "float y", "float z", "uchar red", "uchar green", "uchar blue", "float intensity"], points)
+}
+
+/// An ASCII PLY file with one row for each point.
+pub(crate) fn ply(properties: &[&str], rows: impl Iterator<Item = String>) -> String {
+    let rows: Vec<_> = rows.collect();
+    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {}\n", rows.len());
+    for property in properties {
+        let _ = writeln!(text, "property {property}");
+    }
+    text + "end_header\n" + &rows.iter().map(|row| format!("{row}\n")).collect::<String>()
+}
+
+/// An ASCII PLY file of bare positions.
+pub(crate) fn points_ply(points: &[&str]) -> String {
+    ply(&["float x", "float y", "float z"], points.iter().map(|point| (*point).to_owned()))
+}

@@ -1,0 +1,120 @@
+//! Exit code 2: what was typed does not exist or does not fit, and the message says what would.
+
+mod common;
+
+use common::{FRONT, Folder};
+
+const RENDER: [&str; 4] = ["render", "sphere.ply", "-o", "out.png"];
+
+#[test]
+fn options_that_do_not_fit() {
+    let folder = Folder::with_sphere();
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["--size", "0x0"], &["0x0", "16384"]),
+        (&["--size", "100000x100000"], &["16384"]),
+        (&["--size", "17"], &["1760x900"]),
+        (&["-k", "0"], &["-k 0", "1 to"]),
+        (&["-k", "65"], &["-k 65"]),
+        (&["-k", "ten"], &["ten"]),
+        (&["--e0", "9"], &["--e0 9", "0 to 8"]),
+        (&["--gap-factor", "1"], &["above 1"]),
+        (&["--splat-scale", "0"], &["0.01"]),
+        (&["--eye-dome", "11"], &["0 to 10"]),
+        (&["--eye-dome", "nan"], &["0 to 10"]),
+        (&["--range", "2..1"], &["lower"]),
+        (&["--background", "red"], &["#rrggbb"]),
+        (&["--color-map", "jet"], &["viridis"]),
+        (&["--view", "sideways"], &["iso", "top"]),
+        (&["--eye", "1,2"], &["three numbers"]),
+        (&["--up", "0,0,1"], &["--eye"]),
+        (&["--eye", "1,2,3", "--look-at", "1,2,3"], &["same point"]),
+        (&["--eye", "0,0,5", "--look-at", "0,0,0", "--up", "0,0,1"], &["line of sight"]),
+        (&["--view", "top", "--eye", "1,2,3"], &["--view", "--eye"]),
+        (&["--fov", "180"], &["170"]),
+        (&["--fov", "40", "--ortho", "2"], &["--ortho"]),
+        (&["--ortho", "-1"], &["above 0"]),
+        (&["--engine", "magic"], &["screen-grid"]),
+        (&["--threads", "0"], &["1"]),
+        (&["--pose", "other.ply=pose.txt"], &["sphere.ply"]),
+        (&["--collor", "rgb"], &["--color"]),
+        (&["--color", "hieght"], &["did you mean 'height'"]),
+        (&["--color", "banana"], &["no field banana", "rgb", "Intensity"]),
+        (&["--color", "classification"], &["no field Classification"]),
+        (&["-o", "out.png"], &["two outputs"]),
+        (&["-o", "out.jpg"], &[".png or .exr"]),
+        (&["-o", "out"], &[".png or .exr"]),
+    ];
+    for (options, words) in cases {
+        folder.fail(&[&RENDER[..], options].concat(), 2, words);
+    }
+}
+
+#[test]
+fn colors_that_the_points_do_not_have() {
+    let folder = Folder::new();
+    folder.write("bare.ply", &common::points_ply(&["0 0 0", "1 0 0", "0 1 0", "1 1 0"]));
+    folder.fail(&["render", "bare.ply", "-o", "out.png", "--color", "rgb"], 2, &["no colours"]);
+    folder.fail(&["render", "bare.ply", "-o", "out.png", "--color", "intensity"], 2, &["no field Intensity"]);
+}
+
+#[test]
+fn commands_that_do_not_exist() {
+    let folder = Folder::with_sphere();
+    folder.fail(&["sphere.ply"], 2, &["no viewer", "autosplats render sphere.ply -o out.png"]);
+    folder.fail(&["scene:herd"], 2, &["autosplats render scene:herd"]);
+    folder.fail(&["rendr", "sphere.ply"], 2, &["did you mean 'render'"]);
+    folder.fail(&["render", "sphere.ply"], 2, &["--out"]);
+    folder.fail(&["render", "-o", "out.png"], 2, &["INPUT"]);
+}
+
+#[test]
+fn scenes_that_do_not_exist() {
+    let folder = Folder::new();
+    folder.fail(&["render", "scene:statu", "-o", "out.png"], 2, &["statu", "did you mean 'statue'"]);
+    folder.fail(&["render", "scene:zebra", "-o", "out.png"], 2, &["zebra", "cathedral", "herd"]);
+    folder.fail(&["render", "scene:herd:many", "-o", "out.png"], 2, &["many"]);
+    folder.fail(&["render", "scene:herd:0", "-o", "out.png"], 2, &["herd:0"]);
+    folder.fail(&["render", "statue", "-o", "out.png"], 3, &["scene:statue"]);
+}
+
+#[test]
+fn inputs_are_never_overwritten() {
+    let folder = Folder::new();
+    folder.write("cloud.png", &common::sphere_ply());
+    folder.fail(&["render", "cloud.png", "-o", "./cloud.png"], 2, &["overwrite an input"]);
+    folder.write("cloud.ply", &common::sphere_ply());
+    folder.fail(&["convert", "cloud.ply", "cloud.ply", "--force"], 2, &["overwrite an input"]);
+    folder.succeed(&["render", "cloud.ply", "-o", "a.png", "--size", "32x32", "--save-camera", "cam.json"]);
+    let clash = ["render", "cloud.ply", "-o", "a.png", "--camera", "cam.json", "--save-camera", "cam.json"];
+    folder.fail(&clash, 2, &["overwrite an input"]);
+}
+
+#[test]
+fn help_is_data() {
+    let folder = Folder::new();
+    for arguments in [&["--help"][..], &["render", "--help"], &["convert", "--help"], &["demo", "--help"]] {
+        let outcome = folder.succeed(arguments);
+        assert!(outcome.stdout.contains("Usage"), "{arguments:?} explains on standard output");
+        assert_eq!(outcome.stderr, "", "{arguments:?} is no error");
+    }
+    assert!(folder.succeed(&["--help"]).stdout.contains("130"), "the exit codes are explained");
+    let outcome = folder.run(&[]);
+    assert_eq!(outcome.code, Some(2), "nothing to do is bad usage");
+    assert!(outcome.stderr.contains("Usage"), "and the help is what helps");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_error() {
+    let folder = Folder::with_sphere();
+    let arguments = [&RENDER[..], &FRONT, &["--size", "32x32", "--json", "--quiet"]].concat();
+    let mut child = folder
+        .command(&arguments)
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("the command ends");
+    assert_eq!(output.status.code(), Some(0), "the picture was written all the same");
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "", "and nobody needs to know");
+}

@@ -1,0 +1,3 @@
+//! Where clouds come from when not from a file.
+
+pub(crate) mod scene;

@@ -1,0 +1,264 @@
+//! A body: solids joined, cut and clipped in order, with smooth seams.
+
+use glam::DVec3;
+
+use super::paint::Paint;
+use super::shape::{Shape, Similarity};
+
+/// What a solid does to the ones before it in its group, or a group to the groups before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Op {
+    /// Adds to them.
+    Join,
+    /// Takes away from them.
+    Cut,
+    /// Keeps only what lies in both.
+    Clip,
+}
+
+/// Radius within which a seam is rounded: none where it is zero. Beyond it the seam changes nothing at all, to the last
+/// bit, which is what lets a cell of space forget all solids but the near ones.
+#[derive(Clone, Copy, Debug)]
+struct Seam {
+    radius: f64,
+    quarter: f64,
+}
+
+impl Seam {
+    fn new(radius: f64) -> Self {
+        Self { radius, quarter: if radius > 0.0 { 0.25 / radius } else { 0.0 } }
+    }
+
+    #[inline]
+    fn min(self, a: f64, b: f64) -> f64 {
+        let near = (self.radius - (a - b).abs()).max(0.0);
+        a.min(b) - near * near * self.quarter
+    }
+
+    #[inline]
+    fn apply(self, op: Op, a: f64, b: f64) -> f64 {
+        match op {
+            Op::Join => self.min(a, b),
+            Op::Cut => -self.min(-a, b),
+            Op::Clip => -self.min(-a, -b),
+        }
+    }
+
+    /// Whether `b` changes `a` nowhere within `slack / 2` metres.
+    fn spares(self, op: Op, a: f64, b: f64, slack: f64) -> bool {
+        match op {
+            Op::Join => b >= a + self.radius + slack,
+            Op::Cut => -b + self.radius + slack <= a,
+            Op::Clip => b + self.radius + slack <= a,
+        }
+    }
+
+    /// How much of the second one's paint shows where the two meet.
+    fn blend(self, op: Op, a: f64, b: f64) -> f32 {
+        let (a, b) = match op {
+            Op::Join => (a, b),
+            Op::Cut => (-a, b),
+            Op::Clip => (-a, -b),
+        };
+        let near = (self.radius - (a - b).abs()).max(0.0);
+        let minor = 2.0 * near * near * self.quarter / self.radius.max(1e-30);
+        (if b < a { 1.0 - minor } else { minor }) as f32
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    shape: Shape,
+    op: Op,
+    seam: Seam,
+    paint: Paint,
+    group: u16,
+    /// Solids next to each other with the same number are one chain: put together without a seam first, so that the
+    /// seam to the rest does not swell where they meet.
+    chain: u16,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    op: Op,
+    seam: Seam,
+    zone: usize,
+}
+
+/// Solids in order, in groups: a group is put together first and then joined to what came before.
+#[derive(Clone, Debug)]
+pub(super) struct Body {
+    nodes: Vec<Node>,
+    groups: Vec<Group>,
+    /// Applied to every solid that is added.
+    pub(super) frame: Similarity,
+    /// Given to every solid that is added.
+    pub(super) paint: Paint,
+    /// Given to every group that is begun.
+    pub(super) zone: usize,
+}
+
+impl Body {
+    pub(super) fn new(paint: Paint) -> Self {
+        Self { nodes: Vec::new(), groups: Vec::new(), frame: Similarity::IDENTITY, paint, zone: 0 }
+    }
+
+    /// Begins a group that will be `op`-ed to all before, with a seam of `radius`.
+    pub(super) fn group(&mut self, op: Op, radius: f64) -> &mut Self {
+        self.groups.push(Group { op, seam: Seam::new(radius * self.frame.scale), zone: self.zone });
+        self
+    }
+
+    fn add(&mut self, op: Op, radius: f64, shape: Shape, linked: bool) -> &mut Self {
+        let before = self.nodes.last().map_or(0, |node| node.chain);
+        let chain = if linked { before } else { before.wrapping_add(1) };
+        let group = u16::try_from(self.groups.len() - 1).expect("bodies have fewer than 65536 groups");
+        let shape = shape.mapped(&self.frame);
+        let seam = Seam::new(radius * self.frame.scale);
+        self.nodes.push(Node { shape, op, seam, paint: self.paint, group, chain });
+        self
+    }
+
+    /// Adds `shape` to the group.
+    pub(super) fn join(&mut self, radius: f64, shape: Shape) -> &mut Self {
+        self.add(Op::Join, radius, shape, false)
+    }
+
+    /// Takes `shape` away from the group.
+    pub(super) fn cut(&mut self, radius: f64, shape: Shape) -> &mut Self {
+        self.add(Op::Cut, radius, shape, false)
+    }
+
+    /// Keeps of the group only what lies in `shape`.
+    pub(super) fn clip(&mut self, radius: f64, shape: Shape) -> &mut Self {
+        self.add(Op::Clip, radius, shape, false)
+    }
+
+    /// Joins a chain of round cones through `points` (position, radius).
+    pub(super) fn strand(&mut self, radius: f64, points: &[(DVec3, f64)]) -> &mut Self {
+        for (i, pair) in points.windows(2).enumerate() {
+            self.add(Op::Join, radius, Shape::cone(pair[0].0, pair[1].0, pair[0].1, pair[1].1), i > 0);
+        }
+        self
+    }
+
+    /// Every solid, for the cell that holds everything.
+    pub(super) fn all(&self) -> Vec<u16> {
+        (0..u16::try_from(self.nodes.len()).expect("bodies have fewer than 65536 solids")).collect()
+    }
+
+    /// Number of zones that groups name.
+    pub(super) fn zones(&self) -> usize {
+        self.groups.iter().map(|group| group.zone + 1).max().unwrap_or(0)
+    }
+
+    /// Whether a solid of `zone` is in `list`.
+    pub(super) fn touches(&self, list: &[u16], zone: usize) -> bool {
+        list.iter().any(|&id| self.groups[usize::from(self.nodes[usize::from(id)].group)].zone == zone)
+    }
+
+    /// Signed distance bound at `p`, where only the solids in `list` matter.
+    #[inline]
+    pub(super) fn distance(&self, p: DVec3, list: &[u16]) -> f64 {
+        let Some((&first, rest)) = list.split_first() else { return f64::INFINITY };
+        let (mut total, mut part) = (f64::INFINITY, f64::INFINITY);
+        let mut last = &self.nodes[usize::from(first)];
+        let mut link = last.shape.distance(p);
+        for &id in rest {
+            let node = &self.nodes[usize::from(id)];
+            let d = node.shape.distance(p);
+            if node.chain == last.chain {
+                link = link.min(d);
+                continue;
+            }
+            part = last.seam.apply(last.op, part, link);
+            link = d;
+            if node.group != last.group {
+                let group = &self.groups[usize::from(last.group)];
+                total = group.seam.apply(group.op, total, part);
+                part = f64::INFINITY;
+            }
+            last = node;
+        }
+        part = last.seam.apply(last.op, part, link);
+        let group = &self.groups[usize::from(last.group)];
+        group.seam.apply(group.op, total, part)
+    }
+
+    /// The list cut where the group, or the chain, changes.
+    fn runs<'a>(&'a self, list: &'a [u16], key: impl Fn(&Node) -> u16 + 'a) -> impl Iterator<Item = &'a [u16]> {
+        list.chunk_by(move |&a, &b| key(&self.nodes[usize::from(a)]) == key(&self.nodes[usize::from(b)]))
+    }
+
+    /// Colour and zone of the surface at `p`; `world` is where `p` lies before any folding of space.
+    pub(super) fn paint(&self, p: DVec3, world: DVec3, list: &[u16]) -> ([f32; 3], usize) {
+        let mix = |a: [f32; 3], b: [f32; 3], t: f32| -> [f32; 3] { std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t) };
+        let (mut total, mut total_rgb, mut zone) = (f64::INFINITY, [0.5; 3], 0);
+        for run in self.runs(list, |node| node.group) {
+            let group = &self.groups[usize::from(self.nodes[usize::from(run[0])].group)];
+            let (mut part, mut part_rgb) = (f64::INFINITY, [0.5; 3]);
+            for chain in self.runs(run, |node| node.chain) {
+                let distances = chain.iter().map(|&id| (self.nodes[usize::from(id)].shape.distance(p), id));
+                let Some((d, id)) = distances.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+                let node = &self.nodes[usize::from(id)];
+                let share = node.seam.blend(node.op, part, d);
+                if share > 0.0 {
+                    part_rgb = mix(part_rgb, node.paint.rgb(world), share);
+                }
+                part = node.seam.apply(node.op, part, d);
+            }
+            let share = group.seam.blend(group.op, total, part);
+            total_rgb = mix(total_rgb, part_rgb, share);
+            if share > 0.5 {
+                zone = group.zone;
+            }
+            total = group.seam.apply(group.op, total, part);
+        }
+        (total_rgb, zone)
+    }
+
+    /// Writes to `kept` the solids of `list` that matter anywhere within `radius` of `center`, and returns the distance
+    /// bound there. With the kept ones the bound is the same to the last bit all over that ball.
+    pub(super) fn prune(&self, list: &[u16], center: DVec3, radius: f64, kept: &mut Vec<u16>) -> f64 {
+        kept.clear();
+        let slack = 2.0 * radius;
+        let mut total = f64::INFINITY;
+        for run in self.runs(list, |node| node.group) {
+            let start = kept.len();
+            let mut part = f64::INFINITY;
+            for chain in self.runs(run, |node| node.chain) {
+                let node = &self.nodes[usize::from(chain[0])];
+                let link = kept.len();
+                let mut d = f64::INFINITY;
+                for &id in chain {
+                    let next = self.nodes[usize::from(id)].shape.distance(center);
+                    if next < d + slack {
+                        if d >= next + slack {
+                            kept.truncate(link);
+                        }
+                        kept.push(id);
+                        d = d.min(next);
+                    }
+                }
+                if part < f64::INFINITY && node.seam.spares(node.op, part, d, slack) {
+                    kept.truncate(link);
+                    continue;
+                }
+                if node.op == Op::Join && node.seam.spares(Op::Join, d, part, slack) {
+                    kept.drain(start..link);
+                }
+                part = node.seam.apply(node.op, part, d);
+            }
+            let Group { op, seam, .. } = self.groups[usize::from(self.nodes[usize::from(run[0])].group)];
+            if total < f64::INFINITY && seam.spares(op, total, part, slack) {
+                kept.truncate(start);
+                continue;
+            }
+            if op == Op::Join && seam.spares(Op::Join, part, total, slack) {
+                kept.drain(..start);
+            }
+            total = seam.apply(op, total, part);
+        }
+        total
+    }
+}

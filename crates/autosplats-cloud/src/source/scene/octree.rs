@@ -1,0 +1,296 @@
+//! Space cut into cells that know which solids matter in them, and rays through those cells.
+//!
+//! # How it works
+//! A cell whose centre is farther from the surface than its corners are from the centre is empty and a ray crosses it in
+//! one step. Every other cell is cut in eight, each with the shorter list of solids that still matter there, until the
+//! list is short or the cell is small. In such a cell a ray advances by the distance bound until the sign changes, and
+//! the root is then polished by regula falsi.
+
+use glam::DVec3;
+
+use super::body::Body;
+use super::fold::Fold;
+
+/// Lists this short are not worth another cut, unless the cell is large.
+const SHORT_LIST: usize = 3;
+
+#[derive(Clone, Copy, Debug)]
+enum Cell {
+    /// Index of the first of eight children, in the order of their bits z, y, x.
+    Branch(u32),
+    Empty {
+        inside: bool,
+    },
+    Surface {
+        first: u32,
+        len: u32,
+    },
+}
+
+/// A cell through which the surface may pass.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf {
+    pub(super) min: DVec3,
+    pub(super) size: f64,
+    first: u32,
+    len: u32,
+}
+
+/// The cells of one body.
+#[derive(Clone, Debug)]
+pub(super) struct Octree {
+    body: Body,
+    fold: Fold,
+    min: DVec3,
+    size: f64,
+    depth: u32,
+    cells: Vec<Cell>,
+    lists: Vec<u16>,
+}
+
+/// Where a ray met the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    pub(super) distance: f64,
+    /// Position before folding.
+    pub(super) world: DVec3,
+    /// Position after folding, and the signs that the fold gave the axes.
+    pub(super) folded: DVec3,
+    pub(super) signs: DVec3,
+    first: u32,
+    len: u32,
+}
+
+impl Octree {
+    /// Cuts the cube at `min` with sides of `size`, which must hold the whole body, down to `size / 2^depth`.
+    pub(super) fn new(body: Body, fold: Fold, min: DVec3, size: f64, depth: u32) -> Self {
+        let mut tree = Self { body, fold, min, size, depth, cells: vec![Cell::Branch(0)], lists: Vec::new() };
+        let all = tree.body.all();
+        tree.cut(0, min, size, 0, &all);
+        tree
+    }
+
+    fn cut(&mut self, cell: usize, min: DVec3, size: f64, level: u32, list: &[u16]) {
+        // A hair more than half the diagonal: normals are taken from a little outside of the cell.
+        let radius = 0.8661 * size + 1e-5;
+        let mut kept = Vec::with_capacity(list.len());
+        let distance = self.body.prune(list, min + DVec3::splat(0.5 * size), radius, &mut kept);
+        if distance.abs() > radius && level >= self.fold.least_level() {
+            self.cells[cell] = Cell::Empty { inside: distance < 0.0 };
+        } else if level == self.depth || (kept.len() <= SHORT_LIST && level + 2 >= self.depth) {
+            let first = self.lists.len() as u32;
+            self.lists.extend_from_slice(&kept);
+            self.cells[cell] = Cell::Surface { first, len: kept.len() as u32 };
+        } else {
+            let first = self.cells.len();
+            self.cells[cell] = Cell::Branch(first as u32);
+            self.cells.resize(first + 8, Cell::Empty { inside: false });
+            let half = 0.5 * size;
+            for child in 0..8 {
+                self.cut(first + child, min + half * corner(child), half, level + 1, &kept);
+            }
+        }
+    }
+
+    pub(super) fn body(&self) -> &Body {
+        &self.body
+    }
+
+    /// The cells the surface may pass through, each where it lies in folded space.
+    pub(super) fn leaves(&self) -> Vec<Leaf> {
+        let mut leaves = Vec::new();
+        let mut stack = vec![(0_usize, self.min, self.size)];
+        while let Some((cell, min, size)) = stack.pop() {
+            match self.cells[cell] {
+                Cell::Empty { .. } => {}
+                Cell::Surface { first, len } => leaves.push(Leaf { min, size, first, len }),
+                Cell::Branch(children) => {
+                    let half = 0.5 * size;
+                    // Reversed, so that they leave the stack in order.
+                    stack.extend((0..8).rev().map(|i| (children as usize + i, min + half * corner(i), half)));
+                }
+            }
+        }
+        leaves
+    }
+
+    /// The solids that matter in `leaf`.
+    pub(super) fn list(&self, leaf: &Leaf) -> &[u16] {
+        &self.lists[leaf.first as usize..(leaf.first + leaf.len) as usize]
+    }
+
+    /// The cell around `p` (folded): its low corner, its size and what it is.
+    #[inline]
+    fn find(&self, p: DVec3) -> (DVec3, f64, Cell) {
+        let steps = f64::from(1_u32 << self.depth);
+        let q = ((p - self.min) * (steps / self.size)).clamp(DVec3::ZERO, DVec3::splat(steps - 1.0));
+        let (x, y, z) = (q.x as u32, q.y as u32, q.z as u32);
+        let (mut cell, mut bit) = (0_usize, self.depth);
+        while let Cell::Branch(children) = self.cells[cell] {
+            bit -= 1;
+            let child = (((z >> bit) & 1) << 2) | (((y >> bit) & 1) << 1) | ((x >> bit) & 1);
+            cell = (children + child) as usize;
+        }
+        let unit = self.size / steps;
+        let corner = DVec3::new(f64::from(x >> bit << bit), f64::from(y >> bit << bit), f64::from(z >> bit << bit));
+        (self.min + corner * unit, unit * f64::from(1_u32 << bit), self.cells[cell])
+    }
+
+    /// Signed distance bound at `p`; farther than one cell from the surface only its sign and order of size are right.
+    pub(super) fn distance(&self, p: DVec3) -> f64 {
+        let (p, _) = self.fold.apply(p);
+        match self.find(p) {
+            (_, _, Cell::Surface { first, len }) => {
+                self.body.distance(p, &self.lists[first as usize..(first + len) as usize])
+            }
+            _ => self.body.distance(p, &self.body.all()),
+        }
+    }
+
+    /// Every place where the bound changes sign on the way from `from` to `to` metres along the ray, nearest first, as
+    /// long as `more` asks for more.
+    fn crossings(&self, leaf: Leaf, origin: DVec3, direction: DVec3, to: f64, more: &mut dyn FnMut(f64) -> bool) -> (f64, bool) {
+        let list = self.list(&leaf);
+        // Steps never get smaller than this, so that grazing rays get on.
+        let least = 1e-3 * leaf.size;
+        let (mut t, mut f) = (0.0, self.body.distance(origin, list));
+        while t < to {
+            let next = (t + f.abs() + least).min(to);
+            let g = self.body.distance(origin + direction * next, list);
+            if (g < 0.0) != (f < 0.0) {
+                let root = polish(|t| self.body.distance(origin + direction * t, list), (t, f), (next, g));
+                if !more(root) {
+                    return (root, true);
+                }
+            }
+            (t, f) = (next, g);
+        }
+        (f, false)
+    }
+
+    /// Calls `hit` with the distance of every place where the surface crosses the line that enters `leaf` at `origin`
+    /// and leaves it after `to` metres.
+    pub(super) fn crossings_in(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, to: f64, hit: &mut dyn FnMut(f64)) {
+        // Most cells' lines meet nothing, which their middle tells at once.
+        if self.body.distance(origin + direction * (0.5 * to), self.list(leaf)).abs() > 0.5 * to {
+            return;
+        }
+        self.crossings(*leaf, origin, direction, to, &mut |t| {
+            hit(t);
+            true
+        });
+    }
+
+    /// First place where the ray crosses the surface, from either side.
+    pub(super) fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Crossing> {
+        let direction = direction.try_normalize()?;
+        let (low, high) = self.fold.bounds(self.min, self.size);
+        let (mut t, end) = clip(low, high, origin, direction)?;
+        let nudge = 1e-10 * self.size;
+        t += nudge;
+        let mut was_inside = None;
+        while t < end {
+            let world = origin + direction * t;
+            let (p, signs) = self.fold.apply(world);
+            let along = direction * signs;
+            let (min, size, cell) = self.find(p);
+            let to = leave(min, size, p, along);
+            match cell {
+                Cell::Surface { first, len } => {
+                    let leaf = Leaf { min, size, first, len };
+                    let crossing = |s: f64| Crossing {
+                        distance: t + s,
+                        world: world + direction * s,
+                        folded: p + along * s,
+                        signs,
+                        first,
+                        len,
+                    };
+                    let inside = self.body.distance(p, self.list(&leaf)) < 0.0;
+                    if was_inside.is_some_and(|was: bool| was != inside) {
+                        return Some(crossing(0.0));
+                    }
+                    let (value, found) = self.crossings(leaf, p, along, to, &mut |_| false);
+                    if found {
+                        return Some(crossing(value));
+                    }
+                    was_inside = Some(value < 0.0);
+                }
+                Cell::Empty { inside } => was_inside = Some(inside),
+                Cell::Branch(_) => unreachable!("find ends at a leaf"),
+            }
+            t += to + nudge;
+        }
+        None
+    }
+
+    /// Outward unit normal where a ray crossed the surface.
+    pub(super) fn normal(&self, at: &Crossing) -> DVec3 {
+        let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
+        self.gradient(at.folded, list) * at.signs
+    }
+
+    /// Direction in which the bound grows fastest, by central differences.
+    pub(super) fn gradient(&self, p: DVec3, list: &[u16]) -> DVec3 {
+        const STEP: f64 = 2e-6;
+        let slope = |axis: DVec3| self.body.distance(p + axis * STEP, list) - self.body.distance(p - axis * STEP, list);
+        DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z)
+    }
+
+    /// Colour where a ray crossed the surface.
+    pub(super) fn rgb(&self, at: &Crossing) -> [f32; 3] {
+        let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
+        self.body.paint(at.folded, at.world, list).0
+    }
+}
+
+fn corner(child: usize) -> DVec3 {
+    DVec3::new((child & 1) as f64, (child >> 1 & 1) as f64, (child >> 2 & 1) as f64)
+}
+
+/// Distances at which a ray enters and leaves a box, the first not below zero.
+fn clip(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
+    let inverse = direction.recip();
+    let (a, b) = ((low - origin) * inverse, (high - origin) * inverse);
+    // A ray in a face's plane makes 0/0 here; f64's own min and max let the other operand win.
+    let start = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(0.0);
+    let end = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
+    (start < end).then_some((start, end))
+}
+
+/// Distance at which a ray from within a cube leaves it.
+#[inline]
+fn leave(min: DVec3, size: f64, p: DVec3, direction: DVec3) -> f64 {
+    let side = |p: f64, d: f64, min: f64| {
+        if d > 0.0 {
+            (min + size - p) / d
+        } else if d < 0.0 {
+            (min - p) / d
+        } else {
+            f64::INFINITY
+        }
+    };
+    side(p.x, direction.x, min.x).min(side(p.y, direction.y, min.y)).min(side(p.z, direction.z, min.z)).max(0.0)
+}
+
+/// The root between two places of opposite sign, by regula falsi with the Illinois rule.
+fn polish(f: impl Fn(f64) -> f64, (mut a, mut fa): (f64, f64), (mut b, mut fb): (f64, f64)) -> f64 {
+    for _ in 0..60 {
+        if fb.abs() < 1e-11 || (b - a).abs() < 1e-12 {
+            break;
+        }
+        let mut t = b - fb * (b - a) / (fb - fa);
+        if !t.is_finite() {
+            t = 0.5 * (a + b);
+        }
+        let ft = f(t);
+        if (ft < 0.0) == (fb < 0.0) {
+            // The same end stays twice in a row: halve its weight, or convergence is linear.
+            fa *= 0.5;
+        } else {
+            (a, fa) = (b, fb);
+        }
+        (b, fb) = (t, ft);
+    }
+    b
+}
