@@ -35,9 +35,7 @@ mod splat;
 pub use autosplats_cloud as cloud;
 pub use camera::{Camera, Projection, ViewDirection, guess_axes};
 pub use error::Error;
-pub use renderer::{
-    Background, ColorMap, ColorMode, Counts, Frame, MAX_SIDE, Reconstruction, Renderer, SearchEngine, Settings,
-    Shading, Timings,
-};
-pub use shade::Image;
+pub use renderer::{Counts, Frame, MAX_SIDE, Reconstruction, Renderer, Settings, Timings};
+pub use search::SearchEngine;
+pub use shade::{Background, ColorMap, ColorMode, Image, Shading};
 pub use splat::{GBuffer, TILE};

@@ -14,13 +14,12 @@ use exr::prelude::{Encoding, Image, SpecificChannels, Vec2, WritableImage as _};
 pub(crate) fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: &mut (impl Write + Seek)) -> Result<()> {
     let Frame { image, layers, .. } = *frame;
     let [right, down, forward] = camera.axes().map_err(Error::other)?.map(|axis| axis.as_vec3());
-    let linear: Vec<f32> = (0..=255u8).map(linear_from_srgb).collect();
     let pixel = |Vec2(x, y): Vec2<usize>| {
         let at = layers.index(x, y);
         if !layers.depth[at].is_finite() {
             return (0.0, 0.0, 0.0, 0.0, f32::INFINITY, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, u32::MAX);
         }
-        let [r, g, b, _] = image.pixels[y * image.width as usize + x].map(|value| linear[usize::from(value)]);
+        let [r, g, b] = image.linear[y * image.width as usize + x];
         let [nx, ny, nz] = layers.normal[at];
         let normal = right * nx + down * ny + forward * nz;
         let (radius, k_radius, curvature) = (layers.radius[at], layers.k_radius[at], layers.curvature[at]);
@@ -45,10 +44,4 @@ pub(crate) fn write_exr(frame: &Frame<'_>, camera: &Camera, writer: &mut (impl W
     let mut picture = Image::from_encoded_channels(size, Encoding::SMALL_LOSSLESS, channels);
     picture.layer_data.attributes.software_name = Some("autosplats".into());
     picture.write().to_buffered(writer).map_err(Error::other)
-}
-
-/// Light of an 8-bit sRGB value, 0 to 1.
-fn linear_from_srgb(value: u8) -> f32 {
-    let value = f32::from(value) / 255.0;
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }

@@ -9,7 +9,7 @@ use image::{ExtendedColorType, ImageEncoder as _};
 /// Writes an image, with an alpha channel if `alpha`.
 pub(crate) fn write_png(image: &Image, alpha: bool, writer: &mut impl Write) -> Result<()> {
     let encoder = PngEncoder::new_with_quality(writer, CompressionType::Fast, FilterType::Adaptive);
-    let Image { width, height, pixels } = image;
+    let Image { width, height, pixels, .. } = image;
     let written = if alpha {
         encoder.write_image(pixels.as_flattened(), *width, *height, ExtendedColorType::Rgba8)
     } else {

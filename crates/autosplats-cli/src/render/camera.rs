@@ -144,7 +144,7 @@ fn load(path: &Path) -> Result<Camera, Failure> {
     let text = read_to_string(path).map_err(|error| failure(&error.to_string()))?;
     let camera: Camera = serde_json::from_str(&text)
         .map_err(|error| failure(&format!("not a camera as --save-camera writes it: {error}")))?;
-    camera.axes().map_err(|error| failure(&error.to_string()))?;
+    camera.check().map_err(|error| failure(&error.to_string()))?;
     Ok(camera)
 }
 

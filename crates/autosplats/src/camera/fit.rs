@@ -81,9 +81,8 @@ impl Camera {
         projection: Projection,
     ) -> Result<Self, Error> {
         let [right, front, up] = frame(axes);
-        let sensor = axes == Axes::Camera && direction == ViewDirection::Auto;
         let (to_viewer, picture_up) = match direction {
-            ViewDirection::Auto if sensor => (front, up),
+            ViewDirection::Auto if axes == Axes::Camera => (front, up),
             ViewDirection::Auto | ViewDirection::Iso => (front + 0.62 * right + 0.55 * up, up),
             ViewDirection::Front => (front, up),
             ViewDirection::Back => (-front, up),
@@ -93,6 +92,7 @@ impl Camera {
             ViewDirection::Bottom => (-up, front),
         };
         let mut camera = Self { eye: to_viewer, look_at: DVec3::ZERO, up: picture_up, projection };
+        let from_sensor = axes == Axes::Camera && direction == ViewDirection::Auto;
         let axes = camera.axes()?;
         let forward = axes[2];
         let samples = samples(cloud, axes);
@@ -111,20 +111,8 @@ impl Camera {
         let half_room = 0.5 - BORDER;
         camera.look_at = to_world(middle);
 
-        if sensor {
-            // The sensor is at the world's origin and saw everything there is from there.
-            let depth = middle[2].max(1e-6);
-            let sensor_offset = axes.map(|axis| -axis.dot(cloud.origin()));
-            let ahead = kept.iter().filter(|p| p.z - sensor_offset[2] > 0.1 * depth);
-            let slope = ahead.fold(0.0f64, |slope, p| {
-                let [x, y, z] = [0, 1, 2].map(|i| p[i] - sensor_offset[i]);
-                slope.max((y / z).abs()).max((x / z).abs() / aspect)
-            });
-            camera.eye = DVec3::ZERO;
-            camera.look_at = forward * depth;
-            let fov = 2.0 * (slope * 0.5 / half_room).atan().to_degrees();
-            camera.projection = Projection::PerspectiveFovDeg(fov.clamp(1.0, 120.0));
-            return Ok(camera);
+        if from_sensor && let Some(sensor) = from_origin(cloud, &kept, axes, middle, aspect) {
+            return Ok(Self { projection: sensor, eye: DVec3::ZERO, ..camera });
         }
         let distance = match &mut camera.projection {
             Projection::OrthographicHeight(height) => {
@@ -144,6 +132,27 @@ impl Camera {
         camera.eye = camera.look_at - forward * distance;
         Ok(camera)
     }
+}
+
+/// The projection that shows all of `points` (along `axes`) from the world's origin looking ahead, where the sensor was if
+/// points are in its frame; `None` if they are not spread about the line of sight, so that it was somewhere else.
+fn from_origin(
+    cloud: &PointCloud,
+    points: &[DVec3],
+    axes: [DVec3; 3],
+    middle: [f64; 3],
+    aspect: f64,
+) -> Option<Projection> {
+    let offset = DVec3::from(axes.map(|axis| axis.dot(cloud.origin())));
+    let middle = DVec3::from(middle) + offset;
+    let ahead = middle.z > 0.0 && middle.x.hypot(middle.y) < 0.3 * middle.z;
+    let slope = points.iter().map(|&p| p + offset).filter(|p| p.z > 0.1 * middle.z).fold(0.0f64, |slope, p| {
+        // Looking at the middle moves the picture's centre there.
+        let [x, y] = [p.x / p.z - middle.x / middle.z, p.y / p.z - middle.y / middle.z];
+        slope.max(y.abs()).max(x.abs() / aspect)
+    });
+    let fov = 2.0 * (slope / (1.0 - 2.0 * BORDER)).atan().to_degrees();
+    (ahead && slope > 0.0 && fov < 120.0).then_some(Projection::PerspectiveFovDeg(fov))
 }
 
 /// Finite positions about the cloud's origin along `axes`, evenly picked.

@@ -78,6 +78,14 @@ impl Camera {
         Ok([right, forward.cross(right), forward])
     }
 
+    /// Checks that the camera can see.
+    ///
+    /// # Errors
+    /// [`Error::Camera`] says what is wrong with its directions or its projection.
+    pub fn check(&self) -> Result<(), Error> {
+        self.view(DVec3::ZERO, [1, 1]).map(|_| ())
+    }
+
     /// Makes the camera ready for a picture of `size` pixels of a cloud about `origin`.
     pub(crate) fn view(&self, origin: DVec3, size: [u32; 2]) -> Result<View, Error> {
         let [right, down, forward] = self.axes()?;

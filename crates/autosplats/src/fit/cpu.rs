@@ -27,14 +27,23 @@ const LONE_RADIUS_PX: f32 = 1.0;
 // the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
 const WIDEST_BEHIND: f32 = 1.0;
 
+/// A point whose neighbours' mean is further from it than this part of the k-radius has them all on one side and close
+/// together: they are a surface elsewhere, and the point an outlier. At a straight edge the part is 0.42, at the end of a
+/// line 0.55.
+// Differs from the paper: it takes any neighbour within the radius of e0 expansions, 31 first search radii at k = 10, as a
+// sign of surface, so that a point in the air before a dense scan grows a disc as wide as its distance.
+const LOPSIDED: f32 = 0.75;
+/// Fewer neighbours than this are too often on one side by chance.
+const LOPSIDED_COUNT: f32 = 6.0;
+
 /// What the fit may be asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FitRules {
     pub(crate) k: u32,
     pub(crate) splat_scale: f32,
     pub(crate) ellipses: bool,
-    /// Keep points without neighbours, as dots.
-    pub(crate) keep_lone: bool,
+    /// Keep outliers: points without neighbours as dots, and those apart from all their neighbours.
+    pub(crate) keep_outliers: bool,
 }
 
 /// Fits a surfel to the neighbourhood of each of `queries`, indices of screen points, and appends them to `surfels`.
@@ -128,10 +137,19 @@ impl Fitted {
         }
         let away = normal[0] * to_eye[0] + normal[1] * to_eye[1] + normal[2] * to_eye[2] < 0.0;
         let sum = least.max(0.0) + middle + largest;
-        let lone = if rules.keep_lone { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
+        let offset = of_lane(&block.offset).map(|sum| sum / count);
+        let apart = offset.iter().map(|c| c * c).sum::<f32>() > (LOPSIDED * k_radius) * (LOPSIDED * k_radius);
+        let outlier = apart & (count >= LOPSIDED_COUNT) & !rules.keep_outliers;
+        let lone = if rules.keep_outliers { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
             center,
-            radius: if count > 0.0 { splat_radius(k_radius, count, rules) } else { lone },
+            radius: if outlier {
+                0.0
+            } else if count > 0.0 {
+                splat_radius(k_radius, count, rules)
+            } else {
+                lone
+            },
             normal: if away { normal.map(|c| -c) } else { normal },
             k_radius,
             major_axis,

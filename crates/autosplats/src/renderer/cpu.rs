@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
 
-use super::{ColorMode, Counts, MAX_SIDE, SearchEngine, Settings, Timings};
+use super::{Counts, MAX_SIDE, Settings, Timings};
 use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::{FitRules, Surfels, fit};
 use crate::project::{Projector, ScreenPoints};
-use crate::search::{Neighborhoods, SearchRules, screen_grid};
-use crate::shade::{Image, Scene, class_colors, linear_steps, shade};
+use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
+use crate::shade::{ColorMode, Image, Scene, class_colors, linear_steps, shade};
 use crate::splat::{Attributes, GBuffer, PointColors, Splatter};
 
 /// Turns clouds into pictures; keeps its buffers, so that a frame after the first allocates next to nothing.
@@ -107,7 +107,7 @@ impl Renderer {
         clock.lap(|timings| &mut timings.splat);
 
         let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
-        shade(layers, &scene, &settings.shading, image);
+        shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade);
 
         let dropped = screen.dropped;
@@ -121,7 +121,7 @@ impl Renderer {
             active: screen.active.len(),
             passive: screen.passive.len(),
             recovered: recovered.len(),
-            outliers: search_counts.outliers,
+            outliers: surfels.iter().filter(|surfel| surfel.radius == 0.0).count(),
             clamped: search_counts.clamped,
             bounded: search_counts.bounded,
         };
@@ -216,7 +216,7 @@ impl Reconstruct<'_> {
             k: settings.k,
             splat_scale: settings.splat_scale,
             ellipses: settings.ellipses,
-            keep_lone: settings.outlier_expansions.is_none(),
+            keep_outliers: settings.outlier_expansions.is_none(),
         };
         let first = surfels.len();
         fit(screen, queries, neighborhoods, view, &rules, surfels);

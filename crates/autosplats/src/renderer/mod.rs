@@ -4,7 +4,7 @@ mod cpu;
 mod settings;
 
 pub use cpu::{Frame, Renderer};
-pub use settings::{Background, ColorMap, ColorMode, Reconstruction, SearchEngine, Settings, Shading};
+pub use settings::{Reconstruction, Settings};
 
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 16_384;

@@ -13,6 +13,15 @@
 
 pub(crate) mod screen_grid;
 
+/// An implementation of the k-radius search.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SearchEngine {
+    /// Buckets of screen points read outwards from each point; exact, in one pass.
+    #[default]
+    ScreenGrid,
+}
+
 /// Neighbourhoods that share a [`NeighborhoodBlock`].
 pub(crate) const LANES: usize = 16;
 

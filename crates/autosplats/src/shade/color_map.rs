@@ -1,7 +1,6 @@
 //! Colour maps: a value in its range to a colour.
 
-use super::linear;
-use crate::renderer::ColorMap;
+use super::{ColorMap, linear};
 
 /// Steps of a table: finer than 8 bits a channel can show.
 const STEPS: usize = 1024;

@@ -4,13 +4,12 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::color_map::Scale;
-use super::{Image, legend, linear, srgb};
+use super::{Background, ColorMap, ColorMode, Image, Shading, legend, linear, srgb};
 use crate::camera::View;
-use crate::renderer::{Background, ColorMap, ColorMode, Shading};
 use crate::splat::GBuffer;
 
 /// One clay tone, linear.
-const CLAY: [f32; 3] = [0.62, 0.58, 0.53];
+const CLAY: [f32; 3] = [0.53, 0.50, 0.46];
 /// Direction to the key light in view space (x right, y down, z forward): over the left shoulder.
 const KEY: Vec3 = Vec3::new(-0.47, -0.62, -0.63);
 const KEY_LIGHT: f32 = 0.86;
@@ -41,8 +40,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) origin: DVec3,
 }
 
-/// Shades `layers` into `image`.
-pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, image: &mut Image) {
+/// Shades `layers` into `image`; also in linear light if `keep_linear`.
+pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep_linear: bool, image: &mut Image) {
     let [width, height] = [layers.width as usize, layers.height as usize];
     image.width = layers.width;
     image.height = layers.height;
@@ -62,6 +61,11 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, imag
             };
         }
     });
+    image.linear.clear();
+    if keep_linear {
+        let pixels = (0..width * height).into_par_iter();
+        pixels.map(|at| shader.pixel(at % width, at / width).unwrap_or_default()).collect_into_vec(&mut image.linear);
+    }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
         legend::draw(image, &title(&shading.color), scale, encode);
     }

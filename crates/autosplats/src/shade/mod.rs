@@ -11,12 +11,14 @@ mod classes;
 mod color_map;
 mod cpu;
 mod legend;
+mod settings;
 
 pub(crate) use classes::class_colors;
 pub(crate) use cpu::{Scene, shade};
+pub use settings::{Background, ColorMap, ColorMode, Shading};
 
 /// An image, rows from the top.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Image {
     /// Width in pixels.
     pub width: u32,
@@ -24,6 +26,9 @@ pub struct Image {
     pub height: u32,
     /// sRGB and straight alpha, 8 bits a channel.
     pub pixels: Vec<[u8; 4]>,
+    /// The same in linear light before any rounding, without legend and background: zero where no surface is. Filled if
+    /// all layers are asked for, otherwise empty.
+    pub linear: Vec<[f32; 3]>,
 }
 
 /// Linear value, 0 to 1, of an sRGB value 0 to 1.

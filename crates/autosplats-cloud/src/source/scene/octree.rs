@@ -149,7 +149,14 @@ impl Octree {
 
     /// Every place where the bound changes sign on the way from `from` to `to` metres along the ray, nearest first, as
     /// long as `more` asks for more.
-    fn crossings(&self, leaf: Leaf, origin: DVec3, direction: DVec3, to: f64, more: &mut dyn FnMut(f64) -> bool) -> (f64, bool) {
+    fn crossings(
+        &self,
+        leaf: Leaf,
+        origin: DVec3,
+        direction: DVec3,
+        to: f64,
+        more: &mut dyn FnMut(f64) -> bool,
+    ) -> (f64, bool) {
         let list = self.list(&leaf);
         // Steps never get smaller than this, so that grazing rays get on.
         let least = 1e-3 * leaf.size;

@@ -54,7 +54,8 @@ struct Zone {
 
 impl Zone {
     fn new(tree: &Octree, zone: usize) -> Self {
-        let leaves = tree.leaves().into_iter().filter(|leaf| tree.body().touches(tree.list(leaf), zone)).collect::<Vec<_>>();
+        let leaves =
+            tree.leaves().into_iter().filter(|leaf| tree.body().touches(tree.list(leaf), zone)).collect::<Vec<_>>();
         let mut sum = 0.0;
         let sums = leaves
             .iter()

@@ -1,0 +1,90 @@
+//! What shading can be asked for.
+
+/// How splats become an image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shading {
+    /// What the surface is coloured by.
+    pub color: ColorMode,
+    /// Values at the two ends of the colour map; `None` takes the 1st and 99th percentile of the picture.
+    pub range: Option<[f32; 2]>,
+    /// Colours for scalar values; `None` takes the one that suits the colour mode.
+    pub color_map: Option<ColorMap>,
+    /// Draw the colour map with its range into the picture, where the colour mode has one.
+    pub legend: bool,
+    /// Light the surface by its normals; otherwise colours are shown as they are.
+    pub lighting: bool,
+    /// Strength of eye-dome lighting, the darkening at depth steps; 0 (off) to 10.
+    pub eye_dome: f32,
+    /// What is seen where no surface is.
+    pub background: Background,
+}
+
+/// What the surface is coloured by.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub enum ColorMode {
+    /// The points' own colours where they have any, else one light clay tone.
+    #[default]
+    Auto,
+    /// The points' own colours.
+    Rgb,
+    /// One light clay tone.
+    Plain,
+    /// World coordinate along the cloud's up axis.
+    Height,
+    /// A colour for each class of field `Classification`, by the ASPRS table.
+    Classification,
+    /// A scalar field by name, letter case ignored; `Intensity` is one.
+    Field(String),
+    /// World-space normal, each component from -1..1 to 0..1.
+    Normal,
+    /// Surface variation λ0/(λ0+λ1+λ2), 0 (flat) to 1/3.
+    Curvature,
+    /// Splat radius in world units.
+    Radius,
+    /// Distance to the k-th neighbour in world units; red where sampling is sparse, as in the paper's Figure 12.
+    KRadius,
+    /// Depth along the viewing axis in world units.
+    Depth,
+}
+
+/// Colours for scalar values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ColorMap {
+    /// Dark violet over green to yellow: perceptually uniform, readable for the colour-blind. The usual one.
+    Viridis,
+    /// Black over violet and orange to white-yellow.
+    Inferno,
+    /// Dark to light blue, green, red: a smooth rainbow.
+    Turbo,
+    /// Black to white.
+    Gray,
+    /// Pale grey over orange to dark red: the high end is a warning. The one for radii.
+    Reds,
+}
+
+/// What is seen where no surface is. Colours are sRGB, 8 bits a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Background {
+    /// One colour.
+    Color([u8; 3]),
+    /// From the first colour at the top to the second at the bottom.
+    Gradient([u8; 3], [u8; 3]),
+    /// Nothing: alpha is 0.
+    Transparent,
+}
+
+impl Default for Shading {
+    fn default() -> Self {
+        Self {
+            color: ColorMode::Auto,
+            range: None,
+            color_map: None,
+            legend: false,
+            lighting: true,
+            eye_dome: 0.0,
+            background: Background::Gradient([0x3a, 0x41, 0x4b], [0x17, 0x1a, 0x1f]),
+        }
+    }
+}
