@@ -115,7 +115,8 @@ fn search_block<S: Simd>(
         let inside = block.spheres_inside(&window, view);
         let mut done = [false; LANES];
         for lane in (0..LANES).filter(|&lane| group[lane]) {
-            let exact = enough & (inside[lane] | everything);
+            // Points so far away that their squared distance overflows are nobody's neighbours.
+            let exact = enough & (inside[lane] | everything) & block.threshold.0[lane].is_finite();
             let kth_radius = block.threshold.0[lane].sqrt();
             let initial_radius = block.initial_radius.0[lane];
             // From r̃₀ on no gap of factor √λ fits below this radius, so that the rules need not be looked at.
@@ -390,10 +391,11 @@ fn largest_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lan
     largest
 }
 
-/// Squared distances of `lane` up to distance `known`, the point itself left out, ascending.
+/// Finite squared distances of `lane` up to distance `known`, the point itself left out, ascending.
 fn sort_lane(squared: &[Lanes], lane: usize, known: f32, sorted: &mut Vec<f32>) {
     sorted.clear();
-    sorted.extend(squared.iter().map(|candidate| candidate.0[lane]).filter(|&d| d <= known * known && d > 0.0));
+    let most = (known * known).min(f32::MAX);
+    sorted.extend(squared.iter().map(|candidate| candidate.0[lane]).filter(|&d| d <= most && d > 0.0));
     sorted.sort_unstable_by(f32::total_cmp);
 }
 
