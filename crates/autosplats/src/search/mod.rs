@@ -12,6 +12,8 @@
 //!   bounded time per point.
 
 pub(crate) mod screen_grid;
+#[cfg(test)]
+mod tests;
 
 /// An implementation of the k-radius search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
