@@ -16,6 +16,8 @@ mod bins;
 mod cpu;
 mod raster;
 mod setup;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;
