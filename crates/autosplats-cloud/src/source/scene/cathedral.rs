@@ -80,7 +80,10 @@ fn nave_vault(inset: f64) -> [Shape; 2] {
 }
 
 fn aisle_vault(inset: f64) -> [Shape; 2] {
-    [along_x(7.45, -0.1, 2.05 - inset, 5.3, 2.9 - inset), along_y(5.0, OUTER - 0.05, -0.1, 2.62 - inset, 5.3, 3.25 - inset)]
+    [
+        along_x(7.45, -0.1, 2.05 - inset, 5.3, 2.9 - inset),
+        along_y(5.0, OUTER - 0.05, -0.1, 2.62 - inset, 5.3, 3.25 - inset),
+    ]
 }
 
 /// The stone, and the large spaces in it.
@@ -267,7 +270,12 @@ fn column(body: &mut Body) {
             let turn = f64::from(i) + 0.5 * row as f64;
             let (sin, cos) = (std::f64::consts::TAU * turn / f64::from(count)).sin_cos();
             let q = |r: f64, z: f64| p(low + z) + DVec3::new(cos, sin, 0.0) * r;
-            let leaf = [(q(0.46, 0.0), 0.055), (q(out - 0.10, 0.17), 0.075), (q(out, 0.30), 0.065), (q(out + 0.05, 0.25), 0.04)];
+            let leaf = [
+                (q(0.46, 0.0), 0.055),
+                (q(out - 0.10, 0.17), 0.075),
+                (q(out, 0.30), 0.065),
+                (q(out + 0.05, 0.25), 0.04),
+            ];
             body.strand(0.02, &leaf);
         }
     }

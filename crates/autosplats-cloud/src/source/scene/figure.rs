@@ -69,7 +69,13 @@ fn dancer(body: &mut Body, phase: f64) {
     body.group(Op::Join, 0.03);
     body.paint = SKIN;
     body.join(0.0, Shape::cone(neck - DVec3::Z * 0.03, middle + turn * DVec3::new(0.0, 0.025, -0.06), 0.058, 0.05));
-    let looks = Looks { skin: SKIN, lips: Paint::Plain(176, 98, 88), eyes: Paint::Plain(232, 226, 216), irises: Paint::Plain(62, 44, 34), brows: HAIR };
+    let looks = Looks {
+        skin: SKIN,
+        lips: Paint::Plain(176, 98, 88),
+        eyes: Paint::Plain(232, 226, 216),
+        irises: Paint::Plain(62, 44, 34),
+        brows: HAIR,
+    };
     head(body, Placement { origin: middle, axes: turn }, looks);
     hair(body, Placement { origin: middle, axes: turn }, a);
 }
@@ -110,12 +116,15 @@ fn torso(body: &mut Body, [pelvis, waist, chest, neck]: [DVec3; 4], hips: DMat3,
     body.join(0.08, egg(chest + turn * DVec3::new(0.0, 0.01, 0.0), turn, [0.138, 0.102, 0.165]));
     for side in [-1.0, 1.0] {
         body.join(0.035, Shape::ball(chest + turn * DVec3::new(side * 0.066, -0.072, -0.015), 0.058));
-        body.join(0.04, Shape::cone(
-            chest + turn * DVec3::new(side * 0.10, 0.055, 0.06),
-            chest + turn * DVec3::new(side * 0.06, 0.06, -0.05),
-            0.045,
-            0.03,
-        ));
+        body.join(
+            0.04,
+            Shape::cone(
+                chest + turn * DVec3::new(side * 0.10, 0.055, 0.06),
+                chest + turn * DVec3::new(side * 0.06, 0.06, -0.05),
+                0.045,
+                0.03,
+            ),
+        );
     }
     body.paint = SKIN;
     for side in [-1.0, 1.0] {
@@ -185,7 +194,8 @@ fn skirt(body: &mut Body, waist: DVec3, hips: DMat3, a: f64) {
     let knot = band.world(DVec3::new(0.085, -0.075, 0.0));
     body.join(0.01, Shape::ball(knot, 0.026));
     for (i, swing) in [(0.0, 0.1), (1.0, -0.1)] {
-        let end = knot + axis * 0.26 + hips * DVec3::new(0.09 + 0.05 * i + swing * 0.3 * a.sin(), -0.13 - 0.02 * i, 0.0);
+        let end =
+            knot + axis * 0.26 + hips * DVec3::new(0.09 + 0.05 * i + swing * 0.3 * a.sin(), -0.13 - 0.02 * i, 0.0);
         let middle = knot.lerp(end, 0.5) + hips * DVec3::new(0.02, -0.02, 0.01);
         body.strand(0.02, &[(knot, 0.012), (middle, 0.02), (end, 0.026)]);
     }

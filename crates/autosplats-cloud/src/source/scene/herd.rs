@@ -39,8 +39,7 @@ pub(super) fn scene(phase: f64) -> Model {
     body.zone = 1;
     for (x, y, turn, size, start, coat) in HERD {
         let origin = DVec3::new(x, y, meadow_height(x, y) - 0.01);
-        body.frame =
-            Similarity { placement: Placement { origin, axes: DMat3::from_rotation_z(turn) }, scale: size };
+        body.frame = Similarity { placement: Placement { origin, axes: DMat3::from_rotation_z(turn) }, scale: size };
         horse(&mut body, Gait::Gallop((STRIDES * phase + start).rem_euclid(1.0)), coat);
     }
     let tree = Octree::new(body, Fold::None, DVec3::new(-8.0, -8.0, -4.0), 16.0, 10);

@@ -219,14 +219,21 @@ fn head(body: &mut Body, poll: DVec3, nose: DVec3, coat: Coat) {
     for side in [-1.0, 1.0] {
         body.join(0.015, egg(at, [long + 0.012, side * 0.042, -0.012], 0.5, [0.034, 0.018, 0.026]));
         body.cut(0.008, egg(at, [long + 0.024, side * 0.06, -0.012], 0.5, [0.02, 0.014, 0.013]));
-        body.cut(0.006, Shape::cone(p(long + 0.05, side * 0.03, -0.078), p(long - 0.07, side * 0.064, -0.072), 0.005, 0.003));
+        body.cut(
+            0.006,
+            Shape::cone(p(long + 0.05, side * 0.03, -0.078), p(long - 0.07, side * 0.064, -0.072), 0.005, 0.003),
+        );
     }
     body.group(Op::Join, 0.006);
     for side in [-1.0, 1.0] {
         body.paint = Paint::Plain(30, 24, 22);
         body.join(0.0, Shape::ball(p(0.155, side * 0.078, 0.014), 0.024));
         body.paint = coat.fur;
-        let lid = [(p(0.125, side * 0.088, 0.012), 0.007), (p(0.15, side * 0.096, 0.034), 0.009), (p(0.185, side * 0.086, 0.016), 0.007)];
+        let lid = [
+            (p(0.125, side * 0.088, 0.012), 0.007),
+            (p(0.15, side * 0.096, 0.034), 0.009),
+            (p(0.185, side * 0.086, 0.016), 0.007),
+        ];
         body.strand(0.006, &lid);
     }
     body.group(Op::Join, 0.03);
@@ -265,7 +272,11 @@ fn hair(body: &mut Body, at: Placement, poll: DVec3, nose: DVec3, moving: f64, b
     let forehead = poll.lerp(nose, 0.3) + (nose - poll).cross(DVec3::Y).normalize() * 0.098;
     for i in -1..=1 {
         let y = 0.024 * f64::from(i);
-        let points = [(top + DVec3::new(0.02, 0.5 * y, 0.0), 0.022), (top.lerp(forehead, 0.5) + DVec3::new(0.035, y, 0.02), 0.018), (forehead + DVec3::new(0.0, 1.4 * y, 0.0), 0.006)];
+        let points = [
+            (top + DVec3::new(0.02, 0.5 * y, 0.0), 0.022),
+            (top.lerp(forehead, 0.5) + DVec3::new(0.035, y, 0.02), 0.018),
+            (forehead + DVec3::new(0.0, 1.4 * y, 0.0), 0.006),
+        ];
         body.strand(0.015, &points);
     }
     let dock = at.world(DVec3::new(-0.86, 0.0, 1.37));

@@ -82,8 +82,9 @@ pub(super) fn parse(text: &str) -> Result<(Kind, usize, f64), Error> {
     let kind = Kind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name.trim()));
     let kind = kind.ok_or_else(|| Error::UnknownScene { given: name.into(), known: known() })?;
     let count = match count {
-        Some(count) => parse_count(count)
-            .ok_or_else(|| bad("a count is a number from 1 to 1G, like 5000, 546K or 1.5M"))?,
+        Some(count) => {
+            parse_count(count).ok_or_else(|| bad("a count is a number from 1 to 1G, like 5000, 546K or 1.5M"))?
+        }
         None => kind.default_count(),
     };
     Ok((kind, count, seconds))

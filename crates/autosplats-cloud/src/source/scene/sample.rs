@@ -54,7 +54,8 @@ struct Zone {
 
 impl Zone {
     fn new(tree: &Octree, zone: usize) -> Self {
-        let leaves = tree.leaves().into_iter().filter(|leaf| tree.body().touches(tree.list(leaf), zone)).collect::<Vec<_>>();
+        let leaves =
+            tree.leaves().into_iter().filter(|leaf| tree.body().touches(tree.list(leaf), zone)).collect::<Vec<_>>();
         let mut sum = 0.0;
         let sums = leaves
             .iter()
@@ -148,8 +149,7 @@ fn pierce(tree: &Octree, leaf: &Leaf, zone: usize, random: &mut Random, out: &mu
     let list = tree.list(leaf);
     tree.crossings_in(leaf, origin, direction, leaf.size, &mut |t| {
         let p = origin + direction * t;
-        let normal = tree.gradient(p, list).abs();
-        if random.unit() * normal.element_sum() < 1.0 {
+        if random.unit() * tree.slant(p, list) < 1.0 {
             let (rgb, in_zone) = tree.body().paint(p, p, list);
             if in_zone == zone {
                 out.push((p.as_vec3().to_array(), quantize(rgb, random)));

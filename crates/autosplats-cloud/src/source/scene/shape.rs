@@ -106,20 +106,47 @@ impl RoundCone {
 pub(super) enum Shape {
     RoundCone(RoundCone),
     /// Half axes along the placement's.
-    Ellipsoid { at: Placement, radii: DVec3 },
+    Ellipsoid {
+        at: Placement,
+        radii: DVec3,
+    },
     /// Half sides, edges rounded by `round` without growing.
-    Block { at: Placement, half: DVec3, round: f64 },
+    Block {
+        at: Placement,
+        half: DVec3,
+        round: f64,
+    },
     /// Axis along local z, edges rounded by `round` without growing.
-    Cylinder { at: Placement, radius: f64, half_height: f64, round: f64 },
+    Cylinder {
+        at: Placement,
+        radius: f64,
+        half_height: f64,
+        round: f64,
+    },
     /// Axis along local z.
-    Ring { at: Placement, major: f64, minor: f64 },
+    Ring {
+        at: Placement,
+        major: f64,
+        minor: f64,
+    },
     /// Everything on the side that `normal` points away from.
-    HalfSpace { normal: DVec3, offset: f64 },
+    HalfSpace {
+        normal: DVec3,
+        offset: f64,
+    },
     /// A passage along local y over the floor z = 0: walls at x = ±`half_width` up to `spring`, above them two arcs of
     /// `radius`, pointed where that exceeds the half width. `half_length` to either side of the origin.
-    Passage { at: Placement, half_width: f64, spring: f64, radius: f64, half_length: f64 },
+    Passage {
+        at: Placement,
+        half_width: f64,
+        spring: f64,
+        radius: f64,
+        half_length: f64,
+    },
     /// A rolling meadow: a disc of `radius` about the origin, one half metre thick.
-    Meadow { radius: f64 },
+    Meadow {
+        radius: f64,
+    },
 }
 
 impl Shape {
@@ -139,18 +166,14 @@ impl Shape {
                 Self::cone(by.point(a), by.point(a + axis), radius_a * s, radius_b * s)
             }
             Self::Ellipsoid { at, radii } => Self::Ellipsoid { at: by.placement(at), radii: radii * s },
-            Self::Block { at, half, round } => {
-                Self::Block { at: by.placement(at), half: half * s, round: round * s }
-            }
+            Self::Block { at, half, round } => Self::Block { at: by.placement(at), half: half * s, round: round * s },
             Self::Cylinder { at, radius, half_height, round } => Self::Cylinder {
                 at: by.placement(at),
                 radius: radius * s,
                 half_height: half_height * s,
                 round: round * s,
             },
-            Self::Ring { at, major, minor } => {
-                Self::Ring { at: by.placement(at), major: major * s, minor: minor * s }
-            }
+            Self::Ring { at, major, minor } => Self::Ring { at: by.placement(at), major: major * s, minor: minor * s },
             Self::HalfSpace { normal, offset } => {
                 let normal = by.placement.axes * normal;
                 Self::HalfSpace { normal, offset: offset * s + normal.dot(by.placement.origin) }
@@ -192,7 +215,8 @@ impl Shape {
             Self::Passage { at, half_width, spring, radius, half_length } => {
                 let p = at.local(p);
                 let (x, z) = (p.x.abs(), p.z - spring);
-                let across = if z < 0.0 { x - half_width } else { (x + radius - half_width).hypot(z) - radius };
+                let across =
+                    if z < 0.0 { x - half_width } else { DVec2::new(x + radius - half_width, z).length() - radius };
                 across.max(-p.z).max(p.y.abs() - half_length)
             }
             Self::Meadow { radius } => {

@@ -102,9 +102,10 @@ fn robe(body: &mut Body) {
         let q = p + DVec3::new(-sin, cos, 0.0) * 0.06 + DVec3::new(cos, sin, 0.0) * 0.02;
         body.join(0.02, Shape::cone(p, q, 0.028, 0.02));
     }
-    for (ankle, forward) in
-        [(DVec3::new(-0.125, -0.15, 0.085), DVec3::new(-0.3, -1.0, 0.0)), (DVec3::new(0.11, -0.13, 0.085), DVec3::new(0.25, -1.0, 0.0))]
-    {
+    for (ankle, forward) in [
+        (DVec3::new(-0.125, -0.15, 0.085), DVec3::new(-0.3, -1.0, 0.0)),
+        (DVec3::new(0.11, -0.13, 0.085), DVec3::new(0.25, -1.0, 0.0)),
+    ] {
         body.group(Op::Join, 0.012);
         foot(body, ankle, forward, DVec3::NEG_Z);
     }
@@ -184,9 +185,10 @@ fn arms(body: &mut Body) {
     let staff = DVec3::new(-0.40, -0.20, 0.0);
     let grip = staff + DVec3::Z * 1.36;
     let book = DVec3::new(0.235, -0.15, 1.085);
-    for (side, target, pole) in
-        [(-1.0, grip + DVec3::new(0.05, 0.045, -0.045), DVec3::new(-0.5, 0.5, -1.0)), (1.0, book + DVec3::new(0.045, 0.01, -0.095), DVec3::new(0.6, 1.0, -0.4))]
-    {
+    for (side, target, pole) in [
+        (-1.0, grip + DVec3::new(0.05, 0.045, -0.045), DVec3::new(-0.5, 0.5, -1.0)),
+        (1.0, book + DVec3::new(0.045, 0.01, -0.095), DVec3::new(0.6, 1.0, -0.4)),
+    ] {
         let shoulder = DVec3::new(side * 0.172, 0.012, 1.425);
         let (elbow, wrist) = reach(shoulder, target, 0.285, 0.25, pole);
         body.group(Op::Join, 0.03);
@@ -205,14 +207,26 @@ fn arms(body: &mut Body) {
             let s = f64::from(i) / 6.0 - 0.5;
             let top = shoulder.lerp(elbow, 0.86) + DVec3::new(0.05 * s, 0.10 * s, -0.02);
             let low = top + DVec3::new(0.02 * side + 0.03 * s, 0.05 * s, -0.17 - 0.03 * whim(i, 32));
-            body.strand(0.012, &[(top, 0.018), (top.lerp(low, 0.5) + DVec3::Y * 0.012 * whim(i, 34), 0.018), (low, 0.014)]);
+            body.strand(
+                0.012,
+                &[(top, 0.018), (top.lerp(low, 0.5) + DVec3::Y * 0.012 * whim(i, 34), 0.018), (low, 0.014)],
+            );
         }
         body.group(Op::Join, 0.012);
         if side < 0.0 {
             let forward = DVec3::new(-0.55, -0.35, 0.25);
             hand(body, Hand { wrist, forward, palm: DVec3::new(-0.35, -0.5, -0.15), thumb: -1.0, curl: 1.05 });
         } else {
-            hand(body, Hand { wrist, forward: DVec3::new(-0.45, -0.75, 0.2), palm: DVec3::new(-0.3, 0.1, 1.0), thumb: -1.0, curl: 0.35 });
+            hand(
+                body,
+                Hand {
+                    wrist,
+                    forward: DVec3::new(-0.45, -0.75, 0.2),
+                    palm: DVec3::new(-0.3, 0.1, 1.0),
+                    thumb: -1.0,
+                    curl: 0.35,
+                },
+            );
         }
     }
     staff_and_finial(body, staff);
@@ -230,7 +244,10 @@ fn arms(body: &mut Body) {
         body.join(0.003, Shape::Block { at: ridge, half: DVec3::new(0.005, 0.029, 0.006), round: 0.004 });
     }
     let boss = at(0.0, -0.029, 0.0);
-    body.join(0.002, Shape::Ring { at: Placement::along(boss.origin, axes.y_axis, DVec3::X), major: 0.026, minor: 0.0045 });
+    body.join(
+        0.002,
+        Shape::Ring { at: Placement::along(boss.origin, axes.y_axis, DVec3::X), major: 0.026, minor: 0.0045 },
+    );
     body.join(0.002, Shape::ball(boss.origin, 0.011));
 }
 
@@ -246,13 +263,24 @@ fn staff_and_finial(body: &mut Body, foot: DVec3) {
     for i in 0..8 {
         let (sin, cos) = (TAU * f64::from(i) / 8.0).sin_cos();
         let leaf = |r: f64, z: f64| p(1.90 + z) + DVec3::new(r * cos, r * sin, 0.0);
-        body.strand(0.006, &[(leaf(0.02, -0.01), 0.008), (leaf(0.056, 0.03), 0.0115), (leaf(0.062, 0.075), 0.008), (leaf(0.084, 0.095), 0.004)]);
+        body.strand(
+            0.006,
+            &[
+                (leaf(0.02, -0.01), 0.008),
+                (leaf(0.056, 0.03), 0.0115),
+                (leaf(0.062, 0.075), 0.008),
+                (leaf(0.084, 0.095), 0.004),
+            ],
+        );
     }
     for i in 0..26 {
         let s = f64::from(i) / 25.0;
         let (sin, cos) = (2.399_963 * f64::from(i)).sin_cos();
         let radius = 0.034 * (1.0 - s).powf(0.6);
-        body.join(0.004, Shape::ball(p(2.0 + 0.085 * s) + DVec3::new(radius * cos, radius * sin, 0.0), 0.012 - 0.003 * s));
+        body.join(
+            0.004,
+            Shape::ball(p(2.0 + 0.085 * s) + DVec3::new(radius * cos, radius * sin, 0.0), 0.012 - 0.003 * s),
+        );
     }
 }
 
