@@ -8,6 +8,6 @@ mod source;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud};
 pub use error::Error;
-pub use source::scene::{Hit, Scene, View};
 /// The vector library of the public interface.
 pub use glam;
+pub use source::scene::{Hit, Scene, View};

@@ -12,7 +12,7 @@ use super::body::Body;
 use super::fold::Fold;
 
 /// Lists this short are not worth another cut, unless the cell is large.
-const SHORT_LIST: usize = 3;
+const SHORT_LIST: usize = 4;
 
 /// Level down to which a table takes the place of the tree.
 const TOP: u32 = 5;
