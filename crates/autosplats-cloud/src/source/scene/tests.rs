@@ -82,14 +82,13 @@ fn every_point_lies_on_the_surface_that_rays_meet() {
             let p = cloud.world_position(i);
             let off = scene.distance(p).abs();
             assert!(off < TOLERANCE, "{} point {i} at {p}: {off} m off the surface", scene.name());
-            // Looking at it from every side, it is where a ray stops, unless something stands before it.
-            for direction in [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
-                let hit = scene.trace(p - direction * 0.02, direction);
-                if hit.is_some_and(|hit| (hit.distance - 0.02).abs() < 1e-4) {
-                    seen += 1;
-                    break;
-                }
-            }
+            // A ray straight at it ends there, unless something stands before it from both sides.
+            let slope = |axis: DVec3| scene.distance(p + axis * 1e-5) - scene.distance(p - axis * 1e-5);
+            let normal = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize();
+            seen += usize::from([normal, -normal].into_iter().any(|side| {
+                let hit = scene.trace(p + side * 0.004, -side);
+                hit.is_some_and(|hit| (hit.distance - 0.004).abs() < 2.0 * TOLERANCE)
+            }));
         }
         assert!(seen * 1000 > cloud.len() * 995, "{}: rays find {seen} of {} points", scene.name(), cloud.len());
     }
