@@ -7,6 +7,7 @@
 //! the root is then polished by regula falsi.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::body::Body;
 use super::fold::Fold;
@@ -53,30 +54,17 @@ pub(super) struct Octree {
     top: Vec<(u32, u32)>,
 }
 
-/// Where a ray met the surface.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Crossing {
-    pub(super) distance: f64,
-    /// Position before folding.
-    pub(super) world: DVec3,
-    /// Position after folding, and the signs that the fold gave the axes.
-    pub(super) folded: DVec3,
-    pub(super) signs: DVec3,
-    first: u32,
-    len: u32,
+/// A part of the cells under construction.
+struct Builder<'a> {
+    body: &'a Body,
+    fold: Fold,
+    depth: u32,
+    cells: Vec<Cell>,
+    lists: Vec<u16>,
 }
 
-impl Octree {
-    /// Cuts the cube at `min` with sides of `size`, which must hold the whole body, down to `size / 2^depth`.
-    pub(super) fn new(body: Body, fold: Fold, min: DVec3, size: f64, depth: u32) -> Self {
-        let mut tree =
-            Self { body, fold, min, size, depth, cells: vec![Cell::Branch(0)], lists: Vec::new(), top: Vec::new() };
-        let all = tree.body.all();
-        tree.cut(0, min, size, 0, &all);
-        tree.top = (0..1_u32 << (3 * TOP)).map(|i| tree.descend(i & MASK, (i >> TOP) & MASK, i >> (2 * TOP))).collect();
-        tree
-    }
-
+impl Builder<'_> {
+    /// Makes `cell` of the cube at `min`, in which only the solids of `list` matter.
     fn cut(&mut self, cell: usize, min: DVec3, size: f64, level: u32, list: &[u16]) {
         // A hair more than half the diagonal: normals are taken from a little outside of the cell.
         let radius = 0.8661 * size + 1e-5;
@@ -97,6 +85,55 @@ impl Octree {
                 self.cut(first + child, min + half * corner(child), half, level + 1, &kept);
             }
         }
+    }
+}
+
+/// Where a ray met the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    pub(super) distance: f64,
+    /// Position before folding.
+    pub(super) world: DVec3,
+    /// Position after folding, and the signs that the fold gave the axes.
+    pub(super) folded: DVec3,
+    pub(super) signs: DVec3,
+    first: u32,
+    len: u32,
+}
+
+impl Octree {
+    /// Cuts the cube at `min` with sides of `size`, which must hold the whole body, down to `size / 2^depth`.
+    pub(super) fn new(body: Body, fold: Fold, min: DVec3, size: f64, depth: u32) -> Self {
+        let all = body.all();
+        // The first two levels are always cut; what is below each of their 64 cells is built in parallel.
+        let parts = (0..64_usize).into_par_iter().map(|i| {
+            let mut part = Builder { body: &body, fold, depth, cells: vec![Cell::Empty(0.0)], lists: Vec::new() };
+            let low = min + 0.5 * size * corner(i / 8) + 0.25 * size * corner(i % 8);
+            part.cut(0, low, 0.25 * size, 2, &all);
+            (part.cells, part.lists)
+        });
+        let parts: Vec<_> = parts.collect();
+        let mut cells = vec![Cell::Branch(1)];
+        cells.extend((0..8).map(|i| Cell::Branch(9 + 8 * i)));
+        cells.resize(9 + 64, Cell::Empty(0.0));
+        let mut lists = Vec::new();
+        for (i, (part, part_lists)) in parts.into_iter().enumerate() {
+            // A part's cell 0 has its place already; the others follow at the end.
+            let (cells_before, lists_before) = (cells.len() as u32 - 1, lists.len() as u32);
+            let mut moved = part.into_iter().map(|cell| match cell {
+                Cell::Branch(children) => Cell::Branch(children + cells_before),
+                Cell::Surface { first, len } => Cell::Surface { first: first + lists_before, len },
+                empty => empty,
+            });
+            if let Some(root) = moved.next() {
+                cells[9 + i] = root;
+            }
+            cells.extend(moved);
+            lists.extend(part_lists);
+        }
+        let mut tree = Self { body, fold, min, size, depth, cells, lists, top: Vec::new() };
+        tree.top = (0..1_u32 << (3 * TOP)).map(|i| tree.descend(i & MASK, (i >> TOP) & MASK, i >> (2 * TOP))).collect();
+        tree
     }
 
     /// The cell at a cube of level [`TOP`], and its level.
@@ -198,6 +235,16 @@ impl Octree {
             (t, f) = (next, g);
         }
         (f, false)
+    }
+
+    /// A bit for every octant of `leaf`, in the order of [`corner`], that the surface may pass through.
+    pub(super) fn octants(&self, leaf: &Leaf) -> u8 {
+        let quarter = 0.25 * leaf.size;
+        let near = |i: &usize| {
+            let middle = leaf.min + DVec3::splat(quarter) + 2.0 * quarter * corner(*i);
+            self.body.distance(middle, self.list(leaf)).abs() <= 1.7321 * quarter
+        };
+        (0..8).filter(near).fold(0, |bits, i| bits | 1 << i)
     }
 
     /// Calls `hit` with the distance of every place where the surface crosses the line that enters `leaf` at `origin`
