@@ -220,8 +220,8 @@ impl Octree {
         more: &mut dyn FnMut(f64) -> bool,
     ) -> (f64, bool) {
         let list = self.list(&leaf);
-        // Steps never get smaller than this, so that grazing rays get on.
-        let least = 1e-3 * leaf.size;
+        // Steps never get smaller than this, so that grazing rays get on. All that is missed are chords shorter than it.
+        let least = 5e-3 * leaf.size;
         let (mut t, mut f) = (0.0, self.body.distance(origin, list));
         while t < to {
             let next = (t + f.abs() + least).min(to);
