@@ -192,7 +192,7 @@ impl Octree {
         (self.min + corner * unit, unit * f64::from(1_u32 << bit), self.cells[cell])
     }
 
-    /// Signed distance bound at `p`; farther than one cell from the surface only its sign and order of size are right.
+    /// Signed distance bound at `p`, from the whole body where no cell has a list.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (p, _) = self.fold.apply(p);
         match self.find(p) {
