@@ -28,11 +28,7 @@ pub use cloud::{Axes, Field, FieldValues, PointCloud};
 pub use error::Error;
 /// The vector library of the public interface.
 pub use glam;
-<<<<<<< HEAD
 pub use progress::Progress;
 pub use read::read;
 pub use source::scene::{Hit, Scene, View};
 pub use write::write_ply;
-=======
-pub use source::scene::{Hit, Scene, View};
->>>>>>> scene

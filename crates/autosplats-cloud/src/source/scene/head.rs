@@ -65,8 +65,6 @@ pub(super) fn head(body: &mut Body, at: Placement, looks: Looks) {
                 (q(0.009, -0.0905, -0.0618), 0.0044),
                 (q(0.0, -0.0915, -0.063), 0.004),
             ],
-<<<<<<< HEAD
-=======
         );
         body.strand(
             0.006,
@@ -75,7 +73,6 @@ pub(super) fn head(body: &mut Body, at: Placement, looks: Looks) {
                 (q(0.009, -0.0893, -0.0722), 0.0052),
                 (q(0.0, -0.0903, -0.0726), 0.0053),
             ],
->>>>>>> scene
         );
     }
     body.cut(0.003, Shape::cone(p(-0.024, -0.086, -0.0672), p(0.0, -0.1005, -0.0675), 0.0012, 0.0016));

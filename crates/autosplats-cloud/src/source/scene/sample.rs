@@ -55,14 +55,9 @@ struct Zone {
 
 impl Zone {
     fn new(tree: &Octree, zone: usize) -> Self {
-<<<<<<< HEAD
-        let leaves =
-            tree.leaves().into_iter().filter(|leaf| tree.body().touches(tree.list(leaf), zone)).collect::<Vec<_>>();
-=======
         let mut leaves = tree.leaves();
         leaves.retain(|leaf| tree.body().touches(tree.list(leaf), zone));
         let leaves: Vec<_> = leaves.into_par_iter().map(|leaf| (leaf, tree.octants(&leaf))).collect();
->>>>>>> scene
         let mut sum = 0.0;
         let sums = leaves
             .iter()
