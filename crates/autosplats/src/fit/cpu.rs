@@ -161,9 +161,11 @@ impl Fitted {
 }
 
 /// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6].
+// Differs from the paper: a neighbourhood that a gap cut short counts as k neighbours. With κ the fewer neighbours a point
+// has the wider it would spread over the gap: one neighbour at distance d would give a disc of radius 2d.
 #[inline(always)]
 fn splat_radius(k_radius: f32, count: f32, rules: &FitRules) -> f32 {
-    rules.splat_scale * 2.0 * k_radius / count.sqrt()
+    rules.splat_scale * 2.0 * k_radius / count.max(rules.k as f32).sqrt()
 }
 
 /// Covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2].

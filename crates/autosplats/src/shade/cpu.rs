@@ -12,14 +12,14 @@ use crate::splat::GBuffer;
 const CLAY: [f32; 3] = [0.53, 0.50, 0.46];
 /// Direction to the key light in view space (x right, y down, z forward): over the left shoulder.
 const KEY: Vec3 = Vec3::new(-0.47, -0.62, -0.63);
-const KEY_LIGHT: f32 = 0.86;
+const KEY_LIGHT: f32 = 0.74;
 /// How far the key light reaches around to surfaces turned away from it.
 const KEY_WRAP: f32 = 0.15;
 /// Direction to the fill light.
 const FILL: Vec3 = Vec3::new(0.80, 0.05, -0.60);
-const FILL_LIGHT: f32 = 0.16;
+const FILL_LIGHT: f32 = 0.13;
 /// Light of the sky on surfaces that face down and up.
-const SKY: [f32; 2] = [0.10, 0.26];
+const SKY: [f32; 2] = [0.05, 0.18];
 /// Part of the light that does not depend on the normal, for points with colours: those were lit when they were scanned.
 const SCANNED_LIGHT: f32 = 0.4;
 /// Neighbours looked at by eye-dome lighting, in pixels.
