@@ -25,7 +25,7 @@ const LONE_RADIUS_PX: f32 = 1.0;
 /// radii.
 // Differs from the paper: such a point is seen past the edge of a nearer surface, its neighbours are mostly hidden, and
 // the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
-const WIDEST_BEHIND: f32 = 1.0;
+const WIDEST_BEHIND: f32 = 3.0;
 
 /// A point whose neighbours' mean is further from it than this part of the k-radius has them all on one side and close
 /// together: they are a surface elsewhere, and the point an outlier. At a straight edge the part is 0.42, at the end of a
