@@ -111,8 +111,8 @@ impl Camera {
         let half_room = 0.5 - BORDER;
         camera.look_at = to_world(middle);
 
-        if from_sensor && let Some(sensor) = from_origin(cloud, &kept, axes, middle, aspect) {
-            return Ok(Self { projection: sensor, eye: DVec3::ZERO, ..camera });
+        if from_sensor && let Some(camera) = from_origin(&kept, axes, cloud.origin(), picture_up, aspect)? {
+            return Ok(camera);
         }
         let distance = match &mut camera.projection {
             Projection::OrthographicHeight(height) => {
@@ -134,25 +134,37 @@ impl Camera {
     }
 }
 
-/// The projection that shows all of `points` (along `axes`) from the world's origin looking ahead, where the sensor was if
-/// points are in its frame; `None` if they are not spread about the line of sight, so that it was somewhere else.
+/// The camera that sees all of `points` (along `axes`, about `origin`) from the world's origin, where the sensor was if
+/// points are in its frame; `None` if they are not spread about the line ahead, so that it was somewhere else.
 fn from_origin(
-    cloud: &PointCloud,
     points: &[DVec3],
     axes: [DVec3; 3],
-    middle: [f64; 3],
+    origin: DVec3,
+    up: DVec3,
     aspect: f64,
-) -> Option<Projection> {
-    let offset = DVec3::from(axes.map(|axis| axis.dot(cloud.origin())));
-    let middle = DVec3::from(middle) + offset;
-    let ahead = middle.z > 0.0 && middle.x.hypot(middle.y) < 0.3 * middle.z;
-    let slope = points.iter().map(|&p| p + offset).filter(|p| p.z > 0.1 * middle.z).fold(0.0f64, |slope, p| {
-        // Looking at the middle moves the picture's centre there.
-        let [x, y] = [p.x / p.z - middle.x / middle.z, p.y / p.z - middle.y / middle.z];
-        slope.max(y.abs()).max(x.abs() / aspect)
+) -> Result<Option<Camera>, Error> {
+    let world = |p: DVec3| axes[0] * p.x + axes[1] * p.y + axes[2] * p.z;
+    let offset = DVec3::from(axes.map(|axis| axis.dot(origin)));
+    let points: Vec<DVec3> = points.iter().map(|&p| p + offset).filter(|p| p.z > 0.0).collect();
+    let depth = points.iter().map(|p| p.z).sum::<f64>() / points.len().max(1) as f64;
+    // Points next to the sensor would spread over half the sky.
+    let slopes = points.iter().filter(|p| p.z > 0.1 * depth).map(|&p| DVec3::new(p.x / p.z, p.y / p.z, 1.0));
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let [low, high] = slopes.clone().fold(none, |[low, high], slope| [low.min(slope), high.max(slope)]);
+    let ahead = 0.5 * (low + high);
+    if !(ahead.truncate().length() < 0.3) {
+        return Ok(None);
+    }
+    let projection = Projection::PerspectiveFovDeg(1.0);
+    let mut camera = Camera { eye: DVec3::ZERO, look_at: world(ahead) * depth, up, projection };
+    let [right, down, forward] = camera.axes()?;
+    let slope = slopes.fold(0.0f64, |most, slope| {
+        let p = world(slope);
+        most.max((p.dot(down) / p.dot(forward)).abs()).max((p.dot(right) / p.dot(forward)).abs() / aspect)
     });
     let fov = 2.0 * (slope / (1.0 - 2.0 * BORDER)).atan().to_degrees();
-    (ahead && slope > 0.0 && fov < 120.0).then_some(Projection::PerspectiveFovDeg(fov))
+    camera.projection = Projection::PerspectiveFovDeg(fov.max(1.0));
+    Ok((fov < 120.0).then_some(camera))
 }
 
 /// Finite positions about the cloud's origin along `axes`, evenly picked.

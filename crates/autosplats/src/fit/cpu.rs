@@ -25,7 +25,7 @@ const LONE_RADIUS_PX: f32 = 1.0;
 /// radii.
 // Differs from the paper: such a point is seen past the edge of a nearer surface, its neighbours are mostly hidden, and
 // the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
-const WIDEST_BEHIND: f32 = 1.0;
+const WIDEST_BEHIND: f32 = 3.0;
 
 /// A point whose neighbours' mean is further from it than this part of the k-radius has them all on one side and close
 /// together: they are a surface elsewhere, and the point an outlier. At a straight edge the part is 0.42, at the end of a
@@ -161,9 +161,11 @@ impl Fitted {
 }
 
 /// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6].
+// Differs from the paper: a neighbourhood that a gap cut short counts as k neighbours. With κ the fewer neighbours a point
+// has the wider it would spread over the gap: one neighbour at distance d would give a disc of radius 2d.
 #[inline(always)]
 fn splat_radius(k_radius: f32, count: f32, rules: &FitRules) -> f32 {
-    rules.splat_scale * 2.0 * k_radius / count.sqrt()
+    rules.splat_scale * 2.0 * k_radius / count.max(rules.k as f32).sqrt()
 }
 
 /// Covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2].

@@ -43,7 +43,7 @@ impl Default for Reconstruction {
         Self {
             k: 10,
             engine: SearchEngine::default(),
-            outlier_expansions: Some(3),
+            outlier_expansions: Some(1),
             gap_factor: Some(4.0),
             splat_scale: 1.0,
             ellipses: false,

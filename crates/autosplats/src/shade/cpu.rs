@@ -12,16 +12,17 @@ use crate::splat::GBuffer;
 const CLAY: [f32; 3] = [0.53, 0.50, 0.46];
 /// Direction to the key light in view space (x right, y down, z forward): over the left shoulder.
 const KEY: Vec3 = Vec3::new(-0.47, -0.62, -0.63);
-const KEY_LIGHT: f32 = 0.86;
+const KEY_LIGHT: f32 = 0.74;
 /// How far the key light reaches around to surfaces turned away from it.
 const KEY_WRAP: f32 = 0.15;
 /// Direction to the fill light.
 const FILL: Vec3 = Vec3::new(0.80, 0.05, -0.60);
-const FILL_LIGHT: f32 = 0.16;
+const FILL_LIGHT: f32 = 0.13;
 /// Light of the sky on surfaces that face down and up.
-const SKY: [f32; 2] = [0.10, 0.26];
-/// Part of the light that does not depend on the normal, for points with colours: those were lit when they were scanned.
-const SCANNED_LIGHT: f32 = 0.4;
+const SKY: [f32; 2] = [0.05, 0.18];
+/// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
+/// the lights above, so that a surface seen straight on keeps its colour.
+const SCANNED_LIGHT: [f32; 2] = [0.45, 0.75];
 /// Neighbours looked at by eye-dome lighting, in pixels.
 const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 /// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
@@ -155,8 +156,8 @@ impl<'a> Shader<'a> {
         let fill = normal.dot(FILL).max(0.0);
         let sky = SKY[0] + (SKY[1] - SKY[0]) * (0.5 - 0.5 * normal.y);
         let light = KEY_LIGHT * key + FILL_LIGHT * fill + sky;
-        let scanned = if self.layers.color.is_empty() { 0.0 } else { SCANNED_LIGHT };
-        scanned + (1.0 - scanned) * light
+        let [base, share] = if self.layers.color.is_empty() { [0.0, 1.0] } else { SCANNED_LIGHT };
+        base + share * light
     }
 
     /// How much light is left beside nearer surfaces.

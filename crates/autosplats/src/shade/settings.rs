@@ -83,7 +83,7 @@ impl Default for Shading {
             color_map: None,
             legend: false,
             lighting: true,
-            eye_dome: 0.0,
+            eye_dome: 1.0,
             background: Background::Gradient([0x3a, 0x41, 0x4b], [0x17, 0x1a, 0x1f]),
         }
     }

@@ -1,4 +1,4 @@
-//! A body: solids joined, cut and clipped in order, with smooth seams.
+//! A body: solids joined and cut in order, with smooth seams.
 
 use glam::DVec3;
 
@@ -12,8 +12,6 @@ pub(super) enum Op {
     Join,
     /// Takes away from them.
     Cut,
-    /// Keeps only what lies in both.
-    Clip,
 }
 
 /// Radius within which a seam is rounded: none where it is zero. Beyond it the seam changes nothing at all, to the last
@@ -40,7 +38,6 @@ impl Seam {
         match op {
             Op::Join => self.min(a, b),
             Op::Cut => -self.min(-a, b),
-            Op::Clip => -self.min(-a, -b),
         }
     }
 
@@ -49,7 +46,6 @@ impl Seam {
         match op {
             Op::Join => b >= a + self.radius + slack,
             Op::Cut => -b + self.radius + slack <= a,
-            Op::Clip => b + self.radius + slack <= a,
         }
     }
 
@@ -58,7 +54,6 @@ impl Seam {
         let (a, b) = match op {
             Op::Join => (a, b),
             Op::Cut => (-a, b),
-            Op::Clip => (-a, -b),
         };
         let near = (self.radius - (a - b).abs()).max(0.0);
         let minor = 2.0 * near * near * self.quarter / self.radius.max(1e-30);
@@ -127,11 +122,6 @@ impl Body {
     /// Takes `shape` away from the group.
     pub(super) fn cut(&mut self, radius: f64, shape: Shape) -> &mut Self {
         self.add(Op::Cut, radius, shape, false)
-    }
-
-    /// Keeps of the group only what lies in `shape`.
-    pub(super) fn clip(&mut self, radius: f64, shape: Shape) -> &mut Self {
-        self.add(Op::Clip, radius, shape, false)
     }
 
     /// Joins a chain of round cones through `points` (position, radius).

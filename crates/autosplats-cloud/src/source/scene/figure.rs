@@ -86,11 +86,13 @@ fn legs(body: &mut Body, pelvis: DVec3, hips: DMat3, sway: f64) {
         let lift = (-side * sway).max(0.0).powi(2);
         let hip = pelvis + hips * DVec3::new(side * 0.09, 0.0, -0.03);
         let ground = DVec3::new(side * (0.085 + 0.03 * lift), 0.02, 0.085);
-        let raised = DVec3::new(side * 0.15, 0.03, 0.36);
+        let raised = DVec3::new(side * 0.14, 0.15, 0.26);
         let target = ground.lerp(raised, lift);
         let (knee, ankle) = reach(hip, target, 0.43, 0.425, DVec3::new(side * (0.12 + 0.35 * lift), -1.0, 0.3 * lift));
-        body.paint = SKIN;
+        // Where the thigh presses through the skirt, it is cloth that shows.
+        body.paint = CLOTH;
         body.join(0.06, Shape::cone(hip, knee, 0.088, 0.054));
+        body.paint = SKIN;
         body.join(0.03, Shape::cone(knee, ankle, 0.053, 0.035));
         let shin = (ankle - knee).normalize();
         let back = DVec3::new(0.0, 1.0, 0.0);
@@ -187,11 +189,14 @@ fn skirt(body: &mut Body, waist: DVec3, hips: DMat3, a: f64) {
     body.group(Op::Join, 0.006);
     body.paint = SASH;
     let band = Placement { origin: waist + hips * DVec3::new(0.0, 0.002, -0.012), axes: hips };
-    for i in 0..3 {
-        let at = Placement { origin: band.world(DVec3::new(0.0, 0.0, 0.018 * f64::from(i) - 0.018)), axes: hips };
-        body.join(0.01, Shape::Ring { at, major: 0.108, minor: 0.0125 });
+    for row in [-0.018, 0.0, 0.018] {
+        let around = std::array::from_fn::<_, 25, _>(|i| {
+            let (sin, cos) = (TAU * i as f64 / 24.0).sin_cos();
+            (band.world(DVec3::new(0.132 * cos, 0.106 * sin, row)), 0.013)
+        });
+        body.strand(0.004, &around);
     }
-    let knot = band.world(DVec3::new(0.085, -0.075, 0.0));
+    let knot = band.world(DVec3::new(0.095, -0.088, 0.0));
     body.join(0.01, Shape::ball(knot, 0.026));
     for (i, swing) in [(0.0, 0.1), (1.0, -0.1)] {
         let end =

@@ -23,7 +23,7 @@ impl Fold {
             Self::Bays { half_bay, last } => {
                 let x = p.x.abs();
                 let bay = 2.0 * half_bay;
-                let along = if x >= last { x - last } else { x - bay * (x / bay).round() };
+                let along = if x >= last { x - last } else { x - bay * f64::from((x / bay + 0.5) as u32) };
                 let signs = DVec3::new(1.0_f64.copysign(p.x * along), 1.0_f64.copysign(p.y), 1.0);
                 (DVec3::new(along.abs(), p.y.abs(), p.z), signs)
             }

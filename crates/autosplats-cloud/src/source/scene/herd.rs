@@ -42,7 +42,7 @@ pub(super) fn scene(phase: f64) -> Model {
         body.frame = Similarity { placement: Placement { origin, axes: DMat3::from_rotation_z(turn) }, scale: size };
         horse(&mut body, Gait::Gallop((STRIDES * phase + start).rem_euclid(1.0)), coat);
     }
-    let tree = Octree::new(body, Fold::None, DVec3::new(-8.0, -8.0, -4.0), 16.0, 10);
+    let tree = Octree::new(body, Fold::None, DVec3::new(-8.0, -8.0, -4.0), 16.0, 9);
     // The meadow needs fewer points than what runs on it.
     Model { tree, points: Points::Strewn(vec![0.22, 0.78]) }
 }

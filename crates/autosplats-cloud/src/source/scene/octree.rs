@@ -7,20 +7,24 @@
 //! the root is then polished by regula falsi.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::body::Body;
 use super::fold::Fold;
 
 /// Lists this short are not worth another cut, unless the cell is large.
-const SHORT_LIST: usize = 3;
+const SHORT_LIST: usize = 4;
+
+/// Level down to which a table takes the place of the tree.
+const TOP: u32 = 5;
+const MASK: u32 = (1 << TOP) - 1;
 
 #[derive(Clone, Copy, Debug)]
 enum Cell {
     /// Index of the first of eight children, in the order of their bits z, y, x.
     Branch(u32),
-    Empty {
-        inside: bool,
-    },
+    /// Distance bound at the middle, negative inside.
+    Empty(f64),
     Surface {
         first: u32,
         len: u32,
@@ -46,6 +50,42 @@ pub(super) struct Octree {
     depth: u32,
     cells: Vec<Cell>,
     lists: Vec<u16>,
+    /// For each cube of level [`TOP`], in order of z, y, x: the deepest cell that holds it, and that cell's level.
+    top: Vec<(u32, u32)>,
+}
+
+/// A part of the cells under construction.
+struct Builder<'a> {
+    body: &'a Body,
+    fold: Fold,
+    depth: u32,
+    cells: Vec<Cell>,
+    lists: Vec<u16>,
+}
+
+impl Builder<'_> {
+    /// Makes `cell` of the cube at `min`, in which only the solids of `list` matter.
+    fn cut(&mut self, cell: usize, min: DVec3, size: f64, level: u32, list: &[u16]) {
+        // A hair more than half the diagonal: normals are taken from a little outside of the cell.
+        let radius = 0.8661 * size + 1e-5;
+        let mut kept = Vec::with_capacity(list.len());
+        let distance = self.body.prune(list, min + DVec3::splat(0.5 * size), radius, &mut kept);
+        if distance.abs() > radius && level >= self.fold.least_level() {
+            self.cells[cell] = Cell::Empty(distance);
+        } else if level == self.depth || (kept.len() <= SHORT_LIST && level + 2 >= self.depth) {
+            let first = self.lists.len() as u32;
+            self.lists.extend_from_slice(&kept);
+            self.cells[cell] = Cell::Surface { first, len: kept.len() as u32 };
+        } else {
+            let first = self.cells.len();
+            self.cells[cell] = Cell::Branch(first as u32);
+            self.cells.resize(first + 8, Cell::Empty(0.0));
+            let half = 0.5 * size;
+            for child in 0..8 {
+                self.cut(first + child, min + half * corner(child), half, level + 1, &kept);
+            }
+        }
+    }
 }
 
 /// Where a ray met the surface.
@@ -64,32 +104,47 @@ pub(super) struct Crossing {
 impl Octree {
     /// Cuts the cube at `min` with sides of `size`, which must hold the whole body, down to `size / 2^depth`.
     pub(super) fn new(body: Body, fold: Fold, min: DVec3, size: f64, depth: u32) -> Self {
-        let mut tree = Self { body, fold, min, size, depth, cells: vec![Cell::Branch(0)], lists: Vec::new() };
-        let all = tree.body.all();
-        tree.cut(0, min, size, 0, &all);
+        let all = body.all();
+        // The first two levels are always cut; what is below each of their 64 cells is built in parallel.
+        let parts = (0..64_usize).into_par_iter().map(|i| {
+            let mut part = Builder { body: &body, fold, depth, cells: vec![Cell::Empty(0.0)], lists: Vec::new() };
+            let low = min + 0.5 * size * corner(i / 8) + 0.25 * size * corner(i % 8);
+            part.cut(0, low, 0.25 * size, 2, &all);
+            (part.cells, part.lists)
+        });
+        let parts: Vec<_> = parts.collect();
+        let mut cells = vec![Cell::Branch(1)];
+        cells.extend((0..8).map(|i| Cell::Branch(9 + 8 * i)));
+        cells.resize(9 + 64, Cell::Empty(0.0));
+        let mut lists = Vec::new();
+        for (i, (part, part_lists)) in parts.into_iter().enumerate() {
+            // A part's cell 0 has its place already; the others follow at the end.
+            let (cells_before, lists_before) = (cells.len() as u32 - 1, lists.len() as u32);
+            let mut moved = part.into_iter().map(|cell| match cell {
+                Cell::Branch(children) => Cell::Branch(children + cells_before),
+                Cell::Surface { first, len } => Cell::Surface { first: first + lists_before, len },
+                empty => empty,
+            });
+            if let Some(root) = moved.next() {
+                cells[9 + i] = root;
+            }
+            cells.extend(moved);
+            lists.extend(part_lists);
+        }
+        let mut tree = Self { body, fold, min, size, depth, cells, lists, top: Vec::new() };
+        tree.top = (0..1_u32 << (3 * TOP)).map(|i| tree.descend(i & MASK, (i >> TOP) & MASK, i >> (2 * TOP))).collect();
         tree
     }
 
-    fn cut(&mut self, cell: usize, min: DVec3, size: f64, level: u32, list: &[u16]) {
-        // A hair more than half the diagonal: normals are taken from a little outside of the cell.
-        let radius = 0.8661 * size + 1e-5;
-        let mut kept = Vec::with_capacity(list.len());
-        let distance = self.body.prune(list, min + DVec3::splat(0.5 * size), radius, &mut kept);
-        if distance.abs() > radius && level >= self.fold.least_level() {
-            self.cells[cell] = Cell::Empty { inside: distance < 0.0 };
-        } else if level == self.depth || (kept.len() <= SHORT_LIST && level + 2 >= self.depth) {
-            let first = self.lists.len() as u32;
-            self.lists.extend_from_slice(&kept);
-            self.cells[cell] = Cell::Surface { first, len: kept.len() as u32 };
-        } else {
-            let first = self.cells.len();
-            self.cells[cell] = Cell::Branch(first as u32);
-            self.cells.resize(first + 8, Cell::Empty { inside: false });
-            let half = 0.5 * size;
-            for child in 0..8 {
-                self.cut(first + child, min + half * corner(child), half, level + 1, &kept);
-            }
+    /// The cell at a cube of level [`TOP`], and its level.
+    fn descend(&self, x: u32, y: u32, z: u32) -> (u32, u32) {
+        let (mut cell, mut level) = (0, 0);
+        while let (Cell::Branch(children), true) = (self.cells[cell as usize], level < TOP) {
+            level += 1;
+            let bit = TOP - level;
+            cell = children + child_at(x, y, z, bit);
         }
+        (cell, level)
     }
 
     pub(super) fn body(&self) -> &Body {
@@ -102,7 +157,7 @@ impl Octree {
         let mut stack = vec![(0_usize, self.min, self.size)];
         while let Some((cell, min, size)) = stack.pop() {
             match self.cells[cell] {
-                Cell::Empty { .. } => {}
+                Cell::Empty(_) => {}
                 Cell::Surface { first, len } => leaves.push(Leaf { min, size, first, len }),
                 Cell::Branch(children) => {
                     let half = 0.5 * size;
@@ -125,18 +180,19 @@ impl Octree {
         let steps = f64::from(1_u32 << self.depth);
         let q = ((p - self.min) * (steps / self.size)).clamp(DVec3::ZERO, DVec3::splat(steps - 1.0));
         let (x, y, z) = (q.x as u32, q.y as u32, q.z as u32);
-        let (mut cell, mut bit) = (0_usize, self.depth);
+        let shift = self.depth - TOP;
+        let (cell, level) = self.top[((((z >> shift) << TOP | (y >> shift)) << TOP) | (x >> shift)) as usize];
+        let (mut cell, mut bit) = (cell as usize, self.depth - level);
         while let Cell::Branch(children) = self.cells[cell] {
             bit -= 1;
-            let child = (((z >> bit) & 1) << 2) | (((y >> bit) & 1) << 1) | ((x >> bit) & 1);
-            cell = (children + child) as usize;
+            cell = (children + child_at(x, y, z, bit)) as usize;
         }
         let unit = self.size / steps;
         let corner = DVec3::new(f64::from(x >> bit << bit), f64::from(y >> bit << bit), f64::from(z >> bit << bit));
         (self.min + corner * unit, unit * f64::from(1_u32 << bit), self.cells[cell])
     }
 
-    /// Signed distance bound at `p`; farther than one cell from the surface only its sign and order of size are right.
+    /// Signed distance bound at `p`, from the whole body where no cell has a list.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (p, _) = self.fold.apply(p);
         match self.find(p) {
@@ -145,6 +201,12 @@ impl Octree {
             }
             _ => self.body.distance(p, &self.body.all()),
         }
+    }
+
+    /// Where `p` lies in the space the body is modelled in.
+    #[cfg(test)]
+    pub(super) fn folded(&self, p: DVec3) -> DVec3 {
+        self.fold.apply(p).0
     }
 
     /// Every place where the bound changes sign on the way from `from` to `to` metres along the ray, nearest first, as
@@ -158,8 +220,8 @@ impl Octree {
         more: &mut dyn FnMut(f64) -> bool,
     ) -> (f64, bool) {
         let list = self.list(&leaf);
-        // Steps never get smaller than this, so that grazing rays get on.
-        let least = 1e-3 * leaf.size;
+        // Steps never get smaller than this, so that grazing rays get on. All that is missed are chords shorter than it.
+        let least = 5e-3 * leaf.size;
         let (mut t, mut f) = (0.0, self.body.distance(origin, list));
         while t < to {
             let next = (t + f.abs() + least).min(to);
@@ -173,6 +235,16 @@ impl Octree {
             (t, f) = (next, g);
         }
         (f, false)
+    }
+
+    /// A bit for every octant of `leaf`, in the order of [`corner`], that the surface may pass through.
+    pub(super) fn octants(&self, leaf: &Leaf) -> u8 {
+        let quarter = 0.25 * leaf.size;
+        let near = |i: &usize| {
+            let middle = leaf.min + DVec3::splat(quarter) + 2.0 * quarter * corner(*i);
+            self.body.distance(middle, self.list(leaf)).abs() <= 1.7321 * quarter
+        };
+        (0..8).filter(near).fold(0, |bits, i| bits | 1 << i)
     }
 
     /// Calls `hit` with the distance of every place where the surface crosses the line that enters `leaf` at `origin`
@@ -193,6 +265,7 @@ impl Octree {
         let direction = direction.try_normalize()?;
         let (low, high) = self.fold.bounds(self.min, self.size);
         let (mut t, end) = clip(low, high, origin, direction)?;
+        let inverse = direction.recip();
         let nudge = 1e-10 * self.size;
         t += nudge;
         let mut was_inside = None;
@@ -201,7 +274,7 @@ impl Octree {
             let (p, signs) = self.fold.apply(world);
             let along = direction * signs;
             let (min, size, cell) = self.find(p);
-            let to = leave(min, size, p, along);
+            let mut to = leave(min, size, p, inverse * signs);
             match cell {
                 Cell::Surface { first, len } => {
                     let leaf = Leaf { min, size, first, len };
@@ -223,7 +296,12 @@ impl Octree {
                     }
                     was_inside = Some(value < 0.0);
                 }
-                Cell::Empty { inside } => was_inside = Some(inside),
+                Cell::Empty(distance) => {
+                    was_inside = Some(distance < 0.0);
+                    // The way out of the cell, or out of the ball around its middle that holds no surface.
+                    let away = (p - min - DVec3::splat(0.5 * size)).length();
+                    to = to.max(distance.abs() - away);
+                }
                 Cell::Branch(_) => unreachable!("find ends at a leaf"),
             }
             t += to + nudge;
@@ -244,11 +322,26 @@ impl Octree {
         DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z)
     }
 
+    /// `|n.x| + |n.y| + |n.z|` of the normal `n` at a place on the surface. One-sided differences do: what is a
+    /// thousandth off in a density, nobody sees.
+    pub(super) fn slant(&self, p: DVec3, list: &[u16]) -> f64 {
+        const STEP: f64 = 1e-6;
+        let here = self.body.distance(p, list);
+        let slope = |axis: DVec3| self.body.distance(p + axis * STEP, list) - here;
+        DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z).abs().element_sum()
+    }
+
     /// Colour where a ray crossed the surface.
     pub(super) fn rgb(&self, at: &Crossing) -> [f32; 3] {
         let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
         self.body.paint(at.folded, at.world, list).0
     }
+}
+
+/// Which child of its parent the cell at this bit of the coordinates is.
+#[inline]
+fn child_at(x: u32, y: u32, z: u32, bit: u32) -> u32 {
+    (((z >> bit) & 1) << 2) | (((y >> bit) & 1) << 1) | ((x >> bit) & 1)
 }
 
 fn corner(child: usize) -> DVec3 {
@@ -265,19 +358,15 @@ fn clip(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> Option<(f64
     (start < end).then_some((start, end))
 }
 
-/// Distance at which a ray from within a cube leaves it.
+/// Distance at which a ray from within a cube leaves it; `inverse` is one over its direction.
 #[inline]
-fn leave(min: DVec3, size: f64, p: DVec3, direction: DVec3) -> f64 {
-    let side = |p: f64, d: f64, min: f64| {
-        if d > 0.0 {
-            (min + size - p) / d
-        } else if d < 0.0 {
-            (min - p) / d
-        } else {
-            f64::INFINITY
-        }
+fn leave(min: DVec3, size: f64, p: DVec3, inverse: DVec3) -> f64 {
+    let p = p - min;
+    let side = |p: f64, inverse: f64| {
+        // Parallel to this side: infinite, or 0/0 in its plane, which min below passes over.
+        if inverse > 0.0 { (size - p) * inverse } else { -p * inverse }
     };
-    side(p.x, direction.x, min.x).min(side(p.y, direction.y, min.y)).min(side(p.z, direction.z, min.z)).max(0.0)
+    f64::INFINITY.min(side(p.x, inverse.x)).min(side(p.y, inverse.y)).min(side(p.z, inverse.z)).max(0.0)
 }
 
 /// The root between two places of opposite sign, by regula falsi with the Illinois rule.

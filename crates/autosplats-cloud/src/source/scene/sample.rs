@@ -47,19 +47,21 @@ pub(super) fn by_blocks(
 
 /// The cells of one zone, and how likely each is drawn.
 struct Zone {
-    leaves: Vec<Leaf>,
+    /// Each with a bit for every one of its eight octants that the surface may pass through.
+    leaves: Vec<(Leaf, u8)>,
     /// Sums of face areas up to and including each cell.
     sums: Vec<f64>,
 }
 
 impl Zone {
     fn new(tree: &Octree, zone: usize) -> Self {
-        let leaves =
-            tree.leaves().into_iter().filter(|leaf| tree.body().touches(tree.list(leaf), zone)).collect::<Vec<_>>();
+        let mut leaves = tree.leaves();
+        leaves.retain(|leaf| tree.body().touches(tree.list(leaf), zone));
+        let leaves: Vec<_> = leaves.into_par_iter().map(|leaf| (leaf, tree.octants(&leaf))).collect();
         let mut sum = 0.0;
         let sums = leaves
             .iter()
-            .map(|leaf| {
+            .map(|(leaf, _)| {
                 sum += leaf.size * leaf.size;
                 sum
             })
@@ -68,7 +70,7 @@ impl Zone {
     }
 
     /// Calls `visit` with about `lines` cells, drawn by the area of their faces and evenly spread over them.
-    fn draw<'a>(&'a self, lines: usize, random: &mut Random, visit: &mut dyn FnMut(&'a Leaf, &mut Random)) {
+    fn draw<'a>(&'a self, lines: usize, random: &mut Random, visit: &mut dyn FnMut(&'a (Leaf, u8), &mut Random)) {
         let Some(total) = self.sums.last() else { return };
         let mut at = 0;
         for line in 0..lines {
@@ -140,17 +142,30 @@ pub(super) fn strew(
 type Painted = ([f32; 3], [u8; 3]);
 
 /// Sends one random line through `leaf` and keeps its crossings in `zone`.
-fn pierce(tree: &Octree, leaf: &Leaf, zone: usize, random: &mut Random, out: &mut Vec<Painted>) {
+fn pierce(tree: &Octree, (leaf, octants): &(Leaf, u8), zone: usize, random: &mut Random, out: &mut Vec<Painted>) {
     let axis = random.below(3);
-    let mut origin = leaf.min;
-    origin[(axis + 1) % 3] += leaf.size * random.unit();
-    origin[(axis + 2) % 3] += leaf.size * random.unit();
+    let (mut origin, mut octant) = (leaf.min, 0);
+    for other in [(axis + 1) % 3, (axis + 2) % 3] {
+        let at = random.unit();
+        origin[other] += leaf.size * at;
+        octant |= u8::from(at >= 0.5) << other;
+    }
+    // The line passes two octants, often through neither of which the surface goes.
+    let near = octants >> octant & 1 > 0;
+    let far = octants >> (octant | 1 << axis) & 1 > 0;
+    let length = match (near, far) {
+        (false, false) => return,
+        (true, true) => leaf.size,
+        _ => 0.5 * leaf.size,
+    };
+    if !near {
+        origin[axis] += length;
+    }
     let direction = DVec3::AXES[axis];
     let list = tree.list(leaf);
-    tree.crossings_in(leaf, origin, direction, leaf.size, &mut |t| {
+    tree.crossings_in(leaf, origin, direction, length, &mut |t| {
         let p = origin + direction * t;
-        let normal = tree.gradient(p, list).abs();
-        if random.unit() * normal.element_sum() < 1.0 {
+        if random.unit() * tree.slant(p, list) < 1.0 {
             let (rgb, in_zone) = tree.body().paint(p, p, list);
             if in_zone == zone {
                 out.push((p.as_vec3().to_array(), quantize(rgb, random)));

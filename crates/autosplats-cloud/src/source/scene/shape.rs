@@ -215,7 +215,8 @@ impl Shape {
             Self::Passage { at, half_width, spring, radius, half_length } => {
                 let p = at.local(p);
                 let (x, z) = (p.x.abs(), p.z - spring);
-                let across = if z < 0.0 { x - half_width } else { (x + radius - half_width).hypot(z) - radius };
+                let across =
+                    if z < 0.0 { x - half_width } else { DVec2::new(x + radius - half_width, z).length() - radius };
                 across.max(-p.z).max(p.y.abs() - half_length)
             }
             Self::Meadow { radius } => {

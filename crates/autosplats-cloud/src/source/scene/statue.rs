@@ -137,8 +137,8 @@ fn robe(body: &mut Body) {
 /// The mantle: from the left shoulder across the chest to the right hip, and down the back.
 fn mantle(body: &mut Body) {
     body.group(Op::Join, 0.010);
-    for i in 0..8 {
-        let s = f64::from(i) / 7.0;
+    for i in 0..5 {
+        let s = f64::from(i) / 4.0;
         let sag = 0.012 * whim(i, 20);
         let deep = 1.0 + 0.25 * whim(i, 23);
         let points = [
@@ -159,24 +159,37 @@ fn mantle(body: &mut Body) {
         let points = [
             (DVec3::new(x, -0.10 - 0.03 * s, 0.99 - 0.03 * s), 0.012),
             (DVec3::new(x - 0.035 + 0.02 * s, -0.145 - 0.035 * s, 0.80), 0.014),
-            (DVec3::new(x - 0.04 + 0.02 * s, -0.165 - 0.03 * s, 0.62 - 0.05 * (i % 2) as f64), 0.017),
-            (DVec3::new(x - 0.05 + 0.03 * s, -0.172 - 0.03 * s, 0.50 - 0.10 * s - 0.03 * (i % 2) as f64), 0.016),
+            (DVec3::new(x - 0.04 + 0.02 * s, -0.165 - 0.03 * s, 0.62 - 0.05 * f64::from(i % 2)), 0.017),
+            (DVec3::new(x - 0.05 + 0.03 * s, -0.172 - 0.03 * s, 0.50 - 0.10 * s - 0.03 * f64::from(i % 2)), 0.016),
         ];
         body.strand(0.014, &points);
     }
     body.group(Op::Join, 0.02);
+    // A sheet behind the ridges, so that there is cloth between them.
+    for side in [-0.6, 0.0, 0.6] {
+        let p = |spread: f64, y: f64, z: f64| DVec3::new(side * spread, y, z);
+        let sheet = [
+            (p(0.13, 0.06, 1.36), 0.07),
+            (p(0.17, 0.07, 1.0), 0.08),
+            (p(0.19, 0.08, 0.65), 0.10),
+            (p(0.22, 0.10, 0.06), 0.15),
+        ];
+        body.strand(0.08, &sheet);
+    }
     for i in 0..15 {
         let s = f64::from(i) / 14.0 * 2.0 - 1.0;
         let wave = 0.012 * whim(i, 21);
+        // Ridge and hollow in turn.
+        let ridge = if i % 2 == 0 { 0.014 } else { -0.010 };
         let points = [
             (DVec3::new(0.165 * s, 0.055, 1.45 + 0.015 * (1.0 - s * s)), 0.022),
-            (DVec3::new(0.19 * s + wave, 0.125 - 0.03 * s * s, 1.28), 0.026),
-            (DVec3::new(0.20 * s - wave, 0.155 - 0.03 * s * s, 1.0), 0.030),
-            (DVec3::new(0.225 * s + wave, 0.19 - 0.03 * s * s, 0.65), 0.033),
-            (DVec3::new(0.26 * s - 2.0 * wave, 0.235 - 0.04 * s * s, 0.28), 0.036),
-            (DVec3::new(0.29 * s, 0.275 - 0.05 * s * s, 0.04), 0.038),
+            (DVec3::new(0.19 * s + wave, 0.5 * ridge + 0.125 - 0.03 * s * s, 1.28), 0.0161),
+            (DVec3::new(0.20 * s - wave, ridge + 0.155 - 0.03 * s * s, 1.0), 0.0186),
+            (DVec3::new(0.225 * s + wave, ridge + 0.19 - 0.03 * s * s, 0.65), 0.0205),
+            (DVec3::new(0.26 * s - 2.0 * wave, ridge + 0.235 - 0.04 * s * s, 0.28), 0.0223),
+            (DVec3::new(0.29 * s, 1.4 * ridge + 0.275 - 0.05 * s * s, 0.04), 0.0236),
         ];
-        body.strand(0.026, &points);
+        body.strand(0.016, &points);
     }
 }
 
