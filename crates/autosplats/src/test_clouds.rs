@@ -62,9 +62,8 @@ fn patch(seed: u64, count: usize, at: impl Fn(f32, f32) -> [f32; 3]) -> Position
     (0..count).map(|_| at(random.signed(), random.signed())).collect()
 }
 
-/// Unit normal of [`plane`].
-pub(crate) const PLANE_NORMAL: DVec3 =
-    DVec3::new(0.281_718_084_909_506_5, -0.187_812_056_606_337_66, -0.939_060_283_031_688_3);
+/// Across [`plane`], towards the eye, of any length.
+pub(crate) const PLANE_NORMAL: DVec3 = DVec3::new(0.3, -0.2, -1.0);
 
 pub(crate) fn plane(count: usize) -> Positions {
     patch(1, count, |x, y| [x, y, 0.3 * x - 0.2 * y])

@@ -2,6 +2,7 @@
 
 use autosplats_cloud::glam::{DMat3, DVec3};
 
+use super::cpu::{LONGEST, LOPSIDED, LOPSIDED_COUNT, WIDEST_BEHIND};
 use super::{FitRules, Surfel, Surfels, fit};
 use crate::camera::{Camera, Projection, View};
 use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
@@ -110,8 +111,10 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
 
     let near = |value: f32, expected: f64, tolerance: f64| (f64::from(value) - expected).abs() <= tolerance;
     let count = n.offsets.len() as f64;
-    let lopsided = (n.mean() * (count + 1.0) / count).length() > 0.75 * n.k_radius() && count >= 6.0;
-    let radius = f64::from(rules.splat_scale) * 2.0 * n.k_radius() / count.sqrt();
+    let lopsided = (n.mean() * (count + 1.0) / count).length() > f64::from(LOPSIDED) * n.k_radius();
+    let lopsided = lopsided && count >= f64::from(LOPSIDED_COUNT);
+    // A neighbourhood cut short counts as k neighbours.
+    let radius = f64::from(rules.splat_scale) * 2.0 * n.k_radius() / count.max(f64::from(rules.k)).sqrt();
     let radius = if lopsided && !rules.keep_outliers { 0.0 } else { radius };
     ensure(near(surfel.radius, radius, 1e-6 * radius), &format!("radius is not {radius}"))?;
     ensure(near(surfel.k_radius, n.k_radius(), 1e-6 * n.k_radius()), "k-radius")?;
@@ -119,7 +122,7 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
     // Rounding of the eigenvalue, in units of the trace.
     let curvature_tolerance = tolerance / (least + middle + largest);
     ensure(near(surfel.curvature, curvature, curvature_tolerance), &format!("curvature is not {curvature}"))?;
-    let ratio = if rules.ellipses { (largest / middle).min(4.0) } else { 1.0 };
+    let ratio = if rules.ellipses { (largest / middle).min(f64::from(LONGEST)) } else { 1.0 };
     let ratio_tolerance = 4.0 * tolerance / middle;
     ensure(near(surfel.major_ratio, ratio, ratio_tolerance), &format!("ratio of axes is not {ratio}"))?;
     ensure(surfel.center == n.center.as_vec3().to_array() && surfel.pixel == 3 << 16 | 5, "centre or pixel")
@@ -202,7 +205,7 @@ fn degenerate_neighborhoods() {
                 // The axis is found to f32 rounding, where one neighbour is a covariance of rank 1.
                 assert!((normal - expected).length() < 2e-3, "{name}: normal {normal}, expected {expected}");
                 assert_eq!(surfel.major_ratio, 1.0, "{name}: drawn as a circle");
-                let radius = 2.0 * one(offsets).k_radius() / (offsets.len() as f64).sqrt();
+                let radius = 2.0 * one(offsets).k_radius() / 10f64.sqrt();
                 assert!((f64::from(surfel.radius) / radius - 1.0).abs() < 1e-6, "{name}: radius {}", surfel.radius);
             }
         }
@@ -224,7 +227,7 @@ fn degenerate_neighborhoods() {
     }
 }
 
-/// Points behind the culling plane get no wider splat than one first search radius would give.
+/// Points behind the culling plane get no wider splat than some first search radii would give.
 #[test]
 fn splats_behind_the_culling_plane_are_limited() {
     for view in views() {
@@ -235,7 +238,7 @@ fn splats_behind_the_culling_plane_are_limited() {
         for (free, limited) in free.iter().zip(&limited) {
             let depth = if view.perspective { free.center[2] } else { 1.0 };
             let first_radius = 200.0 * (10.0f32 / std::f32::consts::PI).sqrt() * depth / view.focal_px;
-            let widest = 2.0 * first_radius / 10f32.sqrt();
+            let widest = 2.0 * WIDEST_BEHIND * first_radius / 10f32.sqrt();
             let expected = free.radius.min(widest);
             assert!((limited.radius - expected).abs() <= 1e-6 * expected, "{limited:?} is not {expected} wide");
             narrowed += usize::from(expected < free.radius);
