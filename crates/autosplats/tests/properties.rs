@@ -380,7 +380,8 @@ fn settings_out_of_range_are_errors() {
         change(&mut settings.reconstruction);
         matches!(renderer.render(&cloud, &camera, SIZE, &settings), Err(Error::Setting { .. }))
     };
-    let wrong: [(&str, fn(&mut Reconstruction)); 7] = [
+    type Change = fn(&mut Reconstruction);
+    let wrong: [(&str, Change); 7] = [
         ("no neighbours", |r| r.k = 0),
         ("too many neighbours", |r| r.k = 65),
         ("too many expansions", |r| r.outlier_expansions = Some(9)),

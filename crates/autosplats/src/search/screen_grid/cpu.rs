@@ -330,8 +330,7 @@ fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANE
             let next = if above == f32::INFINITY {
                 t * (target / n * 1.1).clamp(1.2, 4.0)
             } else if step < 4 || step % 2 == 0 {
-                let share =
-                    (target as f32 - 0.5 - low_count[lane] as f32) / (high_count[lane] as f32 - low_count[lane] as f32);
+                let share = (target - 0.5 - low_count[lane]) / (high_count[lane] - low_count[lane]);
                 below + (above - below) * share
             } else {
                 f32::from_bits(below_bits + (above_bits - below_bits) / 2)
