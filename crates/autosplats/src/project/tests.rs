@@ -171,7 +171,8 @@ fn comparison_sees_each_kind_of_error() {
     let positions = settled(&camera, size, &test_clouds::two_layers(2000));
     let view = camera.view(DVec3::ZERO, size).expect("a view");
     let oracle = oracle(&camera, size, &positions);
-    let errors: [(&str, fn(&mut ScreenPoints)); 9] = [
+    type Spoil = fn(&mut ScreenPoints);
+    let errors: [(&str, Spoil); 9] = [
         ("other owner", |s| s.source[3] += 1),
         ("moved point", |s| s.points[5].position_view[0] += 1e-4),
         ("other pixel", |s| s.points[0].pixel += 1 << 16),

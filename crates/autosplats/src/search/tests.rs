@@ -243,7 +243,8 @@ fn comparison_sees_each_kind_of_error() {
         compare(&oracle, &radii, &queries, &self::rules(10), &neighborhoods)
     };
     assert_eq!(outcome(rules(10), |_| ()), Ok(0), "nothing is wrong yet");
-    let spoils: [(&str, fn(&mut Neighborhoods)); 5] = [
+    type Spoil = fn(&mut Neighborhoods);
+    let spoils: [(&str, Spoil); 5] = [
         ("k-radius", |n| n.blocks[1].k_radius.0[4] *= 1.0001),
         ("count", |n| n.blocks[1].count.0[4] += 1.0),
         ("offset", |n| n.blocks[1].offset[1].0[4] += 1e-3 * n.blocks[1].k_radius.0[4]),

@@ -66,6 +66,7 @@ pub(super) fn draw_attributes(
     }
 }
 
+#[allow(clippy::too_many_arguments, reason = "the vectors' type is one of them, the dispatch knows no methods")]
 #[pulp::with_simd(draw_attribute_entries = pulp::Arch::new())]
 #[inline(always)]
 fn draw_attribute_entries_with<'a, S: Simd>(

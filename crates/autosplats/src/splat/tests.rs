@@ -331,7 +331,8 @@ fn comparison_sees_each_kind_of_error() {
     let covered = covered.filter(|&(p, i)| right.weight[i] > 0.0 && oracle[p].is_some());
     let (pixel, at) = covered.max_by(|a, b| right.weight[a.1].total_cmp(&right.weight[b.1])).expect("a covered pixel");
     assert!(oracle[pixel].as_ref().is_some_and(|means| means.heaviest.is_some()), "one splat is the heaviest");
-    let spoils: [(&str, fn(&mut GBuffer, usize)); 7] = [
+    type Spoil = fn(&mut GBuffer, usize);
+    let spoils: [(&str, Spoil); 7] = [
         ("weight", |l, i| l.weight[i] *= 1.01),
         ("depth", |l, i| l.depth[i] *= 1.01),
         ("normal", |l, i| l.normal[i][0] += 0.01),
