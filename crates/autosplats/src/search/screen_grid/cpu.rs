@@ -150,15 +150,16 @@ fn search_block<S: Simd>(
             }
             done[lane] = true;
             block.threshold.0[lane] = match verdict {
-                Verdict::Outlier => 0.0,
+                Verdict::Outlier | Verdict::Bounded(0) => 0.0,
                 Verdict::Clamped(neighbors) | Verdict::Bounded(neighbors) => scratch.sorted[neighbors - 1],
                 Verdict::Exact | Verdict::Grow(_) => block.threshold.0[lane],
             };
             match verdict {
                 Verdict::Outlier => counts.outliers += 1,
                 Verdict::Clamped(_) => counts.clamped += 1,
-                Verdict::Bounded(_) => {
-                    counts.clamped += 1;
+                Verdict::Bounded(neighbors) => {
+                    // Without any neighbour there is nothing to keep.
+                    *(if neighbors == 0 { &mut counts.outliers } else { &mut counts.clamped }) += 1;
                     counts.bounded += 1;
                 }
                 Verdict::Exact | Verdict::Grow(_) => {}
@@ -203,7 +204,7 @@ fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: f32, e
     let next = upper.min(2.0 * known * growth);
     let too_much = || Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) > MAX_CANDIDATES;
     match squared.len() {
-        0 if known == f32::INFINITY || too_much() => Verdict::Outlier,
+        0 if known == f32::INFINITY => Verdict::Outlier,
         neighbors if known == f32::INFINITY => Verdict::Clamped(neighbors),
         neighbors if too_much() => Verdict::Bounded(neighbors),
         _ => Verdict::Grow(next),
