@@ -1,0 +1,64 @@
+//! What the benchmarks share: scenes with their cameras, medians, and what they ran on.
+
+use std::path::Path;
+
+use autosplats::cloud::{PointCloud, Scene};
+use autosplats::{Camera, Projection, Renderer, Settings, Timings};
+
+/// The size of every picture, the paper's.
+pub(crate) const SIZE: [u32; 2] = [1760, 900];
+
+/// Arguments without those that Cargo adds.
+pub(crate) fn args() -> Vec<String> {
+    std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect()
+}
+
+/// The made-up scene `name` with `count` points, and the camera that shows it best.
+pub(crate) fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
+    let (scene, _) = Scene::parse(name).expect("a scene of this name");
+    let cloud = scene.sample(count, &|_| true).expect("enough memory");
+    let view = scene.view();
+    let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
+    (cloud, Camera { eye: view.eye, look_at: view.look_at, up: view.up, projection })
+}
+
+/// Renders one frame and returns its times and the number of visible points.
+pub(crate) fn frame(
+    renderer: &mut Renderer,
+    cloud: &PointCloud,
+    camera: &Camera,
+    settings: &Settings,
+) -> (Timings, usize) {
+    let frame = renderer.render(cloud, camera, SIZE, settings).expect("valid settings");
+    (frame.timings, frame.counts.visible)
+}
+
+/// The middle value, or the mean of the two middle ones.
+pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}
+
+/// A number with its thousand, million or nothing: 36K, 1M.
+pub(crate) fn short(count: usize) -> String {
+    match count {
+        1_000_000.. if count % 1_000_000 == 0 => format!("{}M", count / 1_000_000),
+        1_000.. => format!("{}K", count / 1000),
+        _ => count.to_string(),
+    }
+}
+
+/// One line about the computer and the picture.
+pub(crate) fn machine() -> String {
+    let threads = rayon::current_num_threads();
+    let [width, height] = SIZE;
+    format!("{}, {threads} threads, {width}x{height} pixels, k = 10", processor())
+}
+
+fn processor() -> String {
+    let info = std::fs::read_to_string(Path::new("/proc/cpuinfo")).unwrap_or_default();
+    let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    name.map_or_else(|| std::env::consts::ARCH.into(), |(_, name)| name.trim().into())
+}
