@@ -65,7 +65,7 @@ impl Default for NeighborhoodBlock {
 /// Neighbourhoods of a list of screen points, in that list's order.
 #[derive(Debug, Default)]
 pub(crate) struct Neighborhoods {
-    /// The last block is filled up with copies of neighbourhoods.
+    /// Lanes of the last block beyond the end of the list hold nothing of use.
     pub(crate) blocks: Vec<NeighborhoodBlock>,
     pub(crate) counts: SearchCounts,
 }
