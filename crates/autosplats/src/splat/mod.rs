@@ -18,6 +18,7 @@ mod raster;
 mod setup;
 #[cfg(test)]
 mod tests;
+mod trim;
 
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;

@@ -112,6 +112,9 @@ fn draw_attribute_entries_with<'a, S: Simd>(
                 let point = &mut sums.point[row.clone()];
                 let source = F32s::splat(simd, f32::from_bits(surfel.source));
                 heavier.select(source, F32s::load(simd, point, vector)).store(point, vector);
+                let reach = &mut sums.reach[row.clone()];
+                let own = F32s::splat(simd, splat.reach_px());
+                heavier.select(own, F32s::load(simd, reach, vector)).store(reach, vector);
             }
         }
     }

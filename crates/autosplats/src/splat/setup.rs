@@ -113,6 +113,13 @@ impl Splat {
         }
     }
 
+    /// About how far it reaches from its centre, in pixels.
+    #[inline(always)]
+    pub(super) fn reach_px(&self) -> f32 {
+        let [width, height] = [self.x, self.y].map(|[first, last]| f32::from(last.saturating_sub(first)));
+        0.5 * width.max(height) + 0.5
+    }
+
     #[inline(always)]
     pub(super) fn covers_nothing(&self) -> bool {
         self.x[0] > self.x[1] || self.y[0] > self.y[1]
