@@ -10,8 +10,8 @@
 use super::tiled_index;
 use crate::camera::View;
 
-/// Weight of a splat from which a pixel belongs to its core: the kernel at 0.55 splat radii.
-const CORE_WEIGHT: f32 = 0.52;
+/// Weight of a splat from which a pixel belongs to its core: the kernel at 0.47 splat radii.
+const CORE_WEIGHT: f32 = 0.62;
 /// Added to how far lines go: what is a pixel wide has cores here and there along it.
 const LEAST_REACH_PX: usize = 2;
 /// Directions of the four lines.
@@ -42,7 +42,7 @@ pub(super) fn sticks_out(rims: &[Rim], x: usize, y: usize, view: &View) -> bool 
     }
     let meets_core = |[dx, dy]: [isize; 2]| {
         let (mut x, mut y) = (x, y);
-        for _ in 0..own as usize + LEAST_REACH_PX {
+        for _ in 0..(3.0 * own) as usize + LEAST_REACH_PX {
             match (x.checked_add_signed(dx), y.checked_add_signed(dy)) {
                 (Some(next_x), Some(next_y)) if next_x < width && next_y < height => (x, y) = (next_x, next_y),
                 // Beyond the picture the surface goes on.

@@ -106,7 +106,7 @@ impl Subject {
             let verdicts = Verdicts::new(&exact, &picture, &self.neighbors);
             let measures = verdicts.measures();
             table += &format!("{label:<28}{measures}\n");
-            assert!(measures.sampled >= 0.0, "{label}: too few points for this size: {measures}");
+            assert!(measures.sampled >= shot.sampled, "{label}: too few points for this size: {measures}");
             let misses = misses(&measures);
             if !misses.is_empty() || std::env::var_os("AUTOSPLATS_TRUTH_IMAGES").is_some() {
                 verdicts.write(&label.replace([':', ' '], "-"));
@@ -137,7 +137,7 @@ fn misses(measures: &Measures) -> Vec<String> {
 
 #[test]
 fn figure() {
-    let subject = Subject::new("figure:550K");
+    let subject = Subject::new("figure:150K");
     subject.meets_the_limits(&[
         subject.own(0.99),
         subject.fitted("iso", ViewDirection::Iso, 0.99),
@@ -147,7 +147,7 @@ fn figure() {
 
 #[test]
 fn two_scales() {
-    let subject = Subject::new("two-scales:800K");
+    let subject = Subject::new("two-scales:200K");
     subject.meets_the_limits(&[
         subject.own(0.9),
         subject.fitted("iso", ViewDirection::Iso, 0.9),
@@ -157,7 +157,7 @@ fn two_scales() {
 
 #[test]
 fn statue() {
-    let subject = Subject::new("statue:1M");
+    let subject = Subject::new("statue:300K");
     subject.meets_the_limits(&[
         subject.own(0.99),
         subject.fitted("iso", ViewDirection::Iso, 0.99),
@@ -188,7 +188,7 @@ fn cathedral() {
 /// The measures notice what they are meant to notice.
 #[test]
 fn poor_pictures_miss_the_limits() {
-    let subject = Subject::new("figure:550K");
+    let subject = Subject::new("figure:150K");
     let shot = subject.own(0.99);
     let exact = subject.exact(&shot);
     let misses = |picture: &Picture| {
