@@ -12,7 +12,7 @@ use crate::fit::Surfel;
 /// Radius in pixels of the dot that is always drawn around a surfel's centre, so that a splat smaller than a pixel or
 /// seen from its edge still covers the pixel of its point: the low-pass filter of [BHZK05]. The furthest that a pixel's
 /// centre can be from a point in the pixel is √½.
-pub(super) const DOT_RADIUS_PX: f32 = 0.75;
+pub(super) const DOT_RADIUS_PX: f32 = 0.71;
 /// A splat is drawn out to this many splat radii, its weight falling to nearly nothing: with randomly scattered points
 /// every fiftieth place on a surface lies in no disc of the splat radius, every three-thousandth in none of these.
 // Differs from the paper: it cuts the Gaussian at the splat radius.

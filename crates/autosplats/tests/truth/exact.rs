@@ -9,6 +9,11 @@ use crate::fit::Neighbors;
 
 /// Widest spacing of points, in pixels, that counts as sampled.
 const WIDEST_SPACING_PX: f64 = 1.5;
+/// Of the k points around a place, this many must lie within 30° of its tangent plane for it to count as sampled: those
+/// on another side of an edge, which a scanner may see alone, tell nothing about this one.
+const LEAST_BESIDE: usize = 3;
+/// Cosine of the steepest slant that widens the tolerance in depth.
+const STEEPEST: f64 = 0.1;
 
 /// The true surface at a pixel's centre.
 #[derive(Clone, Copy)]
@@ -17,22 +22,21 @@ pub(crate) struct Surface {
     pub(crate) depth: f64,
     /// World space.
     pub(crate) normal: DVec3,
-    /// Radius of the ball about this place that holds k points.
-    pub(crate) k_radius: f64,
-    /// Mean distance of the points in that ball, in pixels.
+    /// Mean distance in pixels of the points around.
     pub(crate) spacing_px: f64,
-}
-
-impl Surface {
     /// Whether there are points enough for a closed picture of this place: elsewhere the limits do not hold.
-    pub(crate) fn sampled(&self) -> bool {
-        self.spacing_px <= WIDEST_SPACING_PX
-    }
+    pub(crate) sampled: bool,
+    /// Difference in depth within which a surface is the same: the radius of the ball that holds k points, and what a
+    /// slanted surface goes back within a pixel.
+    pub(crate) tolerance: f64,
 }
 
 /// The true picture, row by row.
 pub(crate) struct Exact {
     pub(crate) width: usize,
+    perspective: bool,
+    /// Size of a pixel at depth 1.
+    pixel: f64,
     pub(crate) surface: Vec<Option<Surface>>,
 }
 
@@ -52,12 +56,27 @@ impl Exact {
                 if perspective { (camera.eye, (forward + across).normalize()) } else { (camera.eye + across, forward) };
             let hit = scene.trace(origin, direction)?;
             let depth = hit.distance * direction.dot(forward);
-            let k_radius = neighbors.k_radius(origin + direction * hit.distance);
             let pixel_size = if perspective { pixel * depth } else { pixel };
-            let spacing_px = k_radius * (std::f64::consts::PI / neighbors.k()).sqrt() / pixel_size;
-            Some(Surface { depth, normal: hit.normal, k_radius, spacing_px })
+            let around = neighbors.around(origin + direction * hit.distance);
+            let spacing_px = spacing(&around) / pixel_size;
+            let beside = around.iter().filter(|offset| offset.dot(hit.normal).abs() <= 0.5 * offset.length());
+            let cos = direction.dot(hit.normal).abs().clamp(STEEPEST, 1.0);
+            Some(Surface {
+                depth,
+                normal: hit.normal,
+                spacing_px,
+                sampled: spacing_px <= WIDEST_SPACING_PX && beside.count() >= LEAST_BESIDE,
+                tolerance: reach(&around) + pixel_size * (1.0 - cos * cos).sqrt() / cos,
+            })
         };
-        Self { width: width as usize, surface: (0..width * height).into_par_iter().map(trace).collect() }
+        let surface = (0..width * height).into_par_iter().map(trace).collect();
+        Self { width: width as usize, perspective, pixel, surface }
+    }
+
+    /// Whether a point shown is one of a sampled surface.
+    pub(crate) fn is_sampled(&self, shown: &Shown, neighbors: &Neighbors) -> bool {
+        let pixel_size = if self.perspective { self.pixel * shown.depth } else { self.pixel };
+        spacing(&neighbors.around(neighbors.position(shown.point))) <= WIDEST_SPACING_PX * pixel_size
     }
 
     /// The true surface at the pixels of the picture that lie at most `reach` pixels from `index` in x and in y.
@@ -67,6 +86,16 @@ impl Exact {
         let range = move |at: usize, side: usize| at.saturating_sub(reach)..(at + reach + 1).min(side);
         range(y, height).flat_map(move |y| range(x, width).map(move |x| self.surface[y * width + x].as_ref()))
     }
+}
+
+/// The farthest of some offsets, ascending.
+fn reach(offsets: &[DVec3]) -> f64 {
+    offsets.last().map_or(f64::INFINITY, |farthest| farthest.length())
+}
+
+/// Mean distance between points that lie at these offsets, ascending, on a surface.
+fn spacing(offsets: &[DVec3]) -> f64 {
+    reach(offsets) * (std::f64::consts::PI / offsets.len() as f64).sqrt()
 }
 
 /// What the render shows at a pixel.

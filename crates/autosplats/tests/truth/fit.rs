@@ -21,24 +21,26 @@ impl Neighbors {
         Self { tree, points, origin: cloud.origin(), k }
     }
 
-    pub(crate) fn k(&self) -> f64 {
-        self.k.get() as f64
+    /// Where point `index` is in the world.
+    pub(crate) fn position(&self, index: u32) -> DVec3 {
+        self.origin + DVec3::from(self.points[index as usize])
     }
 
-    /// Radius of the ball about a place in the world that holds k points.
-    pub(crate) fn k_radius(&self, place: DVec3) -> f64 {
-        let place = (place - self.origin).to_array();
-        let nearest = self.tree.query(&place).nearest_n::<SquaredEuclidean<f64>>(self.k).execute();
-        nearest.iter().fold(0.0, |radius: f64, point| radius.max(point.distance)).sqrt()
+    /// Offsets of the k nearest points from a place in the world, the nearest first.
+    pub(crate) fn around(&self, place: DVec3) -> Vec<DVec3> {
+        self.offsets(place - self.origin, self.k)
+    }
+
+    fn offsets(&self, place: DVec3, count: NonZero<usize>) -> Vec<DVec3> {
+        let nearest = self.tree.query(&place.to_array()).nearest_n::<SquaredEuclidean<f64>>(count).execute();
+        nearest.iter().map(|point| DVec3::from(self.points[point.item as usize]) - place).collect()
     }
 
     /// Normal of the plane through point `index` and its k nearest neighbours, of either sign.
     pub(crate) fn normal(&self, index: u32) -> DVec3 {
-        let center = &self.points[index as usize];
         // The point itself is among those found.
-        let nearest = self.tree.query(center).nearest_n::<SquaredEuclidean<f64>>(self.k.saturating_add(1)).execute();
-        let offsets = nearest.iter().map(|point| DVec3::from(self.points[point.item as usize]) - DVec3::from(*center));
-        plane_normal(&offsets.collect::<Vec<_>>())
+        let offsets = self.offsets(self.points[index as usize].into(), self.k.saturating_add(1));
+        plane_normal(&offsets)
     }
 }
 

@@ -17,7 +17,7 @@ const INSIDE_PX: usize = 2;
 enum Verdict {
     /// Empty, and so it should be.
     Empty,
-    /// A surface with too few points to ask anything about it, or covered beside such a surface alone.
+    /// A surface with too few points to ask anything about it, or something of such a surface shown where nothing is.
     Unsampled,
     /// Shown where it is. Angles in degrees of our normal and of the reference to the true one.
     Right { ours: f64, reference: f64 },
@@ -28,11 +28,11 @@ enum Verdict {
     /// Covered outside the silhouette.
     Over,
     /// Behind all that is truly seen at this pixel and the eight around it, each of which sees some surface, by more than
-    /// the k-radius there. At a step in depth either side may be seen.
+    /// the tolerance there. At a step in depth either side may be seen.
     Leak,
-    /// Before all that is truly seen at this pixel and the eight around it, by more than the k-radius there.
+    /// Before all that is truly seen at this pixel and the eight around it, by more than the tolerance there.
     Before,
-    /// At another depth than it should be by more than the k-radius, but at one that is seen beside it.
+    /// At another depth than it should be by more than the tolerance, but at one that is seen beside it.
     Beside,
 }
 
@@ -42,6 +42,8 @@ pub(crate) struct Verdicts {
     verdicts: Vec<Verdict>,
     /// Sampled pixels inside the silhouette.
     inside: usize,
+    /// Sampled pixels at its edge.
+    edge: usize,
     /// Median over the surface.
     spacing_px: f64,
     /// Share of the surface that is sampled.
@@ -57,6 +59,8 @@ pub(crate) struct Measures {
     pub(crate) sampled: f64,
     /// Intersection over union of the covered pixels.
     pub(crate) iou: f64,
+    /// Pixels by which the silhouette is too wide on average; below 0 if too narrow.
+    pub(crate) wider_px: f64,
     /// Of the pixels inside the true silhouette, those that are empty.
     pub(crate) holes: f64,
     /// Of the pixels covered in both, those that show something behind the surface.
@@ -73,14 +77,14 @@ impl Verdicts {
     pub(crate) fn new(exact: &Exact, picture: &Picture, neighbors: &Neighbors) -> Self {
         let judge = |pixel: usize| match (&exact.surface[pixel], &picture.shown[pixel]) {
             (None, None) => Verdict::Empty,
-            (None, Some(_)) if beside_unsampled(exact, pixel) => Verdict::Unsampled,
+            (None, Some(shown)) if !exact.is_sampled(shown, neighbors) => Verdict::Unsampled,
             (None, Some(_)) => Verdict::Over,
-            (Some(surface), _) if !surface.sampled() => Verdict::Unsampled,
+            (Some(surface), _) if !surface.sampled => Verdict::Unsampled,
             (Some(_), None) if inside(exact, pixel) => Verdict::Hole,
             (Some(_), None) => Verdict::Short,
             (Some(surface), Some(shown)) => compare(exact, pixel, surface, shown, neighbors),
         };
-        let sampled = |pixel: usize| exact.surface[pixel].is_some_and(|surface| surface.sampled());
+        let sampled = |pixel: usize| exact.surface[pixel].is_some_and(|surface| surface.sampled);
         let pixels = 0..exact.surface.len();
         let surfaces = exact.surface.iter().flatten();
         let mut spacings: Vec<_> = surfaces.clone().map(|surface| surface.spacing_px).collect();
@@ -88,8 +92,9 @@ impl Verdicts {
         Self {
             width: exact.width,
             verdicts: pixels.clone().into_par_iter().map(judge).collect(),
-            inside: pixels.filter(|&pixel| sampled(pixel) && inside(exact, pixel)).count(),
-            sampled: surfaces.filter(|surface| surface.sampled()).count() as f64 / spacings.len() as f64,
+            inside: pixels.clone().filter(|&pixel| sampled(pixel) && inside(exact, pixel)).count(),
+            edge: pixels.filter(|&pixel| sampled(pixel) && exact.around(pixel, 1).any(|near| near.is_none())).count(),
+            sampled: surfaces.filter(|surface| surface.sampled).count() as f64 / spacings.len() as f64,
             spacing_px: spacings.get(spacings.len() / 2).copied().unwrap_or(f64::INFINITY),
         }
     }
@@ -111,6 +116,7 @@ impl Verdicts {
             spacing_px: self.spacing_px,
             sampled: self.sampled,
             iou: covered / (surface + count(&[Verdict::Over])),
+            wider_px: (count(&[Verdict::Over]) - count(&[Verdict::Short])) / self.edge as f64,
             holes: count(&[Verdict::Hole]) / self.inside as f64,
             leaks: leaks / covered,
             before: before / covered,
@@ -146,15 +152,9 @@ fn inside(exact: &Exact, pixel: usize) -> bool {
     exact.around(pixel, INSIDE_PX).all(|surface| surface.is_some())
 }
 
-/// Whether all surface near this pixel, and there is some, is not sampled.
-fn beside_unsampled(exact: &Exact, pixel: usize) -> bool {
-    let mut surface = exact.around(pixel, INSIDE_PX).flatten().peekable();
-    surface.peek().is_some() && surface.all(|surface| !surface.sampled())
-}
-
 /// The verdict where there is a surface and one is shown.
 fn compare(exact: &Exact, pixel: usize, surface: &Surface, shown: &Shown, neighbors: &Neighbors) -> Verdict {
-    let tolerance = surface.k_radius;
+    let tolerance = surface.tolerance;
     if (shown.depth - surface.depth).abs() <= tolerance {
         let degrees = |normal: DVec3| {
             // The angle's sine is exact where its cosine is not.
@@ -177,7 +177,7 @@ fn compare(exact: &Exact, pixel: usize, surface: &Surface, shown: &Shown, neighb
 
 impl Measures {
     pub(crate) const HEADER: &str =
-        "spacing px  sampled %     IoU  holes %  leaks %  before %  normals °  reference °  ratio";
+        "spacing px  sampled %     IoU  wider px  holes %  leaks %  before %  normals °  reference °  ratio";
 
     /// Mean error of our normals over that of the reference.
     pub(crate) fn ratio(&self) -> f64 {
@@ -187,9 +187,9 @@ impl Measures {
 
 impl fmt::Display for Measures {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { spacing_px, sampled, iou, holes, leaks, before, ours, reference } = *self;
+        let Self { spacing_px, sampled, iou, wider_px, holes, leaks, before, ours, reference } = *self;
         let [sampled, holes, leaks, before] = [sampled, holes, leaks, before].map(|share| 100.0 * share);
-        write!(f, "{spacing_px:10.2}{sampled:11.2}{iou:8.4}{holes:9.3}{leaks:9.3}{before:10.3}")?;
+        write!(f, "{spacing_px:10.2}{sampled:11.2}{iou:8.4}{wider_px:10.2}{holes:9.3}{leaks:9.3}{before:10.3}")?;
         write!(f, "{ours:11.2}{reference:13.2}{:7.3}", self.ratio())
     }
 }
