@@ -176,7 +176,7 @@ fn herd() {
     subject.meets_the_limits(&[
         subject.own(0.2),
         subject.fitted("iso", ViewDirection::Iso, 0.2),
-        subject.parallel("top", ViewDirection::Top, 0.2),
+        subject.parallel("top", ViewDirection::Top, 0.1),
     ]);
 }
 
