@@ -53,6 +53,21 @@ impl Default for Lanes {
     }
 }
 
+impl NeighborhoodBlock {
+    /// Copies neighbourhood `from` of another block to `lane`.
+    #[inline(always)]
+    pub(crate) fn set_lane(&mut self, lane: usize, other: &Self, from: usize) {
+        self.count.0[lane] = other.count.0[from];
+        self.k_radius.0[lane] = other.k_radius.0[from];
+        for (to, other) in self.offset.iter_mut().zip(&other.offset) {
+            to.0[lane] = other.0[from];
+        }
+        for (to, other) in self.second.iter_mut().zip(&other.second) {
+            to.0[lane] = other.0[from];
+        }
+    }
+}
+
 impl Default for NeighborhoodBlock {
     fn default() -> Self {
         let zero = Lanes::default();
@@ -111,6 +126,13 @@ impl SearchRules {
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
         self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * (self.k as f32).powf(0.5 * e0 as f32))
+    }
+
+    /// Whether a rule can end a neighbourhood within `radius`: from r̃₀ on no gap of factor √λ fits below that multiple of it.
+    #[inline(always)]
+    pub(crate) fn may_end(&self, initial_radius: f32, radius: f32) -> bool {
+        self.gap_factor.is_some_and(|gap| radius > gap.sqrt() * initial_radius)
+            | (radius > self.outlier_radius(initial_radius))
     }
 
     /// Applies the rules to the squared distances, ascending and complete up to distance `known`.

@@ -13,8 +13,13 @@ use crate::simd::F32s;
 
 /// Blocks per task: enough to hide its start, few enough to share out evenly.
 const TASK_BLOCKS: usize = 64;
-/// The first window holds spheres of this many first search radii: most points find their k neighbours in it.
+/// The first window holds spheres of this many k-radii, as those of late lead to expect: most points find their k
+/// neighbours in it.
 const FIRST_REACH: f32 = 1.3;
+/// Range of the k-radius that is expected, in first search radii.
+const EXPECTED: [f32; 2] = [0.5, 3.0];
+/// Weight of the last block in what is expected of the next.
+const NEWS: f32 = 0.3;
 /// A radius that has to grow grows at least by this factor.
 const LEAST_GROWTH: f32 = 1.3;
 /// Candidates counted at a time, each into a sum of its own: one sum would wait for itself.
@@ -59,8 +64,10 @@ struct Scratch {
     candidates: Vec<[f32; 3]>,
     /// Squared distance of each candidate to each of the sixteen points.
     squared: Vec<Lanes>,
-    /// Squared distances of one lane, sorted.
-    sorted: Vec<f32>,
+    /// Squared distances of one lane.
+    listed: Vec<f32>,
+    /// A task's queries, those in front of the culling planes first, and where each stands in the task.
+    order: Vec<(u32, u32)>,
 }
 
 /// Sixteen points and how far each has got.
@@ -84,10 +91,33 @@ fn search_blocks_with<'a, S: Simd>(
     out: &'a mut [NeighborhoodBlock],
     scratch: &'a mut Scratch,
 ) -> SearchCounts {
+    let Task { screen, .. } = *task;
+    // Points of different surfaces want different windows, in place and in size.
+    let mut order = std::mem::take(&mut scratch.order);
+    order.clear();
+    let layer = |behind: bool| {
+        let places = queries.iter().zip(0..).map(|(&query, place)| (query, place));
+        places.filter(move |&(query, _)| screen.density.culls(&screen.points[query as usize]) == behind)
+    };
+    order.extend(layer(false));
+    let front = order.len();
+    order.extend(layer(true));
+
     let mut counts = SearchCounts::default();
-    for (queries, out) in queries.chunks(LANES).zip(out) {
-        search_block(simd, task, queries, out, scratch, &mut counts);
+    for layer in [&order[..front], &order[front..]] {
+        let mut expected = 1.0;
+        for places in layer.chunks(LANES) {
+            let mut block = Block::new(task, places, expected);
+            let mut found = NeighborhoodBlock::default();
+            search_block(simd, task, &mut block, &mut found, scratch, &mut counts);
+            expected += NEWS * (block.expected(&found, places.len()) - expected);
+            for (lane, &(_, place)) in places.iter().enumerate() {
+                let place = place as usize;
+                out[place / LANES].set_lane(place % LANES, &found, lane);
+            }
+        }
     }
+    scratch.order = order;
     counts
 }
 
@@ -95,13 +125,12 @@ fn search_blocks_with<'a, S: Simd>(
 fn search_block<S: Simd>(
     simd: S,
     task: &Task,
-    queries: &[u32],
+    block: &mut Block,
     out: &mut NeighborhoodBlock,
     scratch: &mut Scratch,
     counts: &mut SearchCounts,
 ) {
     let Task { screen, view, rules } = *task;
-    let mut block = Block::new(task, queries);
     while block.pending.contains(&true) {
         let (window, group) = block.next_window(task);
         let everything = window.is_all();
@@ -113,15 +142,13 @@ fn search_block<S: Simd>(
             kth_smallest(simd, &scratch.squared, rules.k, &group, &mut block.threshold);
         }
         let inside = block.spheres_inside(&window, view);
+        let within = block.count_within(simd, &scratch.squared);
         let mut done = [false; LANES];
         for lane in (0..LANES).filter(|&lane| group[lane]) {
             let exact = enough & (inside[lane] | everything);
             let kth_radius = block.threshold.0[lane].sqrt();
             let initial_radius = block.initial_radius.0[lane];
-            // From r̃₀ on no gap of factor √λ fits below this radius, so that the rules need not be looked at.
-            let ruled = rules.gap_factor.is_some_and(|gap| kth_radius > gap.sqrt() * initial_radius)
-                | (kth_radius > rules.outlier_radius(initial_radius));
-            if exact & !ruled {
+            if exact & !rules.may_end(initial_radius, kth_radius) {
                 done[lane] = true;
                 continue;
             }
@@ -132,18 +159,23 @@ fn search_block<S: Simd>(
             } else {
                 block.radius.0[lane]
             };
-            sort_lane(&scratch.squared, lane, known, &mut scratch.sorted);
-            let end = rules.early_end(&scratch.sorted, initial_radius, known);
-            let found = scratch.sorted.len();
+            let mut found = within.0[lane] as usize;
+            let mut end = None;
+            if rules.may_end(initial_radius, known) {
+                list_lane(&scratch.squared, lane, known, &mut scratch.listed);
+                scratch.listed.sort_unstable_by(f32::total_cmp);
+                end = rules.early_end(&scratch.listed, initial_radius, known);
+                found = scratch.listed.len();
+            }
             done[lane] = match end {
                 Some(EarlyEnd::Outlier) => {
-                    counts.outliers += usize::from(lane < queries.len());
+                    counts.outliers += 1;
                     block.threshold.0[lane] = 0.0;
                     true
                 }
                 Some(EarlyEnd::Gap(neighbors)) => {
-                    counts.clamped += usize::from(lane < queries.len());
-                    block.threshold.0[lane] = scratch.sorted[neighbors - 1];
+                    counts.clamped += 1;
+                    block.threshold.0[lane] = scratch.listed[neighbors - 1];
                     true
                 }
                 None if exact => true,
@@ -151,15 +183,23 @@ fn search_block<S: Simd>(
                     let growth = (rules.k as f32 / found.max(1) as f32).sqrt().max(LEAST_GROWTH);
                     // What was read bounds the k-radius, but across a depth step only loosely.
                     let grown = known * growth;
-                    let next = if enough { kth_radius.min(2.0 * grown) } else { grown };
-                    let next_window = Window::of_sphere(block.center(lane), next, view);
-                    let stop = everything || next_window.candidates(&screen.cells) > MAX_CANDIDATES;
+                    let mut next = if enough { kth_radius.min(2.0 * grown) } else { grown };
+                    let too_large = |radius: f32| {
+                        let window = Window::of_sphere(block.center(lane), radius, view);
+                        window.candidates(&screen.cells) > MAX_CANDIDATES
+                    };
+                    let mut stop = everything || too_large(next);
+                    if stop & !everything {
+                        // A smaller step may still find them.
+                        next = next.min(LEAST_GROWTH * known);
+                        stop = too_large(next);
+                    }
                     if stop {
-                        let real = usize::from(lane < queries.len());
-                        counts.bounded += if everything { 0 } else { real };
+                        list_lane(&scratch.squared, lane, known, &mut scratch.listed);
+                        counts.bounded += usize::from(!everything);
                         // Without any neighbour there is nothing to keep.
-                        *(if found == 0 { &mut counts.outliers } else { &mut counts.clamped }) += real;
-                        block.threshold.0[lane] = scratch.sorted.last().copied().unwrap_or(0.0);
+                        *(if scratch.listed.is_empty() { &mut counts.outliers } else { &mut counts.clamped }) += 1;
+                        block.threshold.0[lane] = scratch.listed.iter().copied().fold(0.0, f32::max);
                     } else {
                         block.radius.0[lane] = next;
                     }
@@ -168,7 +208,7 @@ fn search_block<S: Simd>(
             };
         }
         if done.contains(&true) {
-            sum_moments(simd, &block, scratch, &done, out);
+            sum_moments(simd, block, scratch, &done, out);
             for lane in 0..LANES {
                 block.pending[lane] &= !done[lane];
             }
@@ -178,7 +218,7 @@ fn search_block<S: Simd>(
 
 impl Block {
     #[inline(always)]
-    fn new(task: &Task, queries: &[u32]) -> Self {
+    fn new(task: &Task, places: &[(u32, u32)], expected: f32) -> Self {
         let Task { screen, view, rules } = *task;
         let mut block = Self {
             position: [Lanes::default(); 3],
@@ -188,18 +228,34 @@ impl Block {
             pending: [true; LANES],
         };
         for lane in 0..LANES {
-            let query = queries[lane.min(queries.len() - 1)];
+            let (query, _) = places[lane.min(places.len() - 1)];
             let point = &screen.points[query as usize];
             for axis in 0..3 {
                 block.position[axis].0[lane] = point.position_view[axis];
             }
-            let radius = screen.density.initial_radius(point, rules.k, view);
-            block.initial_radius.0[lane] = radius;
+            let initial_radius = screen.density.initial_radius(point, rules.k, view);
+            let radius = expected * initial_radius;
+            block.initial_radius.0[lane] = initial_radius;
             block.radius.0[lane] = FIRST_REACH * radius;
             block.threshold.0[lane] = radius * radius;
-            block.pending[lane] = lane < queries.len();
+            block.pending[lane] = lane < places.len();
         }
         block
+    }
+
+    /// Mean k-radius of the first `len` points, in first search radii.
+    fn expected(&self, found: &NeighborhoodBlock, len: usize) -> f32 {
+        let [least, most] = EXPECTED;
+        let lanes = found.k_radius.0.iter().zip(&self.initial_radius.0).take(len);
+        lanes.map(|(found, initial)| (found / initial).clamp(least, most)).sum::<f32>() / len as f32
+    }
+
+    /// How many candidates lie within the radius of each lane, the point itself not counted.
+    #[inline(always)]
+    fn count_within<S: Simd>(&self, simd: S, squared: &[Lanes]) -> Lanes {
+        let mut count = count_below(simd, squared, &Lanes(self.radius.0.map(|radius| radius * radius)));
+        count.0.iter_mut().for_each(|count| *count -= 1.0);
+        count
     }
 
     #[inline(always)]
@@ -390,11 +446,18 @@ fn largest_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lan
     largest
 }
 
-/// Squared distances of `lane` up to distance `known`, the point itself left out, ascending.
-fn sort_lane(squared: &[Lanes], lane: usize, known: f32, sorted: &mut Vec<f32>) {
-    sorted.clear();
-    sorted.extend(squared.iter().map(|candidate| candidate.0[lane]).filter(|&d| d <= known * known && d > 0.0));
-    sorted.sort_unstable_by(f32::total_cmp);
+/// Lists the squared distances of `lane` up to distance `known`, the point itself left out.
+#[inline(always)]
+fn list_lane(squared: &[Lanes], lane: usize, known: f32, listed: &mut Vec<f32>) {
+    listed.resize(squared.len(), 0.0);
+    let mut len = 0;
+    for candidate in squared {
+        // Written first and counted after, as in `gather`.
+        let d = candidate.0[lane];
+        listed[len] = d;
+        len += usize::from((d <= known * known) & (d > 0.0) & (d < f32::INFINITY));
+    }
+    listed.truncate(len);
 }
 
 /// Sums the neighbours below the threshold of each lane in `done`.
