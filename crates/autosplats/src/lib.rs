@@ -31,6 +31,8 @@ mod search;
 mod shade;
 mod simd;
 mod splat;
+#[cfg(test)]
+mod test_clouds;
 
 pub use autosplats_cloud as cloud;
 pub use camera::{Camera, Projection, ViewDirection, guess_axes};

@@ -49,14 +49,16 @@ impl<S: Simd> F32s<S> {
         Self { value: self.simd.abs_f32s(self.value), ..self }
     }
 
+    /// Neither may be NaN: processors differ in what they make of it.
     #[inline(always)]
     pub(crate) fn min(self, other: Self) -> Self {
-        self.less(other).select(self, other)
+        Self { value: self.simd.min_f32s(self.value, other.value), ..self }
     }
 
+    /// Neither may be NaN: processors differ in what they make of it.
     #[inline(always)]
     pub(crate) fn max(self, other: Self) -> Self {
-        other.less(self).select(self, other)
+        Self { value: self.simd.max_f32s(self.value, other.value), ..self }
     }
 
     /// self < other, false where either is NaN.

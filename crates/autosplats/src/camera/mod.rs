@@ -116,6 +116,7 @@ impl Camera {
     }
 }
 
+#[allow(clippy::wrong_self_convention, reason = "a view is too large to be handed over for every point")]
 impl View {
     /// View-space position of a point given relative to the cloud's origin.
     #[inline(always)]

@@ -17,7 +17,7 @@ const TASK_BLOCKS: usize = 64;
 const LINE: f32 = 1e-5;
 /// Longest ellipse, semi-major over semi-minor axis.
 // Differs from the paper: it sets no limit, and a nearly straight neighbourhood would draw a needle across the picture.
-const LONGEST: f32 = 4.0;
+pub(super) const LONGEST: f32 = 4.0;
 /// Radius in pixels of a point drawn although it has no neighbour.
 const LONE_RADIUS_PX: f32 = 1.0;
 
@@ -25,16 +25,16 @@ const LONE_RADIUS_PX: f32 = 1.0;
 /// radii.
 // Differs from the paper: such a point is seen past the edge of a nearer surface, its neighbours are mostly hidden, and
 // the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
-const WIDEST_BEHIND: f32 = 1.0;
+pub(super) const WIDEST_BEHIND: f32 = 3.0;
 
 /// A point whose neighbours' mean is further from it than this part of the k-radius has them all on one side and close
 /// together: they are a surface elsewhere, and the point an outlier. At a straight edge the part is 0.42, at the end of a
 /// line 0.55.
 // Differs from the paper: it takes any neighbour within the radius of e0 expansions, 31 first search radii at k = 10, as a
 // sign of surface, so that a point in the air before a dense scan grows a disc as wide as its distance.
-const LOPSIDED: f32 = 0.75;
+pub(super) const LOPSIDED: f32 = 0.75;
 /// Fewer neighbours than this are too often on one side by chance.
-const LOPSIDED_COUNT: f32 = 6.0;
+pub(super) const LOPSIDED_COUNT: f32 = 6.0;
 
 /// What the fit may be asked for.
 #[derive(Clone, Copy, Debug)]

@@ -57,7 +57,7 @@ impl<S: Simd> Rotated<S> {
         let cos = one / (one + tan * tan).sqrt();
         let sin = tan * cos;
         self.diagonal[P] = self.diagonal[P] - tan * pq;
-        self.diagonal[Q] = self.diagonal[Q] + tan * pq;
+        self.diagonal[Q] += tan * pq;
         self.rest[R] = zero;
         // (P, R) leaves out Q, (Q, R) leaves out P.
         let [pr, qr] = [self.rest[Q], self.rest[P]];

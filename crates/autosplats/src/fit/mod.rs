@@ -8,6 +8,8 @@
 
 mod cpu;
 mod eigen;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use cpu::{FitRules, fit};
 

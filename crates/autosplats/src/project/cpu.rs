@@ -111,6 +111,7 @@ fn project_point(position: [f32; 3], view: &View) -> (u32, f32) {
     let pixel = if inside { pixel } else { OUTSIDE };
     let pixel = if z > view.near { pixel } else { BEHIND };
     // Finite coordinates so large that their transform is not count as not finite too.
+    #[allow(clippy::eq_op, reason = "three subtractions vectorise, is_finite does not")]
     let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
     (if finite { pixel } else { NOT_FINITE }, z)
 }

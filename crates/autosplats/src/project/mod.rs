@@ -10,6 +10,8 @@
 //! nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 
 mod cpu;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use cpu::Projector;
 
@@ -34,7 +36,7 @@ impl ScreenPoint {
 }
 
 /// The screen points of one frame in cell order.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ScreenPoints {
     pub(crate) points: Vec<ScreenPoint>,
     /// Index in the cloud of each screen point.
@@ -57,7 +59,7 @@ pub(crate) struct Dropped {
 }
 
 /// Where in the list of screen points each cell begins.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ScreenCells {
     /// Height of a strip in pixels.
     pub(crate) strip_px: usize,
@@ -77,7 +79,7 @@ impl ScreenCells {
 }
 
 /// The low-resolution grid of §5.1: square cells of about k screen points.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct DensityGrid {
     /// Side of a cell in pixels.
     pub(crate) cell_px: usize,

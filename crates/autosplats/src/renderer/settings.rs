@@ -22,8 +22,8 @@ pub struct Reconstruction {
     pub k: u32,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
-    /// e0: points without a neighbour after this many expansions of their first search radius, each by √k, are
-    /// discarded as outliers; 0 to 8. `None` keeps every point [Paper, §5.3].
+    /// e0: points without a neighbour after this many expansions of their first search radius, each by √k (√2 at least),
+    /// are discarded as outliers; 0 to 8. `None` keeps every point [Paper, §5.3].
     pub outlier_expansions: Option<u32>,
     /// λ: a search that has at least one neighbour ends with those it has when its circle's area grows by this factor
     /// without meeting another; above 1. `None` bridges any gap [Paper, §5.3].

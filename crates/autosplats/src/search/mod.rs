@@ -3,7 +3,7 @@
 //! Every engine answers the same question, stated here without iterations so that the answer depends on the screen points
 //! alone. For point P with first search radius r̃₀ (§5.1) and the distances d₁ ≤ d₂ ≤ … to the other screen points:
 //!
-//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√k^e0, the radius after e0 expansions that met nothing;
+//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 2)^e0, the radius after e0 expansions that met nothing;
 //! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
 //!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ;
 //! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
@@ -12,6 +12,8 @@
 //!   bounded time per point.
 
 pub(crate) mod screen_grid;
+#[cfg(test)]
+mod tests;
 
 /// An implementation of the k-radius search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,21 +55,6 @@ impl Default for Lanes {
     }
 }
 
-impl NeighborhoodBlock {
-    /// Copies neighbourhood `from` of another block to `lane`.
-    #[inline(always)]
-    pub(crate) fn set_lane(&mut self, lane: usize, other: &Self, from: usize) {
-        self.count.0[lane] = other.count.0[from];
-        self.k_radius.0[lane] = other.k_radius.0[from];
-        for (to, other) in self.offset.iter_mut().zip(&other.offset) {
-            to.0[lane] = other.0[from];
-        }
-        for (to, other) in self.second.iter_mut().zip(&other.second) {
-            to.0[lane] = other.0[from];
-        }
-    }
-}
-
 impl Default for NeighborhoodBlock {
     fn default() -> Self {
         let zero = Lanes::default();
@@ -78,7 +65,7 @@ impl Default for NeighborhoodBlock {
 /// Neighbourhoods of a list of screen points, in that list's order.
 #[derive(Debug, Default)]
 pub(crate) struct Neighborhoods {
-    /// The last block is filled up with copies of neighbourhoods.
+    /// Lanes of the last block beyond the end of the list hold nothing of use.
     pub(crate) blocks: Vec<NeighborhoodBlock>,
     pub(crate) counts: SearchCounts,
 }
@@ -125,14 +112,9 @@ impl SearchRules {
     /// Radius within which a point must have a neighbour.
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
-        self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * (self.k as f32).powf(0.5 * e0 as f32))
-    }
-
-    /// Whether a rule can end a neighbourhood within `radius`: from r̃₀ on no gap of factor √λ fits below that multiple of it.
-    #[inline(always)]
-    pub(crate) fn may_end(&self, initial_radius: f32, radius: f32) -> bool {
-        self.gap_factor.is_some_and(|gap| radius > gap.sqrt() * initial_radius)
-            | (radius > self.outlier_radius(initial_radius))
+        // An expansion by √1 would be none.
+        let growth = self.k.max(2) as f32;
+        self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * growth.powf(0.5 * e0 as f32))
     }
 
     /// Applies the rules to the squared distances, ascending and complete up to distance `known`.

@@ -20,8 +20,9 @@ const FILL: Vec3 = Vec3::new(0.80, 0.05, -0.60);
 const FILL_LIGHT: f32 = 0.13;
 /// Light of the sky on surfaces that face down and up.
 const SKY: [f32; 2] = [0.05, 0.18];
-/// Part of the light that does not depend on the normal, for points with colours: those were lit when they were scanned.
-const SCANNED_LIGHT: f32 = 0.4;
+/// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
+/// the lights above, so that a surface seen straight on keeps its colour.
+const SCANNED_LIGHT: [f32; 2] = [0.45, 0.75];
 /// Neighbours looked at by eye-dome lighting, in pixels.
 const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 /// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
@@ -155,8 +156,8 @@ impl<'a> Shader<'a> {
         let fill = normal.dot(FILL).max(0.0);
         let sky = SKY[0] + (SKY[1] - SKY[0]) * (0.5 - 0.5 * normal.y);
         let light = KEY_LIGHT * key + FILL_LIGHT * fill + sky;
-        let scanned = if self.layers.color.is_empty() { 0.0 } else { SCANNED_LIGHT };
-        scanned + (1.0 - scanned) * light
+        let [base, share] = if self.layers.color.is_empty() { [0.0, 1.0] } else { SCANNED_LIGHT };
+        base + share * light
     }
 
     /// How much light is left beside nearer surfaces.

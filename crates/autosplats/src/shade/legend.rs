@@ -23,7 +23,7 @@ pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, encode: impl F
         (0..LABELS).map(|i| number(high + (low - high) * i as f32 / (LABELS - 1) as f32, high - low)).collect();
     let text_width = labels.iter().map(String::len).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;
     let bar_width = 14 * unit;
-    let panel_width = (bar_width + text_width + 5 * line / 2).max(0);
+    let panel_width = bar_width + text_width + 5 * line / 2;
     let bar_height = height / 2;
     let panel_height = bar_height + 3 * line;
     if panel_width + line > width || panel_height + line > height || bar_height < LABELS * line {

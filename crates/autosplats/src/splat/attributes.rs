@@ -65,14 +65,15 @@ pub(super) struct TileSums {
     pub(super) depth: Vec<f32>,
     /// One tile after the other, in the order of [`Attributes::values`].
     pub(super) channels: Vec<f32>,
-    /// Weight of the heaviest splat, and the bits of the index of the point it comes from.
+    /// Weight of the heaviest splat, the bits of the index of the point it comes from, and its reach in pixels.
     pub(super) heaviest: Vec<f32>,
     pub(super) point: Vec<f32>,
+    pub(super) reach: Vec<f32>,
 }
 
 impl TileSums {
     pub(super) fn clear(&mut self, attributes: &Attributes<'_>) {
-        for sum in [&mut self.weight, &mut self.depth, &mut self.heaviest] {
+        for sum in [&mut self.weight, &mut self.depth, &mut self.heaviest, &mut self.reach] {
             sum.clear();
             sum.resize(TILE_AREA, 0.0);
         }
@@ -118,6 +119,27 @@ impl TileSums {
             for layer in [&mut layers.radius, &mut layers.k_radius, &mut layers.curvature] {
                 let sum = channel();
                 layer.iter_mut().enumerate().for_each(|(i, value)| *value = mean(sum, &self.weight, i));
+            }
+        }
+    }
+}
+
+impl TileLayers<'_> {
+    /// Leaves nothing at pixel `at` of the tile.
+    pub(super) fn clear(&mut self, at: usize) {
+        self.weight[at] = 0.0;
+        self.depth[at] = f32::INFINITY;
+        self.normal[at] = [0.0; 3];
+        self.point[at] = u32::MAX;
+        if let Some(color) = self.color.get_mut(at) {
+            *color = [0.0; 3];
+        }
+        if let Some(scalar) = self.scalar.get_mut(at) {
+            *scalar = f32::NAN;
+        }
+        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature] {
+            if let Some(value) = measure.get_mut(at) {
+                *value = 0.0;
             }
         }
     }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
 use super::raster::{Tile, draw_attributes, draw_depth};
+use super::trim::{Rim, rim, sticks_out};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -22,6 +23,8 @@ pub(crate) struct Splatter {
     depth: Vec<f32>,
     /// The depth map before the last refinement.
     previous: Vec<f32>,
+    /// What trimming needs to know, tile by tile.
+    rims: Vec<Rim>,
     layers: GBuffer,
 }
 
@@ -71,15 +74,29 @@ impl Splatter {
 
     /// Attribute pass: the weighted mean of all living surfels within ε of the depth map [Paper, §7].
     pub(crate) fn attributes(&mut self, surfels: &[Surfel], view: &View, attributes: &Attributes<'_>) -> &GBuffer {
-        let Self { runs, used, depth, layers, .. } = self;
+        let Self { runs, used, depth, rims, layers, .. } = self;
         layers.resize(view, depth.len(), attributes);
-        let layers_by_tile = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).enumerate();
-        layers_by_tile.for_each_init(TileSums::default, |sums, (index, (mut layers, depth))| {
+        rims.resize(depth.len(), 0.0);
+        let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(rims.par_chunks_mut(TILE_AREA));
+        tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), rims))| {
             sums.clear(attributes);
             for run in &runs[..*used] {
                 draw_attributes(run, surfels, tile(index, view), view, depth, attributes, sums);
             }
             sums.normalize(attributes, &mut layers);
+            for (out, (&heaviest, &reach)) in rims.iter_mut().zip(sums.heaviest.iter().zip(&sums.reach)) {
+                *out = rim(heaviest, reach);
+            }
+        });
+        layers.tiles().into_par_iter().enumerate().for_each(|(index, mut layers)| {
+            let [x0, y0] = tile(index, view).origin;
+            for y in y0..(y0 + TILE).min(view.height as usize) {
+                for x in x0..(x0 + TILE).min(view.width as usize) {
+                    if sticks_out(rims, x, y, view) {
+                        layers.clear((y - y0) * TILE + x - x0);
+                    }
+                }
+            }
         });
         layers
     }

@@ -16,6 +16,9 @@ mod bins;
 mod cpu;
 mod raster;
 mod setup;
+#[cfg(test)]
+mod tests;
+mod trim;
 
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;

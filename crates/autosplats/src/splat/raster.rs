@@ -66,6 +66,7 @@ pub(super) fn draw_attributes(
     }
 }
 
+#[allow(clippy::too_many_arguments, reason = "the vectors' type is one of them, the dispatch knows no methods")]
 #[pulp::with_simd(draw_attribute_entries = pulp::Arch::new())]
 #[inline(always)]
 fn draw_attribute_entries_with<'a, S: Simd>(
@@ -111,6 +112,9 @@ fn draw_attribute_entries_with<'a, S: Simd>(
                 let point = &mut sums.point[row.clone()];
                 let source = F32s::splat(simd, f32::from_bits(surfel.source));
                 heavier.select(source, F32s::load(simd, point, vector)).store(point, vector);
+                let reach = &mut sums.reach[row.clone()];
+                let own = F32s::splat(simd, splat.reach_px());
+                heavier.select(own, F32s::load(simd, reach, vector)).store(reach, vector);
             }
         }
     }
@@ -241,5 +245,57 @@ impl<S: Simd> Brush<S> {
         let dot = (dx * dx + self.dy_squared) * per_dot;
         // The dot reaches beyond the disc, where its plane is of no use.
         Fragment { squared: (u * u + v * v).min(dot), depth: hit.max(self.low).min(self.high) }
+    }
+}
+#[cfg(test)]
+mod tests {
+    use super::super::attributes::PointColors;
+    use super::super::tests::{ALL_DISCS, Data, surfels, views};
+    use super::*;
+
+    #[test]
+    fn vectors_of_any_width_give_the_same_bits() {
+        let data = Data::new(500);
+        let color = PointColors { srgb: &data.colors, linear: &data.linear };
+        let attributes = Attributes { color: Some(color), scalar: None, measures: true };
+        for view in views([70, 50]) {
+            for discs in ALL_DISCS {
+                let surfels = surfels(35, 400, discs, &view);
+                let mut run = Run::default();
+                run.set_up(0, &surfels, &view);
+                for tile in [Tile { index: 0, origin: [0, 0] }, Tile { index: 1, origin: [TILE, 0] }] {
+                    let mut depth = vec![f32::INFINITY; TILE_AREA];
+                    let mut scalar_depth = depth.clone();
+                    draw_depth(&run, tile, &view, &mut depth);
+                    draw_depth_entries_with(pulp::Scalar, &run, tile, &view, &mut scalar_depth);
+                    // Wide vectors reach beyond the picture.
+                    let seen = |&i: &usize| tile.origin[0] + i % TILE < view.width as usize;
+                    let seen: Vec<usize> = (0..TILE_AREA).filter(seen).collect();
+                    let same = seen.iter().all(|&i| depth[i].to_bits() == scalar_depth[i].to_bits());
+                    assert!(same, "{discs:?}: depth map of tile {}", tile.index);
+
+                    let (mut sums, mut scalar) = (TileSums::default(), TileSums::default());
+                    sums.clear(&attributes);
+                    scalar.clear(&attributes);
+                    draw_attributes(&run, &surfels, tile, &view, &depth, &attributes, &mut sums);
+                    draw_attribute_entries_with(
+                        pulp::Scalar,
+                        &run,
+                        &surfels,
+                        tile,
+                        &view,
+                        &depth,
+                        &attributes,
+                        &mut scalar,
+                    );
+                    let bits = |sums: &TileSums| -> Vec<u32> {
+                        let all = [&sums.weight, &sums.depth, &sums.channels, &sums.heaviest, &sums.point];
+                        let tiles = all.into_iter().flat_map(|sums| sums.chunks_exact(TILE_AREA));
+                        tiles.flat_map(|tile| seen.iter().map(|&i| tile[i].to_bits())).collect()
+                    };
+                    assert!(bits(&sums) == bits(&scalar), "{discs:?}: sums of tile {}", tile.index);
+                }
+            }
+        }
     }
 }

@@ -16,13 +16,13 @@ pub(super) const DOT_RADIUS_PX: f32 = 0.75;
 /// A splat is drawn out to this many splat radii, its weight falling to nearly nothing: with randomly scattered points
 /// every fiftieth place on a surface lies in no disc of the splat radius, every three-thousandth in none of these.
 // Differs from the paper: it cuts the Gaussian at the splat radius.
-const SUPPORT: f32 = 1.4;
+pub(super) const SUPPORT: f32 = 1.4;
 /// Discs that face the eye less than this (cosine) are drawn as dots: their gradients are no longer numbers to trust.
-const GRAZING: f32 = 0.01;
+pub(super) const GRAZING: f32 = 0.01;
 /// Depth tolerance ε in splat radii: layers of one surface blend, layers further apart occlude.
-const EPSILON_RADII: f32 = 1.0;
+pub(super) const EPSILON_RADII: f32 = 1.0;
 /// A splat reaches at most this part of the way to the eye.
-const NEAREST: f32 = 0.5;
+pub(super) const NEAREST: f32 = 0.5;
 
 /// A surfel ready to be drawn.
 #[derive(Clone, Copy, Debug, Default)]
@@ -111,6 +111,13 @@ impl Splat {
             x,
             y,
         }
+    }
+
+    /// About how far it reaches from its centre, in pixels.
+    #[inline(always)]
+    pub(super) fn reach_px(&self) -> f32 {
+        let [width, height] = [self.x, self.y].map(|[first, last]| f32::from(last.saturating_sub(first)));
+        0.5 * width.max(height) + 0.5
     }
 
     #[inline(always)]

@@ -128,9 +128,16 @@ fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// An image of points, all in front of the sensor and in its own frame, comes from a depth camera.
+/// Furthest that depth cameras see, metres, with room to spare.
+const DEPTH_CAMERA_RANGE: f32 = 20.0;
+
+/// Points in a depth camera's own frame: an image of points, or coloured ones nearer than such cameras see, all in front.
 fn seen_from_origin(header: &Header, cloud: &PointCloud) -> bool {
-    if header.height < 2 || !header.viewpoint_is_identity || cloud.origin() != DVec3::ZERO {
+    if !header.viewpoint_is_identity || cloud.origin() != DVec3::ZERO {
+        return false;
+    }
+    let far = || cloud.positions().iter().flatten().any(|value| value.abs() > DEPTH_CAMERA_RANGE);
+    if header.height < 2 && (cloud.colors().is_none() || far()) {
         return false;
     }
     let finite = cloud.positions().iter().filter(|point| point.iter().all(|value| value.is_finite()));

@@ -1,8 +1,12 @@
 //! The screen-grid search on the CPU: sixteen points at a time.
 
+#[cfg(test)]
+mod tests;
+
 use pulp::Simd;
 use rayon::prelude::*;
 
+use super::select::{GROUP, kth_smallest, largest_below, vectors};
 use super::window::Window;
 use crate::camera::View;
 use crate::project::ScreenPoints;
@@ -13,22 +17,13 @@ use crate::simd::F32s;
 
 /// Blocks per task: enough to hide its start, few enough to share out evenly.
 const TASK_BLOCKS: usize = 64;
-/// The first window holds spheres of this many k-radii, as those of late lead to expect: most points find their k
-/// neighbours in it.
+/// The first window holds spheres of the k-radius expected, that of the block before in first search radii, times this:
+/// most points find their k neighbours in it.
 const FIRST_REACH: f32 = 1.3;
-/// Range of the k-radius that is expected, in first search radii.
-const EXPECTED: [f32; 2] = [0.5, 3.0];
-/// Weight of the last block in what is expected of the next.
-const NEWS: f32 = 0.3;
+/// Least and most that is expected.
+const REACH: [f32; 2] = [0.8, 4.0];
 /// A radius that has to grow grows at least by this factor.
 const LEAST_GROWTH: f32 = 1.3;
-/// Candidates counted at a time, each into a sum of its own: one sum would wait for itself.
-const GROUP: usize = 4;
-/// A threshold with no more than this many candidates too many is near enough: the largest distances below it are listed.
-const SURPLUS: usize = 3;
-/// Threshold moves after which the k-th smallest distance is given up to the interval's upper end. Every other move
-/// halves the interval of floats, so that this many always suffice.
-const MOST_MOVES: usize = 80;
 
 /// Finds the neighbourhoods of `queries`, indices of screen points, ascending.
 pub(crate) fn search(
@@ -44,6 +39,8 @@ pub(crate) fn search(
         .par_chunks_mut(TASK_BLOCKS)
         .zip(queries.par_chunks(TASK_BLOCKS * LANES))
         .map_init(Scratch::default, |scratch, (blocks, queries)| {
+            // Tasks are cut the same for any number of threads, and so must be what they start from.
+            scratch.reach = 1.0;
             search_blocks(&Task { screen, view, rules }, queries, blocks, scratch)
         })
         .reduce(SearchCounts::default, |a, b| a + b);
@@ -58,16 +55,21 @@ struct Task<'a> {
 }
 
 /// Memory of one thread.
-#[derive(Default)]
 struct Scratch {
     /// The current window's screen points.
     candidates: Vec<[f32; 3]>,
     /// Squared distance of each candidate to each of the sixteen points.
     squared: Vec<Lanes>,
-    /// Squared distances of one lane.
-    listed: Vec<f32>,
-    /// A task's queries, those in front of the culling planes first, and where each stands in the task.
-    order: Vec<(u32, u32)>,
+    /// Squared distances of one lane, sorted.
+    sorted: Vec<f32>,
+    /// Mean k-radius of the block before, in first search radii. A guess: it decides what is read first, not what is found.
+    reach: f32,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self { candidates: Vec::new(), squared: Vec::new(), sorted: Vec::new(), reach: 1.0 }
+    }
 }
 
 /// Sixteen points and how far each has got.
@@ -91,33 +93,10 @@ fn search_blocks_with<'a, S: Simd>(
     out: &'a mut [NeighborhoodBlock],
     scratch: &'a mut Scratch,
 ) -> SearchCounts {
-    let Task { screen, .. } = *task;
-    // Points of different surfaces want different windows, in place and in size.
-    let mut order = std::mem::take(&mut scratch.order);
-    order.clear();
-    let layer = |behind: bool| {
-        let places = queries.iter().zip(0..).map(|(&query, place)| (query, place));
-        places.filter(move |&(query, _)| screen.density.culls(&screen.points[query as usize]) == behind)
-    };
-    order.extend(layer(false));
-    let front = order.len();
-    order.extend(layer(true));
-
     let mut counts = SearchCounts::default();
-    for layer in [&order[..front], &order[front..]] {
-        let mut expected = 1.0;
-        for places in layer.chunks(LANES) {
-            let mut block = Block::new(task, places, expected);
-            let mut found = NeighborhoodBlock::default();
-            search_block(simd, task, &mut block, &mut found, scratch, &mut counts);
-            expected += NEWS * (block.expected(&found, places.len()) - expected);
-            for (lane, &(_, place)) in places.iter().enumerate() {
-                let place = place as usize;
-                out[place / LANES].set_lane(place % LANES, &found, lane);
-            }
-        }
+    for (queries, out) in queries.chunks(LANES).zip(out) {
+        search_block(simd, task, queries, out, scratch, &mut counts);
     }
-    scratch.order = order;
     counts
 }
 
@@ -125,12 +104,13 @@ fn search_blocks_with<'a, S: Simd>(
 fn search_block<S: Simd>(
     simd: S,
     task: &Task,
-    block: &mut Block,
+    queries: &[u32],
     out: &mut NeighborhoodBlock,
     scratch: &mut Scratch,
     counts: &mut SearchCounts,
 ) {
     let Task { screen, view, rules } = *task;
+    let mut block = Block::new(task, queries, scratch.reach);
     while block.pending.contains(&true) {
         let (window, group) = block.next_window(task);
         let everything = window.is_all();
@@ -138,87 +118,145 @@ fn search_block<S: Simd>(
         let padded = candidates.next_multiple_of(GROUP);
         squared_distances(simd, &block.position, &scratch.candidates[..padded], &mut scratch.squared);
         let enough = candidates > rules.k as usize;
+        let mut exact = [false; LANES];
+        let mut done = [false; LANES];
         if enough {
             kth_smallest(simd, &scratch.squared, rules.k, &group, &mut block.threshold);
+            let inside = block.spheres_inside(&window, view);
+            for lane in 0..LANES {
+                // Points so far away that their squared distance overflows are nobody's neighbours.
+                exact[lane] = group[lane] & (inside[lane] | everything) & block.threshold.0[lane].is_finite();
+            }
+            done = unruled(simd, &scratch.squared, &block, rules, &exact);
         }
-        let inside = block.spheres_inside(&window, view);
-        let within = block.count_within(simd, &scratch.squared);
-        let mut done = [false; LANES];
-        for lane in (0..LANES).filter(|&lane| group[lane]) {
-            let exact = enough & (inside[lane] | everything);
-            let kth_radius = block.threshold.0[lane].sqrt();
-            let initial_radius = block.initial_radius.0[lane];
-            if exact & !rules.may_end(initial_radius, kth_radius) {
-                done[lane] = true;
+        for lane in 0..LANES {
+            if !group[lane] | done[lane] {
                 continue;
             }
+            let kth_radius = block.threshold.0[lane].sqrt();
             let known = if everything {
                 f32::INFINITY
-            } else if exact {
+            } else if exact[lane] {
                 kth_radius
             } else {
                 block.radius.0[lane]
             };
-            let mut found = within.0[lane] as usize;
-            let mut end = None;
-            if rules.may_end(initial_radius, known) {
-                list_lane(&scratch.squared, lane, known, &mut scratch.listed);
-                scratch.listed.sort_unstable_by(f32::total_cmp);
-                end = rules.early_end(&scratch.listed, initial_radius, known);
-                found = scratch.listed.len();
+            let upper = if enough { kth_radius } else { f32::INFINITY };
+            sort_lane(&scratch.squared, lane, known, &mut scratch.sorted);
+            let verdict = judge(task, &block, lane, &scratch.sorted, known, exact[lane], upper);
+            if let Verdict::Grow(radius) = verdict {
+                block.radius.0[lane] = radius;
+                continue;
             }
-            done[lane] = match end {
-                Some(EarlyEnd::Outlier) => {
-                    counts.outliers += 1;
-                    block.threshold.0[lane] = 0.0;
-                    true
-                }
-                Some(EarlyEnd::Gap(neighbors)) => {
-                    counts.clamped += 1;
-                    block.threshold.0[lane] = scratch.listed[neighbors - 1];
-                    true
-                }
-                None if exact => true,
-                None => {
-                    let growth = (rules.k as f32 / found.max(1) as f32).sqrt().max(LEAST_GROWTH);
-                    // What was read bounds the k-radius, but across a depth step only loosely.
-                    let grown = known * growth;
-                    let mut next = if enough { kth_radius.min(2.0 * grown) } else { grown };
-                    let too_large = |radius: f32| {
-                        let window = Window::of_sphere(block.center(lane), radius, view);
-                        window.candidates(&screen.cells) > MAX_CANDIDATES
-                    };
-                    let mut stop = everything || too_large(next);
-                    if stop & !everything {
-                        // A smaller step may still find them.
-                        next = next.min(LEAST_GROWTH * known);
-                        stop = too_large(next);
-                    }
-                    if stop {
-                        list_lane(&scratch.squared, lane, known, &mut scratch.listed);
-                        counts.bounded += usize::from(!everything);
-                        // Without any neighbour there is nothing to keep.
-                        *(if scratch.listed.is_empty() { &mut counts.outliers } else { &mut counts.clamped }) += 1;
-                        block.threshold.0[lane] = scratch.listed.iter().copied().fold(0.0, f32::max);
-                    } else {
-                        block.radius.0[lane] = next;
-                    }
-                    stop
-                }
+            done[lane] = true;
+            block.threshold.0[lane] = match verdict {
+                Verdict::Outlier | Verdict::Bounded(0) => 0.0,
+                Verdict::Clamped(neighbors) | Verdict::Bounded(neighbors) => scratch.sorted[neighbors - 1],
+                Verdict::Exact | Verdict::Grow(_) => block.threshold.0[lane],
             };
+            match verdict {
+                Verdict::Outlier => counts.outliers += 1,
+                Verdict::Clamped(_) => counts.clamped += 1,
+                Verdict::Bounded(neighbors) => {
+                    // Without any neighbour there is nothing to keep.
+                    *(if neighbors == 0 { &mut counts.outliers } else { &mut counts.clamped }) += 1;
+                    counts.bounded += 1;
+                }
+                Verdict::Exact | Verdict::Grow(_) => {}
+            }
         }
         if done.contains(&true) {
-            sum_moments(simd, block, scratch, &done, out);
+            sum_moments(simd, &block, scratch, &done, out);
             for lane in 0..LANES {
                 block.pending[lane] &= !done[lane];
             }
         }
     }
+    scratch.reach = block.reach(queries.len(), out, rules.k);
+}
+
+/// What is to be done with a point whose window was read.
+#[derive(Clone, Copy)]
+enum Verdict {
+    /// No rule ends its neighbourhood early.
+    Exact,
+    Outlier,
+    /// A gap, or the end of the points, follows this many neighbours.
+    Clamped(usize),
+    /// The next window would be too much to read; this many neighbours are certain.
+    Bounded(usize),
+    /// A window for this radius is needed.
+    Grow(f32),
+}
+
+/// Applies the rules to a point one by one, whose squared distances up to `known` are given ascending, and whose k-th
+/// neighbour is no further than `upper`.
+fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: f32, exact: bool, upper: f32) -> Verdict {
+    let Task { screen, view, rules } = *task;
+    match rules.early_end(squared, block.initial_radius.0[lane], known) {
+        Some(EarlyEnd::Outlier) => return Verdict::Outlier,
+        Some(EarlyEnd::Gap(neighbors)) => return Verdict::Clamped(neighbors),
+        None if exact => return Verdict::Exact,
+        None => {}
+    }
+    let growth = (rules.k as f32 / squared.len().max(1) as f32).sqrt().max(LEAST_GROWTH);
+    // What was read bounds the k-radius, but across a depth step only loosely.
+    let next = upper.min(2.0 * known * growth);
+    let too_much = || Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) > MAX_CANDIDATES;
+    match squared.len() {
+        0 if known == f32::INFINITY => Verdict::Outlier,
+        neighbors if known == f32::INFINITY => Verdict::Clamped(neighbors),
+        neighbors if too_much() => Verdict::Bounded(neighbors),
+        _ => Verdict::Grow(next),
+    }
+}
+
+/// Those lanes of `exact` whose neighbourhoods no rule can end early; the others need to be looked at one by one.
+///
+/// A gap starts at some b from r̃₀ on and is an annulus (b, √λ·b] without a point. So from b = r̃₀ the furthest point
+/// within √λ·b becomes the next b, until the k-radius is within reach; where there is none, there is a gap, or nothing near.
+#[inline(always)]
+fn unruled<S: Simd>(
+    simd: S,
+    squared: &[Lanes],
+    block: &Block,
+    rules: &SearchRules,
+    exact: &[bool; LANES],
+) -> [bool; LANES] {
+    let Some(growth) = rules.gap_factor else {
+        return std::array::from_fn(|lane| {
+            exact[lane] & (block.threshold.0[lane].sqrt() <= rules.outlier_radius(block.initial_radius.0[lane]))
+        });
+    };
+    let mut unruled = [false; LANES];
+    let mut open = *exact;
+    let mut base = block.initial_radius;
+    for lane in 0..LANES {
+        // The first step below finds a neighbour within √λ·r̃₀, or none: too far for the outlier rule only if that is.
+        open[lane] &= growth.sqrt() * base.0[lane] <= rules.outlier_radius(base.0[lane]);
+        base.0[lane] *= base.0[lane];
+    }
+    while open.contains(&true) {
+        let reach = Lanes(base.0.map(|base| growth * base));
+        for lane in 0..LANES {
+            unruled[lane] |= open[lane] & (block.threshold.0[lane] <= reach.0[lane]);
+            open[lane] &= !unruled[lane];
+        }
+        if !open.contains(&true) {
+            break;
+        }
+        let [furthest] = largest_below(simd, squared, &reach);
+        for lane in 0..LANES {
+            open[lane] &= furthest.0[lane] > base.0[lane];
+        }
+        base = furthest;
+    }
+    unruled
 }
 
 impl Block {
     #[inline(always)]
-    fn new(task: &Task, places: &[(u32, u32)], expected: f32) -> Self {
+    fn new(task: &Task, queries: &[u32], reach: f32) -> Self {
         let Task { screen, view, rules } = *task;
         let mut block = Self {
             position: [Lanes::default(); 3],
@@ -228,34 +266,29 @@ impl Block {
             pending: [true; LANES],
         };
         for lane in 0..LANES {
-            let (query, _) = places[lane.min(places.len() - 1)];
+            let query = queries[lane.min(queries.len() - 1)];
             let point = &screen.points[query as usize];
             for axis in 0..3 {
                 block.position[axis].0[lane] = point.position_view[axis];
             }
-            let initial_radius = screen.density.initial_radius(point, rules.k, view);
-            let radius = expected * initial_radius;
-            block.initial_radius.0[lane] = initial_radius;
-            block.radius.0[lane] = FIRST_REACH * radius;
-            block.threshold.0[lane] = radius * radius;
-            block.pending[lane] = lane < places.len();
+            let radius = screen.density.initial_radius(point, rules.k, view);
+            block.initial_radius.0[lane] = radius;
+            // A radius that rounds to nothing would never grow.
+            block.radius.0[lane] = (FIRST_REACH * reach * radius).max(f32::MIN_POSITIVE);
+            block.threshold.0[lane] = (reach * radius) * (reach * radius);
+            block.pending[lane] = lane < queries.len();
         }
         block
     }
 
-    /// Mean k-radius of the first `len` points, in first search radii.
-    fn expected(&self, found: &NeighborhoodBlock, len: usize) -> f32 {
-        let [least, most] = EXPECTED;
-        let lanes = found.k_radius.0.iter().zip(&self.initial_radius.0).take(len);
-        lanes.map(|(found, initial)| (found / initial).clamp(least, most)).sum::<f32>() / len as f32
-    }
-
-    /// How many candidates lie within the radius of each lane, the point itself not counted.
+    /// Mean k-radius of the first `lanes` lanes in first search radii, for those that found k neighbours.
     #[inline(always)]
-    fn count_within<S: Simd>(&self, simd: S, squared: &[Lanes]) -> Lanes {
-        let mut count = count_below(simd, squared, &Lanes(self.radius.0.map(|radius| radius * radius)));
-        count.0.iter_mut().for_each(|count| *count -= 1.0);
-        count
+    fn reach(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> f32 {
+        let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32);
+        let ratios = full.map(|lane| out.k_radius.0[lane] / self.initial_radius.0[lane]);
+        let (count, sum) = ratios.fold((0.0, 0.0), |(count, sum), ratio| (count + 1.0, sum + ratio));
+        let [least, most] = REACH;
+        (sum / f32::max(count, 1.0)).clamp(least, most)
     }
 
     #[inline(always)]
@@ -319,11 +352,6 @@ fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>
     len
 }
 
-/// Vectors that sixteen lanes take.
-const fn vectors<S: Simd>() -> usize {
-    LANES / S::F32_LANES
-}
-
 /// Squared distances from each candidate to each of the sixteen points.
 #[inline(always)]
 fn squared_distances<S: Simd>(simd: S, position: &[Lanes; 3], candidates: &[[f32; 3]], squared: &mut Vec<Lanes>) {
@@ -340,124 +368,12 @@ fn squared_distances<S: Simd>(simd: S, position: &[Lanes; 3], candidates: &[[f32
     }
 }
 
-/// Moves the threshold of each lane in `group` to its k-th smallest squared distance, the point itself not counted.
-///
-/// `threshold` holds first guesses; there are more than `k` candidates.
-#[inline(always)]
-fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
-    // The point itself is among the candidates, at distance 0.
-    let target = (k + 1) as f32;
-    let mut low = [0f32; LANES];
-    let mut high = [f32::INFINITY; LANES];
-    let mut low_count = [1f32; LANES];
-    let mut high_count = [f32::INFINITY; LANES];
-    let mut at = *threshold;
-    let mut open = *group;
-    let mut surplus = [0; LANES];
-    for step in 0..MOST_MOVES {
-        let count = count_below(simd, squared, &at);
-        let mut any_open = false;
-        for lane in 0..LANES {
-            if !open[lane] {
-                continue;
-            }
-            let [t, n] = [at.0[lane], count.0[lane]];
-            if (n >= target) & (n <= target + SURPLUS as f32) {
-                open[lane] = false;
-                surplus[lane] = (n - target) as usize;
-                continue;
-            }
-            if n < target {
-                (low[lane], low_count[lane]) = (t, n);
-            } else {
-                (high[lane], high_count[lane]) = (t, n);
-            }
-            let [below, above] = [low[lane], high[lane]];
-            let [below_bits, above_bits] = [below.to_bits(), above.to_bits()];
-            if above_bits - below_bits <= 1 {
-                // Several candidates at the same distance: all of them belong.
-                at.0[lane] = above;
-                open[lane] = false;
-                continue;
-            }
-            any_open = true;
-            // On a surface the count grows with the area, so with the squared distance; in odd steps it need not.
-            let next = if above == f32::INFINITY {
-                t * (target / n * 1.1).clamp(1.2, 4.0)
-            } else if step < 4 || step % 2 == 0 {
-                let share =
-                    (target as f32 - 0.5 - low_count[lane] as f32) / (high_count[lane] as f32 - low_count[lane] as f32);
-                below + (above - below) * share
-            } else {
-                f32::from_bits(below_bits + (above_bits - below_bits) / 2)
-            };
-            let inner = f32::from_bits(below_bits + 1)..=f32::from_bits(above_bits - 1);
-            at.0[lane] = next.clamp(*inner.start(), *inner.end());
-        }
-        if !any_open {
-            break;
-        }
-    }
-    let largest = largest_below(simd, squared, &at);
-    for lane in (0..LANES).filter(|&lane| group[lane]) {
-        threshold.0[lane] = largest[surplus[lane]].0[lane];
-    }
-}
-
-/// How many candidates lie at or below each lane's threshold.
-#[inline(always)]
-fn count_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> Lanes {
-    let mut count = Lanes::default();
-    let one = F32s::splat(simd, 1.0);
-    for vector in 0..vectors::<S>() {
-        let threshold = F32s::load(simd, &threshold.0, vector);
-        let mut sums = [F32s::splat(simd, 0.0); GROUP];
-        for group in squared.chunks_exact(GROUP) {
-            for (sum, candidate) in sums.iter_mut().zip(group) {
-                *sum += F32s::load(simd, &candidate.0, vector).at_most(threshold).keep(one);
-            }
-        }
-        let [a, b, c, d] = sums;
-        ((a + b) + (c + d)).store(&mut count.0, vector);
-    }
-    count
-}
-
-/// The largest squared distances at or below each lane's threshold, descending.
-#[inline(always)]
-fn largest_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lanes; SURPLUS + 1] {
-    let mut largest = [Lanes::default(); SURPLUS + 1];
-    for vector in 0..vectors::<S>() {
-        let threshold = F32s::load(simd, &threshold.0, vector);
-        let mut list = [F32s::splat(simd, 0.0); SURPLUS + 1];
-        for candidate in squared {
-            let d = F32s::load(simd, &candidate.0, vector);
-            let mut sinking = d.at_most(threshold).keep(d);
-            for entry in &mut list {
-                let above = entry.max(sinking);
-                sinking = entry.min(sinking);
-                *entry = above;
-            }
-        }
-        for (largest, entry) in largest.iter_mut().zip(list) {
-            entry.store(&mut largest.0, vector);
-        }
-    }
-    largest
-}
-
-/// Lists the squared distances of `lane` up to distance `known`, the point itself left out.
-#[inline(always)]
-fn list_lane(squared: &[Lanes], lane: usize, known: f32, listed: &mut Vec<f32>) {
-    listed.resize(squared.len(), 0.0);
-    let mut len = 0;
-    for candidate in squared {
-        // Written first and counted after, as in `gather`.
-        let d = candidate.0[lane];
-        listed[len] = d;
-        len += usize::from((d <= known * known) & (d > 0.0) & (d < f32::INFINITY));
-    }
-    listed.truncate(len);
+/// Finite squared distances of `lane` up to distance `known`, the point itself left out, ascending.
+fn sort_lane(squared: &[Lanes], lane: usize, known: f32, sorted: &mut Vec<f32>) {
+    sorted.clear();
+    let most = (known * known).min(f32::MAX);
+    sorted.extend(squared.iter().map(|candidate| candidate.0[lane]).filter(|&d| d <= most && d > 0.0));
+    sorted.sort_unstable_by(f32::total_cmp);
 }
 
 /// Sums the neighbours below the threshold of each lane in `done`.

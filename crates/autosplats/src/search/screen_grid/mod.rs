@@ -9,9 +9,11 @@
 //!
 //! A lane is finished when the projected bound of the sphere (P, d_k) lies inside the window: then no point outside can be
 //! nearer. The others get a window for the radius now known to suffice, or, with too few candidates, for one grown by
-//! √(k/σ) as in §5.2. The result is exact, and the same whichever points happened to share a block.
+//! √(k/σ) as in §5.2. So the result is exact, and the same whichever points happened to share a block; only where the bound
+//! on search work ends a search, what is kept depends on what happened to be read.
 
 mod cpu;
+mod select;
 mod window;
 
 pub(crate) use cpu::search;

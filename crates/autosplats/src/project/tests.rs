@@ -1,0 +1,328 @@
+//! Projection against brute force over all points in `f64`.
+
+use std::collections::HashMap;
+
+use autosplats_cloud::PointCloud;
+use autosplats_cloud::glam::DVec3;
+
+use super::{Dropped, Projector, ScreenPoint, ScreenPoints};
+use crate::camera::{Camera, Projection};
+use crate::test_clouds::{self, EYE, Positions, Random};
+
+const SIZES: [[u32; 2]; 6] = [[1, 1], [7, 3], [3, 70], [300, 2], [64, 64], [121, 90]];
+
+fn cameras() -> [Camera; 2] {
+    let camera = |projection| Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+    [camera(Projection::PerspectiveFovDeg(30.0)), camera(Projection::OrthographicHeight(2.1))]
+}
+
+/// Where a point goes, in `f64`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    NotFinite,
+    Behind,
+    /// Pixel coordinates and view-space position.
+    Ahead([f64; 2], DVec3),
+}
+
+fn place(camera: &Camera, size: [u32; 2], position: [f32; 3]) -> Place {
+    let [right, down, forward] = camera.axes().expect("a valid camera");
+    let offset = DVec3::from(position.map(f64::from)) - camera.eye;
+    let view = DVec3::new(offset.dot(right), offset.dot(down), offset.dot(forward));
+    let [width, height] = size.map(f64::from);
+    let (near, scale) = match camera.projection {
+        Projection::PerspectiveFovDeg(fov) => {
+            let focal_px = 0.5 * height / (0.5 * fov.to_radians()).tan();
+            (1e-5 * (camera.look_at - camera.eye).length(), focal_px / view.z)
+        }
+        Projection::OrthographicHeight(world) => (0.0, height / world),
+    };
+    if !view.is_finite() {
+        Place::NotFinite
+    } else if view.z <= near {
+        Place::Behind
+    } else {
+        Place::Ahead([view.x * scale + 0.5 * width, view.y * scale + 0.5 * height], view)
+    }
+}
+
+/// What projection must find.
+#[derive(Default)]
+struct Oracle {
+    /// Index and view-space position of each pixel's owner.
+    owners: HashMap<[usize; 2], (usize, DVec3)>,
+    dropped: Dropped,
+}
+
+fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Oracle {
+    let mut oracle = Oracle::default();
+    for (index, &position) in positions.iter().enumerate() {
+        match place(camera, size, position) {
+            Place::NotFinite => oracle.dropped.not_finite += 1,
+            Place::Behind => oracle.dropped.behind += 1,
+            Place::Ahead(px, view) => {
+                if (0..2).all(|i| (0.0..f64::from(size[i])).contains(&px[i])) {
+                    let owner = oracle.owners.entry(px.map(|c| c as usize)).or_insert((index, view));
+                    if view.z < owner.1.z {
+                        *owner = (index, view);
+                    }
+                } else {
+                    oracle.dropped.outside += 1;
+                }
+            }
+        }
+    }
+    oracle
+}
+
+/// The points that `f32` cannot put elsewhere than `f64`: not within 2e-3 px of a pixel's border (rounding of positions and
+/// of the rotation reaches 1e-4 px here), and not within 1e-5 of another point's depth in the same pixel but for copies.
+fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions {
+    let mut taken: HashMap<[i64; 2], Vec<([f32; 3], f64)>> = HashMap::new();
+    let mut settled = Positions::new();
+    for &position in positions {
+        if let Place::Ahead(px, view) = place(camera, size, position) {
+            let others = taken.entry(px.map(|c| c.floor() as i64)).or_default();
+            let clear = others.iter().all(|&(other, depth)| other == position || (depth - view.z).abs() > 1e-5);
+            if !clear || px.iter().any(|c| (c - c.round()).abs() < 2e-3) {
+                continue;
+            }
+            others.push((position, view.z));
+        }
+        settled.push(position);
+    }
+    settled
+}
+
+/// Owners, drops, order, start table, density grid and the split by depth.
+fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 2]) -> Result<(), String> {
+    let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(what.to_owned()) };
+    let ScreenPoints { points, source, cells, density, active, passive, dropped } = screen;
+    ensure(*dropped == oracle.dropped, &format!("dropped {dropped:?}, not {:?}", oracle.dropped))?;
+    ensure(points.len() == oracle.owners.len() && source.len() == points.len(), "number of screen points")?;
+    for (point, &source) in points.iter().zip(source) {
+        let owner = oracle.owners.get(&point.pixel_xy());
+        let &(index, view) = owner.ok_or_else(|| format!("nothing projects to {:?}", point.pixel_xy()))?;
+        ensure(index == source as usize, &format!("point {source} owns the pixel of {index}"))?;
+        let error = (DVec3::from(point.position_view.map(f64::from)) - view).abs().max_element();
+        // f32 rounding of a rotation of coordinates up to 50.
+        ensure(error < 2e-5, &format!("position of point {source} is off by {error}"))?;
+    }
+
+    let [width, height] = size.map(|side| side as usize);
+    let cell = |p: &ScreenPoint| p.pixel_xy()[1] / cells.strip_px * width + p.pixel_xy()[0];
+    let order: Vec<_> = points.iter().map(|p| (cell(p), p.pixel_xy()[1])).collect();
+    ensure(order.is_sorted(), "screen points are not in cell order")?;
+    ensure(cells.columns == width, "a strip is as long as the picture")?;
+    ensure(cells.start.len() == height.div_ceil(cells.strip_px) * width + 1, "length of the start table")?;
+    for (index, &start) in cells.start.iter().enumerate() {
+        let before = points.iter().filter(|p| cell(p) < index).count();
+        ensure(start as usize == before, &format!("cell {index} starts at {start}, not {before}"))?;
+    }
+
+    let coarse = |p: &ScreenPoint| p.pixel_xy().map(|c| c / density.cell_px);
+    ensure(density.columns == width.div_ceil(density.cell_px), "columns of the density grid")?;
+    ensure(density.count.len() == density.columns * height.div_ceil(density.cell_px), "cells of the density grid")?;
+    let unit = |depth: f64| match camera.projection {
+        Projection::PerspectiveFovDeg(fov) => 2.0 * (0.5 * fov.to_radians()).tan() * depth / height as f64,
+        Projection::OrthographicHeight(world) => world / height as f64,
+    };
+    let mut culled = vec![false; points.len()];
+    for index in 0..density.count.len() {
+        let here = [index % density.columns, index / density.columns];
+        let members: Vec<usize> = (0..points.len()).filter(|&i| coarse(&points[i]) == here).collect();
+        ensure(density.count[index] as usize == members.len(), &format!("count of density cell {index}"))?;
+        let nearest = members.iter().map(|&i| points[i].position_view[2]).fold(f32::INFINITY, f32::min);
+        ensure(density.nearest[index] == nearest, &format!("nearest depth of density cell {index}"))?;
+        let plane = f64::from(nearest) + density.cell_px as f64 * unit(f64::from(nearest));
+        let error = (f64::from(density.culling[index]) - plane).abs();
+        // f32 rounding of a product and a sum.
+        ensure(members.is_empty() || error < 1e-5 * plane, &format!("culling plane of density cell {index}"))?;
+        members.iter().for_each(|&i| culled[i] = points[i].position_view[2] > density.culling[index]);
+    }
+    let listed = |culled_or_not: bool| (0..points.len() as u32).filter(move |&i| culled[i as usize] == culled_or_not);
+    ensure(active.iter().copied().eq(listed.clone()(false)), "active points")?;
+    ensure(passive.iter().copied().eq(listed(true)), "passive points")
+}
+
+fn cloud(positions: &[[f32; 3]]) -> PointCloud {
+    PointCloud::new(DVec3::ZERO, positions.to_vec())
+}
+
+#[test]
+fn every_cloud_at_every_size() {
+    let mut projector = Projector::default();
+    for camera in cameras() {
+        for (name, positions) in test_clouds::all(3000) {
+            for size in SIZES {
+                let positions = settled(&camera, size, &positions);
+                let view = camera.view(DVec3::ZERO, size).expect("a view");
+                let screen = projector.project(&cloud(&positions), &view, 10, true);
+                let outcome = compare(screen, &oracle(&camera, size, &positions), &camera, size);
+                assert_eq!(outcome, Ok(()), "{name}, {size:?}, {:?}", camera.projection);
+            }
+        }
+    }
+}
+
+#[test]
+fn comparison_sees_each_kind_of_error() {
+    let (camera, size) = (cameras()[0], [121, 90]);
+    let positions = settled(&camera, size, &test_clouds::two_layers(2000));
+    let view = camera.view(DVec3::ZERO, size).expect("a view");
+    let oracle = oracle(&camera, size, &positions);
+    type Spoil = fn(&mut ScreenPoints);
+    let errors: [(&str, Spoil); 9] = [
+        ("other owner", |s| s.source[3] += 1),
+        ("moved point", |s| s.points[5].position_view[0] += 1e-4),
+        ("other pixel", |s| s.points[0].pixel += 1 << 16),
+        ("other order", |s| {
+            s.points.swap(1, 400);
+            s.source.swap(1, 400);
+        }),
+        ("missing point", |s| {
+            s.points.pop();
+            s.source.pop();
+        }),
+        ("wrong start", |s| s.cells.start[500] += 1),
+        ("wrong count", |s| s.density.count[7] += 1),
+        ("wrong drop", |s| s.dropped.outside += 1),
+        ("wrong list", |s| s.passive.extend(s.active.pop())),
+    ];
+    let mut projector = Projector::default();
+    let right = projector.project(&cloud(&positions), &view, 10, true);
+    assert_eq!(compare(right, &oracle, &camera, size), Ok(()), "nothing is wrong yet");
+    for (name, spoil) in errors {
+        let mut wrong = right.clone();
+        spoil(&mut wrong);
+        assert!(compare(&wrong, &oracle, &camera, size).is_err(), "not noticed: {name}");
+    }
+}
+
+/// Looks along z from the origin, so that transforms are exact.
+fn straight(projection: Projection) -> Camera {
+    Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection }
+}
+
+#[test]
+fn each_drop_is_counted_for_its_reason() {
+    const NEAR: f32 = 1e-5;
+    let perspective = straight(Projection::PerspectiveFovDeg(90.0));
+    let parallel = straight(Projection::OrthographicHeight(2.0));
+    let (nan, inf, huge) = (f32::NAN, f32::INFINITY, 1e38);
+    let not_finite = Dropped { not_finite: 1, ..Dropped::default() };
+    let behind = Dropped { behind: 1, ..Dropped::default() };
+    let outside = Dropped { outside: 1, ..Dropped::default() };
+    let visible = Dropped::default();
+    let cases = [
+        ("NaN", [0.0, nan, 1.0], not_finite, not_finite),
+        ("NaN depth", [0.0, 0.0, nan], not_finite, not_finite),
+        ("infinite", [inf, 0.0, 1.0], not_finite, not_finite),
+        ("infinite depth", [0.0, 0.0, inf], not_finite, not_finite),
+        ("infinitely far behind", [0.0, 0.0, -inf], not_finite, not_finite),
+        ("behind", [0.0, 0.0, -1.0], behind, behind),
+        ("at the eye", [0.0, 0.0, 0.0], behind, behind),
+        ("minus zero", [0.0, 0.0, -0.0], behind, behind),
+        ("on the near plane", [0.0, 0.0, NEAR], behind, visible),
+        ("past the near plane", [0.0, 0.0, NEAR.next_up()], visible, visible),
+        ("smallest depth", [0.0, 0.0, f32::from_bits(1)], behind, visible),
+        ("beside", [1.5, 0.0, 1.0], outside, outside),
+        ("above", [0.0, -1.5, 1.0], outside, outside),
+        ("left border", [-1.0, 0.0, 1.0], visible, visible),
+        ("right border", [1.0, 0.0, 1.0], outside, outside),
+        ("lower border", [0.0, 1.0, 1.0], outside, outside),
+        ("huge and beside", [huge, 0.0, 1.0], outside, outside),
+        ("huge depth", [0.0, 0.0, huge], visible, visible),
+        ("huge and behind", [0.0, 0.0, -huge], behind, behind),
+        ("huge diagonal", [huge, huge, huge], outside, outside),
+    ];
+    for (name, position, in_perspective, in_parallel) in cases {
+        for (camera, expected) in [(perspective, in_perspective), (parallel, in_parallel)] {
+            let view = camera.view(DVec3::ZERO, [8, 8]).expect("a view");
+            let mut projector = Projector::default();
+            let screen = projector.project(&cloud(&[position]), &view, 10, true);
+            assert_eq!(screen.dropped, expected, "{name}, {:?}", camera.projection);
+            assert_eq!(screen.points.len(), usize::from(expected == visible), "{name}: number of screen points");
+        }
+    }
+}
+
+/// Points that have no place, wherever they stand in the list, leave the others as they are.
+#[test]
+fn poison_harms_nobody() {
+    let poison = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e38, 1e38];
+    for camera in cameras() {
+        let view = camera.view(DVec3::ZERO, [90, 70]).expect("a view");
+        let healthy = test_clouds::sphere(2000);
+        let mut random = Random::new(11);
+        let mut mixed: Vec<[f32; 3]> = (0..500)
+            .map(|_| {
+                let mut point = random.direction();
+                point[random.below(3)] = poison[random.below(poison.len())];
+                point
+            })
+            .collect();
+        // Huge points that are seen lie behind everything else.
+        mixed.extend(&healthy);
+        random.shuffle(&mut mixed);
+        let (mut clean, mut mixed_projector) = (Projector::default(), Projector::default());
+        let clean = clean.project(&cloud(&healthy), &view, 10, true);
+        let screen = mixed_projector.project(&cloud(&mixed), &view, 10, true);
+        let near = screen.points.iter().filter(|point| point.position_view[2] < 100.0);
+        let by_pixel = |point: &&ScreenPoint| point.pixel;
+        let mut near: Vec<_> = near.collect();
+        let mut healthy: Vec<_> = clean.points.iter().collect();
+        near.sort_by_key(by_pixel);
+        healthy.sort_by_key(by_pixel);
+        assert_eq!(near, healthy, "{:?}", camera.projection);
+        let Dropped { not_finite, behind, outside } = screen.dropped;
+        assert!(not_finite > 100 && behind + outside > 50, "poison is dropped: {:?}", screen.dropped);
+    }
+}
+
+#[test]
+fn order_of_points_does_not_matter() {
+    for camera in cameras() {
+        let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
+        for (name, positions) in test_clouds::all(3000) {
+            let mut shuffled = positions.clone();
+            Random::new(12).shuffle(&mut shuffled);
+            let (mut first, mut second) = (Projector::default(), Projector::default());
+            let first = first.project(&cloud(&positions), &view, 10, true);
+            let second = second.project(&cloud(&shuffled), &view, 10, true);
+            assert_eq!(first.points, second.points, "{name}: screen points");
+            assert_eq!(first.cells.start, second.cells.start, "{name}: cells");
+            let places = |screen: &ScreenPoints, cloud: &[[f32; 3]]| -> Positions {
+                screen.source.iter().map(|&source| cloud[source as usize]).collect()
+            };
+            assert_eq!(places(first, &positions), places(second, &shuffled), "{name}: sources");
+        }
+    }
+}
+
+#[test]
+fn equal_points_go_to_the_lower_index() {
+    let camera = straight(Projection::PerspectiveFovDeg(60.0));
+    let view = camera.view(DVec3::ZERO, [5, 5]).expect("a view");
+    let mut positions = vec![[0.5, 0.0, 3.0]; 40_000];
+    positions[..100].fill([0.5, 0.0, 4.0]);
+    let mut projector = Projector::default();
+    let screen = projector.project(&cloud(&positions), &view, 10, true);
+    assert_eq!(screen.source, [100], "the first of the nearest");
+}
+
+/// The density grid is as coarse as promised: about k points to a cell where there are points.
+#[test]
+fn density_cells_hold_about_k_points() {
+    let camera = straight(Projection::OrthographicHeight(1.8));
+    let view = camera.view(DVec3::ZERO, [200, 200]).expect("a view");
+    let positions: Positions = test_clouds::plane(5000).iter().map(|&[x, y, _]| [x, y, 2.0]).collect();
+    for k in [4, 10, 64] {
+        let mut projector = Projector::default();
+        let screen = projector.project(&cloud(&positions), &view, k, true);
+        let area = (screen.density.cell_px * screen.density.cell_px) as f32;
+        let mean = screen.points.len() as f32 / (200.0 * 200.0) * area;
+        // Cells have a whole number of pixels.
+        assert!((0.6..1.6).contains(&(mean / k as f32)), "k = {k}: {mean} points to a cell");
+    }
+}

@@ -1,0 +1,124 @@
+//! Selection: the k-th smallest of many numbers for sixteen points at once, by counting.
+
+use pulp::Simd;
+
+use crate::search::{LANES, Lanes};
+use crate::simd::F32s;
+
+/// Candidates counted at a time, each into a sum of its own: one sum would wait for itself.
+pub(super) const GROUP: usize = 4;
+/// A threshold with no more than this many candidates too many is near enough: the largest distances below it are listed.
+const SURPLUS: usize = 3;
+/// Threshold moves after which the k-th smallest distance is given up to the interval's upper end. Every other move
+/// halves the interval of floats, so that this many always suffice.
+const MOST_MOVES: usize = 80;
+
+/// Vectors that sixteen lanes take.
+pub(super) const fn vectors<S: Simd>() -> usize {
+    LANES / S::F32_LANES
+}
+
+/// Moves the threshold of each lane in `group` to its k-th smallest squared distance, the point itself not counted.
+///
+/// `threshold` holds first guesses; there are more than `k` candidates.
+#[inline(always)]
+pub(super) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
+    // The point itself is among the candidates, at distance 0.
+    let target = (k + 1) as f32;
+    let mut low = [0f32; LANES];
+    let mut high = [f32::INFINITY; LANES];
+    let mut low_count = [1f32; LANES];
+    let mut high_count = [f32::INFINITY; LANES];
+    let mut at = *threshold;
+    let mut open = *group;
+    let mut surplus = [0; LANES];
+    for step in 0..MOST_MOVES {
+        let count = count_below(simd, squared, &at);
+        let mut any_open = false;
+        for lane in 0..LANES {
+            if !open[lane] {
+                continue;
+            }
+            let [t, n] = [at.0[lane], count.0[lane]];
+            if (n >= target) & (n <= target + SURPLUS as f32) {
+                open[lane] = false;
+                surplus[lane] = (n - target) as usize;
+                continue;
+            }
+            if n < target {
+                (low[lane], low_count[lane]) = (t, n);
+            } else {
+                (high[lane], high_count[lane]) = (t, n);
+            }
+            let [below, above] = [low[lane], high[lane]];
+            let [below_bits, above_bits] = [below.to_bits(), above.to_bits()];
+            if above_bits - below_bits <= 1 {
+                // Several candidates at the same distance: all of them belong.
+                at.0[lane] = above;
+                open[lane] = false;
+                continue;
+            }
+            any_open = true;
+            // On a surface the count grows with the area, so with the squared distance; in odd steps it need not.
+            let next = if above == f32::INFINITY {
+                t * (target / n * 1.1).clamp(1.2, 4.0)
+            } else if step < 4 || step % 2 == 0 {
+                let share = (target - 0.5 - low_count[lane]) / (high_count[lane] - low_count[lane]);
+                below + (above - below) * share
+            } else {
+                f32::from_bits(below_bits + (above_bits - below_bits) / 2)
+            };
+            let inner = f32::from_bits(below_bits + 1)..=f32::from_bits(above_bits - 1);
+            at.0[lane] = next.clamp(*inner.start(), *inner.end());
+        }
+        if !any_open {
+            break;
+        }
+    }
+    let largest: [Lanes; SURPLUS + 1] = largest_below(simd, squared, &at);
+    for lane in (0..LANES).filter(|&lane| group[lane]) {
+        threshold.0[lane] = largest[surplus[lane]].0[lane];
+    }
+}
+
+/// How many candidates lie at or below each lane's threshold.
+#[inline(always)]
+fn count_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> Lanes {
+    let mut count = Lanes::default();
+    let one = F32s::splat(simd, 1.0);
+    for vector in 0..vectors::<S>() {
+        let threshold = F32s::load(simd, &threshold.0, vector);
+        let mut sums = [F32s::splat(simd, 0.0); GROUP];
+        for group in squared.chunks_exact(GROUP) {
+            for (sum, candidate) in sums.iter_mut().zip(group) {
+                *sum += F32s::load(simd, &candidate.0, vector).at_most(threshold).keep(one);
+            }
+        }
+        let [a, b, c, d] = sums;
+        ((a + b) + (c + d)).store(&mut count.0, vector);
+    }
+    count
+}
+
+/// The N largest squared distances at or below each lane's threshold, descending.
+#[inline(always)]
+pub(super) fn largest_below<S: Simd, const N: usize>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lanes; N] {
+    let mut largest = [Lanes::default(); N];
+    for vector in 0..vectors::<S>() {
+        let threshold = F32s::load(simd, &threshold.0, vector);
+        let mut list = [F32s::splat(simd, 0.0); N];
+        for candidate in squared {
+            let d = F32s::load(simd, &candidate.0, vector);
+            let mut sinking = d.at_most(threshold).keep(d);
+            for entry in &mut list {
+                let above = entry.max(sinking);
+                sinking = entry.min(sinking);
+                *entry = above;
+            }
+        }
+        for (largest, entry) in largest.iter_mut().zip(list) {
+            entry.store(&mut largest.0, vector);
+        }
+    }
+    largest
+}

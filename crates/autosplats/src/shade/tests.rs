@@ -1,0 +1,178 @@
+//! Direct checks of pictures small enough to write down.
+
+use autosplats_cloud::glam::DVec3;
+
+use super::*;
+use crate::camera::{Camera, Projection, View};
+use crate::splat::{GBuffer, TILE_AREA};
+
+#[test]
+fn srgb_round_trip() {
+    for (step, value) in linear_steps().into_iter().enumerate() {
+        assert_eq!((srgb(value) * 255.0).round() as usize, step, "step {step} does not come back");
+    }
+}
+
+fn view(size: [u32; 2]) -> View {
+    let projection = Projection::PerspectiveFovDeg(40.0);
+    let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
+    camera.view(DVec3::ZERO, size).expect("a view")
+}
+
+/// A wall at depth 2 that faces the eye and covers the left half of the picture.
+fn half_a_wall(size: [u32; 2]) -> GBuffer {
+    let [width, height] = size;
+    let tiles = width.div_ceil(64) * height.div_ceil(64);
+    let area = TILE_AREA * tiles as usize;
+    let mut layers = GBuffer {
+        width,
+        height,
+        weight: vec![0.0; area],
+        depth: vec![f32::INFINITY; area],
+        normal: vec![[0.0; 3]; area],
+        point: vec![u32::MAX; area],
+        ..GBuffer::default()
+    };
+    for pixel in 0..(width / 2 * height) as usize {
+        let index = layers.index(pixel % (width / 2) as usize, pixel / (width / 2) as usize);
+        layers.weight[index] = 1.0;
+        layers.depth[index] = 2.0;
+        layers.normal[index] = [0.0, 0.0, -1.0];
+    }
+    layers
+}
+
+fn shaded(layers: &GBuffer, shading: &Shading) -> Image {
+    let view = view([layers.width, layers.height]);
+    let mut image = Image::default();
+    shade(layers, &Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO }, shading, true, &mut image);
+    assert_eq!(image.pixels.len(), (layers.width * layers.height) as usize, "size of the image");
+    image
+}
+
+/// Without light, so that colours are what they are.
+fn flat(color: ColorMode) -> Shading {
+    Shading { color, lighting: false, eye_dome: 0.0, background: Background::Transparent, ..Shading::default() }
+}
+
+#[test]
+fn backgrounds_show_where_no_surface_is() {
+    let layers = half_a_wall([8, 4]);
+    let with = |background| shaded(&layers, &Shading { background, ..Shading::default() }).pixels;
+    let right = |pixels: &[[u8; 4]], y: usize| pixels[y * 8 + 4..y * 8 + 8].to_vec();
+    let (transparent, color) = (with(Background::Transparent), with(Background::Color([1, 2, 3])));
+    let gradient = with(Background::Gradient([0, 100, 40], [80, 100, 0]));
+    for y in 0..4 {
+        assert_eq!(right(&transparent, y), [[0; 4]; 4], "transparent in row {y}");
+        assert_eq!(right(&color, y), [[1, 2, 3, 255]; 4], "one colour in row {y}");
+        let step = 10 + 20 * y as u8;
+        assert_eq!(right(&gradient, y), [[step, 100, 40 - step / 2, 255]; 4], "gradient in row {y}");
+        for x in 0..4 {
+            assert_eq!(transparent[y * 8 + x][3], 255, "the surface is opaque");
+            assert_eq!(transparent[y * 8 + x], gradient[y * 8 + x], "the surface hides the background");
+        }
+    }
+}
+
+#[test]
+fn point_colors_are_reproduced() {
+    let mut layers = half_a_wall([8, 4]);
+    let steps = linear_steps();
+    layers.color = vec![[steps[7], steps[200], steps[255]]; layers.weight.len()];
+    for color in [ColorMode::Auto, ColorMode::Rgb, ColorMode::Classification] {
+        let image = shaded(&layers, &flat(color.clone()));
+        assert_eq!(image.pixels[0], [7, 200, 255, 255], "{color:?}");
+        assert_eq!(image.linear[0], layers.color[0], "{color:?}: linear light");
+        assert_eq!(image.linear[4], [0.0; 3], "{color:?}: nothing in linear light");
+    }
+}
+
+#[test]
+fn values_take_the_colors_of_their_map() {
+    let mut layers = half_a_wall([8, 4]);
+    layers.scalar = vec![f32::NAN; layers.weight.len()];
+    let values = [0.0, 5.0, 10.0, -3.0, 99.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    for (pixel, value) in values.into_iter().enumerate() {
+        let index = layers.index(pixel % 4, pixel / 4);
+        layers.scalar[index] = value;
+    }
+    let field = ColorMode::Field("intensity".into());
+    let shading = Shading { range: Some([0.0, 10.0]), color_map: Some(ColorMap::Gray), ..flat(field.clone()) };
+    let image = shaded(&layers, &shading);
+    for (pixel, expected) in [0u8, 128, 255, 0, 255, 0, 255, 0].into_iter().enumerate() {
+        let [r, g, b, a] = image.pixels[pixel / 4 * 8 + pixel % 4];
+        assert!(r == g && g == b && a == 255, "value {}: gray", values[pixel]);
+        // Half of 1023 steps is no step.
+        assert!(r.abs_diff(expected) <= 1, "value {}: {r}, not {expected}", values[pixel]);
+    }
+    // The usual range leaves out what is not finite; nothing at all to see is no reason to fail.
+    for scalar in [f32::NAN, f32::INFINITY, 3.0] {
+        layers.scalar.fill(scalar);
+        shaded(&layers, &flat(field.clone()));
+    }
+}
+
+#[test]
+fn normals_and_depth_are_shown_as_documented() {
+    let layers = half_a_wall([8, 4]);
+    let normal = shaded(&layers, &flat(ColorMode::Normal)).pixels[0];
+    // View z is world z here: -1 becomes 0.
+    // Half of 255 is no step.
+    let near = [128u8, 128, 0, 255].iter().zip(normal).all(|(expected, value)| value.abs_diff(*expected) <= 1);
+    assert!(near, "a normal of (0, 0, -1) is shown as {normal:?}");
+    let depth = Shading { range: Some([1.0, 3.0]), color_map: Some(ColorMap::Gray), ..flat(ColorMode::Depth) };
+    assert!(shaded(&layers, &depth).pixels[0][0].abs_diff(128) <= 1, "the middle of the range");
+}
+
+#[test]
+fn light_shows_shape_and_keeps_within_range() {
+    let mut layers = half_a_wall([8, 4]);
+    let mut brightness = |normal: [f32; 3]| {
+        layers.normal[0] = normal;
+        shaded(&layers, &Shading { eye_dome: 0.0, ..Shading::default() }).linear[0].iter().sum::<f32>() / 3.0
+    };
+    let [towards, up_left, down_right] =
+        [[0.0, 0.0, -1.0], [-0.6, -0.6, -0.529], [0.6, 0.6, -0.529]].map(&mut brightness);
+    assert!(up_left > 1.5 * down_right, "lit from above left: {up_left}, {down_right}");
+    assert!(towards > 0.1 && towards < 1.0, "a surface seen straight on is neither dark nor burnt out: {towards}");
+    assert!(down_right > 0.0, "nothing is black");
+}
+
+#[test]
+fn eye_dome_darkens_behind_a_step_only() {
+    let mut layers = half_a_wall([8, 4]);
+    for y in 0..4 {
+        // The two leftmost columns stand well before the others.
+        for x in 0..2 {
+            let index = layers.index(x, y);
+            layers.depth[index] = 1.0;
+        }
+    }
+    let image = shaded(&layers, &Shading { eye_dome: 1.0, ..flat(ColorMode::Plain) });
+    let without = shaded(&layers, &flat(ColorMode::Plain));
+    assert_eq!(image.pixels[0], without.pixels[0], "before the step");
+    assert!(image.pixels[2][0] < without.pixels[2][0], "behind the step");
+}
+
+#[test]
+fn legend_fits_or_is_left_out() {
+    let mut drawn = 0;
+    for size in [[1, 1], [64, 64], [130, 500], [300, 90], [300, 200], [400, 300], [1760, 900]] {
+        let mut layers = half_a_wall(size);
+        layers.scalar = vec![1.0; layers.weight.len()];
+        for name in ["intensity", "größe", "a name that is longer than any legend has room for, and then some"] {
+            for background in [Background::Transparent, Background::Color([90; 3])] {
+                let plain = Shading { background, ..flat(ColorMode::Field(name.into())) };
+                let with = shaded(&layers, &Shading { legend: true, ..plain.clone() });
+                let without = shaded(&layers, &plain);
+                let changed = (0..with.pixels.len()).filter(|&i| with.pixels[i] != without.pixels[i]);
+                let columns: Vec<usize> = changed.map(|i| i % size[0] as usize).collect();
+                drawn += usize::from(!columns.is_empty());
+                let border = columns.iter().any(|&x| x == 0 || x + 1 == size[0] as usize);
+                assert!(!border, "{name} in {size:?}: the legend touches the border");
+                assert_eq!(with.linear, without.linear, "{name} in {size:?}: no legend in linear light");
+            }
+        }
+    }
+    assert!(drawn >= 8, "large pictures have legends: {drawn}");
+}

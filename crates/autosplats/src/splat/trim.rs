@@ -1,0 +1,60 @@
+//! Trim: takes off the rim of tails that splats leave around a silhouette.
+//!
+//! # How it works
+//! The outer half of a splat closes the gaps between scattered points, but where there are no more points it sticks out.
+//! The inner half, the *core*, ends about where the surface does. A pixel that lies in no core stays if it is closed in:
+//! if on one of four lines through it there is a core in both directions, no further than the splat there reaches, and
+//! nothing empty in between.
+// Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
+
+use super::tiled_index;
+use crate::camera::View;
+
+/// Weight of a splat from which a pixel belongs to its core: the kernel at 0.55 splat radii.
+const CORE_WEIGHT: f32 = 0.52;
+/// Added to how far lines go: what is a pixel wide has cores here and there along it.
+const LEAST_REACH_PX: usize = 2;
+/// Directions of the four lines.
+const LINES: [[isize; 2]; 4] = [[1, 0], [0, 1], [1, 1], [1, -1]];
+
+/// What trimming knows of a pixel: [`EMPTY`], [`CORE`], or how far its heaviest splat reaches in pixels.
+pub(super) type Rim = f32;
+const EMPTY: Rim = 0.0;
+const CORE: Rim = -1.0;
+
+/// The rim of a pixel by the weight and the reach of its heaviest splat.
+pub(super) fn rim(heaviest: f32, reach_px: f32) -> Rim {
+    if heaviest >= CORE_WEIGHT {
+        CORE
+    } else if heaviest > 0.0 {
+        reach_px
+    } else {
+        EMPTY
+    }
+}
+
+/// Whether pixel (x, y) is a tail that nothing closes in. `rims` is stored tile by tile.
+pub(super) fn sticks_out(rims: &[Rim], x: usize, y: usize, view: &View) -> bool {
+    let [width, height] = [view.width as usize, view.height as usize];
+    let own = rims[tiled_index(width, x, y)];
+    if own == EMPTY || own == CORE {
+        return false;
+    }
+    let meets_core = |[dx, dy]: [isize; 2]| {
+        let (mut x, mut y) = (x, y);
+        for _ in 0..own as usize + LEAST_REACH_PX {
+            match (x.checked_add_signed(dx), y.checked_add_signed(dy)) {
+                (Some(next_x), Some(next_y)) if next_x < width && next_y < height => (x, y) = (next_x, next_y),
+                // Beyond the picture the surface goes on.
+                _ => return true,
+            }
+            match rims[tiled_index(width, x, y)] {
+                EMPTY => return false,
+                CORE => return true,
+                _ => {}
+            }
+        }
+        false
+    };
+    !LINES.iter().any(|&[dx, dy]| meets_core([dx, dy]) && meets_core([-dx, -dy]))
+}

@@ -1,0 +1,148 @@
+//! Point clouds for tests: synthetic, seeded and named, all about the world's origin and some two units wide.
+
+#![allow(dead_code, reason = "unit tests and tests of the public API use different ones")]
+
+use autosplats_cloud::glam::DVec3;
+
+/// Reproducible random numbers (SplitMix64).
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Within 0..1.
+    pub(crate) fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    /// Within -1..1.
+    pub(crate) fn signed(&mut self) -> f32 {
+        2.0 * self.unit() - 1.0
+    }
+
+    pub(crate) fn below(&mut self, end: usize) -> usize {
+        (self.bits() % end as u64) as usize
+    }
+
+    /// A direction, all equally likely.
+    pub(crate) fn direction(&mut self) -> [f32; 3] {
+        loop {
+            let v = [self.signed(), self.signed(), self.signed()];
+            let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
+            if (0.1..1.0).contains(&length) {
+                return v.map(|c| c / length);
+            }
+        }
+    }
+
+    pub(crate) fn shuffle<T>(&mut self, list: &mut [T]) {
+        for last in (1..list.len()).rev() {
+            list.swap(last, self.below(last + 1));
+        }
+    }
+}
+
+/// Where the test cameras stand.
+pub(crate) const EYE: DVec3 = DVec3::new(0.5, -0.8, -4.0);
+
+pub(crate) type Positions = Vec<[f32; 3]>;
+
+/// `count` points of a square patch, `at` places its coordinates, -1 to 1, in space.
+fn patch(seed: u64, count: usize, at: impl Fn(f32, f32) -> [f32; 3]) -> Positions {
+    let mut random = Random::new(seed);
+    (0..count).map(|_| at(random.signed(), random.signed())).collect()
+}
+
+/// Across [`plane`], towards the eye, of any length.
+pub(crate) const PLANE_NORMAL: DVec3 = DVec3::new(0.3, -0.2, -1.0);
+
+pub(crate) fn plane(count: usize) -> Positions {
+    patch(1, count, |x, y| [x, y, 0.3 * x - 0.2 * y])
+}
+
+pub(crate) fn sphere(count: usize) -> Positions {
+    let mut random = Random::new(2);
+    (0..count).map(|_| random.direction()).collect()
+}
+
+/// Two planes, one close behind the other.
+pub(crate) fn two_layers(count: usize) -> Positions {
+    let mut layers = patch(3, count / 2, |x, y| [x, y, 0.0]);
+    layers.extend(patch(4, count - count / 2, |x, y| [x, y, 0.25]));
+    layers
+}
+
+/// Two planes that meet at a right angle.
+pub(crate) fn edge(count: usize) -> Positions {
+    patch(5, count, |x, y| [x, y, x.abs()])
+}
+
+/// A plane with more and more points towards one side.
+pub(crate) fn density_ramp(count: usize) -> Positions {
+    patch(6, count, |x, y| [x * x * x, y, 0.1 * y])
+}
+
+/// Each point of a plane three times.
+pub(crate) fn duplicates(count: usize) -> Positions {
+    plane(count / 3).iter().flat_map(|&point| [point; 3]).collect()
+}
+
+pub(crate) fn behind(count: usize) -> Positions {
+    let eye = EYE.as_vec3();
+    sphere(count).iter().map(|p| [p[0] + 2.0 * eye.x, p[1] + 2.0 * eye.y, p[2] + 2.0 * eye.z]).collect()
+}
+
+/// Groups of 1 to 16 points, far from each other.
+pub(crate) fn clumps(count: usize) -> Positions {
+    let mut random = Random::new(7);
+    let mut points = Vec::new();
+    while points.len() < count {
+        let center = [random.signed(), random.signed(), random.signed()];
+        for _ in 0..1 + random.below(16) {
+            points.push(center.map(|c| c + 0.02 * random.signed()));
+        }
+    }
+    points
+}
+
+pub(crate) fn line(count: usize) -> Positions {
+    patch(8, count, |t, _| [t, 0.6 * t, -0.4 * t])
+}
+
+/// Points with nothing near them, along the line of sight through a room far deeper than wide.
+pub(crate) fn outliers(count: usize) -> Positions {
+    let mut random = Random::new(9);
+    let forward = (EYE / EYE.z).as_vec3();
+    let mut point = || {
+        let depth = 40.0 * random.unit();
+        [random.signed() + depth * forward.x, random.signed() + depth * forward.y, depth]
+    };
+    (0..count).map(|_| point()).collect()
+}
+
+/// All of them by name, those with many points of about `count`.
+pub(crate) fn all(count: usize) -> Vec<(&'static str, Positions)> {
+    vec![
+        ("plane", plane(count)),
+        ("sphere", sphere(count)),
+        ("two layers", two_layers(count)),
+        ("edge", edge(count)),
+        ("density ramp", density_ramp(count)),
+        ("one point", plane(1)),
+        ("four points", plane(4)),
+        ("duplicates", duplicates(count)),
+        ("behind", behind(count)),
+        ("clumps", clumps(count / 4)),
+        ("line", line(count / 4)),
+        ("outliers", outliers(count / 4)),
+    ]
+}
