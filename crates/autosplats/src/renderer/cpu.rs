@@ -103,7 +103,8 @@ impl Renderer {
             splatter.refine(surfels, &view);
             splatter.refine(surfels, &view);
         }
-        let layers = splatter.attributes(surfels, &view, &attributes);
+        splatter.attributes(surfels, &view, &attributes);
+        let layers = splatter.trim(&view);
         clock.lap(|timings| &mut timings.splat);
 
         let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };

@@ -88,6 +88,12 @@ impl Splatter {
                 *out = rim(heaviest, reach);
             }
         });
+        layers
+    }
+
+    /// Trims the attributes just drawn: silhouettes end where the surface does.
+    pub(crate) fn trim(&mut self, view: &View) -> &GBuffer {
+        let Self { rims, layers, .. } = self;
         layers.tiles().into_par_iter().enumerate().for_each(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;
             for y in y0..(y0 + TILE).min(view.height as usize) {

@@ -20,7 +20,7 @@ use self::exact::{Exact, Picture};
 use self::fit::Neighbors;
 use self::verdict::{Measures, Verdicts};
 
-const SIZE: [u32; 2] = [640, 400];
+const SIZE: [u32; 2] = [1280, 800];
 
 /// Least intersection over union of the covered pixels.
 const IOU: f64 = 0.985;
