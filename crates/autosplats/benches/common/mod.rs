@@ -44,7 +44,7 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 /// A number with its thousand, million or nothing: 36K, 1M.
 pub(crate) fn short(count: usize) -> String {
     match count {
-        1_000_000.. if count % 1_000_000 == 0 => format!("{}M", count / 1_000_000),
+        1_000_000.. if count.is_multiple_of(1_000_000) => format!("{}M", count / 1_000_000),
         1_000.. => format!("{}K", count / 1000),
         _ => count.to_string(),
     }

@@ -84,8 +84,9 @@ impl Splatter {
                 draw_attributes(run, surfels, tile(index, view), view, depth, attributes, sums);
             }
             sums.normalize(attributes, &mut layers);
-            for (out, (&heaviest, &reach)) in rims.iter_mut().zip(sums.heaviest.iter().zip(&sums.reach)) {
-                *out = rim(heaviest, reach);
+            let TileSums { weight, heaviest, reach, .. } = sums;
+            for (at, out) in rims.iter_mut().enumerate() {
+                *out = rim(weight[at], heaviest[at], reach[at]);
             }
         });
         layers

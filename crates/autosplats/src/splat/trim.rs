@@ -12,6 +12,10 @@ use crate::camera::View;
 
 /// Weight of a splat from which a pixel belongs to its core: the kernel at 0.42 splat radii.
 const CORE_WEIGHT: f32 = 0.68;
+/// Sum of weights from which a pixel belongs to the surface whatever its heaviest splat: inside a surface the sum is
+/// about 2, at its border 1. Where many points fall into each pixel, the nearest one may lie at the same edge of every
+/// pixel, and no pixel's centre in a core.
+const INNER_WEIGHT: f32 = 1.3;
 /// Added to how far lines go: what is a pixel wide has cores here and there along it.
 const LEAST_REACH_PX: usize = 2;
 /// Directions of the eight lines.
@@ -22,9 +26,9 @@ pub(super) type Rim = f32;
 const EMPTY: Rim = 0.0;
 const CORE: Rim = -1.0;
 
-/// The rim of a pixel by the weight and the reach of its heaviest splat.
-pub(super) fn rim(heaviest: f32, reach_px: f32) -> Rim {
-    if heaviest >= CORE_WEIGHT {
+/// The rim of a pixel by its sum of weights, and the weight and the reach of its heaviest splat.
+pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
+    if heaviest >= CORE_WEIGHT || weight >= INNER_WEIGHT {
         CORE
     } else if heaviest > 0.0 {
         reach_px
