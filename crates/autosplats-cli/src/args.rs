@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use autosplats::{Background, ColorMode};
+use autosplats::{Background, ColorMode, Reconstruction, Shading};
 use autosplats_cloud::glam::DVec3;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -47,7 +47,7 @@ Examples:
   autosplats render scan.laz -o scan.png --view top --color height --legend
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
-  autosplats render scene:cathedral:10M -o cathedral.png --eye-dome 1 --json
+  autosplats render scene:cathedral:10M -o cathedral.png --eye-dome 2 --json
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
 
 #[derive(Args, Debug)]
@@ -115,7 +115,7 @@ pub(crate) struct CameraArgs {
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
     /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother
-    #[arg(short, value_name = "COUNT", default_value_t = 10, allow_negative_numbers = true)]
+    #[arg(short, value_name = "COUNT", default_value_t = Reconstruction::default().k, allow_negative_numbers = true)]
     pub(crate) k: u32,
     /// How the neighbours are found
     #[arg(long, value_enum, default_value = "screen-grid")]
@@ -127,7 +127,7 @@ pub(crate) struct SurfaceArgs {
     #[arg(
         long,
         value_name = "COUNT",
-        default_value_t = 3,
+        default_value_t = Reconstruction::default().outlier_expansions.unwrap_or_default(),
         allow_negative_numbers = true,
         conflicts_with = "keep_outliers"
     )]
@@ -139,7 +139,7 @@ pub(crate) struct SurfaceArgs {
     #[arg(
         long,
         value_name = "FACTOR",
-        default_value_t = 4.0,
+        default_value_t = Reconstruction::default().gap_factor.unwrap_or_default(),
         allow_negative_numbers = true,
         conflicts_with = "bridge_gaps"
     )]
@@ -148,7 +148,7 @@ pub(crate) struct SurfaceArgs {
     #[arg(long)]
     pub(crate) bridge_gaps: bool,
     /// Factor on the size of every splat, 0.01 to 100
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "FACTOR", default_value_t = Reconstruction::default().splat_scale, allow_negative_numbers = true)]
     pub(crate) splat_scale: f32,
     /// Draw ellipses that follow the spread of the neighbours, instead of circles
     #[arg(long)]
@@ -181,7 +181,7 @@ pub(crate) struct LookArgs {
     #[arg(long)]
     pub(crate) no_lighting: bool,
     /// Strength of eye-dome lighting, the darkening at depth steps, 0 to 10
-    #[arg(long, value_name = "STRENGTH", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STRENGTH", default_value_t = Shading::default().eye_dome, allow_negative_numbers = true)]
     pub(crate) eye_dome: f32,
     /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
     #[arg(long, value_name = "COLOR", value_parser = values::background)]
