@@ -1,7 +1,7 @@
 //! What a frame costs as the cloud grows: `cargo bench -p autosplats --bench scaling [-- quick | full]`.
 //!
 //! The cathedral at rising counts, seen from within by the same camera. `full` goes on to 100 million points, which takes
-//! minutes to generate and about 3 GB; `quick` only shows that the benchmark runs. Times are medians of seven frames.
+//! minutes to generate and about 2 GB; `quick` only shows that the benchmark runs. Times are medians of seven frames.
 
 mod common;
 
