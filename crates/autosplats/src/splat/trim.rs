@@ -4,7 +4,7 @@
 //! The outer half of a splat closes the gaps between scattered points, but where there are no more points it sticks out.
 //! The inner half, the *core*, ends about where the surface does. A pixel that lies in no core stays if it is closed in:
 //! if on one of eight lines through it there is a core in both directions, at most five times as far as the splat there reaches, and
-//! nothing empty in between.
+//! nothing empty in between; or if there is no core around it at all.
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
 use super::tiled_index;
@@ -68,7 +68,16 @@ pub(super) fn sticks_out(rims: &[Rim], x: usize, y: usize, view: &View) -> bool 
         }
         false
     };
-    !LINES.iter().any(|&[dx, dy]| meets_core([dx, dy]) && meets_core([-dx, -dy]))
+    // What has no core anywhere around, as a point alone, sticks out of nothing.
+    let mut sticks_out = false;
+    for [dx, dy] in LINES {
+        match (meets_core([dx, dy]), meets_core([-dx, -dy])) {
+            (true, true) => return false,
+            (false, false) => {}
+            _ => sticks_out = true,
+        }
+    }
+    sticks_out
 }
 
 #[cfg(test)]
@@ -142,7 +151,11 @@ mod tests {
             "###         ",
             "++#         ",
             "###         ",
+            "            ",
+            "            ",
         ];
         assert_eq!(trimmed(&drawing), drawing, "nothing sticks out here");
+        let alone = ["      ", "      ", "  ++  ", "  +   ", "      ", "      "];
+        assert_eq!(trimmed(&alone), alone, "nor here");
     }
 }
