@@ -22,7 +22,7 @@ pub struct Reconstruction {
     pub k: u32,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
-    /// e0: points without a neighbour after this many expansions of their first search radius, each by √k (√2 at least),
+    /// e0: points without a neighbour after this many expansions of their first search radius, each by √k (√10 at least),
     /// are discarded as outliers; 0 to 8. `None` keeps every point [Paper, §5.3].
     pub outlier_expansions: Option<u32>,
     /// λ: a search that has at least one neighbour ends with those it has when its circle's area grows by this factor

@@ -3,7 +3,7 @@
 //! Every engine answers the same question, stated here without iterations so that the answer depends on the screen points
 //! alone. For point P with first search radius r̃₀ (§5.1) and the distances d₁ ≤ d₂ ≤ … to the other screen points:
 //!
-//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 2)^e0, the radius after e0 expansions that met nothing;
+//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions that met nothing;
 //! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
 //!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ;
 //! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
@@ -112,8 +112,8 @@ impl SearchRules {
     /// Radius within which a point must have a neighbour.
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
-        // An expansion by √1 would be none.
-        let growth = self.k.max(2) as f32;
+        // Differs from the paper, whose expansion by √k would be none at k = 1, and discard surface below the usual k.
+        let growth = self.k.max(10) as f32;
         self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * growth.powf(0.5 * e0 as f32))
     }
 

@@ -88,7 +88,7 @@ impl Oracle {
         };
         let outlier = rules
             .outlier_expansions
-            .is_some_and(|e0| exceeds(distance(1), initial_radius * f64::from(rules.k.max(2)).sqrt().powi(e0 as i32)));
+            .is_some_and(|e0| exceeds(distance(1), initial_radius * f64::from(rules.k.max(10)).sqrt().powi(e0 as i32)));
         if outlier || self.others[point].is_empty() {
             return Expected { fate: Fate::Outlier, count: 0, radius: 0.0, unsure };
         }
