@@ -186,7 +186,7 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &[AtomicU64], spacing_px: 
         let keys = strip_keys(strip);
         let mut next = 0;
         for x in 0..width {
-            for (row, y) in (strip * strip_px..).zip(keys.chunks(width)).map(|(y, row)| (row, y)) {
+            for (y, row) in (strip * strip_px..).zip(keys.chunks(width)) {
                 let key = row[x].load(Ordering::Relaxed);
                 if key != EMPTY {
                     let index = key as u32;

@@ -9,7 +9,7 @@
 //! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
 //! - *bound*: an engine need not read more than [`MAX_CANDIDATES`] screen points for P. A search that would have to keeps
 //!   the neighbours it is already sure of, is clamped and counted as bounded. So a cloud of nothing but outliers costs a
-//!   bounded time per point.
+//!   bounded time per point. Only here does the answer depend on what the engine happened to read.
 
 pub(crate) mod screen_grid;
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! # How it works
 //! The outer half of a splat closes the gaps between scattered points, but where there are no more points it sticks out.
 //! The inner half, the *core*, ends about where the surface does. A pixel that lies in no core stays if it is closed in:
-//! if on one of eight lines through it there is a core in both directions, at most five times as far as the splat there reaches, and
-//! nothing empty in between; or if there is no core around it at all.
+//! if on one of eight lines through it there is a core in both directions, at most five times as far as the splat there
+//! reaches, and nothing empty in between; or if there is no core around it at all.
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
 use super::tiled_index;

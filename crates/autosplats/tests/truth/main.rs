@@ -170,6 +170,8 @@ fn statue() {
     ]);
 }
 
+// Not held to the limits, as ARCHITECTURE.md says: the herd from the left, whose slits between legs and manes close, and
+// the cathedral's nave across scanner shadows, where trimming opens holes.
 #[test]
 fn herd() {
     let subject = Subject::new("herd:1M", [1280, 800]);
