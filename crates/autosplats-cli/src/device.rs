@@ -4,8 +4,6 @@ use std::fs::read_to_string;
 
 use serde::Serialize;
 
-use crate::exit::{Exit, Failure};
-
 /// What a picture was rendered on.
 #[derive(Debug, Serialize)]
 pub(crate) struct Device {
@@ -50,32 +48,4 @@ fn simd() -> Vec<&'static str> {
 #[cfg(not(any(target_arch = "x86_64", target_arch = "x86", target_arch = "aarch64")))]
 fn simd() -> Vec<&'static str> {
     Vec::new()
-}
-
-/// Refuses a task that needs more memory than there is. Systems promise memory they do not have and then kill whoever
-/// touches it, so asking first is the only way to fail with a message.
-pub(crate) fn check_memory(task: &str, needed: u64) -> Result<(), Failure> {
-    match available_memory() {
-        Some(available) if needed > available => Err(Failure::new(
-            Exit::Memory,
-            format!("{task} needs about {} of memory, {} are free", gigabytes(needed), gigabytes(available)),
-        )),
-        _ => Ok(()),
-    }
-}
-
-fn gigabytes(bytes: u64) -> String {
-    format!("{:.1} GB", bytes as f64 / 1e9)
-}
-
-/// Bytes that can be allocated now, where the system says so (Linux).
-fn available_memory() -> Option<u64> {
-    let meminfo = read_to_string("/proc/meminfo").ok()?;
-    let line = meminfo.lines().find(|line| line.starts_with("MemAvailable:"))?;
-    let free = line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024;
-    // A container's own limit, if there is one ("max" if not).
-    let bytes = |file: &str| read_to_string(file).ok()?.trim().parse::<u64>().ok();
-    let limit = bytes("/sys/fs/cgroup/memory.max");
-    let used = bytes("/sys/fs/cgroup/memory.current").unwrap_or(0);
-    Some(limit.map_or(free, |limit| free.min(limit.saturating_sub(used))))
 }

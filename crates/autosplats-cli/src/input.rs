@@ -4,9 +4,8 @@ use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::glam::{DMat4, DVec4};
-use autosplats_cloud::{Error, PointCloud, Progress as _, Scene};
+use autosplats_cloud::{Error, PointCloud, Progress as _, Scene, check_memory};
 
-use crate::device::check_memory;
 use crate::exit::{Exit, Failure, suggest};
 use crate::progress::Bar;
 
@@ -41,7 +40,8 @@ impl Inputs {
     pub(crate) fn new(names: &[String], poses: &[String]) -> Result<Self, Failure> {
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
         let generated = list.iter().map(Input::generated_points).sum::<u64>();
-        check_memory(&format!("generating {generated} points"), generated * BYTES_PER_GENERATED_POINT)?;
+        check_memory(&format!("{generated} generated points"), generated * BYTES_PER_GENERATED_POINT)
+            .map_err(read_failure)?;
         for pose in poses {
             let (input, matrix) = list
                 .iter_mut()
@@ -130,8 +130,7 @@ impl Input {
     fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
         match &self.source {
             Source::File(path) => {
-                let shown = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                let bar = Bar::new(&format!("reading {shown}"), quiet);
+                let bar = Bar::on_file("reading", path, quiet);
                 autosplats_cloud::read(path, &bar).map_err(read_failure)
             }
             Source::Scene(scene, count) => {
@@ -157,7 +156,7 @@ fn unknown_scene(error: Error) -> Failure {
 }
 
 /// What failing to read is to the caller of the program.
-fn read_failure(error: Error) -> Failure {
+pub(crate) fn read_failure(error: Error) -> Failure {
     match error {
         Error::Cancelled => Failure::interrupted(),
         Error::OutOfMemory { .. } => Failure::new(Exit::Memory, error),

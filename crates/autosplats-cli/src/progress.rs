@@ -1,6 +1,7 @@
 //! Progress on standard error, for people: only on a terminal, and only for what takes longer than half a second.
 
 use std::io::{IsTerminal as _, stderr};
+use std::path::Path;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -17,6 +18,8 @@ const STEPS: u64 = 1000;
 /// One task on the screen. It vanishes when dropped.
 pub(crate) struct Bar {
     bar: ProgressBar,
+    /// What [notes](Progress::note) are about; nothing if they are not wanted.
+    subject: Option<String>,
     /// Dropped to end the thread that draws.
     done: Option<Sender<()>>,
     drawing: Option<JoinHandle<()>>,
@@ -28,6 +31,15 @@ impl Bar {
         Self::start(task, quiet, "{msg:30!} [{bar:40}] {percent:>3} % {eta:>4}", "=> ")
     }
 
+    /// Starts a task on a file, to which its notes then belong.
+    pub(crate) fn on_file(task: &str, file: &Path, quiet: bool) -> Self {
+        let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+        let subject = (!quiet).then(|| file.display().to_string());
+        let mut bar = Self::new(&format!("{task} {name}"), quiet);
+        bar.subject = subject;
+        bar
+    }
+
     /// Starts a task that cannot say how far it is.
     pub(crate) fn spinner(task: &str, quiet: bool) -> Self {
         Self::start(task, quiet, "{msg:30!} {spinner} {elapsed}", "-\\|/ ")
@@ -37,7 +49,7 @@ impl Bar {
         let bar =
             ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden()).with_message(task.to_owned());
         if quiet || !stderr().is_terminal() {
-            return Self { bar, done: None, drawing: None };
+            return Self { bar, subject: None, done: None, drawing: None };
         }
         if let Ok(style) = ProgressStyle::with_template(template) {
             let spinning = template.contains("spinner");
@@ -56,7 +68,7 @@ impl Bar {
             }
             shown.finish_and_clear();
         });
-        Self { bar, done: Some(done), drawing: Some(drawing) }
+        Self { bar, subject: None, done: Some(done), drawing: Some(drawing) }
     }
 }
 
@@ -67,6 +79,12 @@ impl Progress for Bar {
 
     fn cancelled(&self) -> bool {
         interrupt::requested()
+    }
+
+    fn note(&self, note: &str) {
+        if let Some(subject) = &self.subject {
+            self.bar.suspend(|| eprintln!("note: {subject}: {note}"));
+        }
     }
 }
 

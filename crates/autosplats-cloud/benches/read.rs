@@ -6,7 +6,7 @@
 
 use std::{path::Path, time::Instant};
 
-use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, read, write_ply};
+use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, read, write};
 
 fn main() {
     // Cargo adds --bench.
@@ -42,7 +42,7 @@ fn positions(points: usize) -> Vec<[f32; 3]> {
 
 fn measure(path: &Path, what: &str, cloud: &PointCloud) {
     let start = Instant::now();
-    write_ply(cloud, path, &()).unwrap();
+    write(cloud, path, &()).unwrap();
     print!("{:>7.1} M points/s written, ", rate(cloud.len(), start));
     time(path, what);
     std::fs::remove_file(path).unwrap();

@@ -1,22 +1,46 @@
 //! The point cloud: what every reader makes and every renderer takes.
 
-use std::path::Path;
+use std::{ops::Range, path::Path};
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 
-use crate::{Error, Progress};
+use crate::{Crs, Error, Progress};
 
 /// Points of one frame: positions, and whatever else the scanner recorded.
 ///
 /// A position is stored as three `f32` about an `f64` [`origin`](Self::origin): survey coordinates reach 5e6, where one
-/// `f32` step is half a metre. World coordinates are `origin + position`. All attributes have one entry per point.
+/// `f32` step is half a metre. World coordinates are `origin + position`, plus a [residual](Self::residuals) where a file
+/// was read [exactly](crate::ReadOptions::exact). All attributes have one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
-    origin: DVec3,
-    positions: Vec<[f32; 3]>,
-    colors: Option<Vec<[u8; 3]>>,
-    fields: Vec<Field>,
-    axes: Option<Axes>,
+    pub(crate) origin: DVec3,
+    pub(crate) positions: Vec<[f32; 3]>,
+    pub(crate) residuals: Option<Vec<[f32; 3]>>,
+    pub(crate) colors: Option<Vec<[u8; 3]>>,
+    pub(crate) fields: Vec<Field>,
+    pub(crate) axes: Option<Axes>,
+    pub(crate) scans: Vec<Scan>,
+    pub(crate) crs: Crs,
+    pub(crate) resolution: Option<DVec3>,
+}
+
+/// A run of points that one sensor saw from one place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scan {
+    /// What the file calls it.
+    pub name: Option<String>,
+    /// Where the sensor stood, and how it was turned: maps its own frame to world coordinates, lengths kept. The points
+    /// are in world coordinates already.
+    pub world_from_sensor: DMat4,
+    /// The points it saw, by index.
+    pub points: Range<usize>,
+}
+
+impl Scan {
+    /// World coordinates of the sensor.
+    pub fn position(&self) -> DVec3 {
+        self.world_from_sensor.w_axis.truncate()
+    }
 }
 
 /// Which way is up, and where a viewer would stand first.
@@ -50,6 +74,8 @@ pub enum FieldValues {
     I16(Vec<i16>),
     U32(Vec<u32>),
     I32(Vec<i32>),
+    U64(Vec<u64>),
+    I64(Vec<i64>),
     F32(Vec<f32>),
     F64(Vec<f64>),
 }
@@ -58,14 +84,16 @@ pub enum FieldValues {
 macro_rules! each_type {
     ($values:expr, $v:ident => $body:expr) => {
         match $values {
-            FieldValues::U8($v) => $body,
-            FieldValues::I8($v) => $body,
-            FieldValues::U16($v) => $body,
-            FieldValues::I16($v) => $body,
-            FieldValues::U32($v) => $body,
-            FieldValues::I32($v) => $body,
-            FieldValues::F32($v) => $body,
-            FieldValues::F64($v) => $body,
+            $crate::FieldValues::U8($v) => $body,
+            $crate::FieldValues::I8($v) => $body,
+            $crate::FieldValues::U16($v) => $body,
+            $crate::FieldValues::I16($v) => $body,
+            $crate::FieldValues::U32($v) => $body,
+            $crate::FieldValues::I32($v) => $body,
+            $crate::FieldValues::U64($v) => $body,
+            $crate::FieldValues::I64($v) => $body,
+            $crate::FieldValues::F32($v) => $body,
+            $crate::FieldValues::F64($v) => $body,
         }
     };
 }
@@ -82,12 +110,12 @@ impl FieldValues {
         self.len() == 0
     }
 
-    /// The value of point `index` as `f64`.
+    /// The value of point `index` as `f64`; 64-bit integers beyond 2⁵³ are rounded.
     ///
     /// # Panics
     /// If `index` is not below [`len`](Self::len).
     pub fn get(&self, index: usize) -> f64 {
-        #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the eight types is f64 itself")]
+        #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the types is f64 itself")]
         {
             each_type!(self, v => v[index] as f64)
         }
@@ -104,7 +132,7 @@ impl PointCloud {
     ///
     /// Non-finite positions are allowed, as scanners record them; the renderer drops and counts them.
     pub fn new(origin: DVec3, positions: Vec<[f32; 3]>) -> Self {
-        Self { origin, positions, colors: None, fields: Vec::new(), axes: None }
+        Self { origin, positions, ..Self::default() }
     }
 
     /// Reads a file of any format known; see [`read`](crate::read).
@@ -113,17 +141,6 @@ impl PointCloud {
     /// Those of [`read`](crate::read).
     pub fn from_path(path: impl AsRef<Path>, progress: &dyn Progress) -> Result<Self, Error> {
         crate::read(path.as_ref(), progress)
-    }
-
-    /// A cloud of attributes that are known to fit.
-    pub(crate) fn from_parts(
-        origin: DVec3,
-        positions: Vec<[f32; 3]>,
-        colors: Option<Vec<[u8; 3]>>,
-        fields: Vec<Field>,
-        axes: Option<Axes>,
-    ) -> Self {
-        Self { origin, positions, colors, fields, axes }
     }
 
     /// Adds colours, sRGB, 8 bits a channel, replacing any.
@@ -152,6 +169,44 @@ impl PointCloud {
     #[must_use]
     pub fn with_axes(mut self, axes: Axes) -> Self {
         self.axes = Some(axes);
+        self
+    }
+
+    /// Adds to each position what `f32` has lost of it, replacing any residuals.
+    ///
+    /// # Errors
+    /// [`Error::AttributeLength`] if there is not exactly one per point.
+    pub fn with_residuals(mut self, residuals: Vec<[f32; 3]>) -> Result<Self, Error> {
+        self.check_length("residuals", residuals.len())?;
+        self.residuals = Some(residuals);
+        Ok(self)
+    }
+
+    /// States which points were seen from where, replacing what was known.
+    ///
+    /// # Panics
+    /// If a scan's points are not among the cloud's.
+    #[must_use]
+    pub fn with_scans(mut self, scans: Vec<Scan>) -> Self {
+        let len = self.len();
+        for Scan { points, .. } in &scans {
+            assert!(points.start <= points.end && points.end <= len, "points {points:?} of {len}");
+        }
+        self.scans = scans;
+        self
+    }
+
+    /// States the coordinate system and its units.
+    #[must_use]
+    pub fn with_crs(mut self, crs: Crs) -> Self {
+        self.crs = crs;
+        self
+    }
+
+    /// States that coordinates are multiples of a step, in each of x, y and z, as files that store integers have it.
+    #[must_use]
+    pub fn with_resolution(mut self, step: DVec3) -> Self {
+        self.resolution = Some(step);
         self
     }
 
@@ -185,7 +240,16 @@ impl PointCloud {
     /// # Panics
     /// If `index` is not below [`len`](Self::len).
     pub fn world_position(&self, index: usize) -> DVec3 {
-        self.origin + DVec3::from(self.positions[index].map(f64::from))
+        let position = DVec3::from(self.positions[index].map(f64::from));
+        match &self.residuals {
+            None => self.origin + position,
+            Some(residuals) => self.origin + (position + DVec3::from(residuals[index].map(f64::from))),
+        }
+    }
+
+    /// What is to be added to each position to get all digits of the file, where `f32` cannot hold them.
+    pub fn residuals(&self) -> Option<&[[f32; 3]]> {
+        self.residuals.as_deref()
     }
 
     /// Colours, sRGB, 8 bits a channel, if the points have any.
@@ -208,9 +272,25 @@ impl PointCloud {
         self.axes
     }
 
+    /// Which points were seen from where, as far as the file says.
+    pub fn scans(&self) -> &[Scan] {
+        &self.scans
+    }
+
+    /// The coordinate system and its units, as far as the file says.
+    pub fn crs(&self) -> &Crs {
+        &self.crs
+    }
+
+    /// The step of which coordinates are multiples, where the file stores them as integers.
+    pub fn resolution(&self) -> Option<DVec3> {
+        self.resolution
+    }
+
     /// Bytes the cloud takes in memory.
     pub fn byte_len(&self) -> usize {
         size_of_val(self.positions.as_slice())
+            + self.residuals.as_ref().map_or(0, |residuals| size_of_val(residuals.as_slice()))
             + self.colors.as_ref().map_or(0, |colors| size_of_val(colors.as_slice()))
             + self.fields.iter().map(|field| field.values.byte_len()).sum::<usize>()
     }

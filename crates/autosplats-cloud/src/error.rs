@@ -25,8 +25,14 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Neither the content nor the name of the file tells a format that is read.
-    #[error("{}: unknown format; {} can be read", path.display(), crate::read::FORMATS)]
+    #[error("{}: unknown format; {} can be read", path.display(), crate::read::format_names())]
     UnknownFormat {
+        /// File concerned.
+        path: PathBuf,
+    },
+    /// The name of a file to write has no extension of a format that is written.
+    #[error("{}: its name tells no format that is written; {} can be", path.display(), crate::write::format_names())]
+    UnknownOutput {
         /// File concerned.
         path: PathBuf,
     },
@@ -49,7 +55,7 @@ pub enum Error {
         what: String,
     },
     /// The memory for a cloud could not be had.
-    #[error("out of memory: {bytes} bytes for {what} could not be had; thin the cloud or split it")]
+    #[error("out of memory: {bytes} bytes for {what} are not free; thin the cloud or split it")]
     OutOfMemory {
         /// What the memory was for.
         what: String,

@@ -3,7 +3,7 @@
 //! This crate never sees a GPU and never draws: it turns bytes into a [`PointCloud`].
 //!
 //! ```
-//! use autosplats_cloud::{PointCloud, write_ply};
+//! use autosplats_cloud::{PointCloud, write};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
@@ -11,24 +11,32 @@
 //! std::fs::write(path("survey.csv"), "x,y,z,Intensity\n512000.5,5400000.25,310.0,7\n")?;
 //! let cloud = PointCloud::from_path(path("survey.csv"), &())?;
 //! assert_eq!(cloud.world_position(0).y, 5_400_000.25);
-//! write_ply(&cloud, &path("survey.ply"), &())?;
+//! write(&cloud, &path("survey.ply"), &())?;
 //! # Ok(())
 //! # }
 //! ```
 
 mod cloud;
+mod crs;
 mod error;
+mod memory;
 mod merge;
 mod progress;
 mod read;
+mod retain;
 mod source;
 mod write;
 
-pub use cloud::{Axes, Field, FieldValues, PointCloud};
+pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
+pub use crs::{Crs, Unit};
 pub use error::Error;
 /// The vector library of the public interface.
 pub use glam;
+pub use memory::{available_memory, check_memory};
 pub use progress::Progress;
-pub use read::read;
+pub use read::{
+    Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
+    read_mesh, read_with,
+};
 pub use source::scene::{Hit, Scene, View};
-pub use write::write_ply;
+pub use write::{check_writable, write, written_formats};

@@ -3,7 +3,7 @@
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 
-use crate::{Field, FieldValues, PointCloud, cloud::each_type, read::SMALL, read::middle};
+use crate::{Crs, Field, FieldValues, PointCloud, Scan, cloud::each_type, read::SMALL, read::middle};
 
 /// Colour of the points of a part that has none, beside parts that have.
 const GREY: [u8; 3] = [200; 3];
@@ -16,7 +16,9 @@ impl PointCloud {
     /// * If any part has colours, the points of the others become mid grey.
     /// * A field is kept if every part has one of that name, letter case included; as `f64` where its widths differ.
     ///   Fields are not moved: normals keep their old directions.
-    /// * The axes are kept if all parts agree on them.
+    /// * Axes, coordinate system and resolution are kept if all parts agree on them; scans stay known, each moved with
+    ///   its part.
+    /// * Residuals are kept if any part has some, and made anew for parts that a pose moves.
     ///
     /// A single part without pose is returned as it is. Parts without points count for nothing.
     #[must_use]
@@ -31,13 +33,23 @@ impl PointCloud {
 
         let origin = common_origin(&parts);
         let total = parts.iter().map(|(cloud, _)| cloud.len()).sum();
+        let exact = parts.iter().any(|(cloud, _)| cloud.residuals().is_some());
         let mut positions = Vec::with_capacity(total);
+        let mut residuals = Vec::with_capacity(if exact { total } else { 0 });
         for (cloud, pose) in &parts {
             if *pose == DMat4::IDENTITY && cloud.origin() == origin {
                 positions.extend_from_slice(cloud.positions());
+                match cloud.residuals() {
+                    Some(own) => residuals.extend_from_slice(own),
+                    None if exact => residuals.resize(positions.len(), [0.0; 3]),
+                    None => {}
+                }
             } else {
-                let moved = |i| (pose.transform_point3(cloud.world_position(i)) - origin).as_vec3().to_array();
-                positions.par_extend((0..cloud.len()).into_par_iter().map(moved));
+                let moved = |i| pose.transform_point3(cloud.world_position(i)) - origin;
+                positions.par_extend((0..cloud.len()).into_par_iter().map(|i| moved(i).as_vec3().to_array()));
+                if exact {
+                    residuals.par_extend((0..cloud.len()).into_par_iter().map(|i| residual(moved(i))));
+                }
             }
         }
         let colors = parts.iter().any(|(cloud, _)| cloud.colors().is_some()).then(|| {
@@ -52,9 +64,36 @@ impl PointCloud {
         });
         let first = &parts[0].0;
         let fields = first.fields().iter().filter_map(|field| common_field(&parts, &field.name)).collect();
-        let axes = first.axes().filter(|_| parts.iter().all(|(cloud, _)| cloud.axes() == first.axes()));
-        Self::from_parts(origin, positions, colors, fields, axes)
+        let agreed = |same: fn(&Self, &Self) -> bool| parts.iter().all(|(cloud, _)| same(cloud, first));
+        let mut scans = Vec::new();
+        let mut start = 0;
+        for (cloud, pose) in &parts {
+            scans.extend(cloud.scans().iter().map(|scan| Scan {
+                name: scan.name.clone(),
+                world_from_sensor: *pose * scan.world_from_sensor,
+                points: scan.points.start + start..scan.points.end + start,
+            }));
+            start += cloud.len();
+        }
+        Self {
+            origin,
+            positions,
+            residuals: exact.then_some(residuals),
+            colors,
+            fields,
+            axes: first.axes().filter(|_| agreed(|a, b| a.axes == b.axes)),
+            scans,
+            crs: if agreed(|a, b| a.crs == b.crs) { first.crs().clone() } else { Crs::default() },
+            resolution: first.resolution().filter(|_| agreed(|a, b| a.resolution == b.resolution)),
+        }
     }
+}
+
+/// What `f32` loses of a position.
+pub(crate) fn residual(position: DVec3) -> [f32; 3] {
+    let lost = (position - position.as_vec3().as_dvec3()).as_vec3();
+    // Nothing is to be added to what is infinite or no number.
+    if lost.is_finite() { lost.to_array() } else { [0.0; 3] }
 }
 
 fn common_origin(parts: &[(PointCloud, DMat4)]) -> DVec3 {
@@ -88,8 +127,8 @@ fn common_field(parts: &[(PointCloud, DMat4)], name: &str) -> Option<Field> {
             }
         };
     }
-    let joined = join!(U8, I8, U16, I16, U32, I32, F32, F64);
-    #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the eight types is f64 itself")]
+    let joined = join!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64);
+    #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the types is f64 itself")]
     let widened =
         |values: &FieldValues| -> Vec<f64> { each_type!(values, v => v.iter().map(|&value| value as f64).collect()) };
     let values = joined.unwrap_or_else(|| FieldValues::F64(all.iter().copied().flat_map(widened).collect()));

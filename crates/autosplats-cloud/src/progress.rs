@@ -1,8 +1,8 @@
 //! How a caller follows and stops long work.
 
-use crate::Error;
+use crate::{Error, PointCloud};
 
-/// Told how far reading or writing has come, and asked whether to go on.
+/// Told how far reading or writing has come and what was noticed, and asked whether to go on.
 ///
 /// `()` implements it: nothing is reported and nothing is cancelled.
 pub trait Progress: Sync {
@@ -13,6 +13,22 @@ pub trait Progress: Sync {
     fn cancelled(&self) -> bool {
         false
     }
+
+    /// Called with what the user should know though it is no error: what was dropped, guessed or cannot be kept. One
+    /// line, without the file's name.
+    fn note(&self, _note: &str) {}
+
+    /// Whether [`chunk`](Self::chunk) is to be called.
+    fn wants_chunks(&self) -> bool {
+        false
+    }
+
+    /// Called with points as they are read, in the file's order, about a million at a time, so that they can be shown
+    /// before the file ends.
+    ///
+    /// Chunks are a preview: each has its own origin, colours are scaled by the chunk alone, and points without a return
+    /// are still there. The cloud that reading returns in the end is the result.
+    fn chunk(&self, _points: PointCloud) {}
 }
 
 impl Progress for () {

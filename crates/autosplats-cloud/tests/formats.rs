@@ -6,7 +6,7 @@ mod common;
 
 use std::sync::Mutex;
 
-use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Progress, glam::DVec3, read, write_ply};
+use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, Progress, glam::DVec3, read, write};
 use common::{colors, error, las_bytes, pcd_bytes, positions, read_bytes, rich_cloud};
 
 /// Values of a field as `f64`.
@@ -28,7 +28,7 @@ fn ply_round_trip_keeps_every_bit() {
     // More points than a block of the writer, and none.
     for count in [0, 1, 300_000] {
         let cloud = rich_cloud(count);
-        write_ply(&cloud, &path, &()).unwrap();
+        write(&cloud, &path, &()).unwrap();
         assert!(read(&path, &()).unwrap() == cloud, "a cloud of {count} points comes back as it was");
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
@@ -43,7 +43,7 @@ fn ply_round_trip_of_survey_coordinates() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud.ply");
     let cloud = PointCloud::new(DVec3::new(512_345.0, 5_400_001.0, 300.0), positions(1000)).with_axes(Axes::ZUp);
-    write_ply(&cloud, &path, &()).unwrap();
+    write(&cloud, &path, &()).unwrap();
     let back = read(&path, &()).unwrap();
     assert_eq!(back.axes(), Some(Axes::ZUp), "the axes are written");
     for i in 0..cloud.len() {
@@ -62,7 +62,7 @@ fn ply_field_names_are_made_fit() {
     for name in ["two words", "x", "a\nb", ""] {
         cloud = cloud.with_field(name, field()).unwrap();
     }
-    write_ply(&cloud, &path, &()).unwrap();
+    write(&cloud, &path, &()).unwrap();
     let back = read(&path, &()).unwrap();
     assert_eq!(names(&back), ["two_words", "x_", "a_b", "_"], "blanks and coordinates are no names");
     assert_eq!(back.positions(), cloud.positions(), "the positions are not disturbed");
@@ -79,11 +79,11 @@ fn a_failed_write_leaves_nothing() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud.ply");
-    assert!(matches!(write_ply(&rich_cloud(10), &path, &Stop), Err(Error::Cancelled)), "cancelled");
+    assert!(matches!(write(&rich_cloud(10), &path, &Stop), Err(Error::Cancelled)), "cancelled");
     let missing = folder.path().join("missing/cloud.ply");
-    assert!(matches!(write_ply(&rich_cloud(10), &missing, &()), Err(Error::Io { .. })), "no such folder");
+    assert!(matches!(write(&rich_cloud(10), &missing, &()), Err(Error::Io { .. })), "no such folder");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "the folder stays empty");
-    write_ply(&rich_cloud(10), &path, &()).unwrap();
+    write(&rich_cloud(10), &path, &()).unwrap();
     assert!(matches!(read(&path, &Stop), Err(Error::Cancelled)), "reading is cancelled too");
 }
 
@@ -444,7 +444,7 @@ fn progress_rises_and_cancelling_ends_the_work() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("written.ply");
     let count = 600_000;
-    write_ply(&rich_cloud(count), &path, &()).unwrap();
+    write(&rich_cloud(count), &path, &()).unwrap();
     let rows: String = positions(count).iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
     let header = "ply\nformat ascii 1.0\nelement vertex 600000\nproperty float x\nproperty float y\nproperty float z\n";
     // A list before the vertices and one in them.

@@ -7,7 +7,7 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use autosplats_cloud::{PointCloud, read, write_ply};
+use autosplats_cloud::{PointCloud, read, write};
 use common::{Random, error, las_bytes, pcd_bytes, read_bytes, rich_cloud};
 
 /// Far above what any of these small files takes, far below what a loop over a claimed count would.
@@ -19,7 +19,7 @@ const POINTS: usize = 300;
 fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
-    write_ply(&rich_cloud(POINTS), &path, &()).unwrap();
+    write(&rich_cloud(POINTS), &path, &()).unwrap();
     let rows: String = rich_cloud(POINTS).positions().iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
     let header =
         "element vertex 300\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nend_header\n";

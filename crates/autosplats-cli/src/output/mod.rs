@@ -7,12 +7,14 @@ use std::fs::{File, metadata};
 use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write, stdout};
 use std::path::{Path, PathBuf};
 
+use autosplats_cloud::{Error, PointCloud, check_writable};
 use tempfile::NamedTempFile;
 
 pub(crate) use self::exr::write_exr;
 pub(crate) use self::png::write_png;
 use crate::exit::{Exit, Failure};
 use crate::interrupt;
+use crate::progress::Bar;
 
 /// Refuses a path that cannot be written, or that would overwrite an input.
 pub(crate) fn check_target<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
@@ -65,6 +67,35 @@ pub(crate) fn replace_file(
     filled?;
     temporary.persist(&target).map_err(|error| cannot_write(path, &error.error))?;
     metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error))
+}
+
+/// Writes a cloud in the format that the name tells, whole or not at all. Returns the size of the file.
+pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Result<u64, Failure> {
+    // A link stays a link: what it points to is replaced.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let bar = Bar::on_file("writing", path, quiet);
+    let _writing = interrupt::writing();
+    match autosplats_cloud::write(cloud, &target, &bar) {
+        Ok(()) => metadata(&target).map(|metadata| metadata.len()).map_err(|error| cannot_write(path, &error)),
+        Err(Error::Cancelled) => Err(Failure::interrupted()),
+        Err(Error::Io { source, .. }) => Err(cannot_write(path, &source)),
+        Err(error) => Err(Failure::new(Exit::Output, error)),
+    }
+}
+
+/// Refuses a cloud's output whose format is not known, that exists and is not to be replaced, or that is no place to
+/// write.
+pub(crate) fn check_cloud_target<'a>(
+    path: &Path,
+    force: bool,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), Failure> {
+    check_writable(path).map_err(Failure::usage)?;
+    check_target(path, inputs)?;
+    if !force && path.exists() {
+        return Err(Failure::new(Exit::Output, format!("{}: is already there; --force replaces it", path.display())));
+    }
+    Ok(())
 }
 
 /// A file that takes no more once Ctrl-C was pressed, so that a long write ends early.

@@ -4,14 +4,13 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use autosplats::{Background, ColorMap, ColorMode, Reconstruction, SearchEngine, Settings, Shading};
-use autosplats_cloud::PointCloud;
+use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
 use super::render_failure;
 use crate::args::{Backend, Engine, LookArgs, Map, RenderArgs, SurfaceArgs};
-use crate::device::check_memory;
 use crate::exit::{Exit, Failure, suggest};
-use crate::input::Inputs;
+use crate::input::{Inputs, read_failure};
 use crate::output::{Format, Picture, check_target};
 use crate::threads::start_threads;
 use crate::values::COLOR_MODES;
@@ -55,7 +54,8 @@ impl Job {
             check_target(target, inputs.files().chain(camera.file()))?;
         }
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)?;
+        check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)
+            .map_err(read_failure)?;
         Ok(Self { inputs, pictures, save_camera, size, camera, settings, json, quiet: run.quiet })
     }
 

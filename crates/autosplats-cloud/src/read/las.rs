@@ -3,14 +3,12 @@
 //! The header is read by the `las` crate in its raw form. Its checked form also reads all variable length records,
 //! allocating what they claim, and refuses files for faults that do not touch the points, so it is not used.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use glam::DVec3;
 use las::raw;
 use rayon::prelude::*;
 
 use super::{
-    Job, laz,
+    Contents, Description, Format, Job, guard, laz,
     table::{Part, collect, middle, reserve},
 };
 use crate::{Axes, Error, FieldValues, PointCloud};
@@ -34,7 +32,21 @@ pub(super) struct Header {
     offset: DVec3,
 }
 
-pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
+pub(super) const FORMAT: Format = Format {
+    name: "LAS",
+    extensions: &["las", "laz", "copc"],
+    recognised: |bytes| bytes.starts_with(b"LASF"),
+    sensor_frame: false,
+    describe,
+    read,
+};
+
+fn describe(job: &Job<'_>) -> Result<Description, Error> {
+    let header = header(job)?;
+    Ok(Description { format: "LAS".into(), points: Some(header.points), ..Description::default() })
+}
+
+fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let header = header(job)?;
     let mut columns = Columns::new(header.format);
     if header.compressed {
@@ -42,7 +54,7 @@ pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
     } else {
         uncompressed(job, &header, &mut columns)?;
     }
-    columns.into_cloud(job, &header)
+    Ok(columns.into_cloud(job, &header)?.into())
 }
 
 fn header(job: &Job<'_>) -> Result<Header, Error> {
@@ -104,11 +116,6 @@ fn uncompressed(job: &Job<'_>, header: &Header, columns: &mut Columns) -> Result
         columns.append(block, header.record_len)?;
     }
     Ok(())
-}
-
-/// Runs code of others on the bytes of a file; a panic becomes an error like any.
-pub(super) fn guard<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err("the data are inconsistent".into()))
 }
 
 /// Where the values lie in a record.

@@ -15,11 +15,7 @@ use laz::{
 };
 use rayon::prelude::*;
 
-use super::{
-    Job,
-    las::{Header, guard},
-    table::reserve,
-};
+use super::{Job, guard, las::Header, table::reserve};
 use crate::Error;
 
 /// Points decompressed between two looks at the caller's wish to stop, about.

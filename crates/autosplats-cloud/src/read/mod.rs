@@ -9,8 +9,11 @@
 //!
 //! A file is not trusted: what its header claims is checked against its size before anything is allocated.
 
+mod describe;
+mod guard;
 mod las;
 mod laz;
+mod options;
 mod pcd;
 mod ply;
 mod table;
@@ -19,13 +22,64 @@ mod xyz;
 
 use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
+use self::guard::guard;
 pub(crate) use self::table::{SMALL, middle};
-use crate::{Error, PointCloud, Progress, progress::tick};
+pub use self::{
+    describe::{Attribute, Description},
+    options::{DepthCamera, ReadOptions},
+};
+use rayon::prelude::*;
 
-/// What [`read`] understands, for messages.
-pub(crate) const FORMATS: &str = "PLY, LAS, LAZ, COPC, PCD and text points (.xyz .txt .csv .pts .asc)";
+use crate::{Error, PointCloud, Progress, memory::check_memory, progress::tick};
 
-/// Reads a point cloud, recognising PLY, LAS, LAZ, COPC, PCD and plain text by content first, then by extension.
+/// A kind of file: how to tell it from others, and what to do with it.
+struct Format {
+    /// Name for messages and tables.
+    name: &'static str,
+    /// Extensions of the file's name, in lower case and without the first dot.
+    extensions: &'static [&'static str],
+    /// Whether the content begins as only this format does; the name is not looked at.
+    recognised: fn(&[u8]) -> bool,
+    /// Whether points at exactly (0, 0, 0) are places where the sensor saw nothing, even a single one.
+    sensor_frame: bool,
+    /// What the header says.
+    describe: fn(&Job<'_>) -> Result<Description, Error>,
+    /// The points, and the triangles of a mesh.
+    read: fn(&Job<'_>) -> Result<Contents, Error>,
+}
+
+/// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
+/// extensions go before shorter ones.
+const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &xyz::FORMAT];
+
+/// Names and extensions of the formats that [`read`] understands.
+pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
+    FORMATS.iter().map(|format| (format.name, format.extensions))
+}
+
+/// The names of all formats, for a message.
+pub(crate) fn format_names() -> String {
+    let shown = |format: &&Format| format!("{} (.{})", format.name, format.extensions.join(" ."));
+    FORMATS.iter().map(shown).collect::<Vec<_>>().join(", ")
+}
+
+/// What a file has: points, and triangles between them if it is a mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contents {
+    /// The points.
+    pub cloud: PointCloud,
+    /// Corners of triangles, as indices of points; empty unless read by [`read_mesh`]. Polygons are cut into triangles,
+    /// faces with corners that do not exist are left out.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl From<PointCloud> for Contents {
+    fn from(cloud: PointCloud) -> Self {
+        Self { cloud, triangles: Vec::new() }
+    }
+}
+
+/// Reads a point cloud in any of the [`formats`], recognised by content first, then by extension.
 ///
 /// Coordinates above about 1e4 are stored about an origin of whole numbers, so that survey coordinates keep their
 /// precision; smaller ones keep the file's `f32` bits. Non-finite points stay in the cloud.
@@ -34,46 +88,90 @@ pub(crate) const FORMATS: &str = "PLY, LAS, LAZ, COPC, PCD and text points (.xyz
 /// [`Error::Io`] if the file cannot be read, [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
 /// for what is in it, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    read_with(path, &ReadOptions::default(), progress)
+}
+
+/// [Reads](read) a point cloud with options.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    let job = Job { path, progress, bytes: &bytes };
-    tick(progress, 0.0)?;
-    let cloud = match Format::of(&bytes, path) {
-        Some(Format::Ply) => ply::read(&job),
-        Some(Format::Las) => las::read(&job),
-        Some(Format::Pcd) => pcd::read(&job),
-        Some(Format::Xyz) => xyz::read(&job),
-        None => Err(Error::UnknownFormat { path: path.into() }),
-    }?;
-    tick(progress, 1.0)?;
-    Ok(cloud)
+    read_bytes(path, &bytes, options, progress)
 }
 
-enum Format {
-    Ply,
-    Las,
-    Pcd,
-    Xyz,
+/// [Reads](read) a point cloud from the bytes of a file. Its name helps to recognise the format and stands in messages.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_bytes(
+    name: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<PointCloud, Error> {
+    Ok(contents(&Job { path: name, progress, bytes, options, triangles: false })?.cloud)
 }
 
-impl Format {
-    fn of(bytes: &[u8], path: &Path) -> Option<Self> {
-        if bytes.starts_with(b"LASF") {
-            return Some(Self::Las);
-        }
-        if bytes.starts_with(b"ply") && bytes.get(3).is_none_or(u8::is_ascii_whitespace) {
-            return Some(Self::Ply);
-        }
-        if pcd::recognised(bytes) {
-            return Some(Self::Pcd);
-        }
-        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-            "ply" => Some(Self::Ply),
-            "las" | "laz" => Some(Self::Las),
-            "pcd" => Some(Self::Pcd),
-            "xyz" | "txt" | "csv" | "pts" | "asc" => Some(Self::Xyz),
-            _ => None,
-        }
+/// Reads points and the triangles between them.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Contents, Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    contents(&Job { path, progress, bytes: &bytes, options, triangles: true })
+}
+
+/// What the header of a file says, in milliseconds whatever its size; formats without a header that counts are looked
+/// at no further than their beginning.
+///
+/// # Errors
+/// Those of [`read`], as far as the header shows them.
+pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error> {
+    let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    describe_bytes(path, &bytes, options)
+}
+
+/// [Describes](describe) a file by its bytes.
+///
+/// # Errors
+/// Those of [`describe`].
+pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Description, Error> {
+    let job = Job { path: name, progress: &(), bytes, options, triangles: false };
+    (format(&job)?.describe)(&job)
+}
+
+fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
+    let name = job.path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
+    let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
+    let by_name = || FORMATS.iter().find(|format| format.extensions.iter().any(ends));
+    by_content.or_else(by_name).copied().ok_or_else(|| Error::UnknownFormat { path: job.path.into() })
+}
+
+fn contents(job: &Job<'_>) -> Result<Contents, Error> {
+    job.tick(0.0)?;
+    let format = format(job)?;
+    let mut contents = (format.read)(job)?;
+    // A mesh would lose its corners.
+    if !job.options.keep_no_returns && contents.triangles.is_empty() {
+        drop_no_returns(job, format, &mut contents.cloud);
     }
+    job.tick(1.0)?;
+    Ok(contents)
+}
+
+/// Scanners write (0, 0, 0) where nothing came back. One such point alone may be a real one, unless a sensor stands there.
+fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
+    let absent = |i: usize| cloud.world_position(i) == glam::DVec3::ZERO;
+    let count = (0..cloud.len()).into_par_iter().filter(|&i| absent(i)).count();
+    let least = if format.sensor_frame { 1 } else { 2 };
+    if count < least || count == cloud.len() {
+        return;
+    }
+    let keep: Vec<bool> = (0..cloud.len()).into_par_iter().map(|i| !absent(i)).collect();
+    job.note(format!("{count} of {} points are at (0, 0, 0), where nothing was measured; dropped", cloud.len()));
+    cloud.retain(|i| keep[i]);
 }
 
 /// Bytes of a header line beyond which it is rather broken than long.
@@ -85,11 +183,27 @@ struct Job<'a> {
     path: &'a Path,
     progress: &'a dyn Progress,
     bytes: &'a [u8],
+    options: &'a ReadOptions,
+    /// Whether triangles are wanted.
+    #[allow(dead_code, reason = "meshes use it")]
+    triangles: bool,
 }
 
 impl Job<'_> {
     fn tick(&self, fraction: f32) -> Result<(), Error> {
         tick(self.progress, fraction)
+    }
+
+    /// Tells the user what is no error.
+    fn note(&self, note: impl AsRef<str>) {
+        self.progress.note(note.as_ref());
+    }
+
+    /// Refuses what would not fit into memory, before anything is allocated: `count` points of so many bytes.
+    fn check_memory(&self, count: usize, bytes_per_point: usize) -> Result<(), Error> {
+        let bytes = (count as u64).saturating_mul(bytes_per_point as u64);
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        check_memory(&format!("the {count} points of {name}"), bytes)
     }
 
     fn malformed(&self, place: impl Into<String>, what: impl Into<String>) -> Error {

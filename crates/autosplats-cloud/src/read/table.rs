@@ -5,8 +5,8 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::Job;
-use crate::{Error, FieldValues, PointCloud};
+use super::{Attribute, Job};
+use crate::{Error, FieldValues, PointCloud, merge::residual};
 
 /// Points handled between two looks at the caller's wish to stop: a few milliseconds.
 const BLOCK: usize = 1 << 18;
@@ -41,6 +41,21 @@ impl Scalar {
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
     }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::I8 => "int8",
+            Self::U8 => "uint8",
+            Self::I16 => "int16",
+            Self::U16 => "uint16",
+            Self::I32 => "int32",
+            Self::U32 => "uint32",
+            Self::I64 => "int64",
+            Self::U64 => "uint64",
+            Self::F32 => "float32",
+            Self::F64 => "float64",
+        }
+    }
 }
 
 /// A number that lies in a file in either byte order.
@@ -71,6 +86,16 @@ pub(super) struct Column {
     pub(super) stride: usize,
 }
 
+impl Column {
+    #[allow(dead_code, reason = "bare records use it")]
+    pub(super) fn attribute(&self) -> Attribute {
+        Attribute::new(&self.name, self.scalar.name())
+    }
+}
+
+/// Points of a preview, about 16 MB of a file.
+const CHUNK: usize = 1 << 20;
+
 /// Columns over some bytes.
 pub(super) struct Table<'a> {
     pub(super) bytes: &'a [u8],
@@ -93,6 +118,9 @@ impl Table<'_> {
             return Err(job.malformed(place, "there are no x, y and z among the values of a point"));
         };
         self.check_size(job, place)?;
+        let exact = if job.options.exact { 12 } else { 0 };
+        let fields: usize = self.columns.iter().map(|column| column.scalar.size()).sum();
+        job.check_memory(self.count, 12 + exact + fields)?;
         let colors = [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]]
             .into_iter()
             .find_map(|names| self.take(names));
@@ -108,9 +136,18 @@ impl Table<'_> {
         };
         let (origin, positions) = self.positions(job, &xyz, part(0))?;
         let mut cloud = PointCloud::new(origin, positions);
+        if let Some(residuals) = self.residuals(job, &xyz, &cloud)? {
+            cloud = cloud.with_residuals(residuals)?;
+        }
         let mut step = 1;
         if let Some(rgb) = &colors {
-            cloud = cloud.with_colors(self.colors(job, rgb, part(step))?)?;
+            let (bytes, exact) = self.colors(job, rgb, part(step))?;
+            cloud = cloud.with_colors(bytes)?;
+            if job.options.exact && !exact {
+                for (column, name) in rgb.iter().zip(["Red", "Green", "Blue"]) {
+                    cloud = cloud.with_field(name, self.field(job, column, part(step))?)?;
+                }
+            }
             step += 1;
         } else if let Some(column) = &packed {
             let unpack = |i| {
@@ -126,6 +163,26 @@ impl Table<'_> {
             cloud = cloud.with_field(field_name(&column.name), values)?;
         }
         Ok(cloud)
+    }
+
+    /// Hands out the points piece by piece, for those who want to see them before all is read.
+    pub(super) fn preview(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
+        if !job.progress.wants_chunks() {
+            return Ok(());
+        }
+        self.check_size(job, place)?;
+        for start in (0..self.count).step_by(CHUNK) {
+            let columns = self.columns.iter().map(|column| {
+                let offset = column.offset + start * column.stride;
+                Column { offset, ..column.clone() }
+            });
+            let count = CHUNK.min(self.count - start);
+            let piece = Self { bytes: self.bytes, columns: columns.collect(), count, ..*self };
+            let quiet = Job { progress: &(), ..*job };
+            job.tick(0.0)?;
+            job.progress.chunk(piece.into_cloud(&quiet, place)?);
+        }
+        Ok(())
     }
 
     /// Takes the columns of three names out, letter case ignored, if they are all there.
@@ -198,12 +255,27 @@ impl Table<'_> {
         Ok((origin, positions?))
     }
 
-    /// Colours of any number type to 8 bits. Wide types often hold 8-bit values, and floats 0 to 1 or 0 to 255, so the
-    /// largest value decides.
-    fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: Part) -> Result<Vec<[u8; 3]>, Error> {
+    /// What `f32` lost of the positions, if all digits are wanted and some are lost.
+    fn residuals(&self, job: &Job<'_>, xyz: &[Column; 3], cloud: &PointCloud) -> Result<Option<Vec<[f32; 3]>>, Error> {
+        let lossless = |column: &Column| column.scalar == Scalar::F32 || column.scalar.size() < 4;
+        if !job.options.exact || cloud.origin() == DVec3::ZERO && xyz.iter().all(lossless) {
+            return Ok(None);
+        }
+        let origin = cloud.origin();
+        let lost = |i| residual(DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i))) - origin);
+        if (0..self.count).into_par_iter().all(|i| lost(i) == [0.0; 3]) {
+            return Ok(None);
+        }
+        collect("residuals", self.count, job, Part { start: 1.0, len: 0.0 }, lost).map(Some)
+    }
+
+    /// Colours of any number type to 8 bits, and whether these say it all. Wide types often hold 8-bit values, and floats
+    /// 0 to 1 or 0 to 255, so the largest value decides.
+    fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: Part) -> Result<(Vec<[u8; 3]>, bool), Error> {
         let rgb = rgb.each_ref();
         if rgb.iter().all(|column| column.scalar == Scalar::U8) {
-            return collect("colours", self.count, job, part, |i| rgb.map(|column| self.value::<u8>(column, i)));
+            let colors = collect("colours", self.count, job, part, |i| rgb.map(|column| self.value::<u8>(column, i)))?;
+            return Ok((colors, true));
         }
         job.tick(part.start)?;
         let largest = |i: usize| rgb.map(|column| self.value_f64(column, i)).into_iter().fold(0.0, f64::max);
@@ -219,7 +291,16 @@ impl Table<'_> {
         // 16-bit values are cut, not rounded: that returns the byte both of v * 256 and of v * 257.
         let round = if scale < 1.0 { 0.0 } else { 0.5 };
         let convert = |value: f64| (value * scale + round) as u8;
-        collect("colours", self.count, job, part, |i| rgb.map(|column| convert(self.value_f64(column, i))))
+        if !float && largest <= 255.0 && rgb.iter().any(|column| column.scalar.size() > 1) && self.count > 0 {
+            job.note("colours of 16 bits or more have no value above 255; taken for 8 bits");
+        }
+        let colors =
+            collect("colours", self.count, job, part, |i| rgb.map(|column| convert(self.value_f64(column, i))))?;
+        let back = if scale < 1.0 { 257.0 } else { 1.0 / scale };
+        let same = |value: f64| (value - f64::from(convert(value)) * back).abs() < 1e-6;
+        let exact = !job.options.exact
+            || (0..self.count).into_par_iter().all(|i| rgb.iter().all(|column| same(self.value_f64(column, i))));
+        Ok((colors, exact))
     }
 
     fn field(&self, job: &Job<'_>, column: &Column, part: Part) -> Result<FieldValues, Error> {
@@ -235,12 +316,10 @@ impl Table<'_> {
             Scalar::U16 => typed!(U16),
             Scalar::I32 => typed!(I32),
             Scalar::U32 => typed!(U32),
+            Scalar::I64 => typed!(I64),
+            Scalar::U64 => typed!(U64),
             Scalar::F32 => typed!(F32),
             Scalar::F64 => typed!(F64),
-            // No field is that wide; 53 bits of it survive.
-            Scalar::I64 | Scalar::U64 => {
-                FieldValues::F64(collect(&column.name, self.count, job, part, |i| self.value_f64(column, i))?)
-            }
         })
     }
 }

@@ -4,11 +4,20 @@
 //! rows: 3 are positions, 4 add an intensity, 6 a colour or a normal, 7 both intensity and colour, and so on.
 
 use super::{
-    Job, MAX_HEADER_LINE,
+    Description, Format, Job, MAX_HEADER_LINE,
     table::{Column, MAX_COLUMNS, Part, Scalar, Table},
     text::{self, Rows, Token},
 };
 use crate::{Error, PointCloud};
+
+pub(super) const FORMAT: Format = Format {
+    name: "text",
+    extensions: &["xyz", "txt", "csv", "pts", "asc"],
+    recognised: |_| false,
+    sensor_frame: false,
+    describe,
+    read: |job| Ok(read(job)?.into()),
+};
 
 /// Part of the work that parsing is.
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
@@ -25,7 +34,11 @@ struct Preamble {
     start: usize,
 }
 
-pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
+fn describe(_job: &Job<'_>) -> Result<Description, Error> {
+    Ok(Description { format: "text".into(), ..Description::default() })
+}
+
+fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
     let bytes = job.bytes;
     if bytes.is_empty() {
         return Err(job.malformed("byte 0", "the file is empty; copy it again"));

@@ -1,13 +1,16 @@
 //! PLY, binary little endian: the one format that keeps all a cloud has.
 
 use std::{
-    io::Write as _,
-    path::{Path, PathBuf},
+    fs::File,
+    io::{BufWriter, Write as _},
 };
 
 use rayon::prelude::*;
 
-use crate::{Axes, Error, Field, FieldValues, PointCloud, Progress, cloud::each_type, progress::tick};
+use super::{Format, Job};
+use crate::{Axes, Error, Field, FieldValues, PointCloud, cloud::each_type};
+
+pub(super) const FORMAT: Format = Format { name: "PLY", extensions: &["ply"], write };
 
 /// Bytes encoded before they are written.
 const BUFFER: usize = 4 << 20;
@@ -15,39 +18,23 @@ const BUFFER: usize = 4 << 20;
 /// Records that one thread encodes at a time.
 const PIECE: usize = 1 << 13;
 
-/// Writes `cloud` as a binary little-endian PLY that [`read`](crate::read) turns back into the same cloud.
-///
-/// Positions are floats if the cloud's origin is zero, else world coordinates in double precision. Blanks in field names
-/// become underscores. The file appears complete or not at all: it is written beside `path` under another name, which
-/// is removed on failure, and then renamed, replacing what was there.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be written, [`Error::Cancelled`] if `progress` says so.
-pub fn write_ply(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
-    let io = |source| Error::Io { path: PathBuf::from(path), source };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".autosplats-").suffix(".tmp");
-    // Temporary files are for their owner alone unless told otherwise; the result is a file like any.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(io)?;
-
+/// Positions are floats if the cloud's origin is zero and it has no residuals, else world coordinates in double
+/// precision. Blanks in field names become underscores.
+fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
+    let cloud = job.cloud;
     let layout = Layout::of(cloud);
-    file.write_all(layout.header(cloud).as_bytes()).map_err(io)?;
+    file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
     let block = (BUFFER / layout.stride).max(PIECE);
     let mut buffer = vec![0; block.min(cloud.len()) * layout.stride];
     for start in (0..cloud.len()).step_by(block) {
-        tick(progress, start as f32 / cloud.len() as f32)?;
+        job.tick(start as f32 / cloud.len() as f32)?;
         let records = &mut buffer[..block.min(cloud.len() - start) * layout.stride];
         records
             .par_chunks_mut(PIECE * layout.stride)
             .enumerate()
             .for_each(|(index, records)| layout.encode(cloud, start + index * PIECE, records));
-        file.write_all(records).map_err(io)?;
+        file.write_all(records).map_err(|source| job.io(source))?;
     }
-    tick(progress, 1.0)?;
-    file.persist(path).map_err(|error| io(error.error))?;
     Ok(())
 }
 
@@ -60,7 +47,7 @@ struct Layout {
 
 impl Layout {
     fn of(cloud: &PointCloud) -> Self {
-        let doubles = cloud.origin() != glam::DVec3::ZERO;
+        let doubles = cloud.origin() != glam::DVec3::ZERO || cloud.residuals().is_some();
         let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
         let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 3 } else { 0 } + fields;
         Self { doubles, names: property_names(cloud.fields()), stride }
@@ -103,9 +90,15 @@ impl Layout {
             self.place(records, &mut at, colors[range.clone()].iter().copied());
         }
         for field in cloud.fields() {
-            each_type!(&field.values, v => {
-                self.place(records, &mut at, v[range.clone()].iter().map(|value| value.to_le_bytes()));
-            });
+            match &field.values {
+                FieldValues::U64(_) | FieldValues::I64(_) => {
+                    let doubles = range.clone().map(|i| field.values.get(i).to_le_bytes());
+                    self.place(records, &mut at, doubles);
+                }
+                values => each_type!(values, v => {
+                    self.place(records, &mut at, v[range.clone()].iter().map(|value| value.to_le_bytes()));
+                }),
+            }
         }
     }
 
@@ -128,7 +121,8 @@ fn scalar(values: &FieldValues) -> (&'static str, usize) {
         FieldValues::I32(_) => ("int", 4),
         FieldValues::U32(_) => ("uint", 4),
         FieldValues::F32(_) => ("float", 4),
-        FieldValues::F64(_) => ("double", 8),
+        // PLY has no wider integers; 53 bits survive.
+        FieldValues::U64(_) | FieldValues::I64(_) | FieldValues::F64(_) => ("double", 8),
     }
 }
 

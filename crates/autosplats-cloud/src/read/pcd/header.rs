@@ -15,6 +15,16 @@ pub(super) enum Encoding {
     Compressed,
 }
 
+impl Encoding {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Ascii => "ascii",
+            Self::Binary => "binary",
+            Self::Compressed => "binary, compressed",
+        }
+    }
+}
+
 /// A named number, or `count` of them, of each point.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
@@ -42,6 +52,9 @@ fn words(line: &[u8]) -> Vec<String> {
 
 impl Header {
     pub(super) fn parse(job: &Job<'_>) -> Result<Self, Error> {
+        if job.bytes.is_empty() {
+            return Err(job.malformed("byte 0", "the file is empty; copy it again"));
+        }
         let (mut names, mut sizes, mut types, mut counts) = (None, None, None, None);
         let (mut width, mut height, mut points) = (None, None, None);
         let mut viewpoint_is_identity = true;
@@ -143,7 +156,7 @@ fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {
 }
 
 /// Whether the file begins as a PCD header does, comments apart.
-pub(crate) fn recognised(bytes: &[u8]) -> bool {
+pub(super) fn recognised(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(1 << 12)];
     let first = start.split(|&byte| byte == b'\n').map(words).find(|words| {
         let first = words.first().map_or("#", String::as_str);

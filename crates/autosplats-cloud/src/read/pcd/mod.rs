@@ -3,24 +3,38 @@
 mod header;
 mod lzf;
 
-pub(super) use self::header::recognised;
 use glam::DVec3;
 
 use self::header::{Encoding, Header};
 use super::{
-    Job,
+    Attribute, Contents, Description, Format, Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, Token},
 };
 use crate::{Axes, Error, PointCloud};
 
+pub(super) const FORMAT: Format =
+    Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
+
 /// Part of the work that parsing text is.
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
 
-pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
-    if job.bytes.is_empty() {
-        return Err(job.malformed("byte 0", "the file is empty; copy it again"));
-    }
+fn describe(job: &Job<'_>) -> Result<Description, Error> {
+    let header = Header::parse(job)?;
+    let stored = |field: &header::Field| match field.count {
+        1 => field.scalar.name().to_owned(),
+        count => format!("{count} × {}", field.scalar.name()),
+    };
+    let fields = header.fields.iter().filter(|field| field.name != "_");
+    Ok(Description {
+        format: format!("PCD, {}", header.encoding.name()),
+        points: Some(header.points as u64),
+        attributes: fields.map(|field| Attribute::new(shown(field.name.as_bytes()), stored(field))).collect(),
+        ..Description::default()
+    })
+}
+
+fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let header = Header::parse(job)?;
     let stride = header.stride().ok_or_else(|| job.malformed("header", "a point is larger than any memory"))?;
     let cloud = match header.encoding {
@@ -35,16 +49,20 @@ pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
                     format!("the file ends after {complete} of {} points; it is cut off, copy it again", header.points),
                 ));
             }
-            table(&header, bytes, 0.0, |before, _| (before, stride)).into_cloud(job, "header")?
+            let table = table(&header, bytes, 0.0, |before, _| (before, stride));
+            table.preview(job, "header")?;
+            table.into_cloud(job, "header")?
         }
         Encoding::Compressed => {
             job.check_not_text_converted(header.end)?;
             let bytes = decompress(job, &header, stride)?;
             // Compressed files hold all values of the first field, then all of the second, and so on.
-            table(&header, &bytes, 0.5, |before, size| (before * header.points, size)).into_cloud(job, "header")?
+            let table = table(&header, &bytes, 0.5, |before, size| (before * header.points, size));
+            table.preview(job, "header")?;
+            table.into_cloud(job, "header")?
         }
     };
-    Ok(if seen_from_origin(&header, &cloud) { cloud.with_axes(Axes::Camera) } else { cloud })
+    Ok(if seen_from_origin(&header, &cloud) { cloud.with_axes(Axes::Camera) } else { cloud }.into())
 }
 
 /// The columns over binary data. `place` makes offset and stride of a field from the bytes of a point before it and of

@@ -11,6 +11,16 @@ pub(super) enum Encoding {
     Big,
 }
 
+impl Encoding {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Ascii => "ascii",
+            Self::Little => "binary little endian",
+            Self::Big => "binary big endian",
+        }
+    }
+}
+
 /// One value of an element, or a list of values.
 #[derive(Clone, Debug)]
 pub(super) struct Property {

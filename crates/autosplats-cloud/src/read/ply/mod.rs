@@ -4,20 +4,50 @@ mod header;
 
 use self::header::{Element, Encoding, Header};
 use super::{
-    Job, shown,
+    Attribute, Contents, Description, Format, Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, Token},
 };
 use crate::{Error, PointCloud};
 
+pub(super) const FORMAT: Format = Format {
+    name: "PLY",
+    extensions: &["ply"],
+    recognised: |bytes| bytes.starts_with(b"ply") && bytes.get(3).is_none_or(u8::is_ascii_whitespace),
+    sensor_frame: false,
+    describe,
+    read,
+};
+
 /// Part of the work that packing text or lists into records is.
 const PACKING: Part = Part { start: 0.0, len: 0.8 };
 
-pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
+fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let header = Header::parse(job)?;
-    let Some(index) = header.elements.iter().position(|element| element.name == "vertex") else {
-        return Err(job.malformed("header", "there is no element 'vertex', hence no points"));
+    let vertex = &header.elements[vertices(job, &header)?];
+    let stored = |property: &header::Property| match property.list {
+        Some(_) => format!("list of {}", property.scalar.name()),
+        None => property.scalar.name().into(),
     };
+    let others = header.elements.iter().filter(|element| element.name != "vertex");
+    Ok(Description {
+        format: format!("PLY, {}", header.encoding.name()),
+        points: Some(vertex.count as u64),
+        faces: header.elements.iter().find(|element| element.name == "face").map(|face| face.count as u64),
+        attributes: vertex.properties.iter().map(|p| Attribute::new(shown(p.name.as_bytes()), stored(p))).collect(),
+        details: others.map(|e| (format!("element {}", shown(e.name.as_bytes())), e.count.to_string())).collect(),
+        ..Description::default()
+    })
+}
+
+fn vertices(job: &Job<'_>, header: &Header) -> Result<usize, Error> {
+    let index = header.elements.iter().position(|element| element.name == "vertex");
+    index.ok_or_else(|| job.malformed("header", "there is no element 'vertex', hence no points"))
+}
+
+fn read(job: &Job<'_>) -> Result<Contents, Error> {
+    let header = Header::parse(job)?;
+    let index = vertices(job, &header)?;
     let (before, vertex) = (&header.elements[..index], &header.elements[index]);
     if header.encoding != Encoding::Ascii {
         job.check_not_text_converted(header.end)?;
@@ -28,8 +58,8 @@ pub(super) fn read(job: &Job<'_>) -> Result<PointCloud, Error> {
         (_, None) => with_lists(job, &header, before, vertex)?,
     };
     Ok(match header.axes {
-        Some(axes) => cloud.with_axes(axes),
-        None => cloud,
+        Some(axes) => cloud.with_axes(axes).into(),
+        None => cloud.into(),
     })
 }
 
@@ -82,7 +112,9 @@ fn plain(
     });
     let columns = columns.collect();
     let big_endian = header.encoding == Encoding::Big;
-    Table { bytes, count: vertex.count, big_endian, columns, packed_rgb: false, done: 0.0 }.into_cloud(job, "header")
+    let table = Table { bytes, count: vertex.count, big_endian, columns, packed_rgb: false, done: 0.0 };
+    table.preview(job, "header")?;
+    table.into_cloud(job, "header")
 }
 
 /// Lists make records of unequal length: the other values are packed together first.
