@@ -36,7 +36,7 @@ pub use memory::{available_memory, check_memory};
 pub use progress::Progress;
 pub use read::{
     Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
-    read_mesh, read_with,
+    read_mesh, read_mesh_bytes, read_with,
 };
 pub use source::scene::{Hit, Scene, View};
 pub use write::{check_writable, write, written_formats};

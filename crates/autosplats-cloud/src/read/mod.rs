@@ -119,7 +119,20 @@ pub fn read_bytes(
 /// Those of [`read`].
 pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Contents, Error> {
     let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    contents(&Job { path, progress, bytes: &bytes, options, triangles: true })
+    read_mesh_bytes(path, &bytes, options, progress)
+}
+
+/// [Reads](read_mesh) points and triangles from the bytes of a file.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_mesh_bytes(
+    name: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<Contents, Error> {
+    contents(&Job { path: name, progress, bytes, options, triangles: true })
 }
 
 /// What the header of a file says, in milliseconds whatever its size; formats without a header that counts are looked
