@@ -9,12 +9,18 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
-usage: cargo xtask test    format, lints, build, tests, documentation and the rules between crates and stages";
+usage: cargo xtask test            format, lints, build, tests, documentation, the rules between crates and stages,
+                               and a minute of broken files
+       cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options";
+
+/// Seconds that the tests feed broken files to the readers.
+const FUZZ_SECONDS: &str = "60";
 
 fn main() -> ExitCode {
     let typed: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["test"] => test(),
+        ["test"] => root().and_then(test),
+        ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
         [] | ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())
@@ -30,10 +36,18 @@ fn main() -> ExitCode {
     }
 }
 
+fn root() -> Result<&'static Path> {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")
+}
+
+/// Broken files for every reader. Built like the tests, so that overflows are found too.
+fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
+    cargo(root, &[&["run", "--locked", "--quiet", "-p", "autosplats-fuzz", "--"], options].concat())
+}
+
 /// Everything a change has to pass, cheapest first.
-fn test() -> Result<()> {
+fn test(root: &Path) -> Result<()> {
     let start = Instant::now();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")?;
     let step = |name: &str, check: &dyn Fn() -> Result<()>| {
         println!("\n== {name}");
         let start = Instant::now();
@@ -54,6 +68,7 @@ fn test() -> Result<()> {
     })?;
     step("build", &|| cargo(root, &["test", "--locked", "--workspace", "--no-run"]))?;
     step("tests", &|| cargo(root, &["test", "--locked", "--workspace"]))?;
+    step("broken files", &|| fuzz(root, &["--seconds", FUZZ_SECONDS]))?;
     step("documentation", &|| {
         let mut command = cargo_command(root);
         run(command.args(["doc", "--locked", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
