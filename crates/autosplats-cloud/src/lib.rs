@@ -25,6 +25,7 @@ mod progress;
 mod read;
 mod retain;
 mod source;
+mod thin;
 mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
@@ -38,5 +39,5 @@ pub use read::{
     Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
     read_mesh, read_mesh_bytes, read_with,
 };
-pub use source::scene::{Hit, Scene, View};
+pub use source::scene::{Hit, Scene, View, parse_count};
 pub use write::{check_writable, write, written_formats};
