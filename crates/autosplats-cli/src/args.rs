@@ -80,7 +80,7 @@ pub(crate) struct RenderArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct InputArgs {
-    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP, help_heading = "Arguments")]
+    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP, help_heading = None::<&'static str>)]
     pub(crate) inputs: Vec<String>,
     /// Place an input by a text file: a row-major 4x4 (or 3x4) matrix from its own to world coordinates, or the seven
     /// numbers tx ty tz qx qy qz qw
@@ -232,7 +232,7 @@ Examples:
 pub(crate) struct ConvertArgs {
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    #[arg(value_name = "OUT", help = output_help(), help_heading = "Arguments")]
+    #[arg(value_name = "OUT", help = output_help(), help_heading = None::<&'static str>)]
     pub(crate) output: PathBuf,
     /// Replace an existing file
     #[arg(long, help_heading = "Running")]

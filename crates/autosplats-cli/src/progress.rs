@@ -4,6 +4,7 @@ use std::io::{IsTerminal as _, stderr};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -50,7 +51,7 @@ impl Bar {
 
     /// A share of this task, one of `parts` equal ones, that reports on an input.
     pub(crate) fn part(&self, parts: usize, subject: &str) -> Part<'_> {
-        Part { bar: self, parts, subject: subject.into(), done: AtomicU64::new(0) }
+        Part { bar: self, parts, subject: subject.into(), done: AtomicU64::new(0), notes: Mutex::default() }
     }
 
     /// Starts a task that cannot say how far it is.
@@ -106,6 +107,8 @@ pub(crate) struct Part<'a> {
     subject: String,
     /// Steps of the bar that this part has added.
     done: AtomicU64,
+    /// Told in the end, so that the notes of several parts do not mix.
+    notes: Mutex<Vec<String>>,
 }
 
 impl Progress for Part<'_> {
@@ -120,7 +123,15 @@ impl Progress for Part<'_> {
     }
 
     fn note(&self, note: &str) {
-        self.bar.tell(&self.subject, note);
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+    }
+}
+
+impl Drop for Part<'_> {
+    fn drop(&mut self) {
+        for note in self.notes.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            self.bar.tell(&self.subject, note);
+        }
     }
 }
 

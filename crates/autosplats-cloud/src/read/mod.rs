@@ -183,7 +183,7 @@ fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
         return;
     }
     let keep: Vec<bool> = (0..cloud.len()).into_par_iter().map(|i| !absent(i)).collect();
-    job.note(format!("{count} of {} points are at (0, 0, 0), where nothing was measured; dropped", cloud.len()));
+    job.note(format!("dropped {count} of {} points at (0, 0, 0), where nothing was measured", cloud.len()));
     cloud.retain(|i| keep[i]);
 }
 
