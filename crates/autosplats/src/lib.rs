@@ -21,6 +21,9 @@
 //! assert_eq!(frame.image.pixels.len(), 400 * 300);
 //! # Ok::<(), autosplats::Error>(())
 //! ```
+//!
+//! [`estimate_normals`] computes for all points of a cloud what a picture shows of those seen: normal, curvature and density
+//! radius, from the exact nearest neighbours in space.
 
 mod camera;
 mod error;
