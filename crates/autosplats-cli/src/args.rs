@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use autosplats::{Background, ColorMode, Reconstruction, Shading};
+use autosplats::{Background, ColorMode, NormalSettings, Reconstruction, Shading};
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{DepthCamera, written_formats};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -34,6 +34,8 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Write any input, or several as one, in another format, whole or thinned
     Convert(Box<ConvertArgs>),
+    /// Estimate normals, curvature and density of all points into a file
+    Normals(Box<NormalsArgs>),
     /// Render every built-in scene and say where the pictures are
     Demo(DemoArgs),
 }
@@ -268,6 +270,51 @@ pub(crate) struct ThinningArgs {
 fn output_help() -> String {
     let formats = written_formats().flat_map(|(_, extensions)| extensions).map(|extension| format!(".{extension}"));
     format!("File to write; its name tells the format: {}", formats.collect::<Vec<_>>().join(" "))
+}
+
+const NORMALS_EXAMPLES: &str = "\
+Examples:
+  autosplats normals scan.e57 normals.ply
+  autosplats normals survey.laz normals.laz -k 20 --orient up
+  autosplats normals sweep.bin normals.ply --sensor 0,0,1.8
+
+The file gets all that the input has and the fields NormalX, NormalY, NormalZ, Curvature (0 flat, 1/3 no surface) and
+DensityRadius (twice the radius of the circle that each neighbour covers on average).";
+
+#[derive(Args, Debug)]
+#[command(after_help = NORMALS_EXAMPLES)]
+pub(crate) struct NormalsArgs {
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    #[arg(value_name = "OUT", help = output_help(), help_heading = None::<&'static str>)]
+    pub(crate) output: PathBuf,
+    /// Neighbours of each point that a plane is fitted to, 3 to 1024; more is smoother
+    #[arg(short, value_name = "COUNT", default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
+    pub(crate) k: u32,
+    /// Which of its two sides a normal points to
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Normals")]
+    pub(crate) orient: OrientChoice,
+    /// World coordinates of the one sensor that saw all points, if the file does not say
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "orient", help_heading = "Normals")]
+    pub(crate) sensor: Option<DVec3>,
+    /// Replace an existing file
+    #[arg(long, help_heading = "Running")]
+    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+/// Which way normals point.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum OrientChoice {
+    /// To the sensor where the file tells its place, else upward for land, else outward
+    Auto,
+    /// To the sensor
+    Sensor,
+    /// Upward, along z
+    Up,
+    /// Away from the middle
+    Outward,
 }
 
 #[derive(Args, Debug)]

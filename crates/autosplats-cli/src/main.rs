@@ -10,6 +10,7 @@ mod device;
 mod exit;
 mod input;
 mod interrupt;
+mod normals;
 mod output;
 mod progress;
 mod render;
@@ -50,6 +51,7 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
     match command_line.command {
         Some(Command::Render(args)) => render::run(*args),
         Some(Command::Convert(args)) => convert::run(&args),
+        Some(Command::Normals(args)) => normals::run(&args),
         Some(Command::Demo(args)) => demo::run(&args),
         None => Err(Failure::usage(without_command(&command_line.rest))),
     }
