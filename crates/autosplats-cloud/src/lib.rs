@@ -19,6 +19,8 @@
 mod cloud;
 mod crs;
 mod error;
+mod geographic;
+mod las;
 mod memory;
 mod merge;
 mod progress;
@@ -29,7 +31,7 @@ mod thin;
 mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
-pub use crs::{Crs, Unit};
+pub use crs::{Crs, GeoKeys, Unit};
 pub use error::Error;
 /// The vector library of the public interface.
 pub use glam;

@@ -12,7 +12,6 @@
 mod describe;
 mod guard;
 mod las;
-mod laz;
 mod options;
 mod pcd;
 mod ply;
