@@ -10,11 +10,17 @@
 //! A file is not trusted: what its header claims is checked against its size before anything is allocated.
 
 mod describe;
+mod gltf;
 mod guard;
 mod las;
+mod lines;
+mod mesh;
+mod obj;
+mod off;
 mod options;
 mod pcd;
 mod ply;
+mod stl;
 mod table;
 mod text;
 mod xyz;
@@ -49,7 +55,20 @@ struct Format {
 
 /// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
 /// extensions go before shorter ones.
-const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &xyz::FORMAT];
+const FORMATS: &[&Format] = &[
+    &las::FORMAT,
+    &ply::FORMAT,
+    &pcd::FORMAT,
+    &xyz::FORMAT,
+    &gltf::FORMAT,
+    &off::FORMAT,
+    &obj::FORMAT,
+    // Its mark is only a number that fits the file's size, so it comes last.
+    &stl::FORMAT,
+];
+
+/// Formats of models, of which (0, 0, 0) is a point like any.
+const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -165,8 +184,9 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     job.tick(0.0)?;
     let format = format(job)?;
     let mut contents = (format.read)(job)?;
+    let model = MODELS.iter().any(|model| model.name == format.name);
     // A mesh would lose its corners.
-    if !job.options.keep_no_returns && contents.triangles.is_empty() {
+    if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
     job.tick(1.0)?;
@@ -197,7 +217,6 @@ struct Job<'a> {
     bytes: &'a [u8],
     options: &'a ReadOptions,
     /// Whether triangles are wanted.
-    #[allow(dead_code, reason = "meshes use it")]
     triangles: bool,
 }
 
