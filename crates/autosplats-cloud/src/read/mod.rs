@@ -10,11 +10,13 @@
 //! A file is not trusted: what its header claims is checked against its size before anything is allocated.
 
 mod describe;
+mod e57;
 mod guard;
 mod las;
 mod laz;
 mod options;
 mod pcd;
+mod placed;
 mod ply;
 mod table;
 mod text;
@@ -50,7 +52,7 @@ struct Format {
 
 /// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
 /// extensions go before shorter ones.
-const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &xyz::FORMAT];
+const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &e57::FORMAT, &xyz::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
