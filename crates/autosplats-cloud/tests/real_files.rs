@@ -159,6 +159,10 @@ fn malformed_files_are_told_or_read() {
     // Points that can be vouched for, or words the error must contain.
     let expected: &[(&str, Result<usize, &str>)] = &[
         ("copc_fake.copc.laz", Err("header")),
+        ("e57_corrupt_crc.e57", Err("checksum of page")),
+        ("e57_empty.e57", Ok(0)),
+        ("e57_invalid_cv_header.e57", Ok(0)),
+        ("e57_read_error.e57", Ok(2651)),
         ("las_bad_vlr_count.las", Ok(10)),
         ("las_gps_time_nan.las", Ok(1)),
         ("las_lots_of_vlr.las", Ok(1)),

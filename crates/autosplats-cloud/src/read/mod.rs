@@ -11,6 +11,7 @@
 
 mod describe;
 mod gltf;
+mod e57;
 mod guard;
 mod las;
 mod lines;
@@ -19,6 +20,7 @@ mod obj;
 mod off;
 mod options;
 mod pcd;
+mod placed;
 mod ply;
 mod stl;
 mod table;
@@ -69,6 +71,7 @@ const FORMATS: &[&Format] = &[
 
 /// Formats of models, of which (0, 0, 0) is a point like any.
 const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
+const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &e57::FORMAT, &xyz::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
