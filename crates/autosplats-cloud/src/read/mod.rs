@@ -4,14 +4,17 @@
 //!
 //! A file is mapped into memory and its format told by its first bytes, then by its extension. Every format ends in the
 //! same shape, a [`table`]: named columns of numbers at fixed distances, from which positions, colours and fields are
-//! taken in parallel. Binary PLY and PCD are such a table as they lie on the disk; text and lists are first packed into
-//! one. LAS has columns of bits and integer coordinates and makes its cloud itself.
+//! taken in parallel. Binary PLY and PCD are such a table as they lie on the disk; their text and lists are first packed
+//! into one, while rows of bare text, which can be the largest, go straight into the columns of a cloud.
+//! LAS has columns of bits and integer coordinates and makes its cloud itself.
 //!
 //! A file is not trusted: what its header claims is checked against its size before anything is allocated.
 
+mod columns;
+mod depth_image;
 mod describe;
-mod gltf;
 mod e57;
+mod gltf;
 mod guard;
 mod las;
 mod lines;
@@ -22,6 +25,7 @@ mod options;
 mod pcd;
 mod placed;
 mod ply;
+mod raw;
 mod stl;
 mod table;
 mod text;
@@ -61,17 +65,19 @@ const FORMATS: &[&Format] = &[
     &las::FORMAT,
     &ply::FORMAT,
     &pcd::FORMAT,
-    &xyz::FORMAT,
+    &e57::FORMAT,
     &gltf::FORMAT,
     &off::FORMAT,
     &obj::FORMAT,
+    &depth_image::FORMAT,
+    &raw::FORMAT,
+    &xyz::FORMAT,
     // Its mark is only a number that fits the file's size, so it comes last.
     &stl::FORMAT,
 ];
 
 /// Formats of models, of which (0, 0, 0) is a point like any.
 const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
-const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &e57::FORMAT, &xyz::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -180,7 +186,9 @@ fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
     let by_name = || FORMATS.iter().find(|format| format.extensions.iter().any(ends));
-    by_content.or_else(by_name).copied().ok_or_else(|| Error::UnknownFormat { path: job.path.into() })
+    // Rows of numbers can stand in files of any name, so they are looked for last.
+    let rows = || xyz::looks_like_rows(job.bytes).then_some(&&xyz::FORMAT);
+    by_content.or_else(by_name).or_else(rows).copied().ok_or_else(|| Error::UnknownFormat { path: job.path.into() })
 }
 
 fn contents(job: &Job<'_>) -> Result<Contents, Error> {
