@@ -1,5 +1,6 @@
 //! The project's own tasks. `cargo xtask test` is everything CI runs.
 
+mod formats;
 mod layers;
 
 use std::path::{Path, PathBuf};
@@ -9,12 +10,17 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
-usage: cargo xtask test    format, lints, build, tests, documentation and the rules between crates and stages";
+usage: cargo xtask test    format, lints, build, tests, documentation and the rules between crates and stages
+       cargo xtask formats [--check]
+                           docs/FORMATS.md, from what the program says of its formats and of the test data; with
+                           --check only whether it is what this build makes";
 
 fn main() -> ExitCode {
     let typed: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["test"] => test(),
+        ["formats"] => root().and_then(|root| formats::run(root, false)),
+        ["formats", "--check"] => root().and_then(|root| formats::run(root, true)),
         [] | ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())
@@ -30,10 +36,14 @@ fn main() -> ExitCode {
     }
 }
 
+fn root() -> Result<&'static Path> {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")
+}
+
 /// Everything a change has to pass, cheapest first.
 fn test() -> Result<()> {
     let start = Instant::now();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")?;
+    let root = root()?;
     let step = |name: &str, check: &dyn Fn() -> Result<()>| {
         println!("\n== {name}");
         let start = Instant::now();

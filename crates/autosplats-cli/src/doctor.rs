@@ -129,11 +129,7 @@ impl Findings {
             ok: self_test.errors.is_empty(),
             backends: vec![
                 Backend { name: "cpu", ready: self_test.render_ms.is_some(), about },
-                Backend {
-                    name: "gpu",
-                    ready: false,
-                    about: "not in this version; graphics adapters are not asked for",
-                },
+                Backend { name: "gpu", ready: false, about: "not in this version" },
             ],
             adapters: [],
             cpu: Cpu { name, threads, simd_found: simd, simd_used, lanes },
@@ -162,10 +158,18 @@ impl Findings {
         };
         for Backend { name, ready, about } in &self.backends {
             let state = if *ready { "ready" } else { "not ready" };
-            line(*ready, &format!("{name}"), format!("{state}: {about}"));
+            line(*ready, name, format!("{state}: {about}"));
         }
+        line(false, "adapters", "none asked for: this version does not use graphics cards".into());
         let Cpu { name, threads, simd_found, simd_used, lanes } = &self.cpu;
-        line(true, "processor", format!("{name}; {}", plural(*threads, "thread")));
+        line(
+            true,
+            "processor",
+            format!(
+                "{name}; {} the work",
+                if *threads == 1 { "one thread does".into() } else { format!("{threads} threads share") }
+            ),
+        );
         let found = if simd_found.is_empty() { "none known".into() } else { simd_found.join(" ") };
         let per = match lanes {
             1 => "one number at a time: rendering takes several times as long".into(),
@@ -294,8 +298,4 @@ fn total_memory() -> Option<u64> {
 
 fn gigabytes(bytes: u64) -> String {
     format!("{:.1} GB", bytes as f64 / 1e9)
-}
-
-fn plural(count: usize, what: &str) -> String {
-    if count == 1 { format!("one {what}") } else { format!("{count} {what}s") }
 }

@@ -6,7 +6,8 @@ use std::sync::{Mutex, PoisonError};
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{
-    Attribute, Description, Error, FieldValues, PointCloud, Progress, ReadOptions, Scene, Unit, describe, read_with,
+    Attribute, Description, Error, FieldValues, PointCloud, Progress, ReadOptions, Scene, Unit, check_memory, describe,
+    read_with,
 };
 use rayon::prelude::*;
 
@@ -129,8 +130,13 @@ impl Report {
         self.crs = CrsFound::from(crs);
         self.resolution = resolution.map(Into::into);
         self.scans = scans.iter().map(ScanFound::from).collect();
-        self.details =
-            details.iter().map(|(name, value)| Detail { name: name.clone(), value: value.clone() }).collect();
+        // What is told above needs no telling again.
+        let told = |name: &str| name == "element face" && faces.is_some();
+        self.details = details
+            .iter()
+            .filter(|(name, _)| !told(name))
+            .map(|(name, value)| Detail { name: name.clone(), value: value.clone() })
+            .collect();
         notes.iter().for_each(|note| self.warn(note.clone()));
         self.attributes = attributes
             .iter()
@@ -166,15 +172,41 @@ impl Report {
         if !cloud.scans().is_empty() {
             self.scans = cloud.scans().iter().map(ScanFound::from).collect();
         }
+        self.attributes = values_of(cloud, attributes);
+        self.tidy();
+        self.compare(header_bounds);
+        if count == 0 {
+            self.warn(if cloud.is_empty() { "there is no point in it" } else { "no point has a place" }.into());
+            return;
+        }
+        if check_memory("", cloud.len() as u64 * spacing::BYTES_PER_POINT).is_err() {
+            self.warn("there is not enough memory to measure spacing and count duplicates; thin the cloud".into());
+            return;
+        }
         self.duplicates = Some(spacing::duplicates(cloud));
         if cloud.crs().unit == Some(Unit::Degree) {
             self.warn("x and y are degrees, z is not: there is no spacing or density; project them to metres".into());
         } else {
             (self.spacing, self.density) = spacing::measure(cloud);
         }
-        self.attributes = values_of(cloud, attributes);
-        self.compare(header_bounds);
         self.check_digits();
+    }
+
+    /// Takes off the last digits of coordinates, which the parts they are added up from do not have.
+    fn tidy(&mut self) {
+        let Some(bounds) = &mut self.bounds else { return };
+        let largest = bounds.min.iter().chain(&bounds.max).fold(0.0_f64, |most, value| most.max(value.abs()));
+        let tidy = |value: &mut f64| *value = tidy(*value, largest);
+        for axis in 0..3 {
+            [&mut bounds.min, &mut bounds.max, &mut bounds.size].into_iter().for_each(|ends| tidy(&mut ends[axis]));
+        }
+        for AttributeFound { name, statistics, .. } in &mut self.attributes {
+            if let Some(Meaning::Axis(_)) = meaning(name) {
+                let Statistics { min, max, mean, histogram, .. } = statistics;
+                [min, max, mean].into_iter().flatten().for_each(tidy);
+                histogram.iter_mut().flat_map(|histogram| &mut histogram.edges).for_each(tidy);
+            }
+        }
     }
 
     /// Says where the header does not fit the points.
@@ -226,6 +258,15 @@ impl Report {
             ));
         }
     }
+}
+
+/// `value` with as many decimals as numbers up to `largest` have in 15 digits.
+fn tidy(value: f64, largest: f64) -> f64 {
+    let decimals = if largest > 0.0 { 14 - largest.log10().floor() as i32 } else { 0 };
+    let shift = 10_f64.powi(decimals.abs());
+    let tidy = if decimals >= 0 { (value * shift).round() / shift } else { value };
+    // A shift beyond all numbers leaves nothing; and there is no minus zero.
+    if tidy.is_finite() { tidy + 0.0 } else { value }
 }
 
 /// What an attribute of a file becomes in a cloud, if not a field of the same name.
@@ -324,5 +365,81 @@ fn type_name(values: &FieldValues) -> &'static str {
         FieldValues::I64(_) => "int64",
         FieldValues::F32(_) => "float32",
         FieldValues::F64(_) => "float64",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use autosplats_cloud::Crs;
+
+    use super::*;
+
+    /// What the header of a survey in feet says.
+    fn header() -> Description {
+        let attribute = |name: &str, stored: &str| Attribute { name: name.into(), stored: stored.into() };
+        Description {
+            format: "LAS 1.2, point format 3".into(),
+            points: Some(4),
+            bounds: Some([DVec3::new(635_619.85, 848_899.7, 406.59), DVec3::new(635_720.85, 848_999.7, 506.59)]),
+            attributes: vec![
+                attribute("X", "int32 × 0.01"),
+                attribute("Y", "int32 × 0.01"),
+                attribute("Z", "int32 × 0.01"),
+                attribute("Classification", "uint8"),
+            ],
+            crs: Crs { epsg: Some(2992), unit: Some(Unit::UsSurveyFoot), ..Crs::default() },
+            resolution: Some(DVec3::splat(0.01)),
+            notes: vec!["from the header".into()],
+            ..Description::default()
+        }
+    }
+
+    fn cloud(last: [f32; 3]) -> PointCloud {
+        let positions = vec![[-0.15, -0.3, -3.41], [0.0, 0.0, 0.0], [50.0, 50.0, 50.0], last];
+        let cloud = PointCloud::new(DVec3::new(635_620.0, 848_900.0, 410.0), positions);
+        cloud.with_crs(header().crs).with_resolution(DVec3::splat(0.01))
+    }
+
+    #[test]
+    fn a_header_alone_has_bounds_units_and_types() {
+        let mut report = Report { file_bytes: Some(1000), ..Report::default() };
+        report.describe(&header());
+        let text = report.to_text(false);
+        for said in
+            ["101.00 × 100.00 × 100.00 ft (30.8 × 30.5 × 30.5 m)", "US survey foot", "EPSG:2992", "635720.85", "--scan"]
+        {
+            assert!(text.contains(said), "'{said}' is not in\n{text}");
+        }
+        assert!(text.contains("warning: from the header"), "notes are warnings:\n{text}");
+        assert!(!text.contains("distribution"), "there are no values:\n{text}");
+    }
+
+    #[test]
+    fn headers_that_contradict_the_points() {
+        let warnings = |last| {
+            let mut report = Report::default();
+            report.describe(&header());
+            report.scan(&cloud(last), &header().attributes);
+            report.warnings.join("; ")
+        };
+        assert_eq!(warnings([100.85, 99.7, 96.59]), "from the header", "as it says");
+        let off = warnings([100.85, 99.7, 196.59]);
+        assert!(off.contains("other bounds") && off.contains("z 406.59 to 506.59") && !off.contains("x "), "{off}");
+    }
+
+    #[test]
+    fn degrees_have_no_spacing() {
+        let mut report = Report::default();
+        let cloud = cloud([1.0; 3]).with_crs(Crs { unit: Some(Unit::Degree), ..Crs::default() });
+        report.scan(&cloud, &[]);
+        assert_eq!(report.spacing, None, "a degree is no height");
+        assert!(report.warnings.iter().any(|warning| warning.contains("degrees")), "{:?}", report.warnings);
+    }
+
+    #[test]
+    fn digits_beyond_the_fifteenth_are_noise() {
+        assert_eq!(tidy(-2.000_961_000_000_003_8, 25.0), -2.000_961, "of a sum");
+        assert_eq!(tidy(5_400_009.75, 6e6), 5_400_009.75, "coordinates stay");
+        assert_eq!([tidy(1e300, 1e300), tidy(0.0, 0.0), tidy(1e-310, 1e-310)], [1e300, 0.0, 1e-310], "extremes too");
     }
 }

@@ -8,32 +8,38 @@ use super::statistics::Statistics;
 
 /// The JSON of one input, as `info --help` and docs/FORMATS.md explain it.
 pub(crate) const SCHEMA: &str = "\
-Fields of the JSON object. What is not known is null, lists are then empty; NaN and infinity do not occur. Later versions
-may add fields.
+Fields of the JSON object. What is not known is null, and lists are then empty; NaN and infinity do
+not occur. Later versions may add fields.
   input             the name as typed
-  error             what kept it from being read in one line, else null
+  error             what kept it from being read, in one line
   format            format, version and encoding, for people
   file_bytes        size of the file
-  scanned           whether all points were read; else everything is from the header
-  points            points there are; without those at (0, 0, 0) where nothing was measured, if scanned
+  scanned           whether all points were read; if not, everything is from the header
+  points            points there are; if scanned without those at (0, 0, 0), where nothing was
+                    measured
   points_in_header  points that the header promises
   faces             faces of a mesh
-  bounds            least and greatest coordinates: {min: [x, y, z], max: […], size: […]}
-  axes              {name: z-up | y-up | camera, guessed: whether it is from the shape of the cloud}
-  crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as far as the file says
+  bounds            least and greatest coordinates: {min: [x, y, z], max: [...], size: [...]}
+  axes              {name: z-up, y-up or camera, guessed: whether from the shape of the cloud}
+  crs               {name, epsg, wkt, unit, vertical_unit, metres_per_unit}, as the file says
   resolution        step of which coordinates are multiples: [x, y, z]
-  spacing           distance to the nearest other point of all, at sampled points: {median, p5, p95, mean, samples}
-  density           points per square unit of the surface, at sampled points: {median, neighbors, samples}. At each,
-                    n / (π r²) with r the distance to its n-th nearest neighbour
+  spacing           distance to the nearest of all other points, at up to 10,000 points spread
+                    over the file: {median, p5, p95, mean, samples}; p5 and p95 are percentiles
+  density           points per square unit of surface: {median, neighbors, samples}; at each of
+                    the same points it is n / (pi r^2), r the distance to the n-th nearest
   duplicates        points at exactly the place of an earlier one
   not_finite        points with a coordinate that is infinite or not a number
-  attributes        {name, stored, min, max, mean, not_finite, distinct, values, histogram} of each value of a point,
-                    coordinates included; stored is the type in the file; distinct and values [{value, count, name}]
-                    only where they are few, names are those of the ASPRS classes; histogram is {edges, counts}, at
-                    most 32 equal bins, of whole numbers if all values are
-  scans             where sensors stood: {name, position, world_from_sensor (row by row), points: [first, end]}
-  details           further facts from the header: {name, value}
-  warnings          what was lost, guessed, dropped, scaled or contradicts itself";
+  attributes        values of a point, coordinates included: {name, stored, min, max, mean,
+                    not_finite, distinct, values, histogram}
+    stored          type in the file
+    distinct        how many different values there are, if all are whole and near each other
+    values          [{value, count, name}] if those are at most 32, or classes; name is that of
+                    the ASPRS class
+    histogram       {edges, counts}: up to 32 equal bins, of whole numbers if all values are
+  scans             where sensors stood: {name, position, world_from_sensor, points}; a matrix
+                    row by row, and [first, end] of the points it saw
+  details           further facts from the header: [{name, value}]
+  warnings          what was lost, guessed, dropped, scaled, or contradicts itself";
 
 /// Everything known of one input.
 #[derive(Debug, Default, Serialize)]

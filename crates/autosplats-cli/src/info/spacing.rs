@@ -6,6 +6,9 @@ use autosplats_cloud::PointCloud;
 use rayon::prelude::*;
 use serde::Serialize;
 
+/// Bytes that the tree, or the sorting that finds duplicates, takes for each point.
+pub(super) const BYTES_PER_POINT: u64 = 18;
+
 /// Points at which is measured.
 const SAMPLES: usize = 10_000;
 
@@ -108,7 +111,7 @@ fn mix(seed: u64) -> u64 {
 /// A k-d tree over a slice of points that it has put in its order: each half of a node's points is a child's.
 enum Tree {
     Leaf,
-    Node { axis: usize, split: f32, children: Box<[Tree; 2]> },
+    Node { axis: usize, split: f32, children: Box<[Self; 2]> },
 }
 
 impl Tree {

@@ -38,7 +38,9 @@ impl Report {
         if let Some(bounds) = &self.bounds {
             fact("size", self.shown_size(bounds));
         }
-        fact("unit", self.shown_unit());
+        if self.file_bytes.is_some() && self.points != Some(0) {
+            fact("unit", self.shown_unit());
+        }
         if let Some(crs) = self.shown_crs() {
             fact("system", crs);
         }
@@ -59,12 +61,12 @@ impl Report {
             fact(
                 "spacing",
                 format!(
-                    "{}{}{metres} to the nearest other point (median of {} asked); 5 to 95 %: {} to {}",
+                    "{}{}{metres} to the nearest point (median of {}; 5 to 95 %: {} to {})",
                     short(spacing.median),
                     self.symbol(),
                     counted(spacing.samples as u64),
                     short(spacing.p5),
-                    short(spacing.p95)
+                    short(spacing.p95),
                 ),
             );
         }
@@ -76,11 +78,13 @@ impl Report {
             let metric = self.crs.metres_per_unit.filter(|metres| *metres != 1.0);
             let metric = metric
                 .map_or_else(String::new, |metres| format!(" ({} per m²)", short(density.median / (metres * metres))));
-            let around = format!("of the surface, from {} neighbours (median)", density.neighbors);
+            let around = format!("of surface (median, by {} neighbours)", density.neighbors);
             fact("density", format!("{} points per {per}{metric} {around}", short(density.median)));
         }
-        if let Some(duplicates) = self.duplicates.filter(|count| *count > 0) {
-            fact("duplicates", format!("{} at the place of an earlier point", self.part(duplicates)));
+        match self.duplicates {
+            Some(0) => fact("duplicates", "none".into()),
+            Some(count) => fact("duplicates", format!("{} at the place of an earlier point", self.part(count))),
+            None => {}
         }
         if let Some(not_finite) = self.not_finite.filter(|count| *count > 0) {
             fact("not finite", format!("{} without a place (NaN or infinite)", self.part(not_finite)));
@@ -93,9 +97,13 @@ impl Report {
             let text = format!("warning: {}", plain(warning));
             let _ = writeln!(page, "  {}", style("33", wrapped(&text, 4)));
         }
-        if !self.scanned && self.error.is_none() {
-            page += "  This is what the header says; --scan reads the points: values, spacing, density, duplicates.\n";
-        }
+        page += match (self.scanned, &self.error) {
+            (true, _) => "",
+            (false, None) => {
+                "  This is what the header says; --scan reads the points: values, spacing, density, duplicates.\n"
+            }
+            (false, Some(_)) => "  This is what the header says; the points could not be read.\n",
+        };
         page
     }
 
@@ -157,7 +165,9 @@ impl Report {
 
     /// A number of points, and what part of all that is.
     fn part(&self, count: u64) -> String {
-        format!("{} ({:.1} %)", counted(count), 100.0 * count as f64 / self.points.unwrap_or(1).max(1) as f64)
+        let percent = 100.0 * count as f64 / self.points.unwrap_or(1).max(1) as f64;
+        let percent = if percent < 0.05 { "less than 0.1".into() } else { format!("{percent:.1}") };
+        format!("{} ({percent} %)", counted(count))
     }
 
     /// Decimals that coordinates along each axis need.
@@ -170,7 +180,7 @@ impl Report {
     }
 
     fn attribute_table(&self, page: &mut String) {
-        if self.attributes.is_empty() {
+        if self.attributes.is_empty() || self.points == Some(0) {
             return;
         }
         let coordinates = self.bounds.as_ref().map(|bounds| self.decimals(bounds));
@@ -192,7 +202,13 @@ impl Report {
                 // Coordinates without a place are counted above.
                 let bad = not_finite.filter(|count| *count > 0 && axis.is_none());
                 let bad = bad.map_or_else(String::new, |count| format!(" {} not finite", counted(count)));
-                let bars = histogram.as_ref().map_or_else(String::new, sparkline);
+                let bars = match histogram {
+                    Some(histogram) => sparkline(histogram),
+                    None if self.scanned && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase()) => {
+                        "a colour: red, green, blue below".into()
+                    }
+                    None => String::new(),
+                };
                 [
                     clipped(&plain(name), 22),
                     clipped(&plain(stored), 16),
