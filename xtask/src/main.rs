@@ -1,5 +1,6 @@
 //! The project's own tasks. `cargo xtask test` is everything CI runs.
 
+mod formats;
 mod layers;
 
 use std::path::{Path, PathBuf};
@@ -11,7 +12,10 @@ use anyhow::{Context as _, Result, bail, ensure};
 const USAGE: &str = "\
 usage: cargo xtask test            format, lints, build, tests, documentation, the rules between crates and stages,
                                and a minute of broken files
-       cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options";
+       cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options
+       cargo xtask formats [--check]
+                               docs/FORMATS.md, from what the program says of its formats and of the test data; with
+                               --check only whether it is what this build makes";
 
 /// Seconds that the tests feed broken files to the readers.
 const FUZZ_SECONDS: &str = "60";
@@ -21,6 +25,8 @@ fn main() -> ExitCode {
     let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["test"] => root().and_then(test),
         ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
+        ["formats"] => root().and_then(|root| formats::run(root, false)),
+        ["formats", "--check"] => root().and_then(|root| formats::run(root, true)),
         [] | ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())

@@ -38,6 +38,14 @@ pub(crate) enum Command {
     Normals(Box<NormalsArgs>),
     /// Render every built-in scene and say where the pictures are
     Demo(DemoArgs),
+    /// Say what is in files: points, bounds, attributes, units, spacing
+    Info(InfoArgs),
+    /// Say what this machine can do, and whether the program works on it
+    Doctor(DoctorArgs),
+    /// Print a script that lets a shell complete this program's options
+    Completions(CompletionsArgs),
+    /// Print the manual page, or write one per command
+    Man(ManArgs),
 }
 
 const INPUT_HELP: &str = "\
@@ -324,6 +332,75 @@ pub(crate) struct DemoArgs {
     pub(crate) out: PathBuf,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+const INFO_EXAMPLES: &str = "\
+Examples:
+  autosplats info scan.laz
+  autosplats info scan.laz --scan
+  autosplats info *.ply *.e57 --json
+  autosplats info points.txt --columns x,y,z,Intensity,-,red,green,blue";
+
+#[derive(Args, Debug)]
+#[command(after_help = INFO_EXAMPLES, after_long_help = format!("{INFO_EXAMPLES}\n\n{}", crate::info::SCHEMA))]
+pub(crate) struct InfoArgs {
+    #[arg(
+        required = true,
+        value_name = "INPUT",
+        help = "\
+A point cloud file, or a generated scene as scene:NAME[:COUNT]. Of several, those that cannot be read are named and the \
+others shown."
+    )]
+    pub(crate) inputs: Vec<String>,
+    /// Read all points even where the header tells number, bounds and attributes (LAS, E57): values, spacing, density,
+    /// duplicates
+    #[arg(long)]
+    pub(crate) scan: bool,
+    /// One JSON object on standard output, for several inputs an array of them (--help has its fields)
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Names of the columns of text and bare records, instead of what is guessed: x,y,z,Intensity,red,green,blue … in
+    /// the file's order; '-' for one to leave out
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(crate) columns: Option<Vec<String>>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct DoctorArgs {
+    /// One JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+const COMPLETIONS_HELP: &str = "\
+To install:
+  bash        autosplats completions bash > ~/.local/share/bash-completion/completions/autosplats
+  zsh         autosplats completions zsh > a folder of $fpath, as _autosplats; then start a new shell
+  fish        autosplats completions fish > ~/.config/fish/completions/autosplats.fish
+  powershell  autosplats completions powershell | Out-String | Invoke-Expression, in the file that $PROFILE names
+  elvish      eval (autosplats completions elvish | slurp), in ~/.config/elvish/rc.elv";
+
+#[derive(Args, Debug)]
+#[command(after_help = COMPLETIONS_HELP)]
+pub(crate) struct CompletionsArgs {
+    /// Shell to write for
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "\
+To read one page:      autosplats man | man -l -
+To install them all:   autosplats man --out ~/.local/share/man/man1")]
+pub(crate) struct ManArgs {
+    /// Folder for one page per command, made if it is not there; without it the main page goes to standard output
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Replace existing pages
+    #[arg(long, requires = "out")]
+    pub(crate) force: bool,
 }
 
 /// Where to look from.

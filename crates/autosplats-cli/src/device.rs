@@ -7,10 +7,10 @@ use serde::Serialize;
 /// What a picture was rendered on.
 #[derive(Debug, Serialize)]
 pub(crate) struct Device {
-    backend: &'static str,
-    name: String,
-    threads: usize,
-    simd: Vec<&'static str>,
+    pub(crate) backend: &'static str,
+    pub(crate) name: String,
+    pub(crate) threads: usize,
+    pub(crate) simd: Vec<&'static str>,
 }
 
 impl Device {

@@ -7,11 +7,14 @@ mod args;
 mod convert;
 mod demo;
 mod device;
+mod doctor;
 mod exit;
+mod info;
 mod input;
 mod interrupt;
 mod normals;
 mod output;
+mod pages;
 mod progress;
 mod render;
 mod threads;
@@ -53,6 +56,10 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Normals(args)) => normals::run(&args),
         Some(Command::Demo(args)) => demo::run(&args),
+        Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Doctor(args)) => doctor::run(&args),
+        Some(Command::Completions(args)) => pages::completions(&args),
+        Some(Command::Man(args)) => pages::manual(&args),
         None => Err(Failure::usage(without_command(&command_line.rest))),
     }
 }

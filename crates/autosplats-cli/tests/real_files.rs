@@ -3,21 +3,8 @@
 mod common;
 
 use std::fs::read_dir;
-use std::path::{Path, PathBuf};
 
-use common::Folder;
-
-/// Where the files are, if they are.
-fn data() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or(beside, PathBuf::from);
-    let found = folder.canonicalize().ok();
-    assert!(found.is_some() || std::env::var_os("CI").is_none(), "CI has the test data at {}", folder.display());
-    if found.is_none() {
-        println!("{} is absent: this test checks nothing. AUTOSPLATS_DATA can name another folder.", folder.display());
-    }
-    found
-}
+use common::{Folder, data};
 
 #[test]
 fn scans_become_pictures() {

@@ -123,7 +123,12 @@ impl Seek for Stoppable<'_> {
 
 /// A line of data on standard output. Nobody reading it any more is no error.
 pub(crate) fn print_line(line: &str) -> Result<(), Failure> {
-    match writeln!(stdout(), "{line}") {
+    print_bytes(format!("{line}\n").as_bytes())
+}
+
+/// Data on standard output. Nobody reading it any more is no error.
+pub(crate) fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    match stdout().write_all(bytes) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(Failure::new(Exit::Output, format!("standard output: {error}")))
         }

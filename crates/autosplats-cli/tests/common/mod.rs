@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 /// Points on the unit sphere, evenly.
@@ -124,4 +124,16 @@ pub(crate) fn ply(properties: &[&str], rows: impl Iterator<Item = String>) -> St
 /// An ASCII PLY file of bare positions.
 pub(crate) fn points_ply(points: &[&str]) -> String {
     ply(&["float x", "float y", "float z"], points.iter().map(|point| (*point).to_owned()))
+}
+
+/// Where the real scans are, if they are.
+pub(crate) fn data() -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or(beside, PathBuf::from);
+    let found = folder.canonicalize().ok();
+    assert!(found.is_some() || std::env::var_os("CI").is_none(), "CI has the test data at {}", folder.display());
+    if found.is_none() {
+        println!("{} is absent: this test checks nothing. AUTOSPLATS_DATA can name another folder.", folder.display());
+    }
+    found
 }

@@ -1,0 +1,301 @@
+//! `autosplats doctor`: what this machine can do, and whether the program works on it.
+
+use std::fs::read_to_string;
+use std::io::{IsTerminal as _, stderr, stdout};
+use std::time::Instant;
+
+use autosplats::{Renderer, Settings};
+use autosplats_cloud::{Scene, available_memory, formats, read, write, written_formats};
+use pulp::{Arch, Simd, WithSimd};
+use serde::Serialize;
+
+use crate::args::DoctorArgs;
+use crate::device::Device;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_bytes, print_line};
+use crate::render::scene_camera;
+
+/// Bytes that a point takes at least: position and colour.
+const BYTES_PER_POINT: u64 = 12 + 3;
+
+/// How much more the whole program takes at its peak while it reads a file and renders it, as measured.
+const PEAK: f64 = 2.3;
+
+/// Points and pixels of the self-test.
+const TEST_POINTS: usize = 20_000;
+const TEST_SIZE: [u32; 2] = [320, 200];
+
+/// Everything that was found out. Its JSON is what `--json` prints.
+#[derive(Debug, Serialize)]
+struct Findings {
+    version: &'static str,
+    system: String,
+    /// Whether nothing is broken.
+    ok: bool,
+    backends: Vec<Backend>,
+    /// Graphics adapters; none, as no backend asks for them.
+    adapters: [&'static str; 0],
+    cpu: Cpu,
+    memory: Memory,
+    self_test: SelfTest,
+    terminal: Terminal,
+    formats: Formats,
+}
+
+#[derive(Debug, Serialize)]
+struct Backend {
+    name: &'static str,
+    ready: bool,
+    about: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Cpu {
+    name: String,
+    threads: usize,
+    simd_found: Vec<&'static str>,
+    simd_used: &'static str,
+    /// Numbers that one instruction handles.
+    lanes: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct Memory {
+    total: Option<u64>,
+    available: Option<u64>,
+    /// Points of the largest coloured cloud that can be rendered with what is available.
+    largest_cloud: Option<u64>,
+}
+
+/// Milliseconds of what worked, and what did not.
+#[derive(Debug, Default, Serialize)]
+struct SelfTest {
+    generate_ms: Option<f64>,
+    render_ms: Option<f64>,
+    write_ms: Option<f64>,
+    read_ms: Option<f64>,
+    temporary_folder: String,
+    errors: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Terminal {
+    standard_output: bool,
+    standard_error: bool,
+    kind: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Formats {
+    read: Vec<Format>,
+    written: Vec<Format>,
+}
+
+#[derive(Debug, Serialize)]
+struct Format {
+    name: &'static str,
+    extensions: &'static [&'static str],
+}
+
+/// Looks at the machine, tries the program on a small scene and prints what came of it.
+pub(crate) fn run(args: &DoctorArgs) -> Result<(), Failure> {
+    let findings = Findings::new();
+    if args.json {
+        let json =
+            serde_json::to_string(&findings).map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?;
+        print_line(&json)?;
+    } else {
+        print_bytes(findings.to_text().as_bytes())?;
+    }
+    if findings.backends.iter().all(|backend| !backend.ready) {
+        return Err(Failure::new(Exit::Device, "no backend works; the self-test says why"));
+    }
+    match findings.self_test.errors.first() {
+        Some(error) => Err(Failure::new(Exit::Output, format!("self-test: {error}"))),
+        None => Ok(()),
+    }
+}
+
+impl Findings {
+    fn new() -> Self {
+        let self_test = SelfTest::run();
+        let Device { name, threads, simd, .. } = Device::cpu();
+        let (simd_used, lanes) = simd_used();
+        let available = available_memory();
+        let about = "renders on the processor, with every feature";
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            system: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
+            ok: self_test.errors.is_empty(),
+            backends: vec![
+                Backend { name: "cpu", ready: self_test.render_ms.is_some(), about },
+                Backend { name: "gpu", ready: false, about: "not in this version" },
+            ],
+            adapters: [],
+            cpu: Cpu { name, threads, simd_found: simd, simd_used, lanes },
+            memory: Memory {
+                total: total_memory(),
+                available,
+                largest_cloud: available.map(|bytes| (bytes as f64 / (BYTES_PER_POINT as f64 * PEAK)) as u64),
+            },
+            self_test,
+            terminal: Terminal {
+                standard_output: stdout().is_terminal(),
+                standard_error: stderr().is_terminal(),
+                kind: std::env::var("TERM").ok(),
+            },
+            formats: Formats {
+                read: formats().map(|(name, extensions)| Format { name, extensions }).collect(),
+                written: written_formats().map(|(name, extensions)| Format { name, extensions }).collect(),
+            },
+        }
+    }
+
+    fn to_text(&self) -> String {
+        let mut lines = vec![format!("autosplats {}, {}", self.version, self.system), String::new()];
+        let mut line = |good: bool, name: &str, what: String| {
+            lines.push(format!("  {:<6} {name:<10} {what}", if good { "ok" } else { "-" }));
+        };
+        for Backend { name, ready, about } in &self.backends {
+            let state = if *ready { "ready" } else { "not ready" };
+            line(*ready, name, format!("{state}: {about}"));
+        }
+        line(false, "adapters", "none asked for: this version does not use graphics cards".into());
+        let Cpu { name, threads, simd_found, simd_used, lanes } = &self.cpu;
+        line(
+            true,
+            "processor",
+            format!(
+                "{name}; {} the work",
+                if *threads == 1 { "one thread does".into() } else { format!("{threads} threads share") }
+            ),
+        );
+        let found = if simd_found.is_empty() { "none known".into() } else { simd_found.join(" ") };
+        let per = match lanes {
+            1 => "one number at a time: rendering takes several times as long".into(),
+            lanes => format!("{lanes} numbers at a time"),
+        };
+        line(*lanes > 1, "simd", format!("{simd_used} is used, {per}; found: {found}"));
+        let Memory { total, available, largest_cloud } = &self.memory;
+        match (available, largest_cloud) {
+            (Some(available), Some(points)) => {
+                let total = total.map_or_else(String::new, |total| format!(" of {}", gigabytes(total)));
+                let what = format!(
+                    "{}{total} available: about {} million coloured points can be rendered",
+                    gigabytes(*available),
+                    points / 1_000_000
+                );
+                line(true, "memory", what);
+            }
+            _ => line(false, "memory", "this system does not say; too large a cloud ends without a message".into()),
+        }
+        let SelfTest { generate_ms, render_ms, write_ms, read_ms, temporary_folder, errors } = &self.self_test;
+        let took = [("made", generate_ms), ("rendered", render_ms), ("written", write_ms), ("read back", read_ms)];
+        let took: Vec<_> =
+            took.into_iter().filter_map(|(what, ms)| Some(format!("{what} in {:.0} ms", (*ms)?))).collect();
+        line(errors.is_empty(), "self-test", format!("{TEST_POINTS} points {}", took.join(", ")));
+        line(
+            write_ms.is_some(),
+            "temporary",
+            format!("{temporary_folder} can{} be written", if write_ms.is_some() { "" } else { "not" }),
+        );
+        for error in errors {
+            lines.push(format!("  broken            {error}"));
+        }
+        let mut line = |name: &str, what: String| lines.push(format!("  {:<6} {name:<10} {what}", "ok"));
+        let Terminal { standard_output, standard_error, kind } = &self.terminal;
+        let progress =
+            if *standard_error { "progress is shown" } else { "no terminal on standard error: progress is not shown" };
+        let kind = kind
+            .as_deref()
+            .filter(|_| *standard_error || *standard_output)
+            .map_or_else(String::new, |kind| format!(" ({kind})"));
+        line("terminal", format!("{progress}{kind}"));
+        for (name, list) in [("reads", &self.formats.read), ("writes", &self.formats.written)] {
+            let shown = |format: &Format| format!("{} (.{})", format.name, format.extensions.join(" ."));
+            line(name, list.iter().map(shown).collect::<Vec<_>>().join(", "));
+        }
+        lines.join("\n") + "\n"
+    }
+}
+
+impl SelfTest {
+    /// Makes a small scene, renders it, writes it and reads it back.
+    fn run() -> Self {
+        let folder = std::env::temp_dir();
+        let mut test = Self { temporary_folder: folder.display().to_string(), ..Self::default() };
+        if let Err(error) = test.try_all() {
+            test.errors.push(error);
+        }
+        test
+    }
+
+    fn try_all(&mut self) -> Result<(), String> {
+        let said = |error: &dyn std::fmt::Display| error.to_string();
+        let since = |start: Instant| Some(start.elapsed().as_secs_f64() * 1e3);
+        let start = Instant::now();
+        let (scene, count) = Scene::parse(&format!("scene:figure:{TEST_POINTS}")).map_err(|error| said(&error))?;
+        let cloud = scene.sample(count, &|_| true).map_err(|error| said(&error))?;
+        self.generate_ms = since(start);
+
+        let start = Instant::now();
+        let mut renderer = Renderer::new();
+        let frame = renderer
+            .render(&cloud, &scene_camera(&scene), TEST_SIZE, &Settings::default())
+            .map_err(|error| said(&error))?;
+        let covered = frame.layers.weight.iter().filter(|weight| **weight > 0.0).count();
+        if covered * 50 < (TEST_SIZE[0] * TEST_SIZE[1]) as usize {
+            return Err(format!("the picture of the test scene is nearly empty: {covered} pixels"));
+        }
+        self.render_ms = since(start);
+
+        let start = Instant::now();
+        let folder = tempfile::Builder::new().prefix("autosplats-").tempdir().map_err(|error| {
+            format!("{}: cannot be written ({error}); the variable TMPDIR names another folder", self.temporary_folder)
+        })?;
+        let path = folder.path().join("test.ply");
+        write(&cloud, &path, &()).map_err(|error| said(&error))?;
+        self.write_ms = since(start);
+        let start = Instant::now();
+        let back = read(&path, &()).map_err(|error| said(&error))?;
+        self.read_ms = since(start);
+        if back.positions() != cloud.positions() || back.colors() != cloud.colors() {
+            return Err("a cloud that was written and read is not the same any more".into());
+        }
+        Ok(())
+    }
+}
+
+/// The instructions that the renderer uses here, and how many numbers one of them handles.
+fn simd_used() -> (&'static str, usize) {
+    struct Lanes;
+    impl WithSimd for Lanes {
+        type Output = usize;
+        fn with_simd<S: Simd>(self, _simd: S) -> usize {
+            S::F32_LANES
+        }
+    }
+    let arch = Arch::new();
+    let lanes = arch.dispatch(Lanes);
+    let name = match (std::env::consts::ARCH, lanes) {
+        (_, 1) => "no vector instruction",
+        ("x86_64" | "x86", 16) => "AVX-512",
+        ("x86_64" | "x86", 8) => "AVX2 with FMA",
+        ("aarch64", _) => "NEON",
+        _ => "vector instructions",
+    };
+    (name, lanes)
+}
+
+/// Bytes that the machine, or the container around the program, has.
+fn total_memory() -> Option<u64> {
+    let meminfo = read_to_string("/proc/meminfo").ok()?;
+    let line = meminfo.lines().find(|line| line.starts_with("MemTotal:"))?;
+    let total = line.split_whitespace().nth(1)?.parse::<u64>().ok()?.checked_mul(1024)?;
+    let limit = read_to_string("/sys/fs/cgroup/memory.max").ok().and_then(|text| text.trim().parse().ok());
+    Some(limit.map_or(total, |limit: u64| total.min(limit)))
+}
+
+fn gigabytes(bytes: u64) -> String {
+    format!("{:.1} GB", bytes as f64 / 1e9)
+}

@@ -1,0 +1,445 @@
+//! From the name of an input to all that is known of it.
+
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use autosplats::guess_axes;
+use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{
+    Attribute, Description, Error, FieldValues, PointCloud, Progress, ReadOptions, Scene, Unit, check_memory, describe,
+    read_with,
+};
+use rayon::prelude::*;
+
+use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};
+use super::spacing;
+use super::statistics::{Statistics, Values};
+use crate::exit::Failure;
+use crate::input::{Inputs, read_failure};
+use crate::progress::Bar;
+
+/// Bytes of a file from which on it is read alone: reading one uses all cores, and two might not fit into memory.
+const LARGE: u64 = 64 << 20;
+
+/// Looks at inputs, several at once.
+pub(super) struct Examiner {
+    options: ReadOptions,
+    scan: bool,
+    quiet: bool,
+    /// Held while a large input is read.
+    large: Mutex<()>,
+}
+
+/// What was found, and what went wrong.
+pub(super) struct Examination {
+    pub(super) report: Report,
+    pub(super) failure: Option<Failure>,
+}
+
+/// Progress to the terminal, notes to the report.
+struct Listener<'a> {
+    bar: &'a Bar,
+    notes: Mutex<Vec<String>>,
+}
+
+impl Progress for Listener<'_> {
+    fn report(&self, fraction: f32) {
+        self.bar.report(fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.bar.cancelled()
+    }
+
+    fn note(&self, note: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+    }
+}
+
+impl Examiner {
+    pub(super) fn new(options: ReadOptions, scan: bool, quiet: bool) -> Self {
+        Self { options, scan, quiet, large: Mutex::new(()) }
+    }
+
+    /// Finds out what there is to know.
+    pub(super) fn examine(&self, name: &str) -> Examination {
+        let mut report = Report { input: name.into(), ..Report::default() };
+        let outcome = Inputs::new(&[name.to_owned()], &[]).and_then(|inputs| {
+            let path = inputs.files().next();
+            match path {
+                Some(path) => self.file(path, &mut report).map_err(read_failure),
+                None => self.scene(name, &mut report).map_err(read_failure),
+            }
+        });
+        report.error = outcome.as_ref().err().map(|failure| failure.message.clone());
+        Examination { report, failure: outcome.err() }
+    }
+
+    fn file(&self, path: &Path, report: &mut Report) -> Result<(), Error> {
+        let bytes = path.metadata().map_or(0, |metadata| metadata.len());
+        report.file_bytes = Some(bytes);
+        let header = describe(path, &self.options)?;
+        report.describe(&header);
+        if !self.scan && header.points.is_some() && header.bounds.is_some() {
+            return Ok(());
+        }
+        let _alone = (bytes >= LARGE).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        let bar = Bar::new(&format!("reading {name}"), self.quiet);
+        let listener = Listener { bar: &bar, notes: Mutex::default() };
+        let cloud = read_with(path, &self.options, &listener);
+        for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            report.warn(note);
+        }
+        drop(bar);
+        let bar = Bar::spinner("measuring", self.quiet);
+        report.scan(&cloud?, &header.attributes);
+        drop(bar);
+        Ok(())
+    }
+
+    fn scene(&self, name: &str, report: &mut Report) -> Result<(), Error> {
+        let (scene, count) = Scene::parse(name)?;
+        let _alone = (count as u64 * 16 >= LARGE).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
+        let bar = Bar::new(&format!("generating {name}"), self.quiet);
+        let cloud = scene.sample(count, &|done| {
+            bar.report(done);
+            !bar.cancelled()
+        })?;
+        report.format = Some("generated scene".into());
+        report.scan(&cloud, &[]);
+        Ok(())
+    }
+}
+
+impl Report {
+    fn warn(&mut self, warning: String) {
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Takes over what the header says.
+    fn describe(&mut self, header: &Description) {
+        let Description { format, points, faces, bounds, attributes, crs, scans, resolution, details, notes } = header;
+        self.format = Some(format.clone());
+        self.points = *points;
+        self.points_in_header = *points;
+        self.faces = *faces;
+        self.bounds = bounds.and_then(Bounds::new);
+        self.crs = CrsFound::from(crs);
+        self.resolution = resolution.map(Into::into);
+        self.scans = scans.iter().map(ScanFound::from).collect();
+        // What is told above needs no telling again.
+        let told = |name: &str| name == "element face" && faces.is_some();
+        self.details = details
+            .iter()
+            .filter(|(name, _)| !told(name))
+            .map(|(name, value)| Detail { name: name.clone(), value: value.clone() })
+            .collect();
+        notes.iter().for_each(|note| self.warn(note.clone()));
+        self.attributes = attributes
+            .iter()
+            .map(|Attribute { name, stored }| {
+                let mut statistics = Statistics::default();
+                if let (Some(Meaning::Axis(axis)), Some(bounds)) = (meaning(name), &self.bounds) {
+                    (statistics.min, statistics.max) = (Some(bounds.min[axis]), Some(bounds.max[axis]));
+                }
+                AttributeFound { name: name.clone(), stored: stored.clone(), statistics }
+            })
+            .collect();
+    }
+
+    /// Looks at all points; what they are counts for more than what the header says.
+    fn scan(&mut self, cloud: &PointCloud, attributes: &[Attribute]) {
+        self.scanned = true;
+        let header_bounds = self.bounds.take();
+        self.points = Some(cloud.len() as u64);
+        let finite = (0..cloud.len()).into_par_iter().map(|i| cloud.world_position(i)).filter(|p| p.is_finite());
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY, 0_u64);
+        let (min, max, count) = finite
+            .fold(|| none, |(min, max, count), position| (min.min(position), max.max(position), count + 1))
+            .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2));
+        self.not_finite = Some(cloud.len() as u64 - count);
+        self.bounds = Bounds::new([min, max]);
+        if count > 0 {
+            self.axes = Some(AxesFound::new(guess_axes(cloud), cloud.axes().is_none()));
+        }
+        if *cloud.crs() != autosplats_cloud::Crs::default() {
+            self.crs = CrsFound::from(cloud.crs());
+        }
+        self.resolution = cloud.resolution().map(Into::into).or(self.resolution);
+        if !cloud.scans().is_empty() {
+            self.scans = cloud.scans().iter().map(ScanFound::from).collect();
+        }
+        self.attributes = values_of(cloud, attributes);
+        self.tidy();
+        self.compare(header_bounds);
+        if count == 0 {
+            self.warn(if cloud.is_empty() { "there is no point in it" } else { "no point has a place" }.into());
+            return;
+        }
+        if check_memory("", cloud.len() as u64 * spacing::BYTES_PER_POINT).is_err() {
+            self.warn("there is not enough memory to measure spacing and count duplicates; thin the cloud".into());
+            return;
+        }
+        self.duplicates = Some(spacing::duplicates(cloud));
+        if cloud.crs().unit == Some(Unit::Degree) {
+            self.warn("x and y are degrees, z is not: there is no spacing or density; project them to metres".into());
+        } else {
+            (self.spacing, self.density) = spacing::measure(cloud);
+        }
+        self.check_digits();
+    }
+
+    /// Takes off the last digits of coordinates, which the parts they are added up from do not have.
+    fn tidy(&mut self) {
+        let Some(bounds) = &mut self.bounds else { return };
+        let largest = bounds.min.iter().chain(&bounds.max).fold(0.0_f64, |most, value| most.max(value.abs()));
+        let tidy = |value: &mut f64| *value = tidy(*value, largest);
+        for axis in 0..3 {
+            [&mut bounds.min, &mut bounds.max, &mut bounds.size].into_iter().for_each(|ends| tidy(&mut ends[axis]));
+        }
+        for AttributeFound { name, statistics, .. } in &mut self.attributes {
+            if let Some(Meaning::Axis(_)) = meaning(name) {
+                let Statistics { min, max, mean, histogram, .. } = statistics;
+                [min, max, mean].into_iter().flatten().for_each(tidy);
+                histogram.iter_mut().flat_map(|histogram| &mut histogram.edges).for_each(tidy);
+            }
+        }
+    }
+
+    /// Says where the header does not fit the points.
+    fn compare(&mut self, header: Option<Bounds>) {
+        let (Some(header), Some(bounds)) = (header, self.bounds) else { return };
+        // Whoever dropped points may have changed the bounds.
+        if self.points != self.points_in_header {
+            return;
+        }
+        let mut off = Vec::new();
+        for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+            let step = self.resolution.map_or(0.0, |step| step[axis]);
+            let allowed = 1.5 * step.max(header.max[axis].abs().max(header.min[axis].abs()) * 1e-7);
+            let ends = [(header.min, bounds.min), (header.max, bounds.max)];
+            if ends.iter().any(|(claimed, found)| (claimed[axis] - found[axis]).abs() > allowed) {
+                off.push(format!("{name} {} to {}", header.min[axis], header.max[axis]));
+            }
+        }
+        if !off.is_empty() {
+            self.warn(format!("the header claims other bounds than the points have: {}", off.join(", ")));
+        }
+    }
+
+    /// Says where coordinates are coarser than the points are apart.
+    fn check_digits(&mut self) {
+        let (Some(spacing), Some(bounds)) = (self.spacing, self.bounds) else { return };
+        let mut coarse = Vec::new();
+        for attribute in &self.attributes {
+            let Some(Meaning::Axis(axis)) = meaning(&attribute.name) else { continue };
+            let step = match (self.resolution, &*attribute.stored) {
+                (Some(step), _) if step[axis] >= 0.5 * spacing.median => step[axis],
+                (None, "float32") => {
+                    let largest = bounds.max[axis].abs().max(bounds.min[axis].abs()) as f32;
+                    let step = f64::from(largest.next_up() - largest);
+                    if step < 0.1 * spacing.median || step == 0.0 {
+                        continue;
+                    }
+                    step
+                }
+                _ => continue,
+            };
+            coarse.push(format!("{} in steps of {step}", attribute.name));
+        }
+        if !coarse.is_empty() {
+            self.warn(format!(
+                "coordinates are coarse for points {} apart: {}; surfaces will look stepped",
+                super::text::short(spacing.median),
+                coarse.join(", ")
+            ));
+        }
+    }
+}
+
+/// `value` with as many decimals as numbers up to `largest` have in 15 digits.
+fn tidy(value: f64, largest: f64) -> f64 {
+    let decimals = if largest > 0.0 { 14 - largest.log10().floor() as i32 } else { 0 };
+    let shift = 10_f64.powi(decimals.abs());
+    let tidy = if decimals >= 0 { (value * shift).round() / shift } else { value };
+    // A shift beyond all numbers leaves nothing; and there is no minus zero.
+    if tidy.is_finite() { tidy + 0.0 } else { value }
+}
+
+/// What an attribute of a file becomes in a cloud, if not a field of the same name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Meaning {
+    Axis(usize),
+    Channel(usize),
+}
+
+fn meaning(name: &str) -> Option<Meaning> {
+    Some(match name.to_ascii_lowercase().as_str() {
+        "x" | "cartesianx" => Meaning::Axis(0),
+        "y" | "cartesiany" => Meaning::Axis(1),
+        "z" | "cartesianz" => Meaning::Axis(2),
+        "red" | "r" | "diffuse_red" | "colorred" => Meaning::Channel(0),
+        "green" | "g" | "diffuse_green" | "colorgreen" => Meaning::Channel(1),
+        "blue" | "b" | "diffuse_blue" | "colorblue" => Meaning::Channel(2),
+        _ => return None,
+    })
+}
+
+/// The name without what programs put before it, and in PDAL's words.
+fn plain_name(name: &str) -> String {
+    let lower = name.to_ascii_lowercase();
+    let plain: String = lower.trim_start_matches("scalar_").chars().filter(|c| !matches!(c, '_' | ' ')).collect();
+    match plain.as_str() {
+        "nx" | "ny" | "nz" => format!("normal{}", &plain[1..]),
+        _ => plain,
+    }
+}
+
+/// Statistics of the attributes that the header names, then of what else the cloud has.
+fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound> {
+    let field_of = |name: &str| cloud.fields().iter().position(|field| plain_name(&field.name) == plain_name(name));
+    let mut rows: Vec<(String, String, Option<Values<'_>>)> = Vec::new();
+    let mut taken = vec![false; cloud.fields().len()];
+    let mut meanings = Vec::new();
+    for Attribute { name, stored } in attributes {
+        let known = meaning(name);
+        // 16-bit colours are fields beside the 8-bit ones.
+        let wide = match known {
+            Some(Meaning::Channel(channel)) => field_of(["red", "green", "blue"][channel]),
+            _ => None,
+        };
+        let field = wide.or_else(|| field_of(name));
+        let values = match (field, known, cloud.colors()) {
+            (Some(index), ..) => {
+                taken[index] = true;
+                Some(Values::Field(&cloud.fields()[index].values))
+            }
+            (None, Some(Meaning::Axis(axis)), _) => Some(Values::Axis(cloud, axis)),
+            (None, Some(Meaning::Channel(channel)), Some(colors)) => Some(Values::Channel(colors, channel)),
+            _ => None,
+        };
+        meanings.extend(known);
+        rows.push((name.clone(), stored.clone(), values));
+    }
+    let mut first = Vec::new();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        if !meanings.contains(&Meaning::Axis(axis)) {
+            first.push((name.to_owned(), String::new(), Some(Values::Axis(cloud, axis))));
+        }
+    }
+    rows.splice(0..0, first);
+    let wide = cloud.fields().iter().any(|field| plain_name(&field.name) == "red");
+    if let Some(colors) = cloud.colors().filter(|_| !wide) {
+        for (channel, name) in ["red", "green", "blue"].into_iter().enumerate() {
+            if !meanings.contains(&Meaning::Channel(channel)) {
+                rows.push((name.into(), "uint8".into(), Some(Values::Channel(colors, channel))));
+            }
+        }
+    }
+    for (field, taken) in cloud.fields().iter().zip(taken) {
+        if !taken {
+            rows.push((field.name.clone(), type_name(&field.values).into(), Some(Values::Field(&field.values))));
+        }
+    }
+    rows.into_iter()
+        .map(|(name, stored, values)| {
+            let classes = plain_name(&name) == "classification";
+            let statistics = values.map_or_else(Statistics::default, |values| Statistics::of(values, classes));
+            AttributeFound { name, stored, statistics }
+        })
+        .collect()
+}
+
+fn type_name(values: &FieldValues) -> &'static str {
+    match values {
+        FieldValues::U8(_) => "uint8",
+        FieldValues::I8(_) => "int8",
+        FieldValues::U16(_) => "uint16",
+        FieldValues::I16(_) => "int16",
+        FieldValues::U32(_) => "uint32",
+        FieldValues::I32(_) => "int32",
+        FieldValues::U64(_) => "uint64",
+        FieldValues::I64(_) => "int64",
+        FieldValues::F32(_) => "float32",
+        FieldValues::F64(_) => "float64",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use autosplats_cloud::Crs;
+
+    use super::*;
+
+    /// What the header of a survey in feet says.
+    fn header() -> Description {
+        let attribute = |name: &str, stored: &str| Attribute { name: name.into(), stored: stored.into() };
+        Description {
+            format: "LAS 1.2, point format 3".into(),
+            points: Some(4),
+            bounds: Some([DVec3::new(635_619.85, 848_899.7, 406.59), DVec3::new(635_720.85, 848_999.7, 506.59)]),
+            attributes: vec![
+                attribute("X", "int32 × 0.01"),
+                attribute("Y", "int32 × 0.01"),
+                attribute("Z", "int32 × 0.01"),
+                attribute("Classification", "uint8"),
+            ],
+            crs: Crs { epsg: Some(2992), unit: Some(Unit::UsSurveyFoot), ..Crs::default() },
+            resolution: Some(DVec3::splat(0.01)),
+            notes: vec!["from the header".into()],
+            ..Description::default()
+        }
+    }
+
+    fn cloud(last: [f32; 3]) -> PointCloud {
+        let positions = vec![[-0.15, -0.3, -3.41], [0.0, 0.0, 0.0], [50.0, 50.0, 50.0], last];
+        let cloud = PointCloud::new(DVec3::new(635_620.0, 848_900.0, 410.0), positions);
+        cloud.with_crs(header().crs).with_resolution(DVec3::splat(0.01))
+    }
+
+    #[test]
+    fn a_header_alone_has_bounds_units_and_types() {
+        let mut report = Report { file_bytes: Some(1000), ..Report::default() };
+        report.describe(&header());
+        let text = report.to_text(false);
+        for said in
+            ["101.00 × 100.00 × 100.00 ft (30.8 × 30.5 × 30.5 m)", "US survey foot", "EPSG:2992", "635720.85", "--scan"]
+        {
+            assert!(text.contains(said), "'{said}' is not in\n{text}");
+        }
+        assert!(text.contains("warning: from the header"), "notes are warnings:\n{text}");
+        assert!(!text.contains("distribution"), "there are no values:\n{text}");
+    }
+
+    #[test]
+    fn headers_that_contradict_the_points() {
+        let warnings = |last| {
+            let mut report = Report::default();
+            report.describe(&header());
+            report.scan(&cloud(last), &header().attributes);
+            report.warnings.join("; ")
+        };
+        assert_eq!(warnings([100.85, 99.7, 96.59]), "from the header", "as it says");
+        let off = warnings([100.85, 99.7, 196.59]);
+        assert!(off.contains("other bounds") && off.contains("z 406.59 to 506.59") && !off.contains("x "), "{off}");
+    }
+
+    #[test]
+    fn degrees_have_no_spacing() {
+        let mut report = Report::default();
+        let cloud = cloud([1.0; 3]).with_crs(Crs { unit: Some(Unit::Degree), ..Crs::default() });
+        report.scan(&cloud, &[]);
+        assert_eq!(report.spacing, None, "a degree is no height");
+        assert!(report.warnings.iter().any(|warning| warning.contains("degrees")), "{:?}", report.warnings);
+    }
+
+    #[test]
+    fn digits_beyond_the_fifteenth_are_noise() {
+        assert_eq!(tidy(-2.000_961_000_000_003_8, 25.0), -2.000_961, "of a sum");
+        assert_eq!(tidy(5_400_009.75, 6e6), 5_400_009.75, "coordinates stay");
+        assert_eq!([tidy(1e300, 1e300), tidy(0.0, 0.0), tidy(1e-310, 1e-310)], [1e300, 0.0, 1e-310], "extremes too");
+    }
+}

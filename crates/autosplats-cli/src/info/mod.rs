@@ -1,0 +1,108 @@
+//! `autosplats info`: what is in files.
+
+mod examine;
+mod report;
+mod spacing;
+mod statistics;
+mod text;
+
+use std::collections::BTreeMap;
+use std::io::{IsTerminal as _, stdout};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+
+use autosplats_cloud::ReadOptions;
+
+use self::examine::{Examination, Examiner};
+pub(crate) use self::report::SCHEMA;
+use crate::args::InfoArgs;
+use crate::exit::{Exit, Failure};
+use crate::output::{print_bytes, print_line};
+use crate::threads::start_threads;
+
+/// Looks at each input and prints what it found, in the order they were typed.
+pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
+    start_threads(&args.run)?;
+    // All digits: what is said of the points is to be true of the file.
+    let options = ReadOptions { exact: true, columns: args.columns.clone(), ..ReadOptions::default() };
+    let several = args.inputs.len() > 1;
+    let examiner = Examiner::new(options, args.scan, args.run.quiet || several);
+
+    let next = AtomicUsize::new(0);
+    let (sender, reports) = channel();
+    std::thread::scope(|scope| {
+        for _ in 0..rayon::current_num_threads().min(args.inputs.len()) {
+            let sender = sender.clone();
+            let (next, examiner) = (&next, &examiner);
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(name) = args.inputs.get(index) else { break };
+                    if sender.send((index, examiner.examine(name))).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut waiting = BTreeMap::new();
+        let mut printed = Printer { json: args.json, several, failures: Vec::new() };
+        printed.begin()?;
+        for (index, examination) in reports {
+            waiting.insert(index, examination);
+            while let Some(examination) = waiting.remove(&printed.failures.len()) {
+                printed.print(examination)?;
+            }
+        }
+        printed.end()
+    })
+}
+
+/// Prints reports as they come.
+struct Printer {
+    json: bool,
+    several: bool,
+    /// Of each input printed, why it could not be read, if so.
+    failures: Vec<Option<Failure>>,
+}
+
+impl Printer {
+    fn begin(&self) -> Result<(), Failure> {
+        if self.json && self.several { print_line("[") } else { Ok(()) }
+    }
+
+    fn print(&mut self, Examination { report, failure }: Examination) -> Result<(), Failure> {
+        if self.json {
+            if !self.failures.is_empty() {
+                print_line(",")?;
+            }
+            let json = serde_json::to_string(&report)
+                .map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?;
+            print_bytes(json.as_bytes())?;
+        } else if report.is_known() {
+            let gap = if self.failures.is_empty() { "" } else { "\n" };
+            let styled = stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+            print_bytes(format!("{gap}{}", report.to_text(styled)).as_bytes())?;
+        }
+        if let Some(failure) = &failure
+            && self.several
+        {
+            eprintln!("error: {}", failure.message);
+        }
+        self.failures.push(failure);
+        Ok(())
+    }
+
+    fn end(self) -> Result<(), Failure> {
+        if self.json {
+            print_line(if self.several { "\n]" } else { "" })?;
+        }
+        let inputs = self.failures.len();
+        let mut failures: Vec<Failure> = self.failures.into_iter().flatten().collect();
+        match failures.len() {
+            0 => Ok(()),
+            1 if inputs == 1 => Err(failures.remove(0)),
+            bad => Err(Failure::new(Exit::Input, format!("{bad} of {inputs} inputs could not be read"))),
+        }
+    }
+}

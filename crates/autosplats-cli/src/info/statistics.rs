@@ -1,0 +1,267 @@
+//! The values of one attribute: least, greatest, mean, how often which.
+
+use std::ops::Range;
+
+use autosplats_cloud::{FieldValues, PointCloud};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Bins of a histogram at most.
+const BINS: usize = 32;
+
+/// Values between the least and the greatest whole number up to which each is counted.
+const MAX_COUNTED: f64 = 65536.0;
+
+/// Different values up to which each is listed.
+const MAX_LISTED: usize = 32;
+
+/// Points summed up in one go. Sums of blocks are added in order, so that results do not depend on the threads.
+const BLOCK: usize = 1 << 16;
+
+/// Where values come from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Values<'a> {
+    /// Coordinates along an axis.
+    Axis(&'a PointCloud, usize),
+    /// A channel of the colours.
+    Channel(&'a [[u8; 3]], usize),
+    /// A scalar field.
+    Field(&'a FieldValues),
+}
+
+/// What is known of the values of an attribute; nothing if they were not read.
+#[derive(Debug, Default, PartialEq, Serialize)]
+pub(super) struct Statistics {
+    pub(super) min: Option<f64>,
+    pub(super) max: Option<f64>,
+    pub(super) mean: Option<f64>,
+    pub(super) not_finite: Option<u64>,
+    pub(super) distinct: Option<usize>,
+    pub(super) values: Vec<Counted>,
+    pub(super) histogram: Option<Histogram>,
+}
+
+/// A value and how many points have it.
+#[derive(Debug, PartialEq, Serialize)]
+pub(super) struct Counted {
+    pub(super) value: f64,
+    pub(super) count: u64,
+    pub(super) name: Option<&'static str>,
+}
+
+/// How many values lie between each two edges; the last bin has its upper edge too.
+#[derive(Debug, PartialEq, Serialize)]
+pub(super) struct Histogram {
+    pub(super) edges: Vec<f64>,
+    pub(super) counts: Vec<u64>,
+}
+
+/// The finite values of a block, summed up.
+#[derive(Clone, Copy, Debug)]
+struct Summary {
+    min: f64,
+    max: f64,
+    sum: f64,
+    count: u64,
+    whole: bool,
+}
+
+impl Values<'_> {
+    fn len(self) -> usize {
+        match self {
+            Self::Axis(cloud, _) => cloud.len(),
+            Self::Channel(colors, _) => colors.len(),
+            Self::Field(values) => values.len(),
+        }
+    }
+
+    /// Calls `visit` with each finite value of some points.
+    fn each(self, points: Range<usize>, mut visit: impl FnMut(f64)) {
+        let mut finite = |value: f64| {
+            if value.is_finite() {
+                visit(value);
+            }
+        };
+        macro_rules! all {
+            ($values:expr) => {
+                $values[points].iter().for_each(|&value| finite(value as f64))
+            };
+        }
+        #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the types is f64 itself")]
+        match self {
+            Self::Axis(cloud, axis) => points.for_each(|i| finite(cloud.world_position(i)[axis])),
+            Self::Channel(colors, channel) => colors[points].iter().for_each(|color| finite(color[channel] as f64)),
+            Self::Field(FieldValues::U8(values)) => all!(values),
+            Self::Field(FieldValues::I8(values)) => all!(values),
+            Self::Field(FieldValues::U16(values)) => all!(values),
+            Self::Field(FieldValues::I16(values)) => all!(values),
+            Self::Field(FieldValues::U32(values)) => all!(values),
+            Self::Field(FieldValues::I32(values)) => all!(values),
+            Self::Field(FieldValues::U64(values)) => all!(values),
+            Self::Field(FieldValues::I64(values)) => all!(values),
+            Self::Field(FieldValues::F32(values)) => all!(values),
+            Self::Field(FieldValues::F64(values)) => all!(values),
+        }
+    }
+
+    fn blocks(self) -> impl IndexedParallelIterator<Item = Range<usize>> {
+        let len = self.len();
+        (0..len.div_ceil(BLOCK)).into_par_iter().map(move |block| block * BLOCK..((block + 1) * BLOCK).min(len))
+    }
+
+    fn summary(self) -> Summary {
+        let none = Summary { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0, whole: true };
+        let blocks: Vec<Summary> = self
+            .blocks()
+            .map(|points| {
+                let mut all = none;
+                self.each(points, |value| {
+                    all.min = all.min.min(value);
+                    all.max = all.max.max(value);
+                    all.sum += value;
+                    all.count += 1;
+                    all.whole &= value.fract() == 0.0;
+                });
+                all
+            })
+            .collect();
+        blocks.into_iter().fold(none, |a, b| Summary {
+            min: a.min.min(b.min),
+            max: a.max.max(b.max),
+            sum: a.sum + b.sum,
+            count: a.count + b.count,
+            whole: a.whole && b.whole,
+        })
+    }
+
+    /// How many values fall into each of `bins`.
+    fn count(self, bins: usize, bin: impl Fn(f64) -> usize + Sync) -> Vec<u64> {
+        let add = |mut counts: Vec<u64>, more: Vec<u64>| {
+            counts.iter_mut().zip(more).for_each(|(count, more)| *count += more);
+            counts
+        };
+        let counted = |mut counts: Vec<u64>, points: Range<usize>| {
+            self.each(points, |value| counts[bin(value).min(bins - 1)] += 1);
+            counts
+        };
+        self.blocks().fold(|| vec![0; bins], counted).reduce(|| vec![0; bins], add)
+    }
+}
+
+impl Statistics {
+    /// Looks at all values; `classes` says whether they are classes of points.
+    pub(super) fn of(values: Values<'_>, classes: bool) -> Self {
+        let Summary { min, max, sum, count, whole } = values.summary();
+        let not_finite = Some(values.len() as u64 - count);
+        let range = max - min;
+        if count == 0 || !range.is_finite() {
+            return Self { not_finite, ..Self::default() };
+        }
+        let mut statistics = Self {
+            min: Some(min),
+            max: Some(max),
+            // Rounding may not put it outside.
+            mean: Some((sum / count as f64).clamp(min, max)).filter(|mean| mean.is_finite()),
+            not_finite,
+            ..Self::default()
+        };
+        if whole && range < MAX_COUNTED {
+            let each = values.count(range as usize + 1, |value| (value - min) as usize);
+            let distinct = each.iter().filter(|count| **count > 0).count();
+            statistics.distinct = Some(distinct);
+            if classes || distinct <= MAX_LISTED {
+                let listed = each.iter().enumerate().filter(|(_, count)| **count > 0);
+                let name = |value: f64| classes.then(|| class_name(value)).flatten();
+                statistics.values = listed
+                    .map(|(offset, &count)| {
+                        let value = min + offset as f64;
+                        Counted { value, count, name: name(value) }
+                    })
+                    .collect();
+            }
+            let width = each.len().div_ceil(BINS);
+            let counts: Vec<u64> = each.chunks(width).map(|bin| bin.iter().sum()).collect();
+            let edges = (0..=counts.len()).map(|edge| min + (edge * width) as f64).collect();
+            statistics.histogram = Some(Histogram { edges, counts });
+        } else {
+            let counts = values.count(BINS, |value| ((value - min) / range * BINS as f64) as usize);
+            let edges = (0..=BINS).map(|edge| if edge == BINS { max } else { min + range * edge as f64 / BINS as f64 });
+            statistics.histogram = Some(Histogram { edges: edges.collect(), counts });
+        }
+        statistics
+    }
+}
+
+/// Names of the ASPRS standard classes (LAS 1.4 R15, table 17).
+fn class_name(class: f64) -> Option<&'static str> {
+    const NAMES: [&str; 23] = [
+        "never classified",
+        "unclassified",
+        "ground",
+        "low vegetation",
+        "medium vegetation",
+        "high vegetation",
+        "building",
+        "low point (noise)",
+        "model key point",
+        "water",
+        "rail",
+        "road surface",
+        "overlap",
+        "wire, guard",
+        "wire, conductor",
+        "transmission tower",
+        "wire connector",
+        "bridge deck",
+        "high noise",
+        "overhead structure",
+        "ignored ground",
+        "snow",
+        "temporal exclusion",
+    ];
+    match class {
+        0.0..=22.0 => Some(NAMES[class as usize]),
+        23.0..=63.0 => Some("reserved"),
+        64.0..=255.0 => Some("user-defined"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_are_counted_each() {
+        let classes = FieldValues::U8(vec![2, 2, 6, 2, 65]);
+        let found = Statistics::of(Values::Field(&classes), true);
+        assert_eq!([found.min, found.max, found.mean], [Some(2.0), Some(65.0), Some(15.4)], "least, greatest, mean");
+        assert_eq!(found.distinct, Some(3), "three classes");
+        let listed: Vec<_> = found.values.iter().map(|v| (v.value, v.count, v.name.unwrap_or_default())).collect();
+        assert_eq!(listed, [(2.0, 3, "ground"), (6.0, 1, "building"), (65.0, 1, "user-defined")], "with names");
+        let histogram = found.histogram.expect("there are values");
+        assert_eq!(histogram.edges[..3], [2.0, 4.0, 6.0], "bins of whole numbers hold equally many");
+        assert_eq!((histogram.counts.len(), histogram.counts[2]), (32, 1), "two to a bin");
+    }
+
+    #[test]
+    fn floats_are_binned() {
+        let values: Vec<f32> = (0..200_000).map(|i| (i % 64) as f32 / 64.0).chain([f32::NAN, f32::INFINITY]).collect();
+        let found = Statistics::of(Values::Field(&FieldValues::F32(values)), false);
+        assert_eq!((found.not_finite, found.max), (Some(2), Some(63.0 / 64.0)), "what is no number is left out");
+        let histogram = found.histogram.expect("there are values");
+        assert_eq!((histogram.edges.len(), histogram.counts.len()), (33, 32), "edges around bins");
+        assert_eq!(histogram.counts.iter().sum::<u64>(), 200_000, "every finite value is in one");
+        assert_eq!(histogram.counts[31], 200_000 / 64 * 2, "the greatest value is in the last");
+    }
+
+    #[test]
+    fn nothing_and_extremes() {
+        let of = |values: Vec<f64>| Statistics::of(Values::Field(&FieldValues::F64(values)), false);
+        assert_eq!(of(vec![]), Statistics { not_finite: Some(0), ..Statistics::default() }, "no points");
+        assert_eq!(of(vec![f64::NAN]).min, None, "no number");
+        assert_eq!(of(vec![f64::MAX, f64::MIN]).histogram, None, "a range beyond all numbers");
+        let one = of(vec![0.5; 3]);
+        assert_eq!((one.mean, one.histogram.map(|h| h.counts.iter().sum())), (Some(0.5), Some(3_u64)), "all equal");
+    }
+}

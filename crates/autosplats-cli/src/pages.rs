@@ -1,0 +1,64 @@
+//! `autosplats completions` and `autosplats man`: what shells and manual readers want, made from the same command line.
+
+use std::fs::create_dir_all;
+use std::io::Write as _;
+
+use clap::{Command, CommandFactory as _};
+use clap_mangen::Man;
+
+use crate::args::{CommandLine, CompletionsArgs, ManArgs};
+use crate::exit::{Exit, Failure};
+use crate::output::{check_target, print_bytes, print_line, write_file};
+
+/// Prints the script of a shell.
+pub(crate) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut CommandLine::command(), "autosplats", &mut script);
+    print_bytes(&script)
+}
+
+/// Prints the main page, or writes all pages into a folder.
+pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
+    let pages = pages();
+    let Some(folder) = &args.out else {
+        return print_bytes(&render(&pages[0].1)?);
+    };
+    create_dir_all(folder).map_err(|error| {
+        Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", folder.display()))
+    })?;
+    let paths: Vec<_> = pages.iter().map(|(name, _)| folder.join(format!("{name}.1"))).collect();
+    // All or none: nothing is written before everything may be.
+    for path in &paths {
+        if path.exists() && !args.force {
+            return Err(Failure::new(
+                Exit::Output,
+                format!("{}: is already there; --force replaces it", path.display()),
+            ));
+        }
+        check_target(path, [])?;
+    }
+    for (path, (_, page)) in paths.iter().zip(&pages) {
+        let page = render(page)?;
+        write_file(path, |writer| writer.write_all(&page))?;
+        print_line(&path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// The program's page and that of each command, by name.
+fn pages() -> Vec<(String, Command)> {
+    let mut program = CommandLine::command().disable_help_subcommand(true);
+    program.build();
+    let mut pages = vec![("autosplats".to_owned(), program.clone())];
+    for command in program.get_subcommands() {
+        let page = format!("autosplats-{}", command.get_name());
+        pages.push((page, command.clone().version(env!("CARGO_PKG_VERSION"))));
+    }
+    pages
+}
+
+fn render(page: &Command) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::new();
+    Man::new(page.clone()).render(&mut bytes).map_err(|error| Failure::new(Exit::Output, error))?;
+    Ok(bytes)
+}

@@ -1,0 +1,160 @@
+//! `cargo xtask formats`: docs/FORMATS.md, from what the program itself says of its formats and of the test data.
+
+mod outcome;
+mod words;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs::{read_dir, read_to_string};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use serde_json::Value;
+
+use self::outcome::{Outcome, Row};
+use self::words::{FILES, HEAD, WORDS};
+
+/// Files that go with point files: documentation, poses, pictures. The folder's own README describes them.
+const COMPANIONS: [(&str, &str); 4] = [
+    ("README.md", "documentation"),
+    (".conf", "poses of scans"),
+    ("pose.txt", "poses of pictures"),
+    ("color_", "colour picture"),
+];
+
+/// Writes the document, or only compares it with what would be written.
+pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
+    let program = build(root)?;
+    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    let data = data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))?;
+
+    let mut document = HEAD.to_owned();
+    formats(&program, &mut document)?;
+    schema(&program, &mut document)?;
+    files(&program, &data, &mut document)?;
+
+    let target = root.join("docs/FORMATS.md");
+    if check {
+        let there = read_to_string(&target).unwrap_or_default();
+        ensure!(there == document, "docs/FORMATS.md is not what this build makes; cargo xtask formats writes it");
+        println!("docs/FORMATS.md is up to date");
+        return Ok(());
+    }
+    std::fs::write(&target, document).with_context(|| target.display().to_string())?;
+    println!("{}", target.display());
+    Ok(())
+}
+
+/// Builds the command and returns where it is.
+fn build(root: &Path) -> Result<PathBuf> {
+    let mut command = Command::new("cargo");
+    command.current_dir(root).args(["build", "--package", "autosplats-cli", "--message-format", "json"]);
+    let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "cargo build: {}", output.status);
+    let messages = String::from_utf8(output.stdout)?;
+    let mut programs = messages.lines().filter_map(|line| {
+        let message: Value = serde_json::from_str(line).ok()?;
+        Some(PathBuf::from(message["executable"].as_str()?))
+    });
+    programs.next_back().context("cargo builds no program")
+}
+
+/// The tables of formats, read and written.
+fn formats(program: &Path, document: &mut String) -> Result<()> {
+    let output = Command::new(program).args(["doctor", "--json"]).output().context("cannot start the program")?;
+    let found: Value = serde_json::from_slice(&output.stdout).context("doctor --json")?;
+    document.push_str("\n## Read\n\n| format | extensions | kept | not kept |\n|---|---|---|---|\n");
+    let list = |which: &str| found["formats"][which].as_array().cloned().unwrap_or_default();
+    for format in list("read") {
+        let (name, extensions) = name_and_extensions(&format);
+        let Some(words) = WORDS.iter().find(|words| words.name == name) else {
+            bail!("xtask/src/formats/words.rs has no words about the format {name}");
+        };
+        let _ = writeln!(document, "| {name} | {extensions} | {} | {} |", words.kept, words.not_kept);
+    }
+    document.push_str(
+        "\n## Written\n\nThe extension of the output tells the format.\n\n| format | extensions |\n|---|---|\n",
+    );
+    for format in list("written") {
+        let (name, extensions) = name_and_extensions(&format);
+        let _ = writeln!(document, "| {name} | {extensions} |");
+    }
+    Ok(())
+}
+
+fn name_and_extensions(format: &Value) -> (&str, String) {
+    let extensions = format["extensions"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    let extensions: Vec<_> = extensions.map(|extension| format!("`.{extension}`")).collect();
+    (format["name"].as_str().unwrap_or_default(), extensions.join(" "))
+}
+
+/// What the program's help says of its JSON.
+fn schema(program: &Path, document: &mut String) -> Result<()> {
+    let output = Command::new(program).args(["info", "--help"]).output().context("cannot start the program")?;
+    let help = String::from_utf8(output.stdout)?;
+    let start = help.find("Fields of the JSON").context("info --help does not explain its JSON")?;
+    document.push_str(
+        "\n## The JSON of info\n\n`autosplats info --json` prints one object, for several inputs an array.\n\n",
+    );
+    let _ = writeln!(document, "```text\n{}\n```", help[start..].trim_end());
+    Ok(())
+}
+
+/// The table of files.
+fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
+    let mut names = Vec::new();
+    collect(data, data, &mut names)?;
+    let pictures = tempfile::tempdir()?;
+    let mut rows: Vec<Row> = Vec::new();
+    let mut others: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let total = names.len();
+    for (number, name) in names.into_iter().enumerate() {
+        println!("{:>4} of {total}  {name}", number + 1);
+        let base = name.rsplit('/').next().unwrap_or(&name);
+        if let Some((_, about)) = COMPANIONS.iter().find(|(part, _)| base.starts_with(part) || base.ends_with(part)) {
+            others.entry((*about).to_owned()).or_default().push(name);
+            continue;
+        }
+        let outcome = Outcome::of(program, data, &name, &pictures.path().join("picture.png"))?;
+        if outcome.is_unknown() && name.ends_with(".mcap") {
+            others.entry("recordings, not read by this version".into()).or_default().push(name);
+            continue;
+        }
+        match rows.last_mut().filter(|row| row.continues(&name, &outcome)) {
+            Some(row) => row.add(&name, &outcome),
+            None => rows.push(Row::new(name, outcome)),
+        }
+    }
+    document.push('\n');
+    document.push_str(FILES);
+    document.push_str("\n| file | format | points | values of a point | from .. to | unit, system | sensors | noted, or the error | rendered |\n");
+    document.push_str("|---|---|---|---|---|---|---|---|---|\n");
+    rows.iter().for_each(|row| document.push_str(&row.to_markdown()));
+    let points: usize = rows.iter().map(Row::files).sum();
+    let read: usize = rows.iter().filter(|row| row.is_read()).map(Row::files).sum();
+    let rendered: usize = rows.iter().filter(|row| row.is_rendered()).map(Row::files).sum();
+    let _ = writeln!(
+        document,
+        "\n{points} point files: {read} are read, {rendered} of them rendered.\n\nNot point files:\n"
+    );
+    for (about, names) in others {
+        let _ = writeln!(document, "- {about}: {}", names.join(", "));
+    }
+    Ok(())
+}
+
+/// The names of all files below `folder`, relative to `data`, in order.
+fn collect(data: &Path, folder: &Path, names: &mut Vec<String>) -> Result<()> {
+    for entry in read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.is_dir() {
+            collect(data, &path, names)?;
+        } else {
+            let parts: Vec<_> = path.strip_prefix(data)?.iter().map(|part| part.to_string_lossy()).collect();
+            names.push(parts.join("/"));
+        }
+    }
+    names.sort();
+    Ok(())
+}
