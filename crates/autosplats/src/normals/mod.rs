@@ -16,6 +16,7 @@
 //! equals, and the result has the same bits for any number of threads and any width of vectors. The order of the points
 //! in the cloud matters to no more than the rounding of sums.
 
+mod boxes;
 mod nearest;
 mod neighbors;
 mod orient;
@@ -110,7 +111,7 @@ pub struct Normals {
 /// Points without a finite position are nobody's neighbours. Where there are not k others, all of them are the
 /// neighbourhood, and k is their number. Points nearer to each other than about 1e-18 may count as one place.
 ///
-/// Beside the cloud this takes 40 bytes per point, the 20 of the result among them, and some megabytes per thread.
+/// Beside the cloud this takes 38 bytes per point, the 20 of the result among them, and some megabytes per thread.
 ///
 /// # Errors
 /// [`Error::Setting`] for a k or an orientation outside its range, [`Error::TooManyPoints`], and [`Error::Cancelled`] if

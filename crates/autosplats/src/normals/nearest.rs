@@ -5,7 +5,8 @@
 
 use std::collections::BinaryHeap;
 
-use super::tree::{Bounds, Node, Tree};
+use super::boxes::Bounds;
+use super::tree::{Node, Tree};
 use crate::search::{LANES, NeighborhoodBlock};
 
 /// Memory of one thread.

@@ -7,8 +7,9 @@
 
 use pulp::Simd;
 
+use super::boxes::Bounds;
 use super::nearest::Nearest;
-use super::tree::{Bounds, Leaf, Tree};
+use super::tree::{Leaf, Tree};
 use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::select::{GROUP, kth_smallest};
 use crate::search::{LANES, Lanes, NeighborhoodBlock};
@@ -19,12 +20,14 @@ const FIRST_REACH: f32 = 1.35;
 const START_REACH: f32 = 0.9;
 /// Least and most that is expected.
 const REACH: [f32; 2] = [0.3, 3.0];
-/// A radius with too few candidates grows by the first factor, one with enough for some by the second at most.
-const GROWTH: [f32; 2] = [2.0, 1.6];
+/// A radius with too few candidates grows as if they lay on a line, within these factors.
+const GROWTH: [f32; 2] = [2.0, 8.0];
+/// A radius with enough candidates for some grows by this factor at most.
+const LAST_GROWTH: f32 = 1.6;
 /// Lists read for one leaf before what is left is searched for alone.
 const MOST_LISTS: usize = 8;
 
-/// Candidates that a list may hold: more than twice what a surface or a volume of even density needs.
+/// Candidates that a list may hold: well above what a surface or a volume of even density needs.
 const fn most_candidates(k: u32) -> usize {
     8 * (k as usize + LANES) + 256
 }
@@ -79,7 +82,8 @@ pub(super) fn search_leaf<S: Simd>(
             continue;
         };
         if listed <= k as usize {
-            radius *= GROWTH[0];
+            let [least, most] = GROWTH;
+            radius *= (k as f32 / listed.max(1) as f32).clamp(least, most);
             continue;
         }
         let candidates = &scratch.candidates[..listed.next_multiple_of(GROUP)];
@@ -97,7 +101,7 @@ pub(super) fn search_leaf<S: Simd>(
             break;
         }
         // What was read bounds the k-radius, but for a point apart from the others only loosely.
-        radius = (furthest.sqrt() * 1.0001).min(GROWTH[1] * radius);
+        radius = (furthest.sqrt() * 1.0001).min(LAST_GROWTH * radius);
         bounds = Bounds::EMPTY;
         for lane in (0..points).filter(|&lane| pending[lane]) {
             bounds.include(tree.leaves[leaf].point(lane));
