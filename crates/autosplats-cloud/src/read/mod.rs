@@ -18,6 +18,7 @@ mod options;
 mod pcd;
 mod placed;
 mod ply;
+mod ptx;
 mod table;
 mod text;
 mod xyz;
@@ -52,7 +53,7 @@ struct Format {
 
 /// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
 /// extensions go before shorter ones.
-const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &e57::FORMAT, &xyz::FORMAT];
+const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &e57::FORMAT, &ptx::FORMAT, &xyz::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
