@@ -6,6 +6,7 @@
 //! failure, and then renamed, replacing what was there. What a format cannot hold is told through
 //! [`Progress::note`], once per kind of loss.
 
+mod e57;
 mod ply;
 
 use std::{
@@ -26,7 +27,7 @@ struct Format {
 }
 
 /// All formats; longer extensions go before shorter ones.
-const FORMATS: &[Format] = &[ply::FORMAT];
+const FORMATS: &[Format] = &[ply::FORMAT, e57::FORMAT];
 
 /// Names and extensions of the formats that [`write`] makes.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
