@@ -25,6 +25,7 @@ mod options;
 mod pcd;
 mod placed;
 mod ply;
+mod ptx;
 mod raw;
 mod stl;
 mod table;
@@ -71,6 +72,7 @@ const FORMATS: &[&Format] = &[
     &obj::FORMAT,
     &depth_image::FORMAT,
     &raw::FORMAT,
+    &ptx::FORMAT,
     &xyz::FORMAT,
     // Its mark is only a number that fits the file's size, so it comes last.
     &stl::FORMAT,

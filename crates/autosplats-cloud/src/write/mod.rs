@@ -7,6 +7,7 @@
 //! [`Progress::note`], once per kind of loss.
 
 mod decimal;
+mod e57;
 mod names;
 mod pcd;
 mod ply;
@@ -30,7 +31,7 @@ struct Format {
 }
 
 /// All formats; longer extensions go before shorter ones.
-const FORMATS: &[Format] = &[ply::FORMAT, pcd::FORMAT, xyz::FORMAT];
+const FORMATS: &[Format] = &[ply::FORMAT, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
 
 /// Names and extensions of the formats that [`write`] makes.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {

@@ -1,0 +1,260 @@
+//! The values of a point, each as a stream of its own.
+
+use glam::{DMat3, DVec3};
+
+use super::super::Job;
+use crate::{Field, FieldValues, PointCloud};
+
+/// One value of each point: how it is called, stored and had.
+pub(super) struct Value<'a> {
+    /// Name, with the prefix of an extension.
+    pub(super) name: String,
+    pub(super) source: Source<'a>,
+}
+
+/// Where a value comes from.
+#[derive(Clone, Copy)]
+pub(super) enum Source<'a> {
+    Position {
+        axis: usize,
+        single: bool,
+    },
+    /// Whether there is a position: two bits.
+    State,
+    Color(usize),
+    Field(&'a FieldValues),
+    /// Returns are counted from 0.
+    FromZero(&'a FieldValues),
+    /// In double precision whatever the field is.
+    Double(&'a FieldValues),
+    Normal {
+        fields: [&'a FieldValues; 3],
+        axis: usize,
+        /// In single precision, because nothing is turned.
+        single: bool,
+    },
+}
+
+/// The frame of a scan: what maps world coordinates to it.
+#[derive(Clone, Copy)]
+pub(super) struct Frame {
+    pub(super) rotation: DMat3,
+    pub(super) translation: DVec3,
+}
+
+impl Frame {
+    pub(super) const WORLD: Self = Self { rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
+
+    pub(super) fn is_world(self) -> bool {
+        self.rotation == DMat3::IDENTITY && self.translation == DVec3::ZERO
+    }
+
+    pub(super) fn local(self, world: DVec3) -> DVec3 {
+        if self.is_world() { world } else { self.rotation.transpose() * (world - self.translation) }
+    }
+}
+
+impl Source<'_> {
+    /// Bits of a value.
+    pub(super) fn bits(self) -> usize {
+        match self {
+            Self::State => 2,
+            Self::Color(_) => 8,
+            Self::Position { single: true, .. } | Self::Normal { single: true, .. } => 32,
+            Self::Position { .. } | Self::Normal { .. } | Self::Double(_) => 64,
+            Self::Field(values) | Self::FromZero(values) => match values {
+                FieldValues::U8(_) | FieldValues::I8(_) => 8,
+                FieldValues::U16(_) | FieldValues::I16(_) => 16,
+                FieldValues::U32(_) | FieldValues::I32(_) | FieldValues::F32(_) => 32,
+                FieldValues::U64(_) | FieldValues::I64(_) | FieldValues::F64(_) => 64,
+            },
+        }
+    }
+
+    /// The attributes of its element in the XML section.
+    pub(super) fn stored(self) -> String {
+        let integer = |min: i64, max: i64| format!("type=\"Integer\" minimum=\"{min}\" maximum=\"{max}\"");
+        let float = |single| if single { "type=\"Float\" precision=\"single\"" } else { "type=\"Float\"" };
+        match self {
+            Self::State => integer(0, 2),
+            Self::Color(_) => integer(0, 255),
+            Self::Position { single, .. } | Self::Normal { single, .. } => float(single).into(),
+            Self::Double(_) => float(false).into(),
+            Self::Field(values) | Self::FromZero(values) => match values {
+                FieldValues::U8(_) => integer(0, u8::MAX.into()),
+                FieldValues::I8(_) => integer(i8::MIN.into(), i8::MAX.into()),
+                FieldValues::U16(_) => integer(0, u16::MAX.into()),
+                FieldValues::I16(_) => integer(i16::MIN.into(), i16::MAX.into()),
+                FieldValues::U32(_) => integer(0, u32::MAX.into()),
+                FieldValues::I32(_) => integer(i32::MIN.into(), i32::MAX.into()),
+                FieldValues::U64(_) | FieldValues::I64(_) => integer(i64::MIN, i64::MAX),
+                FieldValues::F32(_) => float(true).into(),
+                FieldValues::F64(_) => float(false).into(),
+            },
+        }
+    }
+
+    /// Appends the values of some points.
+    pub(super) fn encode(self, cloud: &PointCloud, frame: Frame, points: &[usize], out: &mut Vec<u8>) {
+        let valid = |i: usize| cloud.positions()[i].iter().all(|value| value.is_finite());
+        match self {
+            Self::Position { axis, single } => {
+                for &i in points {
+                    let local = if valid(i) { frame.local(cloud.world_position(i)) } else { DVec3::ZERO };
+                    if single {
+                        out.extend((local[axis] as f32).to_le_bytes());
+                    } else {
+                        out.extend(local[axis].to_le_bytes());
+                    }
+                }
+            }
+            Self::State => {
+                out.extend(points.chunks(4).map(|four| {
+                    let bits = |(place, &i): (usize, &usize)| if valid(i) { 0 } else { 2_u8 << (2 * place) };
+                    four.iter().enumerate().map(bits).sum::<u8>()
+                }));
+            }
+            Self::Color(channel) => {
+                if let Some(colors) = cloud.colors() {
+                    out.extend(points.iter().map(|&i| colors[i][channel]));
+                }
+            }
+            Self::Double(values) => points.iter().for_each(|&i| out.extend(values.get(i).to_le_bytes())),
+            Self::Normal { fields, axis, single } => {
+                for &i in points {
+                    if single {
+                        out.extend((fields[axis].get(i) as f32).to_le_bytes());
+                    } else {
+                        let world = DVec3::from(fields.map(|values| values.get(i)));
+                        let local = if frame.is_world() { world } else { frame.rotation.transpose() * world };
+                        out.extend(local[axis].to_le_bytes());
+                    }
+                }
+            }
+            Self::Field(values) => put(values, points, 0, out),
+            Self::FromZero(values) => put(values, points, 1, out),
+        }
+    }
+}
+
+/// Integers are stored by their distance from the least of their type.
+fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
+    macro_rules! put {
+        ($v:expr, $min:expr, $less:expr) => {
+            for &i in points {
+                out.extend($v[i].wrapping_sub($less).wrapping_sub($min).to_le_bytes());
+            }
+        };
+    }
+    match values {
+        FieldValues::U8(v) => put!(v, 0, less),
+        FieldValues::I8(v) => put!(v, i8::MIN, less as i8),
+        FieldValues::U16(v) => put!(v, 0, u16::from(less)),
+        FieldValues::I16(v) => put!(v, i16::MIN, i16::from(less)),
+        FieldValues::U32(v) => put!(v, 0, u32::from(less)),
+        FieldValues::I32(v) => put!(v, i32::MIN, i32::from(less)),
+        // Half the range of a signed integer is above the least one.
+        FieldValues::U64(v) => put!(v, 1 << 63, u64::from(less)),
+        FieldValues::I64(v) => put!(v, i64::MIN, i64::from(less)),
+        FieldValues::F32(v) => points.iter().for_each(|&i| out.extend(v[i].to_le_bytes())),
+        FieldValues::F64(v) => points.iter().for_each(|&i| out.extend(v[i].to_le_bytes())),
+    }
+}
+
+/// All values of the points of a cloud: `single` positions or double ones, with `state` if some have none.
+pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool) -> Vec<Value<'a>> {
+    let cloud = job.cloud;
+    let mut all = Vec::new();
+    let mut add = |name: &str, source| all.push(Value { name: name.into(), source });
+    for (axis, name) in ["cartesianX", "cartesianY", "cartesianZ"].into_iter().enumerate() {
+        add(name, Source::Position { axis, single });
+    }
+    if state {
+        add("cartesianInvalidState", Source::State);
+    }
+    let three = |names: [&str; 3]| -> Option<[&'a FieldValues; 3]> {
+        let found = names.map(|name| named(cloud, name));
+        Some([found[0]?, found[1]?, found[2]?])
+    };
+    let wide = wide_colors(cloud);
+    for (channel, name) in ["colorRed", "colorGreen", "colorBlue"].into_iter().enumerate() {
+        match wide {
+            Some(wide) => add(name, Source::Field(wide[channel])),
+            None if cloud.colors().is_some() => add(name, Source::Color(channel)),
+            None => {}
+        }
+    }
+    let normals = three(["NormalX", "NormalY", "NormalZ"]);
+    let counted = returns(cloud);
+    let mut names: Vec<String> = Vec::new();
+    for Field { name, values } in cloud.fields() {
+        let integers = !matches!(values, FieldValues::F32(_) | FieldValues::F64(_));
+        match &**name {
+            "Red" | "Green" | "Blue" if wide.is_some() => {}
+            "Intensity" => add("intensity", field(values)),
+            "ReturnNumber" if counted => add("returnIndex", Source::FromZero(values)),
+            "NumberOfReturns" if counted => add("returnCount", field(values)),
+            "GpsTime" => add("timeStamp", Source::Double(values)),
+            "rowIndex" | "columnIndex" | "isIntensityInvalid" | "isColorInvalid" if integers => {
+                add(name, field(values))
+            }
+            "NormalX" | "NormalY" | "NormalZ" if normals.is_some() => {
+                if let Some((axis, fields)) =
+                    ["NormalX", "NormalY", "NormalZ"].iter().position(|it| it == name).zip(normals)
+                {
+                    let single = frame.rotation == DMat3::IDENTITY
+                        && fields.iter().all(|values| matches!(values, FieldValues::F32(_)));
+                    add(["nor:normalX", "nor:normalY", "nor:normalZ"][axis], Source::Normal { fields, axis, single });
+                }
+            }
+            _ => {
+                let mut fit = xml_name(name);
+                while names.contains(&fit) {
+                    fit.push('_');
+                }
+                add(&format!("autosplats:{fit}"), field(values));
+                names.push(fit);
+            }
+        }
+    }
+    all
+}
+
+/// A field as it is, but for integers that E57 cannot hold.
+fn field(values: &FieldValues) -> Source<'_> {
+    if beyond(values) { Source::Double(values) } else { Source::Field(values) }
+}
+
+/// Whether integers are beyond 63 bits.
+pub(super) fn beyond(values: &FieldValues) -> bool {
+    matches!(values, FieldValues::U64(values) if values.iter().any(|&value| i64::try_from(value).is_err()))
+}
+
+fn named<'a>(cloud: &'a PointCloud, name: &str) -> Option<&'a FieldValues> {
+    cloud.fields().iter().find(|field| field.name == name).map(|field| &field.values)
+}
+
+/// Colours of 16 bits, if the cloud has some.
+pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
+    let [red, green, blue] = ["Red", "Green", "Blue"].map(|name| named(cloud, name));
+    let all = [red?, green?, blue?];
+    all.iter().all(|values| matches!(values, FieldValues::U16(_))).then_some(all)
+}
+
+/// Whether returns are counted from 1, as they should be, so that E57's own elements can hold them.
+fn returns(cloud: &PointCloud) -> bool {
+    let whole = |values: &&FieldValues| !matches!(values, FieldValues::F32(_) | FieldValues::F64(_)) && !beyond(values);
+    let number = named(cloud, "ReturnNumber").filter(whole);
+    let counts = named(cloud, "NumberOfReturns").filter(whole);
+    counts.is_some() && number.is_some_and(|number| (0..number.len()).all(|i| number.get(i) >= 1.0))
+}
+
+/// A name that XML allows.
+pub(super) fn xml_name(name: &str) -> String {
+    let fit = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.') { c } else { '_' };
+    let mut fit: String = name.chars().map(fit).collect();
+    if !fit.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+        fit.insert(0, '_');
+    }
+    fit
+}
