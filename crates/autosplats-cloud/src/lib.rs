@@ -24,6 +24,7 @@ mod merge;
 mod progress;
 mod read;
 mod retain;
+mod sample;
 mod source;
 mod write;
 
@@ -38,5 +39,6 @@ pub use read::{
     Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
     read_mesh, read_with,
 };
+pub use sample::sample_surface;
 pub use source::scene::{Hit, Scene, View};
 pub use write::{check_writable, write, written_formats};
