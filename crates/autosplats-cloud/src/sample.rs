@@ -26,6 +26,10 @@ const PIECE: usize = 1 << 12;
 /// How far a point is drawn from the middle of its patch to a random place in it, so that no pattern is seen.
 const JITTER: f64 = 0.3;
 
+/// Part of a patch that is large enough to have the point in its own middle. The nearest place to the middle of all parts
+/// would be on an edge, where the points of other patches come to lie too.
+const LARGE: f64 = 0.3;
+
 /// Halvings beyond those that make a piece as small as a patch.
 const FINER: i32 = 6;
 
@@ -337,14 +341,18 @@ impl<'a> Surface<'a> {
             let middle = self.part(first, start, end, patch).1;
             return self.jittered(first, middle, start, end, patch, random);
         }
+        let parts = (first..=after).map(|index| (self.part(index, start, end, patch), index));
+        let largest = parts.max_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        if let Some(((_, weights), index)) = largest.filter(|((area, _), _)| *area >= LARGE * patch) {
+            return self.jittered(index, weights, start, end, patch, random);
+        }
         let goal = sum / total;
-        let nearest = (first..=after)
-            .map(|index| {
-                let triangle = self.triangle(index as u32);
-                let weights = triangle.nearest(goal);
-                (triangle.at(weights.x as f32, weights.y as f32).distance_squared(goal), index, weights)
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = (first..=after).map(|index| {
+            let triangle = self.triangle(index as u32);
+            let weights = triangle.nearest(goal);
+            (triangle.at(weights.x as f32, weights.y as f32).distance_squared(goal), index, weights)
+        });
+        let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
         let (_, index, weights) = nearest.unwrap_or((0.0, first, DVec2::splat(1.0 / 3.0)));
         self.jittered(index, weights, start, end, patch, random)
     }

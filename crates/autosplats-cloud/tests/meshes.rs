@@ -6,9 +6,7 @@ mod common;
 
 use std::{path::Path, sync::Mutex};
 
-use autosplats_cloud::{
-    Axes, Contents, Description, FieldValues, Progress, ReadOptions, Unit, describe, glam::DVec3, read_mesh,
-};
+use autosplats_cloud::{Contents, Description, Progress, ReadOptions, describe, glam::DVec3, read_mesh};
 use common::{error, read_bytes};
 
 /// Keeps what the user is told.

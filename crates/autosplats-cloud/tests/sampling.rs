@@ -172,9 +172,8 @@ fn points_keep_more_distance_than_random_ones() {
     ];
     for (what, mesh, area) in surfaces {
         let spacings = spacings(&sample(&mesh, 4000), area);
-        println!("{what}: mean {:.3}, hundredth {:.3}, least {:.3}", mean(&spacings), spacings[40], spacings[0]);
-        assert!(mean(&spacings) > 1.45, "{what}: mean distance {}", mean(&spacings));
-        assert!(spacings[40] > 0.6, "{what}: every hundredth has a neighbour at {}", spacings[40]);
+        assert!(mean(&spacings) > 1.33, "{what}: mean distance {}", mean(&spacings));
+        assert!(spacings[40] > 0.65, "{what}: every hundredth has a neighbour at {}", spacings[40]);
     }
 }
 
