@@ -72,6 +72,9 @@ pub enum Error {
         /// What it should be.
         rule: &'static str,
     },
+    /// A mesh has nothing that points could be strewn over.
+    #[error("there is no surface to strew points over: no triangle has an area; take the points as they are")]
+    NoSurface,
     /// No made-up scene has this name.
     #[error("no scene is called {given:?}; there are:{known}")]
     UnknownScene {

@@ -26,6 +26,7 @@ mod merge;
 mod progress;
 mod read;
 mod retain;
+mod sample;
 mod source;
 mod thin;
 mod write;
@@ -41,5 +42,6 @@ pub use read::{
     Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
     read_mesh, read_mesh_bytes, read_with,
 };
+pub use sample::sample_surface;
 pub use source::scene::{Hit, Scene, View, parse_count};
 pub use write::{check_writable, write, written_formats};

@@ -7,7 +7,7 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use autosplats_cloud::{PointCloud, read, write};
+use autosplats_cloud::{PointCloud, ReadOptions, describe, read, read_mesh, write};
 use common::{Random, error, las_bytes, pcd_bytes, read_bytes, rich_cloud};
 
 /// Far above what any of these small files takes, far below what a loop over a claimed count would.
@@ -44,13 +44,87 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("a.xyz", rows.clone().into_bytes()),
         ("a.pts", format!("{POINTS}\n{rows}").into_bytes()),
         ("a.csv", format!("x,y,z\n{}", rows.replace(' ', ",")).into_bytes()),
+        ("a.obj", rows.lines().map(|row| format!("v {row}\n")).chain(faces("f", 1)).collect::<String>().into_bytes()),
+        ("a.off", format!("OFF\n{POINTS} 298 0\n{rows}{}", faces("3", 0).collect::<String>()).into_bytes()),
+        ("a.stl", stl(false)),
+        ("b.stl", stl(true)),
+        ("a.glb", glb()),
+        ("d.ply", mesh_ply()),
     ]
+}
+
+/// A triangle of every three points in a row.
+fn faces(word: &str, first: usize) -> impl Iterator<Item = String> {
+    (first..first + POINTS - 2).map(move |i| format!("{word} {i} {} {}\n", i + 1, i + 2))
+}
+
+/// A hundred triangles that share no corner.
+fn stl(text: bool) -> Vec<u8> {
+    let positions = rich_cloud(POINTS).positions().to_vec();
+    if text {
+        let facet = |corners: &[[f32; 3]]| {
+            let vertex = |[x, y, z]: &[f32; 3]| format!("vertex {x} {y} {z}\n");
+            let vertices: String = corners.iter().map(vertex).collect();
+            format!("facet normal 0 0 1\nouter loop\n{vertices}endloop\nendfacet\n")
+        };
+        let facets: String = positions.chunks(3).map(facet).collect();
+        return format!("solid\n{facets}endsolid\n").into_bytes();
+    }
+    let mut bytes = vec![b' '; 80];
+    bytes.extend((POINTS as u32 / 3).to_le_bytes());
+    for corners in positions.chunks(3) {
+        bytes.extend([0; 12]);
+        corners.as_flattened().iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// A triangle of every three points in a row, shown by the child of a node.
+fn glb() -> Vec<u8> {
+    let positions =
+        rich_cloud(POINTS).positions().as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+    let indices = (0..POINTS as u16).flat_map(u16::to_le_bytes).collect::<Vec<_>>();
+    let json = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"children\":[1]}},\
+         {{\"mesh\":0,\"scale\":[1,2,3]}}],\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}},\"indices\":1}}]}}],\
+         \"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\"count\":{POINTS},\"type\":\"VEC3\"}},{{\"bufferView\":1,\
+         \"componentType\":5123,\"count\":{POINTS},\"type\":\"SCALAR\"}}],\"bufferViews\":[{{\"buffer\":0,\"byteLength\":{0}}},\
+         {{\"buffer\":0,\"byteOffset\":{0},\"byteLength\":{1}}}],\"buffers\":[{{\"byteLength\":{2}}}]}}",
+        positions.len(),
+        indices.len(),
+        positions.len() + indices.len()
+    );
+    let padding = json.len().next_multiple_of(4) - json.len();
+    let len = |len: usize| (len as u32).to_le_bytes();
+    let json = json + &"   "[..padding];
+    let data = [positions, indices].concat();
+    let total = len(28 + json.len() + data.len());
+    let header = [&b"glTF\x02\0\0\0"[..], &total, &len(json.len()), b"JSON"].concat();
+    [&header[..], json.as_bytes(), &len(data.len()), b"BIN\0", &data].concat()
+}
+
+/// Faces after the vertices, and a strip.
+fn mesh_ply() -> Vec<u8> {
+    let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement face 298\nproperty list uchar int vertex_indices\n\
+        element tristrips 1\nproperty list int int vertex_indices\nelement vertex 300\nproperty float x\n\
+        property float y\nproperty float z\nend_header\n"
+        .to_vec();
+    for i in 0..POINTS as i32 - 2 {
+        bytes.push(3);
+        bytes.extend([i, i + 1, i + 2].map(i32::to_le_bytes).as_flattened());
+    }
+    bytes.extend(7_i32.to_le_bytes());
+    bytes.extend([0, 1, 2, -1, 3, 4, 5].map(i32::to_le_bytes).as_flattened());
+    bytes.extend(rich_cloud(POINTS).positions().as_flattened().iter().flat_map(|value| value.to_le_bytes()));
+    bytes
 }
 
 /// Reads what may be broken. A panic fails the test by itself; here time and sanity are checked.
 fn survive(name: &str, what: &str, bytes: &[u8]) -> Option<PointCloud> {
     let start = Instant::now();
     let result = read_bytes(name, bytes);
+    survive_as_mesh(name, what, bytes, result.is_ok());
     assert!(start.elapsed() < LIMIT, "{name}, {what}: took {:?}", start.elapsed());
     match result {
         Ok(cloud) => {
@@ -62,6 +136,25 @@ fn survive(name: &str, what: &str, bytes: &[u8]) -> Option<PointCloud> {
             assert!(!message.contains(char::is_control), "{name}, {what}: one line of plain text: {message:?}");
             None
         }
+    }
+}
+
+/// The same with triangles, and described. Triangles are no reason to be read where points are not.
+fn survive_as_mesh(name: &str, what: &str, bytes: &[u8], points: bool) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    match read_mesh(&path, &ReadOptions::default(), &()) {
+        Ok(mesh) => {
+            assert!(points, "{name}, {what}: a mesh, but no points");
+            assert!(mesh.triangles.len() <= bytes.len(), "{name}, {what}: more triangles than bytes");
+            let exist = mesh.triangles.as_flattened().iter().all(|&corner| (corner as usize) < mesh.cloud.len());
+            assert!(exist, "{name}, {what}: a corner that does not exist");
+        }
+        Err(error) => assert!(!error.to_string().contains(char::is_control), "{name}, {what}: one line of plain text"),
+    }
+    if let Ok(description) = describe(&path, &ReadOptions::default()) {
+        assert!(!description.format.contains(char::is_control), "{name}, {what}: one line of plain text");
     }
 }
 
@@ -81,7 +174,10 @@ fn files_cut_anywhere() {
             let cloud = survive(name, &format!("cut after {len} bytes"), &bytes[..len]);
             // Bare rows do not say how many there should be; every other format does. The last line feed is no loss,
             // nor is what LAZ has after its points, nor a digit of the last number. Of LAS the complete points are kept.
-            let counted = !matches!(name, "a.xyz" | "a.csv") && len + 20 < bytes.len() && !name.contains(".la");
+            let bare = matches!(name, "a.xyz" | "a.csv" | "a.obj");
+            // Faces come after the points; text of triangles is whole after any of them.
+            let faces = matches!(name, "a.off" | "b.stl");
+            let counted = !bare && !faces && len + 20 < bytes.len() && !name.contains(".la");
             assert!(!counted || cloud.is_none(), "{name}, cut after {len} of {} bytes: was read", bytes.len());
         }
     }

@@ -6,9 +6,7 @@ mod common;
 
 use std::{path::Path, sync::Mutex};
 
-use autosplats_cloud::{
-    Axes, Contents, Description, FieldValues, Progress, ReadOptions, Unit, describe, glam::DVec3, read_mesh,
-};
+use autosplats_cloud::{Contents, Description, Progress, ReadOptions, describe, glam::DVec3, read_mesh};
 use common::{error, read_bytes};
 
 /// Keeps what the user is told.
@@ -376,7 +374,8 @@ fn stl_corners_are_welded() {
     assert!(open.triangles.len() == 3 && notes.contains("may be cut off"), "{notes}");
     assert!(error("a.stl", &text.as_bytes()[..text.len() - 42]).contains("ends inside triangle 3"), "text cut off");
     assert!(error("a.stl", &binary[..200]).contains("after 2 of 3 triangles"), "binary cut off");
-    assert!(error("a.stl", &binary[..50]).contains("inside the header"), "binary cut off early");
+    assert!(error("a.stl", &binary[..50]).contains("before the first triangle"), "binary cut off early");
+    assert!(error("a.stl", &[0; 50]).contains("inside the header"), "no text");
     assert!(
         error("a.stl", text.replace("vertex", "vortex").as_bytes()).contains("line 4: 'vortex' is no word"),
         "typo"

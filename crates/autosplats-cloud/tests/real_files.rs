@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use autosplats_cloud::{Axes, Error, PointCloud, glam::DVec3, read};
+use autosplats_cloud::{Axes, Error, PointCloud, ReadOptions, describe, glam::DVec3, read, read_mesh};
 
 fn data() -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
@@ -58,6 +58,8 @@ const LAS: &[&str] = &["Intensity", "ReturnNumber", "NumberOfReturns", "Classifi
 const CASES: &[Case] = &[
     ("models/armadillo_normals.ply", 38_294, [-13.66165, -12.38138, -48.86357], [11.12058, 95.40793, 57.714], &["nx", "ny", "nz"], false),
     ("models/bunny.ply", 35_947, [-0.0946899, 0.0329874, -0.0618736], [0.0610091, 0.187321, 0.0587997], &["confidence", "Intensity"], false),
+    ("models/camelhead.off", 11_381, [-0.261816, -0.329475, -0.532113], [0.26182, 0.202191, 0.467887], &[], false),
+    ("animation/stork_morph.glb", 358, [-98.4, -6.0, -82.3], [98.4, 23.9, 92.0], &[], true),
     ("models/guanyin_color.ply", 238_154, [-0.510808, 0.002058, -0.370374], [0.474869, 1.292931, 0.453506], &[], true),
     ("models/igea.ply", 134_345, [-0.034556, -0.049669, -0.049538], [0.034556, 0.049669, 0.049538], &[], false),
     ("scans/autzen_thin.las", 10_653, [635589.0, 848886.5, 406.59], [638994.8, 853535.4, 593.73], LAS, true),
@@ -153,6 +155,43 @@ fn particulars_of_real_files() {
 }
 
 #[test]
+fn meshes_have_the_triangles_that_others_say() {
+    let Some(folder) = data() else { return };
+    let mesh = |file: &str| {
+        read_mesh(&folder.join(file), &ReadOptions::default(), &()).unwrap_or_else(|error| panic!("{error}"))
+    };
+    for (file, faces) in [
+        ("models/bunny.ply", 69_451),
+        ("models/camelhead.off", 22_704),
+        ("models/armadillo_normals.ply", 0),
+        ("animation/horse_gallop/frame_000.ply", 16_843),
+        ("animation/samba/frame_000.ply", 19_938),
+    ] {
+        let mesh = mesh(file);
+        assert_eq!(mesh.triangles.len(), faces, "{file}");
+        let described = describe(&folder.join(file), &ReadOptions::default()).unwrap();
+        assert_eq!(described.faces, Some(faces as u64), "{file}: described");
+        assert_eq!(described.points, Some(mesh.cloud.len() as u64), "{file}: described");
+    }
+    // A closed surface of V points has 2 V - 4 triangles, and each edge belongs to two of them, in opposite senses.
+    let igea = mesh("models/igea.ply");
+    assert_eq!(igea.triangles.len(), 2 * 134_345 - 4, "the strips of a closed surface");
+    let mut edges: Vec<[u32; 2]> = igea.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    edges.sort_unstable();
+    let count = edges.len();
+    edges.dedup();
+    assert_eq!(edges.len(), count, "no edge twice in the same sense");
+    assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()), "each edge in the other sense too");
+    let stork = mesh("animation/stork_morph.glb");
+    let described = describe(&folder.join("animation/stork_morph.glb"), &ReadOptions::default()).unwrap();
+    assert_eq!((described.points, described.faces), (Some(358), Some(stork.triangles.len() as u64)), "the stork");
+    assert_eq!(stork.cloud.axes(), Some(Axes::YUp), "glTF has Y up");
+    // Two faces have an index beyond all vertices or none.
+    let cube = mesh("malformed/obj_malformed.obj");
+    assert_eq!((cube.cloud.len(), cube.triangles.len()), (8, 8), "four of six squares");
+}
+
+#[test]
 fn malformed_files_are_told_or_read() {
     let Some(folder) = data() else { return };
     let folder = folder.join("malformed");
@@ -169,6 +208,8 @@ fn malformed_files_are_told_or_read() {
         ("las_no_points.las", Ok(0)),
         ("laz_four_bytes.laz", Err("byte 4: the header")),
         ("laz_two_padding_bytes.laz", Ok(1065)),
+        ("obj_malformed.obj", Ok(8)),
+        ("off_out_of_memory.off", Err("line 2: 353535235358 vertices cannot be in a file of 309 bytes")),
         ("pcd_comma_separated.pcd", Ok(10)),
         ("pcd_missing_header.pcd", Err("line 1: '289814.15' is no word of a PCD header")),
         ("pcd_utf8_destroyed.pcd", Err("UTF-8")),

@@ -163,6 +163,10 @@ fn read_text(job: &Job<'_>) -> Result<Contents, Error> {
         let what = format!("the file ends inside triangle {}; it is cut off, copy it again", ends.len() + 1);
         return Err(job.malformed(job.line(job.bytes.len()), what));
     }
+    if closed != Some(true) && ends.is_empty() {
+        let what = "the file ends before the first triangle; it is cut off, copy it again";
+        return Err(job.malformed(job.line(job.bytes.len()), what));
+    }
     if closed != Some(true) {
         job.note("the file does not end with 'endsolid'; it may be cut off");
     }

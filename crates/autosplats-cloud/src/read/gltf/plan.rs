@@ -111,7 +111,8 @@ impl<'a> Plan<'a> {
         let bound = bytes.saturating_mul(MAX_POINTS_PER_BYTE).max(ALWAYS);
         let most = self.points.max(if job.triangles { self.corners } else { 0 });
         if most > bound {
-            let what = format!("its nodes repeat its meshes to {most} points from {bytes} bytes; split the file");
+            let what =
+                format!("they show {most} points, too many for a file of {bytes} bytes; split it or export it again");
             return Err(job.malformed("nodes", what));
         }
         // Positions are in f64 until their origin is known.

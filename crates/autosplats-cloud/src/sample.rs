@@ -1,0 +1,494 @@
+//! Points strewn evenly over the triangles of a mesh.
+//!
+//! # How it works
+//!
+//! A curve is laid through the whole surface: from triangle to triangle in an order that keeps neighbours together, and
+//! within each as a Sierpiński curve, which halves it again and again. The way along the curve is measured in area. Cut
+//! into as many equal pieces as points are wanted, it makes patches of equal area that hang together, and each patch
+//! gets one point, near its middle. So the density is exactly even, and there are neither clumps nor holes, as random
+//! points have them. Choosing among many more random points (dart throwing, sample elimination) covers yet more evenly,
+//! but takes a search among neighbours, in an order that threads would have to keep; here every point is on its own.
+//!
+//! The middle of a part of a triangle is had in closed form: halves that lie before a place on the curve add their
+//! centres, weighted by area, and only the half that the place is in is looked into.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::{Contents, Error, Field, FieldValues, PointCloud, Progress, memory::check_memory, progress};
+
+/// Points made between two looks at the caller's wish to stop.
+const BLOCK: usize = 1 << 18;
+
+/// Points that one thread makes at a time.
+const PIECE: usize = 1 << 12;
+
+/// How far a point is drawn from the middle of its patch to a random place in it, so that no pattern is seen.
+const JITTER: f64 = 0.3;
+
+/// Part of a patch that is large enough to have the point in its own middle. The nearest place to the middle of all parts
+/// would be on an edge, where the points of other patches come to lie too.
+const LARGE: f64 = 0.3;
+
+/// Halvings beyond those that make a piece as small as a patch.
+const FINER: i32 = 6;
+
+/// Strews exactly `count` points over the triangles of `mesh`, evenly by area: each has a patch of the same area for its
+/// own. Colours and fields of floats are interpolated, other fields are those of the nearest corner; normals get length
+/// one. Origin, axes and coordinate system are the mesh's. Triangles without area, or with corners that are not finite
+/// or do not exist, get no points. The same `seed` gives the same points, however many threads there are.
+///
+/// # Errors
+/// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
+pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    progress::tick(progress, 0.0)?;
+    let cloud = &mesh.cloud;
+    let value = |field: &Field| field.values.byte_len().checked_div(cloud.len()).unwrap_or(0);
+    let per_point = 12 + 3 + size_of::<Place>() + cloud.fields().iter().map(value).sum::<usize>();
+    let bytes = (count as u64).saturating_mul(per_point as u64).saturating_add(mesh.triangles.len() as u64 * 16);
+    check_memory(&format!("{count} points on a surface"), bytes)?;
+    let surface = Surface::new(mesh);
+    if surface.area() <= 0.0 {
+        return Err(Error::NoSurface);
+    }
+    progress::tick(progress, 0.1)?;
+
+    let mut places: Vec<Place> = Vec::new();
+    let full =
+        |_| Error::OutOfMemory { what: format!("{count} points on a surface"), bytes: count.saturating_mul(per_point) };
+    places.try_reserve_exact(count).map_err(full)?;
+    for start in (0..count).step_by(BLOCK) {
+        progress::tick(progress, 0.1 + 0.7 * start as f32 / count as f32)?;
+        let pieces = (start..count.min(start + BLOCK)).into_par_iter().step_by(PIECE);
+        let made: Vec<Vec<Place>> = pieces
+            .map(|first| surface.places(first..count.min(start + BLOCK).min(first + PIECE), count, seed))
+            .collect();
+        made.into_iter().for_each(|piece| places.extend(piece));
+    }
+    progress::tick(progress, 0.8)?;
+
+    let world = |place: &Place| surface.triangle(place.triangle).at(place.second, place.third).as_vec3().to_array();
+    let mut sampled =
+        PointCloud::new(cloud.origin(), places.par_iter().map(world).collect()).with_crs(cloud.crs().clone());
+    sampled.axes = cloud.axes();
+    if let Some(colors) = cloud.colors() {
+        let mixed = |place: &Place| {
+            let corners = surface.corners(place).map(|corner| colors[corner]);
+            [0, 1, 2].map(|c| (place.mix(corners.map(|color| color[c].into())) + 0.5) as u8)
+        };
+        sampled.colors = Some(places.par_iter().map(mixed).collect());
+    }
+    for field in cloud.fields() {
+        progress::tick(progress, 0.9)?;
+        sampled.fields.push(Field { name: field.name.clone(), values: surface.field(&field.values, &places) });
+    }
+    normalize_normals(&mut sampled);
+    progress::tick(progress, 1.0)?;
+    Ok(sampled)
+}
+
+/// A place on the surface: a triangle of those in order, and the weights of its second and third corners.
+#[derive(Clone, Copy)]
+struct Place {
+    triangle: u32,
+    second: f32,
+    third: f32,
+}
+
+impl Place {
+    fn weights(&self) -> [f64; 3] {
+        let (second, third) = (f64::from(self.second), f64::from(self.third));
+        [(1.0 - second - third).max(0.0), second, third]
+    }
+
+    fn mix(&self, [a, b, c]: [f64; 3]) -> f64 {
+        let [first, second, third] = self.weights();
+        // A corner without weight may be no number.
+        let part = |weight: f64, value: f64| if weight > 0.0 { weight * value } else { 0.0 };
+        part(first, a) + part(second, b) + part(third, c)
+    }
+
+    /// Which of the corners is nearest, by weight.
+    fn nearest(&self) -> usize {
+        let [first, second, third] = self.weights();
+        if first >= second && first >= third {
+            0
+        } else if second >= third {
+            1
+        } else {
+            2
+        }
+    }
+}
+
+/// Corners in space; the curve goes from the first to the second.
+#[derive(Clone, Copy)]
+struct Triangle([DVec3; 3]);
+
+impl Triangle {
+    fn area(&self) -> f64 {
+        let [a, b, c] = self.0;
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    fn at(&self, second: f32, third: f32) -> DVec3 {
+        let [a, b, c] = self.0;
+        a + (b - a) * f64::from(second) + (c - a) * f64::from(third)
+    }
+
+    /// Weights of the second and third corner at the place nearest to `point`.
+    fn nearest(&self, point: DVec3) -> DVec2 {
+        let [a, b, c] = self.0;
+        let (ab, ac, ap) = (b - a, c - a, point - a);
+        let (bb, bc, cc) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
+        let (pb, pc) = (ap.dot(ab), ap.dot(ac));
+        let within = bb * cc - bc * bc;
+        let inner = DVec2::new(cc * pb - bc * pc, bb * pc - bc * pb) / within;
+        if inner.x >= 0.0 && inner.y >= 0.0 && inner.x + inner.y <= 1.0 {
+            return inner;
+        }
+        let clamp = |t: f64| if t > 0.0 { t.min(1.0) } else { 0.0 };
+        let on_ab = DVec2::new(clamp(pb / bb), 0.0);
+        let on_ac = DVec2::new(0.0, clamp(pc / cc));
+        let along = clamp((point - b).dot(c - b) / (c - b).length_squared());
+        let on_bc = DVec2::new(1.0 - along, along);
+        let distance = |weights: &DVec2| (ab * weights.x + ac * weights.y - ap).length_squared();
+        let nearest = [on_ab, on_ac, on_bc].into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.unwrap_or(DVec2::splat(1.0 / 3.0))
+    }
+}
+
+/// Weights of the second and third corner, at the corners of a piece of a triangle through which the curve goes from the
+/// first to the second.
+type Piece = [DVec2; 3];
+
+const WHOLE: Piece = [DVec2::ZERO, DVec2::X, DVec2::Y];
+
+/// The halves of a piece, as the curve goes through them.
+fn halves([from, to, apex]: Piece) -> [Piece; 2] {
+    let middle = 0.5 * (from + to);
+    [[from, apex, middle], [apex, to, middle]]
+}
+
+fn centre([a, b, c]: Piece) -> DVec2 {
+    (a + b + c) / 3.0
+}
+
+/// The integral of the place over the first part `way` of the curve through a triangle of area one.
+fn moment(mut way: f64, depth: i32) -> DVec2 {
+    let (mut piece, mut area, mut sum) = (WHOLE, 1.0, DVec2::ZERO);
+    for _ in 0..depth {
+        let [first, second] = halves(piece);
+        area *= 0.5;
+        way *= 2.0;
+        if way < 1.0 {
+            piece = first;
+        } else {
+            sum += area * centre(first);
+            piece = second;
+            way -= 1.0;
+        }
+    }
+    sum + area * way * centre(piece)
+}
+
+/// The place at `way` along the curve, 0 to 1.
+fn place(mut way: f64, depth: i32) -> DVec2 {
+    let mut piece = WHOLE;
+    for _ in 0..depth {
+        way *= 2.0;
+        let second = way >= 1.0;
+        piece = halves(piece)[usize::from(second)];
+        way -= f64::from(u8::from(second));
+    }
+    centre(piece)
+}
+
+/// The triangles that have an area, in the order of the curve.
+struct Surface<'a> {
+    mesh: &'a Contents,
+    /// Corners in the sense of the curve.
+    triangles: Vec<[u32; 3]>,
+    /// Areas of all triangles up to and including each.
+    ways: Vec<f64>,
+}
+
+impl<'a> Surface<'a> {
+    fn new(mesh: &'a Contents) -> Self {
+        let mut surface = Self { mesh, triangles: Vec::new(), ways: Vec::new() };
+        let exists = |corners: &[u32; 3]| corners.iter().all(|&corner| (corner as usize) < mesh.cloud.len());
+        let sound = |corners: &&[u32; 3]| {
+            exists(corners) && {
+                let area = surface.triangle_of(corners).area();
+                area > 0.0 && area.is_finite()
+            }
+        };
+        let mut triangles: Vec<[u32; 3]> = mesh.triangles.par_iter().filter(sound).copied().collect();
+        surface.sort(&mut triangles);
+        let enter = surface.entrances(&triangles);
+        surface.triangles = triangles
+            .par_iter()
+            .zip(enter)
+            .map(|(&[a, b, c], turn)| match turn {
+                0 => [a, b, c],
+                1 => [b, c, a],
+                2 => [c, a, b],
+                3 => [b, a, c],
+                4 => [c, b, a],
+                _ => [a, c, b],
+            })
+            .collect();
+        let mut way = 0.0;
+        surface.ways = Vec::with_capacity(surface.triangles.len());
+        for corners in &surface.triangles {
+            way += surface.triangle_of(corners).area();
+            surface.ways.push(way);
+        }
+        surface
+    }
+
+    fn triangle_of(&self, corners: &[u32; 3]) -> Triangle {
+        Triangle(corners.map(|corner| DVec3::from(self.mesh.cloud.positions()[corner as usize].map(f64::from))))
+    }
+
+    fn triangle(&self, index: u32) -> Triangle {
+        self.triangle_of(&self.triangles[index as usize])
+    }
+
+    fn corners(&self, place: &Place) -> [usize; 3] {
+        self.triangles[place.triangle as usize].map(|corner| corner as usize)
+    }
+
+    fn area(&self) -> f64 {
+        self.ways.last().copied().unwrap_or(0.0)
+    }
+
+    /// Sorts triangles along a Hilbert curve through space, which keeps neighbours together better than any other order
+    /// of boxes.
+    fn sort(&self, triangles: &mut [[u32; 3]]) {
+        let middle = |corners: &[u32; 3]| {
+            let [a, b, c] = self.triangle_of(corners).0;
+            (a + b + c) / 3.0
+        };
+        let empty = || [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let both = |[a, b]: [DVec3; 2], [c, d]: [DVec3; 2]| [a.min(c), b.max(d)];
+        let [low, high] = triangles.par_iter().map(|corners| [middle(corners); 2]).reduce(empty, both);
+        let size = (high - low).max_element().max(f64::MIN_POSITIVE);
+        let key = |corners: &[u32; 3]| {
+            let cell = (middle(corners) - low) / size * f64::from((1 << HILBERT_BITS) - 1);
+            hilbert(cell.to_array().map(|value| value as u32))
+        };
+        triangles.par_sort_by_cached_key(key);
+    }
+
+    /// Which way the curve goes through each triangle: along the longest edge, so that halves are no needles, and out
+    /// where the next triangle is nearer.
+    fn entrances(&self, triangles: &[[u32; 3]]) -> Vec<u8> {
+        let turn = |index: usize| {
+            let [a, b, c] = self.triangle_of(&triangles[index]).0;
+            let lengths = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
+            let longest = if lengths[0] >= lengths[1] && lengths[0] >= lengths[2] {
+                0
+            } else if lengths[1] >= lengths[2] {
+                1
+            } else {
+                2
+            };
+            let (from, to) = [(a, b), (b, c), (c, a)][longest];
+            let next = triangles.get(index + 1).map(|corners| {
+                let [a, b, c] = self.triangle_of(corners).0;
+                (a + b + c) / 3.0
+            });
+            let back = next.is_some_and(|next| next.distance_squared(from) < next.distance_squared(to));
+            longest as u8 + if back { 3 } else { 0 }
+        };
+        (0..triangles.len()).into_par_iter().map(turn).collect()
+    }
+
+    /// The places of some of `count` points.
+    fn places(&self, range: std::ops::Range<usize>, count: usize, seed: u64) -> Vec<Place> {
+        let patch = self.area() / count as f64;
+        let mut triangle = self.ways.partition_point(|&way| way <= patch * range.start as f64);
+        range.map(|i| self.place(i, patch, &mut triangle, seed)).collect()
+    }
+
+    /// A place near the middle of patch `i`, which begins in `triangle` or after it; that is moved to where the patch
+    /// ends.
+    fn place(&self, i: usize, patch: f64, triangle: &mut usize, seed: u64) -> Place {
+        let (start, end) = (patch * i as f64, patch * (i + 1) as f64);
+        let last = self.triangles.len() - 1;
+        *triangle = (*triangle).min(last);
+        while *triangle < last && self.ways[*triangle] <= start {
+            *triangle += 1;
+        }
+        // The middle of the whole patch, which need not lie on the surface.
+        let first = *triangle;
+        let (mut sum, mut total) = (DVec3::ZERO, 0.0);
+        let mut after = first;
+        loop {
+            let (area, middle) = self.part(after, start, end, patch);
+            let triangle = self.triangle(after as u32);
+            sum += area * triangle.at(middle.x as f32, middle.y as f32);
+            total += area;
+            if after == last || self.ways[after] >= end {
+                break;
+            }
+            after += 1;
+        }
+        *triangle = after;
+        let random = Random::new(seed, i as u64);
+        if first == after {
+            let middle = self.part(first, start, end, patch).1;
+            return self.jittered(first, middle, start, end, patch, random);
+        }
+        let parts = (first..=after).map(|index| (self.part(index, start, end, patch), index));
+        let largest = parts.max_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        if let Some(((_, weights), index)) = largest.filter(|((area, _), _)| *area >= LARGE * patch) {
+            return self.jittered(index, weights, start, end, patch, random);
+        }
+        let goal = sum / total;
+        let nearest = (first..=after).map(|index| {
+            let triangle = self.triangle(index as u32);
+            let weights = triangle.nearest(goal);
+            (triangle.at(weights.x as f32, weights.y as f32).distance_squared(goal), index, weights)
+        });
+        let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
+        let (_, index, weights) = nearest.unwrap_or((0.0, first, DVec2::splat(1.0 / 3.0)));
+        self.jittered(index, weights, start, end, patch, random)
+    }
+
+    /// The part of a triangle that lies between two places on the way: where it begins and ends along the curve through
+    /// the triangle, 0 to 1.
+    fn ends(&self, index: usize, start: f64, end: f64) -> [f64; 2] {
+        let before = if index == 0 { 0.0 } else { self.ways[index - 1] };
+        let area = self.ways[index] - before;
+        let way = |at: f64| if area > 0.0 { ((at - before) / area).clamp(0.0, 1.0) } else { 0.0 };
+        [way(start), way(end)]
+    }
+
+    /// Area of such a part, and its middle.
+    fn part(&self, index: usize, start: f64, end: f64, patch: f64) -> (f64, DVec2) {
+        let before = if index == 0 { 0.0 } else { self.ways[index - 1] };
+        let area = self.ways[index] - before;
+        let [from, to] = self.ends(index, start, end);
+        if !(to - from > 1e-9) {
+            return (0.0, place(from, 1));
+        }
+        if to - from == 1.0 {
+            return (area, centre(WHOLE));
+        }
+        let depth = depth(area, patch);
+        (area * (to - from), (moment(to, depth) - moment(from, depth)) / (to - from))
+    }
+
+    fn jittered(&self, index: usize, middle: DVec2, start: f64, end: f64, patch: f64, mut random: Random) -> Place {
+        let before = if index == 0 { 0.0 } else { self.ways[index - 1] };
+        let [from, to] = self.ends(index, start, end);
+        let way = from + (to - from) * random.unit();
+        let weights = middle.lerp(place(way, depth(self.ways[index] - before, patch)), JITTER);
+        // Rounding must not carry a point out of its triangle.
+        let (second, third) = (weights.x.clamp(0.0, 1.0), weights.y.clamp(0.0, 1.0));
+        Place { triangle: index as u32, second: second as f32, third: third.min(1.0 - second) as f32 }
+    }
+
+    fn field(&self, values: &FieldValues, places: &[Place]) -> FieldValues {
+        let mixed = |value: &(dyn Fn(usize) -> f64 + Sync), place: &Place| place.mix(self.corners(place).map(value));
+        macro_rules! nearest {
+            ($($variant:ident),*) => {
+                match values {
+                    FieldValues::F32(v) => FieldValues::F32(
+                        places.par_iter().map(|place| mixed(&|i| v[i].into(), place) as f32).collect(),
+                    ),
+                    FieldValues::F64(v) => FieldValues::F64(
+                        places.par_iter().map(|place| mixed(&|i| v[i], place)).collect(),
+                    ),
+                    $(FieldValues::$variant(v) => FieldValues::$variant(
+                        places.par_iter().map(|place| v[self.corners(place)[place.nearest()]]).collect(),
+                    ),)*
+                }
+            };
+        }
+        nearest!(U8, I8, U16, I16, U32, I32, U64, I64)
+    }
+}
+
+/// Halvings of a triangle until its pieces are much smaller than a patch.
+fn depth(area: f64, patch: f64) -> i32 {
+    (FINER + (area / patch).log2().ceil().clamp(0.0, 40.0) as i32).min(46)
+}
+
+/// Interpolated normals are shorter than one.
+fn normalize_normals(cloud: &mut PointCloud) {
+    let find =
+        |cloud: &PointCloud, name: &str| cloud.fields.iter().position(|field| field.name.eq_ignore_ascii_case(name));
+    for names in [["NormalX", "NormalY", "NormalZ"], ["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]] {
+        let [Some(x), Some(y), Some(z)] = names.map(|name| find(cloud, name)) else { continue };
+        let value = |axis: usize, i: usize| cloud.fields[axis].values.get(i);
+        let unit = |i: usize| DVec3::new(value(x, i), value(y, i), value(z, i)).normalize_or_zero();
+        let units: Vec<DVec3> = (0..cloud.len()).into_par_iter().map(unit).collect();
+        for (axis, index) in [x, y, z].into_iter().enumerate() {
+            match &mut cloud.fields[index].values {
+                FieldValues::F32(v) => v.iter_mut().zip(&units).for_each(|(v, unit)| *v = unit[axis] as f32),
+                FieldValues::F64(v) => v.iter_mut().zip(&units).for_each(|(v, unit)| *v = unit[axis]),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Splitmix: random numbers of one point, whoever asks.
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64, point: u64) -> Self {
+        let mut random = Self(seed ^ point.wrapping_mul(0xD134_2543_DE82_EF95));
+        random.bits();
+        random
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
+    }
+}
+
+/// Steps per axis of the Hilbert curve, as a power of two.
+const HILBERT_BITS: u32 = 16;
+
+/// How far along a Hilbert curve through a cube a cell lies (Skilling, "Programming the Hilbert curve", 2004).
+fn hilbert(mut cell: [u32; 3]) -> u64 {
+    let mut bit = 1 << (HILBERT_BITS - 1);
+    while bit > 1 {
+        let below = bit - 1;
+        for axis in 0..3 {
+            if cell[axis] & bit != 0 {
+                cell[0] ^= below;
+            } else {
+                let swapped = (cell[0] ^ cell[axis]) & below;
+                cell[0] ^= swapped;
+                cell[axis] ^= swapped;
+            }
+        }
+        bit >>= 1;
+    }
+    cell[1] ^= cell[0];
+    cell[2] ^= cell[1];
+    let mut turned = 0;
+    let mut bit = 1 << (HILBERT_BITS - 1);
+    while bit > 1 {
+        if cell[2] & bit != 0 {
+            turned ^= bit - 1;
+        }
+        bit >>= 1;
+    }
+    let cell = cell.map(|value| value ^ turned);
+    let bits = |level: u32| cell.iter().fold(0, |key, value| key << 1 | u64::from(value >> level & 1));
+    (0..HILBERT_BITS).rev().fold(0, |key, level| key << 3 | bits(level))
+}
