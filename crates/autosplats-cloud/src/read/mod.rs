@@ -54,7 +54,8 @@ struct Format {
 
 /// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
 /// extensions go before shorter ones.
-const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &depth_image::FORMAT, &raw::FORMAT, &xyz::FORMAT];
+const FORMATS: &[&Format] =
+    &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &depth_image::FORMAT, &raw::FORMAT, &xyz::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {

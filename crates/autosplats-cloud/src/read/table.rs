@@ -5,7 +5,10 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Attribute, Job, columns::{field_name, find_color}};
+use super::{
+    Attribute, Job,
+    columns::{field_name, find_color},
+};
 use crate::{Error, FieldValues, PointCloud, merge::residual};
 
 /// Points handled between two looks at the caller's wish to stop: a few milliseconds.
@@ -87,7 +90,6 @@ pub(super) struct Column {
 }
 
 impl Column {
-    #[allow(dead_code, reason = "bare records use it")]
     pub(super) fn attribute(&self) -> Attribute {
         Attribute::new(&self.name, self.scalar.name())
     }

@@ -91,7 +91,8 @@ impl Layout {
             Some(Axes::Camera) => "# axes camera\n",
             None => "",
         };
-        let words = |word: &dyn Fn(&(&str, char, usize)) -> String| fields.iter().map(word).collect::<Vec<_>>().join(" ");
+        let words =
+            |word: &dyn Fn(&(&str, char, usize)) -> String| fields.iter().map(word).collect::<Vec<_>>().join(" ");
         format!(
             "# .PCD v0.7 - Point Cloud Data file format\n{axes}VERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
              WIDTH {len}\nHEIGHT 1\nVIEWPOINT {}\nPOINTS {len}\nDATA binary\n",

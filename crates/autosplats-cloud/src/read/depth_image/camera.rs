@@ -42,7 +42,8 @@ impl Camera {
             return Self { camera, source: "the caller".into(), notes };
         }
         let folder = job.path.parent().unwrap_or(Path::new(""));
-        let in_depth_folder = folder.file_name().is_some_and(|name| name.to_string_lossy().to_lowercase().contains("depth"));
+        let in_depth_folder =
+            folder.file_name().is_some_and(|name| name.to_string_lossy().to_lowercase().contains("depth"));
         let folders = [Some(folder), folder.parent().filter(|_| in_depth_folder)];
         for path in folders.into_iter().flatten().flat_map(|folder| FILES.map(|name| folder.join(name))) {
             if !metadata(&path).is_ok_and(|metadata| metadata.is_file() && metadata.len() <= MAX_BYTES) {
@@ -121,10 +122,12 @@ fn from_json(json: &Value, width: usize, height: usize) -> Option<DepthCamera> {
 /// Three rows of three numbers, the upper left of a 4 × 4 matrix, or fx fy cx cy; a scale may follow.
 fn from_numbers(text: &str) -> Option<DepthCamera> {
     let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default());
-    let words = lines.flat_map(|line| line.split([' ', '\t', ',', ';', '[', ']'])).filter(|word| !word.trim().is_empty());
+    let words =
+        lines.flat_map(|line| line.split([' ', '\t', ',', ';', '[', ']'])).filter(|word| !word.trim().is_empty());
     let k = words.map(|word| word.trim().parse().ok()).collect::<Option<Vec<f64>>>()?;
     let scale = |index: usize| k.get(index).copied().map_or(PER_METRE, scale_of);
-    let camera = |[fx, fy, cx, cy]: [usize; 4], scale| DepthCamera { fx: k[fx], fy: k[fy], cx: k[cx], cy: k[cy], scale };
+    let camera =
+        |[fx, fy, cx, cy]: [usize; 4], scale| DepthCamera { fx: k[fx], fy: k[fy], cx: k[cx], cy: k[cy], scale };
     match k.len() {
         4 | 5 => Some(camera([0, 1, 2, 3], scale(4))),
         9 | 10 if k[8] == 1.0 && [3, 6, 7].iter().all(|&index| k[index] == 0.0) => Some(camera([0, 4, 2, 5], scale(9))),
@@ -151,7 +154,8 @@ mod tests {
             assert_eq!(parse(text, 640, 480), Some(expected), "{text}");
         }
         assert_eq!(parse("518 519 325.5 253.5 5000", 640, 480).map(|camera| camera.scale), Some(5000.0), "a scale");
-        for text in ["", "1 2 3", "518 0 0 0 519 0 325.5 253.5 1", "0 519 1 1", "{}", "[1, 2]", "x 1 2 3", "nan 1 2 3"] {
+        for text in ["", "1 2 3", "518 0 0 0 519 0 325.5 253.5 1", "0 519 1 1", "{}", "[1, 2]", "x 1 2 3", "nan 1 2 3"]
+        {
             assert_eq!(parse(text, 640, 480), None, "{text} is no camera");
         }
     }

@@ -63,9 +63,8 @@ impl Header {
         let Some(header) = job.bytes.get(12..29).filter(|header| header.starts_with(b"IHDR")) else {
             return Err(job.malformed("byte 12", "the PNG lacks its header; copy it again"));
         };
-        let [width, height] = [4, 8].map(|at| {
-            u32::from_be_bytes(std::array::from_fn(|byte| header[at + byte])) as usize
-        });
+        let [width, height] =
+            [4, 8].map(|at| u32::from_be_bytes(std::array::from_fn(|byte| header[at + byte])) as usize);
         let (depth, kind) = (header[12], header[13]);
         if (depth, kind) != (16, 0) {
             let kind = match kind {

@@ -78,7 +78,8 @@ impl Dialect {
     }
 }
 
-fn unquoted(cell: &[u8]) -> &[u8] {
+/// A cell without blanks and quotes around it.
+pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
     let cell = cell.trim_ascii();
     match cell {
         [b'"', inner @ .., b'"'] => inner.trim_ascii(),
@@ -89,7 +90,8 @@ fn unquoted(cell: &[u8]) -> &[u8] {
 /// Whether a cell holds nothing, in one of the ways that tables have of saying so.
 pub(super) fn is_missing(cell: &[u8]) -> bool {
     let cell = unquoted(cell);
-    matches!(cell, b"" | b"-") || [&b"na"[..], b"n/a", b"null", b"none"].iter().any(|word| cell.eq_ignore_ascii_case(word))
+    matches!(cell, b"" | b"-")
+        || [&b"na"[..], b"n/a", b"null", b"none"].iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
 
 /// The cells of a line.

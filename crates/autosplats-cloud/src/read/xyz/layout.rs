@@ -2,7 +2,7 @@
 
 use super::{
     super::{Job, MAX_HEADER_LINE, columns, shown, table::MAX_COLUMNS, text},
-    cells::{Dialect, Separator, is_missing, trimmed},
+    cells::{Dialect, Separator, is_missing, trimmed, unquoted},
 };
 use crate::{Crs, Error, Unit};
 
@@ -148,6 +148,11 @@ impl Header {
         Some(Self { names, units })
     }
 
+    /// Number of names, a separator after the last one not counted.
+    fn len(&self) -> usize {
+        self.names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1)
+    }
+
     fn has_axes(&self) -> bool {
         columns::find_axes(&self.names).is_some()
     }
@@ -201,7 +206,7 @@ impl Layout {
         let Some(&(first, _)) = lines.first() else { return Ok(None) };
         let place = || job.line(first);
         let rows: Vec<&[u8]> = lines.iter().map(|&(_, line)| line).collect();
-        let named_columns = preamble.header.as_ref().map(|header| header.names.len());
+        let named_columns = preamble.header.as_ref().map(Header::len);
         let (dialect, width) = Dialect::of(&rows, named_columns).map_err(|what| job.unsupported(what))?;
         if width < 3 {
             return Err(job.malformed(place(), format!("{width} values; a point needs x, y and z")));
@@ -256,7 +261,9 @@ impl Layout {
             let place = |three: [usize; 3]| three.iter().position(|&place| place == index);
             targets.push(match name {
                 _ if place(axes).is_some() => Target::Axis(place(axes).unwrap_or_default()),
-                Some(_) if color.and_then(place).is_some() => Target::Channel(color.and_then(place).unwrap_or_default()),
+                Some(_) if color.and_then(place).is_some() => {
+                    Target::Channel(color.and_then(place).unwrap_or_default())
+                }
                 Some(text) if words(rows, index) => {
                     notes.push(format!("column '{}' holds words; left out", shown(text.as_bytes())));
                     *name = None;
@@ -408,19 +415,20 @@ impl Dialect {
             let strict = Self { separator, decimal_comma: false };
             let Some(width) = strict.common_width(lines, named).filter(|&width| width >= 3) else { continue };
             let cells = || lines.iter().flat_map(|line| strict.cells(line));
+            let numbers = |cell: &[u8]| text::values(cell).all(|value| Self::ANY.number(value).is_ok());
             let with_comma = || cells().filter(|cell| cell.contains(&b','));
-            if separator != Separator::Comma && with_comma().any(|cell| Self::COMMAS.number(cell).is_ok()) {
-                if with_comma().all(one_decimal_comma) && !cells().any(|cell| cell.contains(&b'.')) {
+            if separator != Separator::Comma && with_comma().any(|cell| numbers(unquoted(cell))) {
+                let points = cells().any(|cell| cell.contains(&b'.'));
+                if with_comma().all(one_decimal_comma) && !points {
                     return Ok((Self { separator, decimal_comma: true }, width));
                 }
-                return Err("numbers with decimal commas among others; write all of them with points".into());
+                if points {
+                    return Err("numbers with decimal commas among others; write all of them with points".into());
+                }
             }
             // Several tabs in a row align columns, if no header says otherwise.
             let aligned = separator == Separator::Tab && named != Some(width) && cells().any(<[u8]>::is_empty);
-            let several = |cell: &[u8]| {
-                let mut numbers = text::values(cell).map(|value| Self::ANY.number(value));
-                text::values(cell).nth(1).is_some() && numbers.all(|number| number.is_ok())
-            };
+            let several = |cell: &[u8]| text::values(cell).nth(1).is_some() && numbers(cell);
             if !aligned && !cells().any(several) {
                 return Ok((strict, width));
             }

@@ -8,8 +8,8 @@ mod cells;
 mod layout;
 mod rows;
 
-use self::layout::{Layout, Preamble};
 pub(super) use self::layout::looks_like_rows;
+use self::layout::{Layout, Preamble};
 use super::{Attribute, Contents, Description, Format, Job};
 use crate::{Error, PointCloud};
 
