@@ -165,7 +165,7 @@ fn content_goes_before_extension() {
     for name in ["a.las", "a.xyz", "a", "a.unknown"] {
         assert_eq!(read_bytes(name, &bytes).unwrap().len(), 3, "{name} is a PLY inside");
     }
-    let message = error("a.bin", &[1, 2, 3, 4]);
+    let message = error("a.unknown", &[1, 2, 3, 4]);
     assert!(message.contains("PLY") && message.contains("PCD") && message.contains(".xyz"), "{message}");
 }
 
@@ -346,7 +346,7 @@ fn pcd_oddities() {
     assert_eq!(cloud.positions()[0], [1.0, 2.0, 3.0], "upper-case names, points from width and height");
     assert!(cloud.positions()[1].iter().all(|value| value.is_nan()), "points that are not finite stay");
     assert_eq!(cloud.colors().unwrap(), [[255, 0, 0], [0, 0, 255]], "integer colours");
-    assert!(cloud.fields().is_empty(), "padding and histograms are left out");
+    assert_eq!(names(&cloud), ["histogram_0", "histogram_1", "histogram_2"], "each of several values, no padding");
 
     let image = |z: &str, viewpoint: &str| {
         let text = format!(
@@ -383,11 +383,15 @@ fn text_of_every_kind() {
     let rgb = Some(&[[9, 8, 7], [255, 0, 1]][..]);
     assert_eq!(three("a.asc", "1 2 3 9 8 7\n-4.5 0.5 0.25 255 0 1\n").colors(), rgb, "six columns");
     let normals = three("a.xyz", "1 2 3 0 0.6 0.8\n-4.5 0.5 0.25 -1 0 0\n");
-    assert_eq!((names(&normals), normals.colors()), (vec!["nx", "ny", "nz"], None), "six columns of normals");
+    assert_eq!(
+        (names(&normals), normals.colors()),
+        (vec!["NormalX", "NormalY", "NormalZ"], None),
+        "six columns of normals"
+    );
     let pts = three("a.pts", "2\n1 2 3 -1035 9 8 7\n-4.5 0.5 0.25 -20 255 0 1\n");
     assert_eq!((pts.colors(), values(&pts, "Intensity")), (rgb, vec![-1035.0, -20.0]), "PTS");
     let alpha = three("a.xyz", "1 2 3 9.0 8.0 7.0 255.0\n-4.5 0.5 0.25 255.0 0 1 255.0\n");
-    assert_eq!((alpha.colors(), names(&alpha)), (rgb, vec!["alpha"]), "seven columns with alpha");
+    assert_eq!((alpha.colors(), names(&alpha)), (rgb, vec!["Alpha"]), "seven columns with alpha");
     let csv =
         three("a.csv", "Classification,x,\"y\",Z,Scan Angle,R,G,B\n3,1,2,3,-7,9,8,7\n4,-4.5,0.5,0.25,7,255,0,1\n");
     assert_eq!((csv.colors(), names(&csv)), (rgb, vec!["Classification", "Scan Angle"]), "names in any order");
@@ -420,12 +424,11 @@ fn errors_name_place_and_remedy() {
     check("a.ply", b"ply\nformat ascii 1.0\nelement vertex many\n", &["line 3", "'many'"]);
     check("a.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty \x1b[31m x\n", &["line 4", "[31m"]);
     check("a.ply", b"", &["empty"]);
-    check("a.pcd", b"1 2 3\n", &["line 1", ".xyz"]);
+    check("a.pcd", b"1 2 three\n", &["line 1", ".xyz"]);
     check("a.xyz", b"1 2\n3 4\n", &["line 1", "x, y and z"]);
     check("a.xyz", b"1 2 3\n4 5 6 7\n", &["line 2", "'7'"]);
     check("a.xyz", b"words\nand more words\n", &["line 2", "'and'"]);
-    check("a.csv", b"1,5;2,5;3,5\n", &["decimal commas"]);
-    check("a.csv", b"1,5 2,5 3,5\n", &["decimal commas"]);
+    check("a.csv", b"1,5;2.5;3,5\n", &["decimal commas", "points"]);
     check("a.pts", b"5\n1 2 3\n", &["1 of 5 points"]);
     check("a.txt", &[0xff, 0xfe, b'1', 0], &["byte 3", "UTF-8"]);
     check("a.laz", b"nothing", &["byte 0", "LASF"]);

@@ -56,7 +56,7 @@ const LAS: &[&str] = &["Intensity", "ReturnNumber", "NumberOfReturns", "Classifi
 
 #[rustfmt::skip]
 const CASES: &[Case] = &[
-    ("models/armadillo_normals.ply", 38_294, [-13.66165, -12.38138, -48.86357], [11.12058, 95.40793, 57.714], &["nx", "ny", "nz"], false),
+    ("models/armadillo_normals.ply", 38_294, [-13.66165, -12.38138, -48.86357], [11.12058, 95.40793, 57.714], &["NormalX", "NormalY", "NormalZ"], false),
     ("models/bunny.ply", 35_947, [-0.0946899, 0.0329874, -0.0618736], [0.0610091, 0.187321, 0.0587997], &["confidence", "Intensity"], false),
     ("models/camelhead.off", 11_381, [-0.261816, -0.329475, -0.532113], [0.26182, 0.202191, 0.467887], &[], false),
     ("animation/stork_morph.glb", 358, [-98.4, -6.0, -82.3], [98.4, 23.9, 92.0], &[], true),
@@ -72,7 +72,7 @@ const CASES: &[Case] = &[
     ("scans/isprs_samp11_utm_f32.pcd", 38_010, [512700.9, 5403548.0, 295.25], [512834.8, 5403850.0, 404.08], &[], false),
     ("scans/latlon_degrees.las", 5_380, [-94.68347, 31.03673, 39.081], [-94.66063, 31.04733, 78.119], &["Intensity"], false),
     ("scans/lion_takanawa.copc.laz", 341_989, [-4.99, 1.04, -3.45], [-0.79, 6.72, 1.12], &["Intensity"], true),
-    ("scans/livingroom_fragment.pcd", 113_662, [1.151989, 0.8152729, 0.7264091], [3.519531, 2.761719, 1.530428], &["normal_x", "curvature"], true),
+    ("scans/livingroom_fragment.pcd", 113_662, [1.151989, 0.8152729, 0.7264091], [3.519531, 2.761719, 1.530428], &["NormalX", "Curvature"], true),
     ("scans/lone_star.copc.laz", 518_862, [515368.6, 4918340.0, 2322.896], [515401.0, 4918381.0, 2338.575], &["Intensity"], false),
     ("scans/rops_ascii.pcd", 32_087, [-0.41984, -0.24034, -1.4022], [0.40617, 0.24871, -1.0098], &[], false),
     ("scans/simple_1065.las", 1_065, [635619.8, 848899.7, 406.59], [638982.6, 853535.4, 586.38], LAS, true),
@@ -211,7 +211,7 @@ fn malformed_files_are_told_or_read() {
         ("obj_malformed.obj", Ok(8)),
         ("off_out_of_memory.off", Err("line 2: 353535235358 vertices cannot be in a file of 309 bytes")),
         ("pcd_comma_separated.pcd", Ok(10)),
-        ("pcd_missing_header.pcd", Err("line 1: '289814.15' is no word of a PCD header")),
+        ("pcd_missing_header.pcd", Ok(10)),
         ("pcd_utf8_destroyed.pcd", Err("UTF-8")),
         ("ply_crash_fuzz.ply", Err("line 7")),
         ("ply_crlf_header_binary.ply", Ok(8)),

@@ -7,7 +7,7 @@
 use glam::DMat4;
 
 use super::{
-    Attribute, Contents, Description, Format, Job, columns,
+    Contents, Description, Format, Job, columns,
     table::{Column, Scalar, Table},
 };
 use crate::{Axes, Error, Scan};
@@ -118,14 +118,10 @@ fn plausible(bytes: &[u8], names: &[&str]) -> bool {
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let layout = Layout::of(job)?;
     let points = job.bytes.len() / layout.stride();
-    let left_out = || Attribute::new("-", Scalar::F32.name());
-    let attribute = |name: &Option<String>| {
-        name.as_ref().map_or_else(left_out, |name| Attribute::new(name.clone(), Scalar::F32.name()))
-    };
     Ok(Description {
         format: "bare 32-bit floats".into(),
         points: Some(points as u64),
-        attributes: layout.names.iter().map(attribute).collect(),
+        attributes: layout.columns().iter().map(Column::attribute).collect(),
         scans: vec![at_the_origin(points)],
         notes: if layout.guessed { vec![columns::taken_for(&layout.names)] } else { Vec::new() },
         ..Description::default()

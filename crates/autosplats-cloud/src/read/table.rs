@@ -90,7 +90,6 @@ pub(super) struct Column {
 }
 
 impl Column {
-    #[allow(dead_code, reason = "bare records use it")]
     pub(super) fn attribute(&self) -> Attribute {
         Attribute::new(&self.name, self.scalar.name())
     }

@@ -9,6 +9,7 @@ use std::{
     path::Path,
 };
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{Format, Job, decimal, names::unique_names};
@@ -140,10 +141,12 @@ impl Layout<'_> {
 
     /// World coordinates, each the shortest decimal from which the cloud's own numbers follow.
     fn position(&self, cloud: &PointCloud, point: usize, text: &mut Vec<u8>) {
-        let world = cloud.world_position(point);
         let position = cloud.positions()[point];
         let residual = cloud.residuals().map(|residuals| residuals[point]);
         let origin = cloud.origin();
+        let bare = origin == DVec3::ZERO && residual.is_none();
+        // A sum has no negative zero.
+        let world = if bare { DVec3::from(position.map(f64::from)) } else { cloud.world_position(point) };
         for axis in 0..3 {
             if axis > 0 {
                 text.push(self.separator);

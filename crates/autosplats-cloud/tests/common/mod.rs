@@ -66,7 +66,7 @@ pub(crate) fn rich_cloud(count: usize) -> PointCloud {
         ("offset", FieldValues::I16(values().into_iter().map(|v| v as i16).collect())),
         ("id", FieldValues::U32(values().into_iter().map(|v| v as u32).collect())),
         ("delta", FieldValues::I32(values().into_iter().map(|v| v as i32).collect())),
-        ("nx", FieldValues::F32(values().into_iter().map(|v| v as f32 / 1e19).collect())),
+        ("NormalX", FieldValues::F32(values().into_iter().map(|v| v as f32 / 1e19).collect())),
         ("GpsTime", FieldValues::F64(values().into_iter().map(|v| v as f64 / 1e3).collect())),
     ];
     let mut cloud = PointCloud::new(DVec3::ZERO, positions(count)).with_colors(colors(count)).unwrap();

@@ -78,7 +78,8 @@ impl Dialect {
     }
 }
 
-fn unquoted(cell: &[u8]) -> &[u8] {
+/// A cell without blanks and quotes around it.
+pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
     let cell = cell.trim_ascii();
     match cell {
         [b'"', inner @ .., b'"'] => inner.trim_ascii(),

@@ -1,8 +1,10 @@
 //! What stands before the first point, and what the values of a row are.
 
 use super::{
-    super::{Job, MAX_HEADER_LINE, columns, shown, table::MAX_COLUMNS, text},
-    cells::{Dialect, Separator, is_missing, trimmed},
+    super::{Job, columns, shown, table::MAX_COLUMNS, text},
+    cells::{Dialect, is_missing, trimmed},
+    guess::{Cell, guessed, wide, words},
+    header::Header,
 };
 use crate::{Crs, Error, Unit};
 
@@ -105,71 +107,6 @@ pub(in super::super) fn looks_like_rows(bytes: &[u8]) -> bool {
     count > 0
 }
 
-/// Names of columns, and what they say of units.
-struct Header {
-    names: Vec<String>,
-    units: Vec<Option<Unit>>,
-}
-
-impl Header {
-    /// The names in a header line, which may be a comment. Names may hold blanks where something else separates them.
-    fn parse(line: &[u8]) -> Option<Self> {
-        if line.len() > MAX_HEADER_LINE {
-            return None;
-        }
-        let line = String::from_utf8_lossy(line);
-        let line = line.trim_start_matches(['#', '/', ' ', '\u{feff}']);
-        let separator = [';', '\t', ','].into_iter().find(|&separator| line.contains(separator));
-        let clean = |name: &str| name.trim().trim_matches(['"', '\'']).trim().to_owned();
-        let mut names: Vec<String> = Vec::new();
-        match separator {
-            Some(separator) => names.extend(line.split(separator).map(clean)),
-            None => {
-                // `x [m] y [m]`: a unit belongs to the name before it.
-                for word in line.split_ascii_whitespace() {
-                    match names.last_mut() {
-                        Some(last) if word.starts_with(['[', '(']) => *last += word,
-                        _ => names.push(clean(word)),
-                    }
-                }
-            }
-        }
-        if names.len() < 3 || names.len() > MAX_COLUMNS + 1 {
-            return None;
-        }
-        let mut units = Vec::with_capacity(names.len());
-        for name in &mut names {
-            let at = name.find(['[', '(']).filter(|&at| at > 0);
-            units.push(at.and_then(|at| unit_of(name[at..].trim_matches(['[', ']', '(', ')', ' ']))));
-            if let Some(at) = at {
-                name.truncate(name[..at].trim_end().len());
-            }
-        }
-        Some(Self { names, units })
-    }
-
-    fn has_axes(&self) -> bool {
-        columns::find_axes(&self.names).is_some()
-    }
-
-    /// The names if they are as many as the values of a row; a separator may stand after the last one.
-    fn fitting(&self, width: usize) -> Option<&[String]> {
-        let more = self.names.get(width..)?;
-        (more.is_empty() || more.len() == 1 && more[0].is_empty()).then(|| &self.names[..width])
-    }
-}
-
-fn unit_of(name: &str) -> Option<Unit> {
-    Some(match &*name.to_lowercase() {
-        "m" | "metre" | "meter" | "metres" | "meters" => Unit::Metre,
-        "mm" => Unit::Millimetre,
-        "ft" | "feet" | "foot" => Unit::Foot,
-        "usft" | "us ft" | "ftus" => Unit::UsSurveyFoot,
-        "deg" | "degree" | "degrees" | "°" => Unit::Degree,
-        _ => return None,
-    })
-}
-
 /// What becomes of a value of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
@@ -201,7 +138,7 @@ impl Layout {
         let Some(&(first, _)) = lines.first() else { return Ok(None) };
         let place = || job.line(first);
         let rows: Vec<&[u8]> = lines.iter().map(|&(_, line)| line).collect();
-        let named_columns = preamble.header.as_ref().map(|header| header.names.len());
+        let named_columns = preamble.header.as_ref().map(Header::len);
         let (dialect, width) = Dialect::of(&rows, named_columns).map_err(|what| job.unsupported(what))?;
         if width < 3 {
             return Err(job.malformed(place(), format!("{width} values; a point needs x, y and z")));
@@ -279,20 +216,6 @@ impl Layout {
     }
 }
 
-/// A value of a sampled row.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Cell {
-    Number(f64),
-    Missing,
-    Word,
-}
-
-impl Cell {
-    fn number(self) -> f64 {
-        if let Self::Number(number) = self { number } else { f64::NAN }
-    }
-}
-
 /// The first rows and where they are.
 fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
     let mut lines = Vec::new();
@@ -335,127 +258,4 @@ fn named(names: &[String], units: &[Option<Unit>], crs: &mut Crs, notes: &mut Ve
     let names: Vec<Option<String>> = names.into_iter().map(Some).collect();
     notes.push(format!("the header names no x, y and z; {}", columns::taken_for(&names)));
     names
-}
-
-fn guessed(rows: &[Vec<Cell>], width: usize) -> Vec<String> {
-    let rest: &[&str] = match width {
-        4 => &["Intensity"],
-        6 if unit_vectors(rows, 3) => &["nx", "ny", "nz"],
-        6 if colors(rows, 3) => &["red", "green", "blue"],
-        7 if colors(rows, 3) && constant(rows, 6) => &["red", "green", "blue", "alpha"],
-        7 if colors(rows, 4) => &["Intensity", "red", "green", "blue"],
-        9 if unit_vectors(rows, 3) && colors(rows, 6) => &["nx", "ny", "nz", "red", "green", "blue"],
-        9 if colors(rows, 3) && unit_vectors(rows, 6) => &["red", "green", "blue", "nx", "ny", "nz"],
-        10 if colors(rows, 4) && unit_vectors(rows, 7) => &["Intensity", "red", "green", "blue", "nx", "ny", "nz"],
-        _ => &[],
-    };
-    let known = ["x", "y", "z"].iter().chain(rest).map(|&name| name.to_owned());
-    let unknown = (3 + rest.len()..width).map(|index| format!("column_{}", index + 1));
-    known.chain(unknown).collect()
-}
-
-/// Whether three columns are normals: all but a few of length 1, and not all along an axis, as pure colours would be.
-fn unit_vectors(rows: &[Vec<Cell>], first: usize) -> bool {
-    let three = |row: &Vec<Cell>| [0, 1, 2].map(|index| row[first + index].number());
-    let unit = |row: &&Vec<Cell>| {
-        let length = three(row).iter().map(|value| value * value).sum::<f64>().sqrt();
-        (0.95..1.05).contains(&length)
-    };
-    let fractional_or_negative =
-        rows.iter().any(|row| three(row).iter().any(|value| value.fract() != 0.0 || *value < 0.0));
-    fractional_or_negative && rows.iter().filter(unit).count() * 10 >= rows.len() * 9
-}
-
-/// Whether three columns can be colours: 0 to 1, to 255 or to 65535, and whole numbers beyond 1.
-fn colors(rows: &[Vec<Cell>], first: usize) -> bool {
-    let values = || rows.iter().flat_map(|row| &row[first..first + 3]).map(|cell| cell.number());
-    let largest = values().fold(0.0, f64::max);
-    values().all(|value| (0.0..=65535.0).contains(&value) && (largest <= 1.0 || value.fract() == 0.0))
-}
-
-fn constant(rows: &[Vec<Cell>], column: usize) -> bool {
-    let first = rows[0][column].number();
-    (first == 255.0 || first == 1.0) && rows.iter().all(|row| row[column].number() == first)
-}
-
-/// Whether a column has words and no number at all.
-fn words(rows: &[Vec<Cell>], column: usize) -> bool {
-    let mut cells = rows.iter().map(|row| row[column]).filter(|cell| *cell != Cell::Missing).peekable();
-    cells.peek().is_some() && cells.all(|cell| cell == Cell::Word)
-}
-
-/// Whether `f32` would not do for a column. Text does not say how wide its numbers are.
-fn wide(rows: &[Vec<Cell>], column: usize, exact: bool) -> bool {
-    rows.iter().map(|row| row[column].number()).any(|value| {
-        let lost = f64::from(value as f32) != value;
-        // Decimals are hardly ever binary fractions; nothing is lost if the same decimal comes out again.
-        let decimal = || format!("{}", value as f32).parse() == Ok(value);
-        value.is_finite() && lost && (value.abs() >= f64::from(1 << 24) || exact && !decimal())
-    })
-}
-
-impl Dialect {
-    /// How rows are written, and how many values they have. `named` is the number of names in a header.
-    fn of(lines: &[&[u8]], named: Option<usize>) -> Result<(Self, usize), String> {
-        let any = (Self::ANY, Self::ANY.cells(lines[0]).take(MAX_COLUMNS + 1).count());
-        let lines = &lines[..lines.len().min(200)];
-        for separator in [Separator::Semicolon, Separator::Tab, Separator::Comma] {
-            if !separator.byte().is_some_and(|byte| lines.iter().all(|line| line.contains(&byte))) {
-                continue;
-            }
-            if separator == Separator::Comma && decimal_commas(lines) {
-                let dialect = Self { separator: Separator::Blank, decimal_comma: true };
-                return Ok((dialect, dialect.cells(lines[0]).count()));
-            }
-            let strict = Self { separator, decimal_comma: false };
-            let Some(width) = strict.common_width(lines, named).filter(|&width| width >= 3) else { continue };
-            let cells = || lines.iter().flat_map(|line| strict.cells(line));
-            let with_comma = || cells().filter(|cell| cell.contains(&b','));
-            if separator != Separator::Comma && with_comma().any(|cell| Self::COMMAS.number(cell).is_ok()) {
-                if with_comma().all(one_decimal_comma) && !cells().any(|cell| cell.contains(&b'.')) {
-                    return Ok((Self { separator, decimal_comma: true }, width));
-                }
-                return Err("numbers with decimal commas among others; write all of them with points".into());
-            }
-            // Several tabs in a row align columns, if no header says otherwise.
-            let aligned = separator == Separator::Tab && named != Some(width) && cells().any(<[u8]>::is_empty);
-            let several = |cell: &[u8]| {
-                let mut numbers = text::values(cell).map(|value| Self::ANY.number(value));
-                text::values(cell).nth(1).is_some() && numbers.all(|number| number.is_ok())
-            };
-            if !aligned && !cells().any(several) {
-                return Ok((strict, width));
-            }
-        }
-        Ok(any)
-    }
-
-    /// The number of values that all lines have, one separator after the last value allowed.
-    fn common_width(&self, lines: &[&[u8]], named: Option<usize>) -> Option<usize> {
-        let count = |line: &[u8]| {
-            let mut last = &[][..];
-            let count = self.cells(line).take(MAX_COLUMNS + 2).inspect(|cell| last = cell).count();
-            (count, count - usize::from(last.is_empty()))
-        };
-        let counts: Vec<(usize, usize)> = lines.iter().map(|line| count(line)).collect();
-        let width = match named {
-            Some(named) if counts.iter().all(|&(all, _)| all == named) => named,
-            _ => counts.iter().map(|&(_, filled)| filled).max()?,
-        };
-        counts.iter().all(|&(all, filled)| all == width || filled == width).then_some(width)
-    }
-}
-
-/// Whether blanks separate the numbers and commas stand inside them.
-fn decimal_commas(lines: &[&[u8]]) -> bool {
-    lines.iter().all(|line| {
-        let words = || line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-        let fits = |word: &[u8]| !word.contains(&b'.') && (!word.contains(&b',') || one_decimal_comma(word));
-        words().count() >= 3 && words().all(fits)
-    })
-}
-
-fn one_decimal_comma(word: &[u8]) -> bool {
-    let inside = !word.starts_with(b",") && !word.ends_with(b",");
-    inside && word.iter().filter(|&&byte| byte == b',').count() == 1 && Dialect::COMMAS.number(word).is_ok()
 }

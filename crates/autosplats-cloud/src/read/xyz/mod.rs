@@ -5,6 +5,9 @@
 //! What is guessed is told.
 
 mod cells;
+mod dialect;
+mod guess;
+mod header;
 mod layout;
 mod rows;
 

@@ -26,6 +26,9 @@ const BATCH: usize = 16;
 /// Part of the work that parsing is.
 const PARSING: f32 = 0.95;
 
+/// Bytes of a line beyond which it is not looked at there.
+const MAX_LINE: usize = 1 << 16;
+
 /// Places looked at to find the middle of the points.
 const PLACES: usize = 1024;
 
@@ -87,9 +90,15 @@ fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
     let (mut last, mut bytes) = (None, 0);
     for place in 0..PLACES {
         let offset = start + ((text.len() - start) as u128 * place as u128 / PLACES as u128) as usize;
-        let at = if place == 0 { start } else { text::after_line_end(text, offset) };
-        let end = text::line_end(text, at);
-        if last == Some(at) || end - at > 1 << 16 {
+        // Not to the end of just any line: one could be as long as the file.
+        let line_end = |at: usize| {
+            let window = &text[at..text.len().min(at + MAX_LINE)];
+            let end = window.iter().position(|&byte| byte == b'\n').map(|len| at + len);
+            end.or((window.len() < MAX_LINE).then_some(text.len()))
+        };
+        let at = if place == 0 { Some(start) } else { line_end(offset).map(|end| (end + 1).min(text.len())) };
+        let Some((at, end)) = at.and_then(|at| Some((at, line_end(at)?))) else { continue };
+        if last == Some(at) {
             continue;
         }
         last = Some(at);
@@ -268,11 +277,12 @@ impl Parser<'_> {
             if self.counts_between && text::is_count(line.trim_ascii()) {
                 let count = std::str::from_utf8(line.trim_ascii()).ok().and_then(|line| line.parse().ok());
                 piece.counts = piece.counts.saturating_add(count.unwrap_or(usize::MAX));
-            } else if !empty && !text::is_blank(line.trim_ascii_start()) {
-                if let Err(what) = self.row(line, &mut piece.columns, &mut fields) {
-                    piece.error = Some((start + at, what));
-                    break;
-                }
+            } else if !empty
+                && !text::is_blank(line.trim_ascii_start())
+                && let Err(what) = self.row(line, &mut piece.columns, &mut fields)
+            {
+                piece.error = Some((start + at, what));
+                break;
             }
             at = end + 1;
         }
