@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
 
-/// The stages in the order of a frame; the renderer uses them all.
-const ORDER: [&str; 6] = ["project", "search", "fit", "splat", "shade", "renderer"];
+/// The stages in the order of a frame; the renderer uses them all. Normals of whole clouds are no stage, but stand on the
+/// search and the fit.
+const ORDER: [&str; 7] = ["project", "search", "fit", "normals", "splat", "shade", "renderer"];
 
 /// Checks every Rust file below `source`, the renderer's `src` folder.
 pub(crate) fn check(source: &Path) -> Result<()> {
@@ -98,6 +99,7 @@ mod tests {
         let text = "use crate::project::A;\nuse crate::splat::B;";
         let wrong = |room| forbidden(room, text).collect::<Vec<_>>();
         assert_eq!(wrong("fit"), ["splat"], "fit comes before splat");
+        assert_eq!(wrong("normals"), ["splat"], "normals need no picture");
         assert_eq!(wrong("shade"), Vec::<String>::new(), "shade comes after both");
         assert_eq!(wrong("camera"), ["project", "splat"], "what is no stage uses none");
     }

@@ -10,15 +10,20 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
-usage: cargo xtask test    format, lints, build, tests, documentation and the rules between crates and stages
-       cargo xtask formats [--check]
-                           docs/FORMATS.md, from what the program says of its formats and of the test data; with
-                           --check only whether it is what this build makes";
+usage: cargo xtask test            format, lints, build, tests, documentation, the rules between crates and stages,
+                               and a minute of broken files
+       cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options
+       cargo xtask formats         docs/FORMATS.md, from what the program says of its formats and of the test data;
+                               with --check only whether it is what this build makes";
+
+/// Seconds that the tests feed broken files to the readers.
+const FUZZ_SECONDS: &str = "60";
 
 fn main() -> ExitCode {
     let typed: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["test"] => test(),
+        ["test"] => root().and_then(test),
+        ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
         ["formats"] => root().and_then(|root| formats::run(root, false)),
         ["formats", "--check"] => root().and_then(|root| formats::run(root, true)),
         [] | ["help" | "-h" | "--help"] => {
@@ -40,10 +45,14 @@ fn root() -> Result<&'static Path> {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask has a workspace around it")
 }
 
+/// Broken files for every reader. Built like the tests, so that overflows are found too.
+fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
+    cargo(root, &[&["run", "--locked", "--quiet", "-p", "autosplats-fuzz", "--"], options].concat())
+}
+
 /// Everything a change has to pass, cheapest first.
-fn test() -> Result<()> {
+fn test(root: &Path) -> Result<()> {
     let start = Instant::now();
-    let root = root()?;
     let step = |name: &str, check: &dyn Fn() -> Result<()>| {
         println!("\n== {name}");
         let start = Instant::now();
@@ -64,6 +73,7 @@ fn test() -> Result<()> {
     })?;
     step("build", &|| cargo(root, &["test", "--locked", "--workspace", "--no-run"]))?;
     step("tests", &|| cargo(root, &["test", "--locked", "--workspace"]))?;
+    step("broken files", &|| fuzz(root, &["--seconds", FUZZ_SECONDS]))?;
     step("documentation", &|| {
         let mut command = cargo_command(root);
         run(command.args(["doc", "--locked", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))

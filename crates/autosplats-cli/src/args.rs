@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use autosplats::{Background, ColorMode, Reconstruction, Shading};
+use autosplats::{Background, ColorMode, NormalSettings, Reconstruction, Shading};
 use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{DepthCamera, written_formats};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::exit::EXIT_CODES;
@@ -31,8 +32,10 @@ pub(crate) struct CommandLine {
 pub(crate) enum Command {
     /// Render points to PNG pictures and EXR layers
     Render(Box<RenderArgs>),
-    /// Write any input, or several as one, as a binary PLY file
-    Convert(ConvertArgs),
+    /// Write any input, or several as one, in another format, whole or thinned
+    Convert(Box<ConvertArgs>),
+    /// Estimate normals, curvature and density of all points into a file
+    Normals(Box<NormalsArgs>),
     /// Render every built-in scene and say where the pictures are
     Demo(DemoArgs),
     /// Say what is in files: points, bounds, attributes, units, spacing
@@ -61,8 +64,8 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = RENDER_EXAMPLES, after_long_help = format!("{RENDER_EXAMPLES}\n\n{EXIT_CODES}"))]
 pub(crate) struct RenderArgs {
-    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP)]
-    pub(crate) inputs: Vec<String>,
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
     /// Picture to write: .png (8 bit) or .exr (32-bit float: R G B A Z N.X N.Y N.Z radius kradius curvature index).
     /// Can be given several times; an existing file is replaced
     #[arg(short, long = "out", value_name = "FILE", required = true)]
@@ -83,8 +86,38 @@ pub(crate) struct RenderArgs {
     pub(crate) json: bool,
 }
 
+/// What is read, and how.
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Camera and placement")]
+#[command(next_help_heading = "Input")]
+pub(crate) struct InputArgs {
+    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP, help_heading = None::<&'static str>)]
+    pub(crate) inputs: Vec<String>,
+    /// Place an input by a text file: a row-major 4x4 (or 3x4) matrix from its own to world coordinates, or the seven
+    /// numbers tx ty tz qx qy qz qw
+    #[arg(long = "pose", value_name = "INPUT=FILE")]
+    pub(crate) poses: Vec<String>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+}
+
+/// What files leave open.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Input")]
+pub(crate) struct ReadingArgs {
+    /// Columns of text and of bare binary records, such as x,y,z,Intensity,red,green,blue; '-' leaves one out
+    /// [default: by the header, or guessed and told]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(crate) columns: Option<Vec<String>>,
+    /// Camera of depth images in pixels, and their values per metre [default: by a file beside the image]
+    #[arg(long, value_name = "FX,FY,CX,CY[,SCALE]", value_parser = values::depth_camera)]
+    pub(crate) depth_camera: Option<DepthCamera>,
+    /// Keep points at the sensor itself, (0, 0, 0), which scanners write where nothing came back
+    #[arg(long)]
+    pub(crate) keep_no_returns: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
     /// Direction to look from, at a distance that shows everything but far outliers [default: iso, or the sensor's
     /// own view where the points are in a camera's frame]
@@ -114,9 +147,6 @@ pub(crate) struct CameraArgs {
     /// Which way is up in the input; 'auto' goes by the file and its shape
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) axes: AxesChoice,
-    /// Place an input by a text file with a row-major 4x4 (or 3x4) matrix from its own to world coordinates
-    #[arg(long = "pose", value_name = "INPUT=FILE")]
-    pub(crate) poses: Vec<String>,
 }
 
 #[derive(Args, Debug)]
@@ -210,25 +240,97 @@ pub(crate) struct RunArgs {
 const CONVERT_EXAMPLES: &str = "\
 Examples:
   autosplats convert scan.laz scan.ply
+  autosplats convert scan.e57 thin.laz --voxel 0.05
+  autosplats convert survey.laz house.ply --bounds 512030,5403600,290,512080,5403640,320
   autosplats convert scene:herd:10M herd.ply
   autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt";
 
 #[derive(Args, Debug)]
 #[command(after_help = CONVERT_EXAMPLES)]
 pub(crate) struct ConvertArgs {
-    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP)]
-    pub(crate) inputs: Vec<String>,
-    /// PLY file to write
-    #[arg(value_name = "OUT.ply")]
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    #[arg(value_name = "OUT", help = output_help(), help_heading = None::<&'static str>)]
     pub(crate) output: PathBuf,
     /// Replace an existing file
-    #[arg(long)]
+    #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,
-    /// Place an input by a text file with a row-major 4x4 (or 3x4) matrix from its own to world coordinates
-    #[arg(long = "pose", value_name = "INPUT=FILE")]
-    pub(crate) poses: Vec<String>,
+    #[command(flatten)]
+    pub(crate) thinning: ThinningArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// What is done to the points, in this order.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Points, in this order")]
+pub(crate) struct ThinningArgs {
+    /// Keep the points in a box of world coordinates
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
+    pub(crate) bounds: Option<[DVec3; 2]>,
+    /// Keep the first of every so many points
+    #[arg(long, value_name = "COUNT", value_parser = values::step)]
+    pub(crate) every: Option<usize>,
+    /// Keep one point for each cube of this size: the one nearest to the mean
+    #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
+    pub(crate) voxel: Option<f64>,
+    /// Shake the points by normally distributed noise with this standard deviation along each axis
+    #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
+    pub(crate) noise: Option<f64>,
+    /// Another seed makes other noise and other samples
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    pub(crate) seed: u64,
+}
+
+/// What can be written, by its extensions.
+fn output_help() -> String {
+    let formats = written_formats().flat_map(|(_, extensions)| extensions).map(|extension| format!(".{extension}"));
+    format!("File to write; its name tells the format: {}", formats.collect::<Vec<_>>().join(" "))
+}
+
+const NORMALS_EXAMPLES: &str = "\
+Examples:
+  autosplats normals scan.e57 normals.ply
+  autosplats normals survey.laz normals.laz -k 20 --orient up
+  autosplats normals sweep.bin normals.ply --sensor 0,0,1.8
+
+The file gets all that the input has and the fields NormalX, NormalY, NormalZ, Curvature (0 flat, 1/3 no surface) and
+DensityRadius (twice the radius of the circle that each neighbour covers on average).";
+
+#[derive(Args, Debug)]
+#[command(after_help = NORMALS_EXAMPLES)]
+pub(crate) struct NormalsArgs {
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    #[arg(value_name = "OUT", help = output_help(), help_heading = None::<&'static str>)]
+    pub(crate) output: PathBuf,
+    /// Neighbours of each point that a plane is fitted to, 3 to 1024; more is smoother
+    #[arg(short, value_name = "COUNT", default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
+    pub(crate) k: u32,
+    /// Which of its two sides a normal points to
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Normals")]
+    pub(crate) orient: OrientChoice,
+    /// World coordinates of the one sensor that saw all points, if the file does not say
+    #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true, conflicts_with = "orient", help_heading = "Normals")]
+    pub(crate) sensor: Option<DVec3>,
+    /// Replace an existing file
+    #[arg(long, help_heading = "Running")]
+    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+/// Which way normals point.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum OrientChoice {
+    /// To the sensor where the file tells its place, else upward for land, else outward
+    Auto,
+    /// To the sensor
+    Sensor,
+    /// Upward, along z
+    Up,
+    /// Away from the middle
+    Outward,
 }
 
 #[derive(Args, Debug)]
@@ -265,10 +367,8 @@ others shown."
     /// One JSON object on standard output, for several inputs an array of them (--help has its fields)
     #[arg(long)]
     pub(crate) json: bool,
-    /// Names of the columns of text and bare records, instead of what is guessed: x,y,z,Intensity,red,green,blue … in
-    /// the file's order; '-' for one to leave out
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    pub(crate) columns: Option<Vec<String>>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

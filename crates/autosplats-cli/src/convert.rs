@@ -1,21 +1,55 @@
 //! `autosplats convert`: any input, or several as one, to a file of another kind.
 
-use crate::args::ConvertArgs;
-use crate::exit::Failure;
+use autosplats_cloud::{Error, PointCloud};
+
+use crate::args::{ConvertArgs, ThinningArgs};
+use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{check_cloud_target, write_cloud};
+use crate::progress::Bar;
 use crate::threads::start_threads;
 
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
-    let ConvertArgs { inputs, output, force, poses, run } = args;
+    let ConvertArgs { input, output, force, thinning, run } = args;
     start_threads(run)?;
-    let inputs = Inputs::new(inputs, poses)?;
+    let inputs = Inputs::new(input)?.exactly();
     check_cloud_target(output, *force, inputs.files())?;
-    let cloud = inputs.read(run.quiet)?;
+    let mut cloud = inputs.read(run.quiet)?;
+    let read = cloud.len();
+    thin(&mut cloud, thinning, run.quiet)?;
+    if cloud.is_empty() {
+        return Err(Failure::new(Exit::Input, format!("none of the {read} points is left; widen --bounds")));
+    }
     let bytes = write_cloud(&cloud, output, run.quiet)?;
     if !run.quiet {
-        eprintln!("{}: {} points, {bytes} bytes", output.display(), cloud.len());
+        let of = if cloud.len() < read { format!(" of {read}") } else { String::new() };
+        eprintln!("{}: {}{of} points, {bytes} bytes", output.display(), cloud.len());
     }
     Ok(())
+}
+
+fn thin(cloud: &mut PointCloud, thinning: &ThinningArgs, quiet: bool) -> Result<(), Failure> {
+    if let Some([min, max]) = thinning.bounds {
+        cloud.crop(min, max);
+    }
+    if let Some(step) = thinning.every {
+        cloud.keep_every(step);
+    }
+    if let Some(size) = thinning.voxel {
+        let bar = Bar::new("thinning", quiet);
+        cloud.thin_by_voxel(size, &bar).map_err(thin_failure)?;
+    }
+    if let Some(sigma) = thinning.noise {
+        let bar = Bar::new("shaking", quiet);
+        cloud.add_noise(sigma, thinning.seed, &bar).map_err(thin_failure)?;
+    }
+    Ok(())
+}
+
+fn thin_failure(error: Error) -> Failure {
+    match error {
+        Error::Cancelled => Failure::interrupted(),
+        error => Failure::usage(error),
+    }
 }

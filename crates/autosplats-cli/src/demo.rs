@@ -28,7 +28,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
         let path = out.join(name).with_extension("png");
         check_target(&path, [])?;
         let input = format!("scene:{name}");
-        let inputs = Inputs::new(std::slice::from_ref(&input), &[])?;
+        let inputs = Inputs::scene(name)?;
         let Some(scene) = inputs.only_scene() else { continue };
 
         let cloud = inputs.read(run.quiet)?;

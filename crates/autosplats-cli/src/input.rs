@@ -3,9 +3,11 @@
 use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
 
-use autosplats_cloud::glam::{DMat4, DVec4};
-use autosplats_cloud::{Error, PointCloud, Progress as _, Scene, check_memory};
+use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
+use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions, Scene, check_memory, read_with};
+use rayon::prelude::*;
 
+use crate::args::{InputArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
 use crate::progress::Bar;
 
@@ -19,6 +21,20 @@ const BYTES_PER_GENERATED_POINT: u64 = 16;
 #[derive(Debug)]
 pub(crate) struct Inputs {
     list: Vec<Input>,
+    options: ReadOptions,
+}
+
+impl ReadingArgs {
+    /// The flags as the library takes them.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let Self { columns, depth_camera, keep_no_returns } = self;
+        ReadOptions {
+            columns: columns.clone(),
+            depth_camera: *depth_camera,
+            keep_no_returns: *keep_no_returns,
+            ..ReadOptions::default()
+        }
+    }
 }
 
 /// One input and where it stands in the world.
@@ -37,7 +53,8 @@ enum Source {
 
 impl Inputs {
     /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
-    pub(crate) fn new(names: &[String], poses: &[String]) -> Result<Self, Failure> {
+    pub(crate) fn new(args: &InputArgs) -> Result<Self, Failure> {
+        let InputArgs { inputs: names, poses, reading } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
         let generated = list.iter().map(Input::generated_points).sum::<u64>();
         check_memory(&format!("{generated} generated points"), generated * BYTES_PER_GENERATED_POINT)
@@ -59,7 +76,19 @@ impl Inputs {
                 })?;
             input.world_from_input = read_pose(Path::new(&matrix))?;
         }
-        Ok(Self { list })
+        Ok(Self { list, options: reading.options() })
+    }
+
+    /// A built-in scene alone.
+    pub(crate) fn scene(name: &str) -> Result<Self, Failure> {
+        let input = Input::new(&format!("{SCENE_PREFIX}{name}"))?;
+        Ok(Self { list: vec![input], options: ReadOptions::default() })
+    }
+
+    /// Asks for all the digits there are, for what is to be written again.
+    pub(crate) fn exactly(mut self) -> Self {
+        self.options.exact = true;
+        self
     }
 
     /// The files among the inputs.
@@ -84,15 +113,31 @@ impl Inputs {
 
     /// Reads everything into one cloud.
     pub(crate) fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
-        let mut clouds = Vec::with_capacity(self.list.len());
-        for input in &self.list {
-            let cloud = input.read(quiet)?;
+        self.read_each(quiet, |input, progress| input.read(&self.options, progress))
+    }
+
+    /// Reads the inputs side by side, each by `read`, and puts them together.
+    fn read_each(
+        &self,
+        quiet: bool,
+        read: impl Fn(&Input, &dyn Progress) -> Result<PointCloud, Error> + Sync,
+    ) -> Result<PointCloud, Failure> {
+        let title = match self.list.as_slice() {
+            [input] => input.task(),
+            several => format!("reading {} inputs", several.len()),
+        };
+        let bar = Bar::new(&title, quiet);
+        let parts: Vec<_> = self.list.iter().map(|input| bar.part(self.list.len(), &input.name)).collect();
+        let clouds = self.list.par_iter().zip(&parts).map(|(input, part)| {
+            let cloud = read(input, part).map_err(read_failure)?;
             if cloud.is_empty() {
                 return Err(Failure::new(Exit::Input, format!("{}: there is no point in it", input.name)));
             }
-            clouds.push((cloud, input.world_from_input));
-        }
-        Ok(PointCloud::merge(clouds))
+            Ok((cloud, input.world_from_input))
+        });
+        // Of several failures, the first input's is told, whichever came first.
+        let clouds: Vec<Result<_, Failure>> = clouds.collect();
+        Ok(PointCloud::merge(clouds.into_iter().collect::<Result<_, _>>()?))
     }
 }
 
@@ -127,21 +172,23 @@ impl Input {
         }
     }
 
-    fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
+    /// What reading it is called.
+    fn task(&self) -> String {
         match &self.source {
             Source::File(path) => {
-                let bar = Bar::on_file("reading", path, quiet);
-                autosplats_cloud::read(path, &bar).map_err(read_failure)
+                format!("reading {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
             }
-            Source::Scene(scene, count) => {
-                let bar = Bar::new(&format!("generating {}", self.name), quiet);
-                scene
-                    .sample(*count, &|done| {
-                        bar.report(done);
-                        !bar.cancelled()
-                    })
-                    .map_err(read_failure)
-            }
+            Source::Scene(..) => format!("generating {}", self.name),
+        }
+    }
+
+    fn read(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
+        match &self.source {
+            Source::File(path) => read_with(path, options, progress),
+            Source::Scene(scene, count) => scene.sample(*count, &|done| {
+                progress.report(done);
+                !progress.cancelled()
+            }),
         }
     }
 }
@@ -164,7 +211,7 @@ pub(crate) fn read_failure(error: Error) -> Failure {
     }
 }
 
-/// Reads a row-major 4x4 or 3x4 matrix from a text file: numbers separated by blanks or commas, `#` begins a comment.
+/// Reads a row-major 4x4 or 3x4 matrix, or a translation and a quaternion, from a text file: numbers separated by blanks or commas, `#` begins a comment.
 fn read_pose(path: &Path) -> Result<DMat4, Failure> {
     let text =
         read_to_string(path).map_err(|error| Failure::new(Exit::Input, format!("{}: {error}", path.display())))?;
@@ -181,11 +228,18 @@ fn parse_pose(text: &str) -> Result<DMat4, String> {
             word.parse().ok().filter(|number: &f64| number.is_finite()).ok_or(format!("'{word}' is not a number"))
         })
         .collect::<Result<Vec<f64>, _>>()?;
+    if let [tx, ty, tz, qx, qy, qz, qw] = numbers[..] {
+        let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
+        if (rotation.length() - 1.0).abs() > 0.01 {
+            return Err(format!("the quaternion {qx} {qy} {qz} {qw} is no rotation: its length is not 1"));
+        }
+        return Ok(DMat4::from_rotation_translation(rotation.normalize(), DVec3::new(tx, ty, tz)));
+    }
     if numbers.len() == 12 {
         numbers.extend([0.0, 0.0, 0.0, 1.0]);
     }
     let numbers: [f64; 16] = numbers.try_into().map_err(|numbers: Vec<f64>| {
-        format!("{} numbers; a pose is a row-major matrix of 4x4 or 3x4", numbers.len())
+        format!("{} numbers; a pose is a row-major matrix of 4x4 or 3x4, or tx ty tz qx qy qz qw", numbers.len())
     })?;
     let matrix = DMat4::from_cols_array(&numbers).transpose();
     if matrix.row(3) != DVec4::W {
@@ -199,8 +253,6 @@ fn parse_pose(text: &str) -> Result<DMat4, String> {
 
 #[cfg(test)]
 mod tests {
-    use autosplats_cloud::glam::DVec3;
-
     use super::*;
 
     #[test]
@@ -208,7 +260,9 @@ mod tests {
         let pose = parse_pose("# a quarter turn\n0 -1 0 10\n1,0,0,20\n[0 0 1 30] # lifted\n")?;
         let moved = pose.transform_point3(DVec3::X);
         assert_eq!(moved, DVec3::new(10.0, 21.0, 30.0), "x turns to y, then moves");
-        for bad in ["", "1 2 3", "1 0 0 0 0 1 0 0 0 0 1 x", "1 0 0 0 0 1 0 0 0 0 nan 0"] {
+        let turned = parse_pose("10 20 30 0 0 0.7071068 0.7071068")?.transform_point3(DVec3::X);
+        assert!(turned.abs_diff_eq(DVec3::new(10.0, 21.0, 30.0), 1e-6), "the same as a quaternion: {turned}");
+        for bad in ["", "1 2 3", "1 2 3 0 0 0 0", "1 0 0 0 0 1 0 0 0 0 1 x", "1 0 0 0 0 1 0 0 0 0 nan 0"] {
             assert!(parse_pose(bad).is_err(), "{bad} is no pose");
         }
         assert!(parse_pose("1 0 0 0 0 1 0 0 0 0 0 0").is_err(), "a flat pose");

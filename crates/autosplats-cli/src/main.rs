@@ -12,6 +12,7 @@ mod exit;
 mod info;
 mod input;
 mod interrupt;
+mod normals;
 mod output;
 mod pages;
 mod progress;
@@ -53,6 +54,7 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
     match command_line.command {
         Some(Command::Render(args)) => render::run(*args),
         Some(Command::Convert(args)) => convert::run(&args),
+        Some(Command::Normals(args)) => normals::run(&args),
         Some(Command::Demo(args)) => demo::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Doctor(args)) => doctor::run(&args),

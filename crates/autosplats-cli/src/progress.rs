@@ -2,7 +2,9 @@
 
 use std::io::{IsTerminal as _, stderr};
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -18,8 +20,10 @@ const STEPS: u64 = 1000;
 /// One task on the screen. It vanishes when dropped.
 pub(crate) struct Bar {
     bar: ProgressBar,
-    /// What [notes](Progress::note) are about; nothing if they are not wanted.
-    subject: Option<String>,
+    /// What [notes](Progress::note) are about.
+    subject: String,
+    /// Whether notes are not wanted.
+    quiet: bool,
     /// Dropped to end the thread that draws.
     done: Option<Sender<()>>,
     drawing: Option<JoinHandle<()>>,
@@ -34,10 +38,20 @@ impl Bar {
     /// Starts a task on a file, to which its notes then belong.
     pub(crate) fn on_file(task: &str, file: &Path, quiet: bool) -> Self {
         let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
-        let subject = (!quiet).then(|| file.display().to_string());
         let mut bar = Self::new(&format!("{task} {name}"), quiet);
-        bar.subject = subject;
+        bar.subject = file.display().to_string();
         bar
+    }
+
+    fn tell(&self, subject: &str, note: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| eprintln!("note: {subject}: {note}"));
+        }
+    }
+
+    /// A share of this task, one of `parts` equal ones, that reports on an input.
+    pub(crate) fn part(&self, parts: usize, subject: &str) -> Part<'_> {
+        Part { bar: self, parts, subject: subject.into(), done: AtomicU64::new(0), notes: Mutex::default() }
     }
 
     /// Starts a task that cannot say how far it is.
@@ -49,7 +63,7 @@ impl Bar {
         let bar =
             ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::hidden()).with_message(task.to_owned());
         if quiet || !stderr().is_terminal() {
-            return Self { bar, subject: None, done: None, drawing: None };
+            return Self { bar, subject: String::new(), quiet, done: None, drawing: None };
         }
         if let Ok(style) = ProgressStyle::with_template(template) {
             let spinning = template.contains("spinner");
@@ -68,7 +82,7 @@ impl Bar {
             }
             shown.finish_and_clear();
         });
-        Self { bar, subject: None, done: Some(done), drawing: Some(drawing) }
+        Self { bar, subject: String::new(), quiet, done: Some(done), drawing: Some(drawing) }
     }
 }
 
@@ -82,8 +96,41 @@ impl Progress for Bar {
     }
 
     fn note(&self, note: &str) {
-        if let Some(subject) = &self.subject {
-            self.bar.suspend(|| eprintln!("note: {subject}: {note}"));
+        self.tell(&self.subject, note);
+    }
+}
+
+/// One of several pieces of work that go on side by side, on one bar.
+pub(crate) struct Part<'a> {
+    bar: &'a Bar,
+    parts: usize,
+    subject: String,
+    /// Steps of the bar that this part has added.
+    done: AtomicU64,
+    /// Told in the end, so that the notes of several parts do not mix.
+    notes: Mutex<Vec<String>>,
+}
+
+impl Progress for Part<'_> {
+    fn report(&self, fraction: f32) {
+        let done = (fraction.clamp(0.0, 1.0) * STEPS as f32) as u64 / self.parts as u64;
+        let before = self.done.fetch_max(done, Ordering::Relaxed);
+        self.bar.bar.inc(done.saturating_sub(before));
+    }
+
+    fn cancelled(&self) -> bool {
+        interrupt::requested()
+    }
+
+    fn note(&self, note: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+    }
+}
+
+impl Drop for Part<'_> {
+    fn drop(&mut self) {
+        for note in self.notes.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            self.bar.tell(&self.subject, note);
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use autosplats::{Background, ColorMode, MAX_SIDE};
+use autosplats_cloud::DepthCamera;
 use autosplats_cloud::glam::DVec3;
 
 /// The colour modes by name; any other name is a field's.
@@ -37,6 +38,43 @@ pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
         Some(&[x, y, z]) => Ok(DVec3::new(x, y, z)),
         _ => Err("three numbers are expected, such as 1.5,-2,0".into()),
     }
+}
+
+/// `0,0,0,1.5,1.5,2`: the lower corner, then the upper one.
+pub(crate) fn bounds(text: &str) -> Result<[DVec3; 2], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    match numbers.as_deref() {
+        Some(&[x0, y0, z0, x1, y1, z1]) => {
+            let [min, max] = [DVec3::new(x0, y0, z0), DVec3::new(x1, y1, z1)];
+            if min.cmple(max).all() { Ok([min, max]) } else { Err("the first corner has to be the lower one".into()) }
+        }
+        _ => Err("six numbers are expected, such as 0,0,0,10,10,2.5".into()),
+    }
+}
+
+/// `525,525,319.5,239.5` or with values per metre as `525,525,319.5,239.5,5000`
+pub(crate) fn depth_camera(text: &str) -> Result<DepthCamera, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    let (fx, fy, cx, cy, scale) = match numbers.as_deref() {
+        Some(&[fx, fy, cx, cy]) => (fx, fy, cx, cy, 1000.0),
+        Some(&[fx, fy, cx, cy, scale]) => (fx, fy, cx, cy, scale),
+        _ => return Err("four or five numbers are expected, such as 525,525,319.5,239.5,1000".into()),
+    };
+    if fx > 0.0 && fy > 0.0 && scale > 0.0 {
+        Ok(DepthCamera { fx, fy, cx, cy, scale })
+    } else {
+        Err("focal lengths and values per metre are above 0".into())
+    }
+}
+
+/// A whole number above zero.
+pub(crate) fn step(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|step| *step > 0).ok_or_else(|| "a whole number above 0 is expected".into())
+}
+
+/// A number above zero.
+pub(crate) fn above_zero(text: &str) -> Result<f64, String> {
+    number(text).filter(|value| *value > 0.0).ok_or_else(|| "a number above 0 is expected".into())
 }
 
 /// `-2..10` or `-2,10`

@@ -45,9 +45,28 @@ fn several_inputs_become_one_file() {
 }
 
 #[test]
-fn only_ply_is_written() {
+fn points_are_taken_out_in_order() {
     let folder = Folder::with_sphere();
-    folder.fail(&["convert", "sphere.ply", "out.las"], 2, &[".ply"]);
+    let count = |options: &[&str]| {
+        folder.succeed(&[&["convert", "sphere.ply", "out.ply", "--force"], options].concat());
+        points(&folder.read("out.ply"))
+    };
+    let half = count(&["--bounds", "-2,-2,0,2,2,2"]);
+    assert!((half as f64 - SPHERE_POINTS as f64 / 2.0).abs() < 100.0, "{half} in the upper half of the sphere");
+    assert_eq!(count(&["--every", "4"]), SPHERE_POINTS / 4, "a quarter");
+    let thin = count(&["--voxel", "0.25"]);
+    assert!((200..500).contains(&thin), "{thin} cubes of a quarter radius touch the sphere: about 1.5 x 4 pi x 16");
+    assert_eq!(count(&["--noise", "0.01", "--every", "2"]), SPHERE_POINTS / 2, "shaken, but all there");
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--bounds", "5,5,5,6,6,6"], 3, &["none of the 6000", "--bounds"]);
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--bounds", "1,1,1,0,0,0"], 2, &["lower"]);
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--voxel", "-1"], 2, &["above 0"]);
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--every", "0"], 2, &["above 0"]);
+}
+
+#[test]
+fn only_known_formats_are_written() {
+    let folder = Folder::with_sphere();
+    folder.fail(&["convert", "sphere.ply", "out.doc"], 2, &["out.doc", ".ply"]);
     folder.fail(&["convert", "sphere.ply"], 2, &["INPUT"]);
     folder.fail(&["convert", "missing.las", "out.ply"], 3, &["missing.las"]);
 }

@@ -62,6 +62,16 @@ pub enum Error {
         /// Size of the request in bytes.
         bytes: usize,
     },
+    /// A number that was given is out of its range.
+    #[error("{name} {value}: it must be {rule}")]
+    BadValue {
+        /// What the number is.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// What it should be.
+        rule: &'static str,
+    },
     /// No made-up scene has this name.
     #[error("no scene is called {given:?}; there are:{known}")]
     UnknownScene {

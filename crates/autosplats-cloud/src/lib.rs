@@ -19,16 +19,19 @@
 mod cloud;
 mod crs;
 mod error;
+mod geographic;
+mod las;
 mod memory;
 mod merge;
 mod progress;
 mod read;
 mod retain;
 mod source;
+mod thin;
 mod write;
 
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
-pub use crs::{Crs, Unit};
+pub use crs::{Crs, GeoKeys, Unit};
 pub use error::Error;
 /// The vector library of the public interface.
 pub use glam;
@@ -36,7 +39,7 @@ pub use memory::{available_memory, check_memory};
 pub use progress::Progress;
 pub use read::{
     Attribute, Contents, DepthCamera, Description, ReadOptions, describe, describe_bytes, formats, read, read_bytes,
-    read_mesh, read_with,
+    read_mesh, read_mesh_bytes, read_with,
 };
-pub use source::scene::{Hit, Scene, View};
+pub use source::scene::{Hit, Scene, View, parse_count};
 pub use write::{check_writable, write, written_formats};

@@ -1,6 +1,6 @@
-//! What a renderer can fail with.
+//! What rendering and estimating normals can fail with.
 
-/// Everything that rendering can fail with.
+/// Everything that rendering and estimating normals can fail with.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -10,7 +10,7 @@ pub enum Error {
     /// A setting lies outside its range.
     #[error("{name} is {value}, must be {range}")]
     Setting {
-        /// Name of the field of [`Settings`](crate::Settings).
+        /// Name of the field of [`Settings`](crate::Settings) or [`NormalSettings`](crate::NormalSettings).
         name: &'static str,
         /// Value given.
         value: String,
@@ -26,7 +26,7 @@ pub enum Error {
         height: u32,
     },
     /// More points than a 32-bit index can name.
-    #[error("{0} points are more than the 4,294,967,295 that one picture can hold; reduce the cloud first")]
+    #[error("{0} points are more than the 4,294,967,295 that can be numbered; reduce the cloud first")]
     TooManyPoints(usize),
     /// The colour mode needs an attribute that the cloud lacks.
     #[error("the cloud has no {name}; it has {has}")]
@@ -39,4 +39,7 @@ pub enum Error {
     /// No surface would be seen: its message says why.
     #[error("nothing to show: {0}")]
     NothingVisible(String),
+    /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) asked to stop.
+    #[error("cancelled")]
+    Cancelled,
 }

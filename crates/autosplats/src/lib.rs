@@ -21,10 +21,14 @@
 //! assert_eq!(frame.image.pixels.len(), 400 * 300);
 //! # Ok::<(), autosplats::Error>(())
 //! ```
+//!
+//! [`estimate_normals`] computes for all points of a cloud what a picture shows of those seen: normal, curvature and density
+//! radius, from the exact nearest neighbours in space.
 
 mod camera;
 mod error;
 mod fit;
+mod normals;
 mod project;
 mod renderer;
 mod search;
@@ -37,6 +41,7 @@ mod test_clouds;
 pub use autosplats_cloud as cloud;
 pub use camera::{Camera, Projection, ViewDirection, guess_axes};
 pub use error::Error;
+pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
 pub use renderer::{Counts, Frame, MAX_SIDE, Reconstruction, Renderer, Settings, Timings};
 pub use search::SearchEngine;
 pub use shade::{Background, ColorMap, ColorMode, Image, Shading};

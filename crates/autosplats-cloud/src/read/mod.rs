@@ -4,18 +4,29 @@
 //!
 //! A file is mapped into memory and its format told by its first bytes, then by its extension. Every format ends in the
 //! same shape, a [`table`]: named columns of numbers at fixed distances, from which positions, colours and fields are
-//! taken in parallel. Binary PLY and PCD are such a table as they lie on the disk; text and lists are first packed into
-//! one. LAS has columns of bits and integer coordinates and makes its cloud itself.
+//! taken in parallel. Binary PLY and PCD are such a table as they lie on the disk; their text and lists are first packed
+//! into one, while rows of bare text, which can be the largest, go straight into the columns of a cloud.
+//! LAS has columns of bits and integer coordinates and makes its cloud itself.
 //!
 //! A file is not trusted: what its header claims is checked against its size before anything is allocated.
 
+mod columns;
+mod depth_image;
 mod describe;
+mod e57;
+mod gltf;
 mod guard;
 mod las;
-mod laz;
+mod lines;
+mod mesh;
+mod obj;
+mod off;
 mod options;
 mod pcd;
+mod placed;
 mod ply;
+mod raw;
+mod stl;
 mod table;
 mod text;
 mod xyz;
@@ -50,7 +61,23 @@ struct Format {
 
 /// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
 /// extensions go before shorter ones.
-const FORMATS: &[&Format] = &[&las::FORMAT, &ply::FORMAT, &pcd::FORMAT, &xyz::FORMAT];
+const FORMATS: &[&Format] = &[
+    &las::FORMAT,
+    &ply::FORMAT,
+    &pcd::FORMAT,
+    &e57::FORMAT,
+    &gltf::FORMAT,
+    &off::FORMAT,
+    &obj::FORMAT,
+    &depth_image::FORMAT,
+    &raw::FORMAT,
+    &xyz::FORMAT,
+    // Its mark is only a number that fits the file's size, so it comes last.
+    &stl::FORMAT,
+];
+
+/// Formats of models, of which (0, 0, 0) is a point like any.
+const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
 pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -119,7 +146,20 @@ pub fn read_bytes(
 /// Those of [`read`].
 pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) -> Result<Contents, Error> {
     let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    contents(&Job { path, progress, bytes: &bytes, options, triangles: true })
+    read_mesh_bytes(path, &bytes, options, progress)
+}
+
+/// [Reads](read_mesh) points and triangles from the bytes of a file.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_mesh_bytes(
+    name: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<Contents, Error> {
+    contents(&Job { path: name, progress, bytes, options, triangles: true })
 }
 
 /// What the header of a file says, in milliseconds whatever its size; formats without a header that counts are looked
@@ -146,15 +186,18 @@ fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
     let by_name = || FORMATS.iter().find(|format| format.extensions.iter().any(ends));
-    by_content.or_else(by_name).copied().ok_or_else(|| Error::UnknownFormat { path: job.path.into() })
+    // Rows of numbers can stand in files of any name, so they are looked for last.
+    let rows = || xyz::looks_like_rows(job.bytes).then_some(&&xyz::FORMAT);
+    by_content.or_else(by_name).or_else(rows).copied().ok_or_else(|| Error::UnknownFormat { path: job.path.into() })
 }
 
 fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     job.tick(0.0)?;
     let format = format(job)?;
     let mut contents = (format.read)(job)?;
+    let model = MODELS.iter().any(|model| model.name == format.name);
     // A mesh would lose its corners.
-    if !job.options.keep_no_returns && contents.triangles.is_empty() {
+    if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
     job.tick(1.0)?;
@@ -170,7 +213,7 @@ fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
         return;
     }
     let keep: Vec<bool> = (0..cloud.len()).into_par_iter().map(|i| !absent(i)).collect();
-    job.note(format!("{count} of {} points are at (0, 0, 0), where nothing was measured; dropped", cloud.len()));
+    job.note(format!("dropped {count} of {} points at (0, 0, 0), where nothing was measured", cloud.len()));
     cloud.retain(|i| keep[i]);
 }
 
@@ -185,7 +228,6 @@ struct Job<'a> {
     bytes: &'a [u8],
     options: &'a ReadOptions,
     /// Whether triangles are wanted.
-    #[allow(dead_code, reason = "meshes use it")]
     triangles: bool,
 }
 

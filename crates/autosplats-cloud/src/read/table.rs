@@ -5,7 +5,10 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Attribute, Job};
+use super::{
+    Attribute, Job,
+    columns::{field_name, find_color},
+};
 use crate::{Error, FieldValues, PointCloud, merge::residual};
 
 /// Points handled between two looks at the caller's wish to stop: a few milliseconds.
@@ -121,9 +124,8 @@ impl Table<'_> {
         let exact = if job.options.exact { 12 } else { 0 };
         let fields: usize = self.columns.iter().map(|column| column.scalar.size()).sum();
         job.check_memory(self.count, 12 + exact + fields)?;
-        let colors = [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]]
-            .into_iter()
-            .find_map(|names| self.take(names));
+        let names: Vec<String> = self.columns.iter().map(|column| column.name.clone()).collect();
+        let colors = find_color(&names).and_then(|three| self.take(three.map(|index| &*names[index])));
         let packed = self.columns.iter().position(|column| {
             self.packed_rgb && column.scalar.size() == 4 && ["rgb", "rgba"].contains(&&*column.name.to_lowercase())
         });
@@ -150,6 +152,13 @@ impl Table<'_> {
             }
             step += 1;
         } else if let Some(column) = &packed {
+            let alpha = |i| self.value::<u32>(column, i).to_be_bytes()[0];
+            let varies = column.name.eq_ignore_ascii_case("rgba")
+                && (1..self.count).into_par_iter().any(|i| alpha(i) != alpha(0));
+            if varies {
+                let values = collect("alpha", self.count, job, part(step), alpha)?;
+                cloud = cloud.with_field("Alpha", FieldValues::U8(values))?;
+            }
             let unpack = |i| {
                 let [_, red, green, blue] = self.value::<u32>(column, i).to_be_bytes();
                 [red, green, blue]
@@ -269,8 +278,7 @@ impl Table<'_> {
         collect("residuals", self.count, job, Part { start: 1.0, len: 0.0 }, lost).map(Some)
     }
 
-    /// Colours of any number type to 8 bits, and whether these say it all. Wide types often hold 8-bit values, and floats
-    /// 0 to 1 or 0 to 255, so the largest value decides.
+    /// Colours of any number type to 8 bits, and whether these say it all.
     fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: Part) -> Result<(Vec<[u8; 3]>, bool), Error> {
         let rgb = rgb.each_ref();
         if rgb.iter().all(|column| column.scalar == Scalar::U8) {
@@ -281,25 +289,14 @@ impl Table<'_> {
         let largest = |i: usize| rgb.map(|column| self.value_f64(column, i)).into_iter().fold(0.0, f64::max);
         let largest = (0..self.count).into_par_iter().map(largest).reduce(|| 0.0, f64::max);
         let float = rgb.iter().any(|column| matches!(column.scalar, Scalar::F32 | Scalar::F64));
-        let scale = if largest > 255.0 {
-            1.0 / 256.0
-        } else if float && largest <= 1.0 {
-            255.0
-        } else {
-            1.0
-        };
-        // 16-bit values are cut, not rounded: that returns the byte both of v * 256 and of v * 257.
-        let round = if scale < 1.0 { 0.0 } else { 0.5 };
-        let convert = |value: f64| (value * scale + round) as u8;
+        let scale = ColorScale::of(largest, float);
         if !float && largest <= 255.0 && rgb.iter().any(|column| column.scalar.size() > 1) && self.count > 0 {
             job.note("colours of 16 bits or more have no value above 255; taken for 8 bits");
         }
         let colors =
-            collect("colours", self.count, job, part, |i| rgb.map(|column| convert(self.value_f64(column, i))))?;
-        let back = if scale < 1.0 { 257.0 } else { 1.0 / scale };
-        let same = |value: f64| (value - f64::from(convert(value)) * back).abs() < 1e-6;
-        let exact = !job.options.exact
-            || (0..self.count).into_par_iter().all(|i| rgb.iter().all(|column| same(self.value_f64(column, i))));
+            collect("colours", self.count, job, part, |i| rgb.map(|column| scale.byte(self.value_f64(column, i))))?;
+        let same = |i| rgb.iter().all(|column| scale.keeps(self.value_f64(column, i)));
+        let exact = !job.options.exact || (0..self.count).into_par_iter().all(same);
         Ok((colors, exact))
     }
 
@@ -321,6 +318,35 @@ impl Table<'_> {
             Scalar::F32 => typed!(F32),
             Scalar::F64 => typed!(F64),
         })
+    }
+}
+
+/// How colours of any number type become 8 bits.
+#[derive(Clone, Copy)]
+pub(super) struct ColorScale(f64);
+
+impl ColorScale {
+    /// Wide types often hold 8-bit values, and floats 0 to 1 or 0 to 255, so the largest value decides.
+    pub(super) fn of(largest: f64, float: bool) -> Self {
+        Self(if largest > 255.0 {
+            1.0 / 256.0
+        } else if float && largest <= 1.0 {
+            255.0
+        } else {
+            1.0
+        })
+    }
+
+    pub(super) fn byte(self, value: f64) -> u8 {
+        // 16-bit values are cut, not rounded: that returns the byte both of v * 256 and of v * 257.
+        let round = if self.0 < 1.0 { 0.0 } else { 0.5 };
+        (value * self.0 + round) as u8
+    }
+
+    /// Whether the byte says it all.
+    pub(super) fn keeps(self, value: f64) -> bool {
+        let back = if self.0 < 1.0 { 257.0 } else { 1.0 / self.0 };
+        (value - f64::from(self.byte(value)) * back).abs() < 1e-6
     }
 }
 
@@ -371,13 +397,4 @@ pub(crate) fn middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
         values.get(index).copied().unwrap_or_default().round()
     };
     DVec3::new(median(0), median(1), median(2))
-}
-
-/// PDAL's name for what files call by several.
-fn field_name(name: &str) -> String {
-    match name.to_ascii_lowercase().as_str() {
-        "intensity" | "scalar_intensity" => "Intensity".into(),
-        "classification" | "scalar_classification" => "Classification".into(),
-        _ => name.into(),
-    }
 }

@@ -6,7 +6,11 @@
 //! failure, and then renamed, replacing what was there. What a format cannot hold is told through
 //! [`Progress::note`], once per kind of loss.
 
+mod decimal;
+mod names;
+mod pcd;
 mod ply;
+mod xyz;
 
 use std::{
     fs::File,
@@ -26,7 +30,7 @@ struct Format {
 }
 
 /// All formats; longer extensions go before shorter ones.
-const FORMATS: &[Format] = &[ply::FORMAT];
+const FORMATS: &[Format] = &[ply::FORMAT, pcd::FORMAT, xyz::FORMAT];
 
 /// Names and extensions of the formats that [`write`] makes.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -53,7 +57,6 @@ impl Job<'_> {
     }
 
     /// Tells the user what the format cannot hold.
-    #[allow(dead_code, reason = "PLY holds nearly everything")]
     fn note(&self, note: impl AsRef<str>) {
         self.progress.note(note.as_ref());
     }

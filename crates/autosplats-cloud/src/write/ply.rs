@@ -131,7 +131,13 @@ fn property_names(fields: &[Field]) -> Vec<String> {
     let mut taken: Vec<String> = ["x", "y", "z", "red", "green", "blue"].map(String::from).into();
     for field in fields {
         let blank = |c: char| c.is_whitespace() || c.is_control();
-        let mut name = field.name.replace(blank, "_");
+        let mut name = match field.name.as_str() {
+            // What other programs look for.
+            "NormalX" => "nx".into(),
+            "NormalY" => "ny".into(),
+            "NormalZ" => "nz".into(),
+            name => name.replace(blank, "_"),
+        };
         while name.is_empty() || taken.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
             name.push('_');
         }

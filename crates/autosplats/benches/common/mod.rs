@@ -57,7 +57,8 @@ pub(crate) fn machine() -> String {
     format!("{}, {threads} threads, {width}x{height} pixels, k = 10", processor())
 }
 
-fn processor() -> String {
+/// The processor's name.
+pub(crate) fn processor() -> String {
     let info = std::fs::read_to_string(Path::new("/proc/cpuinfo")).unwrap_or_default();
     let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     name.map_or_else(|| std::env::consts::ARCH.into(), |(_, name)| name.trim().into())

@@ -15,6 +15,8 @@ use crate::simd::F32s;
 const TASK_BLOCKS: usize = 64;
 /// A neighbourhood whose middle eigenvalue is below this part of the largest is a line, not a plane.
 const LINE: f32 = 1e-5;
+/// Sine of the angle to the eye below which a line has no side towards it.
+const LEAST_ACROSS: f32 = 1e-3;
 /// Longest ellipse, semi-major over semi-minor axis.
 // Differs from the paper: it sets no limit, and a nearly straight neighbourhood would draw a needle across the picture.
 pub(super) const LONGEST: f32 = 4.0;
@@ -94,9 +96,21 @@ fn fit_blocks_with<'a, S: Simd>(
     }
 }
 
+/// The plane through a neighbourhood.
+pub(crate) struct Plane {
+    /// Unit length.
+    pub(crate) normal: [f32; 3],
+    /// Unit direction in which the neighbourhood is longest, in the plane.
+    pub(crate) major_axis: [f32; 3],
+    /// Eigenvalue along the major axis over the one across it, at least 1.
+    pub(crate) major_ratio: f32,
+    /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
+    pub(crate) curvature: f32,
+}
+
 /// Principal axes of sixteen neighbourhoods.
 #[derive(Default)]
-struct Fitted {
+pub(crate) struct Fitted {
     /// Eigenvalues, ascending, in units of the squared k-radius.
     values: [Lanes; 3],
     normal: [Lanes; 3],
@@ -106,12 +120,35 @@ struct Fitted {
 impl Fitted {
     /// Diagonalises the covariances of the `vector`-th part of `block`.
     #[inline(always)]
-    fn fit<S: Simd>(&mut self, simd: S, block: &NeighborhoodBlock, vector: usize) {
+    pub(crate) fn fit<S: Simd>(&mut self, simd: S, block: &NeighborhoodBlock, vector: usize) {
         let eigen = eigen(simd, covariance(simd, block, vector));
         for i in 0..3 {
             eigen.values[i].store(&mut self.values[i].0, vector);
             eigen.vectors[0][i].store(&mut self.normal[i].0, vector);
             eigen.vectors[2][i].store(&mut self.major_axis[i].0, vector);
+        }
+    }
+
+    /// The plane through the neighbourhood of `lane` [Paper, Eq. 1 to 3], seen from the side that `toward` points to.
+    ///
+    /// A neighbourhood that is a line or one place has many; the one most square to `toward` is taken.
+    #[inline(always)]
+    pub(crate) fn plane(&self, lane: usize, toward: [f32; 3]) -> Plane {
+        let [least, middle, largest] = of_lane(&self.values, lane);
+        let (mut normal, mut major_axis) = (of_lane(&self.normal, lane), of_lane(&self.major_axis, lane));
+        let plane = middle > LINE * largest;
+        if !plane {
+            normal = facing(toward, major_axis, largest > 0.0);
+            // Any tangent does for a circle.
+            major_axis = Vec3::from(normal).any_orthonormal_vector().to_array();
+        }
+        let away = normal[0] * toward[0] + normal[1] * toward[1] + normal[2] * toward[2] < 0.0;
+        let sum = least.max(0.0) + middle + largest;
+        Plane {
+            normal: if away { normal.map(|c| -c) } else { normal },
+            major_axis,
+            major_ratio: if plane { largest / middle } else { 1.0 },
+            curvature: if sum > 0.0 { least.max(0.0) / sum } else { 0.0 },
         }
     }
 
@@ -124,20 +161,10 @@ impl Fitted {
         view: &View,
         rules: &FitRules,
     ) -> Surfel {
-        let of_lane = |lanes: &[Lanes; 3]| [lanes[0].0[lane], lanes[1].0[lane], lanes[2].0[lane]];
-        let [least, middle, largest] = of_lane(&self.values);
         let [count, k_radius] = [block.count.0[lane], block.k_radius.0[lane]];
         let to_eye = if view.perspective { center.map(|c| -c) } else { [0.0, 0.0, -1.0] };
-        let (mut normal, mut major_axis) = (of_lane(&self.normal), of_lane(&self.major_axis));
-        let plane = middle > LINE * largest;
-        if !plane {
-            normal = facing(to_eye, major_axis, largest > 0.0);
-            // Any tangent does for a circle.
-            major_axis = Vec3::from(normal).any_orthonormal_vector().to_array();
-        }
-        let away = normal[0] * to_eye[0] + normal[1] * to_eye[1] + normal[2] * to_eye[2] < 0.0;
-        let sum = least.max(0.0) + middle + largest;
-        let offset = of_lane(&block.offset).map(|sum| sum / count);
+        let plane = self.plane(lane, to_eye);
+        let offset = of_lane(&block.offset, lane).map(|sum| sum / count);
         let apart = offset.iter().map(|c| c * c).sum::<f32>() > (LOPSIDED * k_radius) * (LOPSIDED * k_radius);
         let outlier = apart & (count >= LOPSIDED_COUNT) & !rules.keep_outliers;
         let lone = if rules.keep_outliers { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
@@ -150,14 +177,19 @@ impl Fitted {
             } else {
                 lone
             },
-            normal: if away { normal.map(|c| -c) } else { normal },
+            normal: plane.normal,
             k_radius,
-            major_axis,
-            major_ratio: if rules.ellipses & plane { (largest / middle).min(LONGEST) } else { 1.0 },
-            curvature: if sum > 0.0 { least.max(0.0) / sum } else { 0.0 },
+            major_axis: plane.major_axis,
+            major_ratio: if rules.ellipses { plane.major_ratio.min(LONGEST) } else { 1.0 },
+            curvature: plane.curvature,
             ..Surfel::default()
         }
     }
+}
+
+#[inline(always)]
+fn of_lane(lanes: &[Lanes; 3], lane: usize) -> [f32; 3] {
+    [lanes[0].0[lane], lanes[1].0[lane], lanes[2].0[lane]]
 }
 
 /// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6].
@@ -174,14 +206,20 @@ fn splat_radius(k_radius: f32, count: f32, rules: &FitRules) -> f32 {
 #[inline(always)]
 fn covariance<S: Simd>(simd: S, block: &NeighborhoodBlock, vector: usize) -> [F32s<S>; 6] {
     let load = |lanes: &Lanes| F32s::load(simd, &lanes.0, vector);
-    let [one, least] = [1.0, f32::MIN_POSITIVE].map(|value| F32s::splat(simd, value));
+    let one = F32s::splat(simd, 1.0);
+    let least = F32s::splat(simd, f32::MIN_POSITIVE);
     // The point itself is one of the points fitted; it adds nothing to sums about itself.
     let share = one / (load(&block.count) + one);
     let unit = one / load(&block.k_radius).max(least);
-    let mean = [0, 1, 2].map(|axis: usize| load(&block.offset[axis]) * unit * share);
-    let second = [0, 1, 2, 3, 4, 5].map(|term: usize| load(&block.second[term]) * unit * unit * share);
-    let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-    [0, 1, 2, 3, 4, 5].map(|term: usize| second[term] - mean[pairs[term].0] * mean[pairs[term].1])
+    let mut mean = [share; 3];
+    for axis in 0..3 {
+        mean[axis] = load(&block.offset[axis]) * unit * share;
+    }
+    let mut terms = [share; 6];
+    for (term, (a, b)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
+        terms[term] = load(&block.second[term]) * unit * unit * share - mean[a] * mean[b];
+    }
+    terms
 }
 
 /// The unit normal of a neighbourhood that is no plane: as much towards the eye as its line allows.
@@ -190,5 +228,12 @@ fn facing(to_eye: [f32; 3], line: [f32; 3], has_line: bool) -> [f32; 3] {
     let to_eye = Vec3::from(to_eye).normalize_or(Vec3::NEG_Z);
     let line = Vec3::from(line);
     let across = to_eye - line * line.dot(to_eye);
-    (if has_line { across.normalize_or(line.any_orthonormal_vector()) } else { to_eye }).to_array()
+    // Of a line towards the eye nothing but rounding is left across it.
+    let clear = across.length_squared() > LEAST_ACROSS * LEAST_ACROSS;
+    match (has_line, clear) {
+        (false, _) => to_eye,
+        (true, true) => across.normalize(),
+        (true, false) => line.any_orthonormal_vector(),
+    }
+    .to_array()
 }

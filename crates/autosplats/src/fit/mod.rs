@@ -9,9 +9,9 @@
 mod cpu;
 mod eigen;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
-pub(crate) use cpu::{FitRules, fit};
+pub(crate) use cpu::{FitRules, Fitted, fit};
 
 /// An oriented disc in view space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -39,7 +39,7 @@ impl Neighborhood {
 }
 
 /// Eigenvalues, ascending, by the trigonometric solution of the characteristic polynomial.
-fn eigenvalues(a: DMat3) -> [f64; 3] {
+pub(crate) fn eigenvalues(a: DMat3) -> [f64; 3] {
     let mean = (a.x_axis.x + a.y_axis.y + a.z_axis.z) / 3.0;
     let b = a - DMat3::from_diagonal(DVec3::splat(mean));
     let spread = ([b.x_axis, b.y_axis, b.z_axis].map(DVec3::length_squared).iter().sum::<f64>() / 6.0).sqrt();

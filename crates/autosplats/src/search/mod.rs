@@ -11,7 +11,9 @@
 //!   the neighbours it is already sure of, is clamped and counted as bounded. So a cloud of nothing but outliers costs a
 //!   bounded time per point. Only here does the answer depend on what the engine happened to read.
 
+pub(crate) mod moments;
 pub(crate) mod screen_grid;
+pub(crate) mod select;
 #[cfg(test)]
 mod tests;
 

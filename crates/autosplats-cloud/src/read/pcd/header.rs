@@ -1,11 +1,13 @@
 //! The header of a PCD file.
 
+use glam::{DMat4, DQuat, DVec3, DVec4};
+
 use super::super::{
     Job, MAX_HEADER_LINE, shown,
     table::Scalar,
     text::{after_line_end, line_end},
 };
-use crate::Error;
+use crate::{Axes, Error};
 
 /// How the values after the header are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,14 +35,45 @@ pub(super) struct Field {
     pub(super) count: usize,
 }
 
+/// Where the sensor stood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Viewpoint {
+    /// At the origin, unturned, which is also what programs write that do not know.
+    Identity,
+    /// Elsewhere.
+    At(DMat4),
+    /// No pose at all.
+    Broken,
+}
+
+impl Viewpoint {
+    /// From tx ty tz qw qx qy qz.
+    fn of(values: &[String]) -> Self {
+        let values: Option<Vec<f64>> = values.iter().map(|value| value.parse().ok()).collect();
+        let Some(&[x, y, z, qw, qx, qy, qz]) = values.as_deref() else { return Self::Broken };
+        let (place, turn) = (DVec3::new(x, y, z), DVec4::new(qx, qy, qz, qw));
+        let length = turn.length();
+        if !place.is_finite() || !(1e-6..1e6).contains(&length) {
+            return Self::Broken;
+        }
+        let turn = DQuat::from_vec4(turn / length);
+        if place == DVec3::ZERO && turn.w.abs() == 1.0 {
+            return Self::Identity;
+        }
+        Self::At(DMat4::from_rotation_translation(turn, place))
+    }
+}
+
 /// All that the header says.
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
+    pub(super) width: Option<usize>,
     pub(super) height: usize,
     pub(super) points: usize,
     pub(super) encoding: Encoding,
-    /// Whether the points lie in the sensor's own frame.
-    pub(super) viewpoint_is_identity: bool,
+    pub(super) viewpoint: Viewpoint,
+    /// What our own files say in a comment.
+    pub(super) axes: Option<Axes>,
     /// First byte after the header.
     pub(super) end: usize,
 }
@@ -57,7 +90,8 @@ impl Header {
         }
         let (mut names, mut sizes, mut types, mut counts) = (None, None, None, None);
         let (mut width, mut height, mut points) = (None, None, None);
-        let mut viewpoint_is_identity = true;
+        let mut viewpoint = Viewpoint::Identity;
+        let mut axes = None;
         let (mut at, mut line) = (0, 0);
         let (encoding, line) = loop {
             line += 1;
@@ -86,10 +120,7 @@ impl Header {
                 "WIDTH" => width = Some(number()?),
                 "HEIGHT" => height = Some(number()?),
                 "POINTS" => points = Some(number()?),
-                "VIEWPOINT" => {
-                    let pose: Vec<f64> = values.iter().map(|value| value.parse().unwrap_or(f64::NAN)).collect();
-                    viewpoint_is_identity = pose == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-                }
+                "VIEWPOINT" => viewpoint = Viewpoint::of(values),
                 "DATA" => match values.first().map(|value| value.to_ascii_lowercase()).as_deref() {
                     Some("ascii") => break (Encoding::Ascii, place),
                     Some("binary") => break (Encoding::Binary, place),
@@ -98,6 +129,9 @@ impl Header {
                         return Err(fail(format!("unknown DATA '{}'", shown(other.unwrap_or_default().as_bytes()))));
                     }
                 },
+                "#" if values.first().is_some_and(|word| word == "axes") => {
+                    axes = values.get(1).and_then(|word| axes_of(word)).or(axes);
+                }
                 word if word.starts_with('#') => {}
                 word => {
                     let word = shown(word.as_bytes());
@@ -128,7 +162,7 @@ impl Header {
         let points = points
             .or_else(|| width?.checked_mul(height))
             .ok_or_else(|| fail("the header lacks POINTS, or WIDTH and HEIGHT".into()))?;
-        Ok(Self { fields, height, points, encoding, viewpoint_is_identity, end: at })
+        Ok(Self { fields, width, height, points, encoding, viewpoint, axes, end: at })
     }
 
     /// Bytes of a point.
@@ -137,6 +171,15 @@ impl Header {
             .iter()
             .try_fold(0_usize, |sum, field| sum.checked_add(field.scalar.size().checked_mul(field.count)?))
     }
+}
+
+fn axes_of(word: &str) -> Option<Axes> {
+    Some(match word {
+        "z-up" => Axes::ZUp,
+        "y-up" => Axes::YUp,
+        "camera" => Axes::Camera,
+        _ => return None,
+    })
 }
 
 fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {

@@ -5,13 +5,14 @@ mod lzf;
 
 use glam::DVec3;
 
-use self::header::{Encoding, Header};
+use self::header::{Encoding, Header, Viewpoint};
 use super::{
     Attribute, Contents, Description, Format, Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, Token},
+    xyz,
 };
-use crate::{Axes, Error, PointCloud};
+use crate::{Axes, Error, PointCloud, Scan};
 
 pub(super) const FORMAT: Format =
     Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
@@ -20,22 +21,57 @@ pub(super) const FORMAT: Format =
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
+    if without_header(job) {
+        let mut description = (xyz::FORMAT.describe)(job)?;
+        description.notes.insert(0, NO_HEADER.into());
+        return Ok(description);
+    }
     let header = Header::parse(job)?;
     let stored = |field: &header::Field| match field.count {
         1 => field.scalar.name().to_owned(),
         count => format!("{count} × {}", field.scalar.name()),
     };
     let fields = header.fields.iter().filter(|field| field.name != "_");
+    let mut details = Vec::new();
+    if let Some(width) = header.width {
+        details.push(("size".into(), format!("{width} × {}", header.height)));
+    }
+    let viewpoint = match header.viewpoint {
+        Viewpoint::Identity => "origin".into(),
+        Viewpoint::At(pose) => {
+            let DVec3 { x, y, z } = pose.w_axis.truncate();
+            format!("{x} {y} {z}")
+        }
+        Viewpoint::Broken => "no pose".into(),
+    };
+    details.push(("viewpoint".into(), viewpoint));
     Ok(Description {
         format: format!("PCD, {}", header.encoding.name()),
         points: Some(header.points as u64),
         attributes: fields.map(|field| Attribute::new(shown(field.name.as_bytes()), stored(field))).collect(),
+        scans: scans(&header, header.points),
+        details,
         ..Description::default()
     })
 }
 
+/// A file of this name without any header can only be meant as rows of numbers, so nothing is gained by refusing it.
+const NO_HEADER: &str = "there is no PCD header; read as text";
+
+fn without_header(job: &Job<'_>) -> bool {
+    !header::recognised(job.bytes) && xyz::looks_like_rows(job.bytes)
+}
+
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
+    if without_header(job) {
+        job.note(NO_HEADER);
+        return (xyz::FORMAT.read)(job);
+    }
     let header = Header::parse(job)?;
+    for field in header.fields.iter().filter(|field| field.name != "_" && field.count > MAX_COUNT) {
+        let name = shown(field.name.as_bytes());
+        job.note(format!("{name} has {} values a point; left out, {MAX_COUNT} at most are read", field.count));
+    }
     let stride = header.stride().ok_or_else(|| job.malformed("header", "a point is larger than any memory"))?;
     let cloud = match header.encoding {
         Encoding::Ascii => ascii(job, &header)?,
@@ -62,7 +98,35 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
             table.into_cloud(job, "header")?
         }
     };
-    Ok(if seen_from_origin(&header, &cloud) { cloud.with_axes(Axes::Camera) } else { cloud }.into())
+    let scans = scans(&header, cloud.len());
+    let axes = header.axes.or_else(|| seen_from_origin(&header, &cloud).then_some(Axes::Camera));
+    let cloud = cloud.with_scans(scans);
+    Ok(if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud }.into())
+}
+
+/// Values that a field may have for each of them to become one of its own. Descriptors have more.
+const MAX_COUNT: usize = 16;
+
+/// Where the sensor stood, if the file says more than the default.
+///
+/// The points are not moved by it: the format calls VIEWPOINT the place that the points were acquired from, not a
+/// transformation to apply, and the programs that write and read PCD leave points alone.
+fn scans(header: &Header, points: usize) -> Vec<Scan> {
+    match header.viewpoint {
+        Viewpoint::At(world_from_sensor) => vec![Scan { name: None, world_from_sensor, points: 0..points }],
+        Viewpoint::Identity | Viewpoint::Broken => Vec::new(),
+    }
+}
+
+/// Names of the columns that a field is read as: none for padding and for fields of too many values.
+fn column_names(field: &header::Field) -> Vec<String> {
+    // A name of "_" is padding.
+    match field.count {
+        _ if field.name == "_" => Vec::new(),
+        1 => vec![field.name.clone()],
+        2..=MAX_COUNT => (0..field.count).map(|index| format!("{}_{index}", field.name)).collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// The columns over binary data. `place` makes offset and stride of a field from the bytes of a point before it and of
@@ -72,10 +136,10 @@ fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, 
     let mut before = 0;
     for field in &header.fields {
         let size = field.scalar.size() * field.count;
-        // A name of "_" is padding.
-        if field.count == 1 && field.name != "_" {
-            let (offset, stride) = place(before, size);
-            columns.push(Column { name: field.name.clone(), scalar: field.scalar, offset, stride });
+        let (offset, stride) = place(before, size);
+        for (index, name) in column_names(field).into_iter().enumerate() {
+            let offset = offset + index * field.scalar.size();
+            columns.push(Column { name, scalar: field.scalar, offset, stride });
         }
         before += size;
     }
@@ -87,7 +151,8 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
     let mut tokens = Vec::new();
     let mut offset = 0;
     for field in &header.fields {
-        if field.count != 1 || field.name == "_" {
+        let names = column_names(field);
+        if names.is_empty() {
             // A line cannot be shorter than its values, which bounds what the header can ask for.
             if field.count > job.bytes.len().saturating_sub(tokens.len()) {
                 return Err(job.malformed("header", format!("a point of {} values", field.count)));
@@ -102,9 +167,11 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
             "rgb" | "rgba" if field.scalar.size() == 4 => (Scalar::U32, Token::Packed),
             _ => (field.scalar, Token::Store(field.scalar)),
         };
-        columns.push(Column { name: field.name.clone(), scalar, offset, stride: 0 });
-        tokens.push(token);
-        offset += token.size();
+        for name in names {
+            columns.push(Column { name, scalar, offset, stride: 0 });
+            tokens.push(token);
+            offset += token.size();
+        }
     }
     for column in &mut columns {
         column.stride = offset;
@@ -151,7 +218,7 @@ const DEPTH_CAMERA_RANGE: f32 = 20.0;
 
 /// Points in a depth camera's own frame: an image of points, or coloured ones nearer than such cameras see, all in front.
 fn seen_from_origin(header: &Header, cloud: &PointCloud) -> bool {
-    if !header.viewpoint_is_identity || cloud.origin() != DVec3::ZERO {
+    if header.viewpoint != Viewpoint::Identity || cloud.origin() != DVec3::ZERO {
         return false;
     }
     let far = || cloud.positions().iter().flatten().any(|value| value.abs() > DEPTH_CAMERA_RANGE);

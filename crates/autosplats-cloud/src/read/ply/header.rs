@@ -1,6 +1,6 @@
 //! The header of a PLY file.
 
-use super::super::{Job, MAX_HEADER_LINE, shown, table::Scalar, text};
+use super::super::{Job, MAX_HEADER_LINE, shown, table::Scalar};
 use crate::{Axes, Error};
 
 /// How the values after the header are written.
@@ -184,21 +184,4 @@ fn axes_of(word: &str) -> Option<Axes> {
         "camera" => Some(Axes::Camera),
         _ => None,
     }
-}
-
-/// The start of the line after `lines` lines that are not empty, or nothing if the file ends before.
-pub(super) fn skip_lines(job: &Job<'_>, mut at: usize, lines: usize) -> Result<Option<usize>, Error> {
-    let mut skipped = 0;
-    while skipped < lines {
-        if skipped % (1 << 16) == 0 {
-            job.tick(0.0)?;
-        }
-        if at >= job.bytes.len() {
-            return Ok(None);
-        }
-        let end = text::line_end(job.bytes, at);
-        skipped += usize::from(!job.bytes[at..end].trim_ascii().is_empty());
-        at = text::after_line_end(job.bytes, at);
-    }
-    Ok(Some(at))
 }

@@ -1,10 +1,12 @@
-//! PLY: ascii and binary of both byte orders, any properties in any order, further elements before and after.
+//! PLY: ascii and binary of both byte orders, any properties in any order, further elements before and after; faces and
+//! strips of triangles where they are wanted.
 
+mod faces;
 mod header;
 
 use self::header::{Element, Encoding, Header};
 use super::{
-    Attribute, Contents, Description, Format, Job, shown,
+    Attribute, Contents, Description, Format, Job, lines, shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, Token},
 };
@@ -57,17 +59,16 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         (_, Some(stride)) => plain(job, &header, before, vertex, stride)?,
         (_, None) => with_lists(job, &header, before, vertex)?,
     };
-    Ok(match header.axes {
-        Some(axes) => cloud.with_axes(axes).into(),
-        None => cloud.into(),
-    })
+    let cloud = match header.axes {
+        Some(axes) => cloud.with_axes(axes),
+        None => cloud,
+    };
+    let triangles = if job.triangles { faces::triangles(job, &header, cloud.len())? } else { Vec::new() };
+    Ok(Contents { cloud, triangles })
 }
 
 fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
-    let lines = before.iter().fold(0, |lines: usize, element| lines.saturating_add(element.count));
-    let Some(start) = header::skip_lines(job, header.end, lines)? else {
-        return Err(cut_off(job, vertex));
-    };
+    let start = skip_rows(job, header, before, vertex)?;
     let mut columns = Vec::new();
     let mut tokens = Vec::new();
     let mut offset = 0;
@@ -143,8 +144,14 @@ fn packed_table(bytes: &[u8], count: usize, big_endian: bool, mut columns: Vec<C
     Table { bytes, count, big_endian, columns, packed_rgb: false, done: PACKING.start + PACKING.len }
 }
 
-/// The first byte after the binary elements before the vertices.
-fn skip(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<usize, Error> {
+/// The first byte after the text of the elements before `element`.
+fn skip_rows(job: &Job<'_>, header: &Header, before: &[Element], element: &Element) -> Result<usize, Error> {
+    let rows = before.iter().fold(0, |rows: usize, element| rows.saturating_add(element.count));
+    lines::skip_lines(job, header.end, rows)?.ok_or_else(|| cut_off(job, element))
+}
+
+/// The first byte after the binary elements before `wanted`.
+fn skip(job: &Job<'_>, header: &Header, before: &[Element], wanted: &Element) -> Result<usize, Error> {
     let mut at = header.end;
     for element in before {
         at = match element.stride() {
@@ -152,7 +159,7 @@ fn skip(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) ->
             None => Some(walk(job, header, element, at, Part { start: 0.0, len: 0.0 }, |_| Ok(()))?),
         }
         .filter(|&end| end <= job.bytes.len())
-        .ok_or_else(|| cut_off(job, vertex))?;
+        .ok_or_else(|| cut_off(job, wanted))?;
     }
     Ok(at)
 }
@@ -199,6 +206,11 @@ fn walk(
 }
 
 fn list_len(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<usize> {
+    usize::try_from(integer(raw, big_endian, scalar)?).ok()
+}
+
+/// An integer of any width; nothing if it is none or beyond all bounds.
+fn integer(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<i64> {
     let mut bytes = [0; 8];
     let len = raw.len();
     bytes[..len].copy_from_slice(raw);
@@ -206,14 +218,24 @@ fn list_len(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<usize> {
         bytes[..len].reverse();
     }
     let value = u64::from_le_bytes(bytes);
-    let signed = matches!(scalar, Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64);
-    let negative = signed && value >> (8 * len - 1) == 1;
-    if negative { None } else { usize::try_from(value).ok() }
+    match scalar {
+        Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64 => {
+            let unused = 64 - 8 * len as u32;
+            Some((value << unused) as i64 >> unused)
+        }
+        Scalar::U8 | Scalar::U16 | Scalar::U32 | Scalar::U64 => i64::try_from(value).ok(),
+        Scalar::F32 | Scalar::F64 => None,
+    }
 }
 
-fn cut_off(job: &Job<'_>, vertex: &Element) -> Error {
+fn cut_off(job: &Job<'_>, element: &Element) -> Error {
+    let what = match &*element.name {
+        "vertex" => "points".into(),
+        "face" => "faces".into(),
+        name => format!("records of '{}'", shown(name.as_bytes())),
+    };
     job.malformed(
         format!("byte {}", job.bytes.len()),
-        format!("the file ends before the first of {} points; it is cut off, copy it again", vertex.count),
+        format!("the file ends before the first of {} {what}; it is cut off, copy it again", element.count),
     )
 }

@@ -31,6 +31,7 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use self::name::Kind;
+pub use self::name::parse_count;
 use self::octree::Octree;
 use crate::{Axes, Error, PointCloud};
 

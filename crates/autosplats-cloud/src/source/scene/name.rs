@@ -95,8 +95,8 @@ fn known() -> String {
     Kind::ALL.map(|kind| format!("\n  {:<11} {}", kind.name(), kind.about())).concat()
 }
 
-/// `1000`, `546K`, `1.5M`, `1g`.
-fn parse_count(text: &str) -> Option<usize> {
+/// A number of points as people type it: `1000`, `546K`, `1.5M`, `1g`; nothing if it is none, or not within 1 to 1G.
+pub fn parse_count(text: &str) -> Option<usize> {
     let text = text.trim();
     let (number, unit) = match text.char_indices().last()? {
         (at, 'k' | 'K') => (&text[..at], 1e3),

@@ -6,14 +6,14 @@ mod tests;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use super::select::{GROUP, kth_smallest, largest_below, vectors};
 use super::window::Window;
 use crate::camera::View;
 use crate::project::ScreenPoints;
+use crate::search::moments::{squared_distances, sum_moments};
+use crate::search::select::{GROUP, kth_smallest, largest_below};
 use crate::search::{
     EarlyEnd, LANES, Lanes, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts, SearchRules,
 };
-use crate::simd::F32s;
 
 /// Blocks per task: enough to hide its start, few enough to share out evenly.
 const TASK_BLOCKS: usize = 64;
@@ -166,7 +166,8 @@ fn search_block<S: Simd>(
             }
         }
         if done.contains(&true) {
-            sum_moments(simd, &block, scratch, &done, out);
+            let Scratch { candidates, squared, .. } = &*scratch;
+            sum_moments(simd, &block.position, &block.threshold, candidates, squared, &done, out);
             for lane in 0..LANES {
                 block.pending[lane] &= !done[lane];
             }
@@ -352,65 +353,10 @@ fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>
     len
 }
 
-/// Squared distances from each candidate to each of the sixteen points.
-#[inline(always)]
-fn squared_distances<S: Simd>(simd: S, position: &[Lanes; 3], candidates: &[[f32; 3]], squared: &mut Vec<Lanes>) {
-    // Every entry is overwritten below.
-    squared.resize(candidates.len(), Lanes::default());
-    for vector in 0..vectors::<S>() {
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| F32s::load(simd, &position[axis].0, vector));
-        for (out, &[qx, qy, qz]) in squared.iter_mut().zip(candidates) {
-            let dx = F32s::splat(simd, qx) - x;
-            let dy = F32s::splat(simd, qy) - y;
-            let dz = F32s::splat(simd, qz) - z;
-            (dx * dx + dy * dy + dz * dz).store(&mut out.0, vector);
-        }
-    }
-}
-
 /// Finite squared distances of `lane` up to distance `known`, the point itself left out, ascending.
 fn sort_lane(squared: &[Lanes], lane: usize, known: f32, sorted: &mut Vec<f32>) {
     sorted.clear();
     let most = (known * known).min(f32::MAX);
     sorted.extend(squared.iter().map(|candidate| candidate.0[lane]).filter(|&d| d <= most && d > 0.0));
     sorted.sort_unstable_by(f32::total_cmp);
-}
-
-/// Sums the neighbours below the threshold of each lane in `done`.
-#[inline(always)]
-fn sum_moments<S: Simd>(simd: S, block: &Block, scratch: &Scratch, done: &[bool; LANES], out: &mut NeighborhoodBlock) {
-    let one = F32s::splat(simd, 1.0);
-    for vector in 0..vectors::<S>() {
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| F32s::load(simd, &block.position[axis].0, vector));
-        let threshold = F32s::load(simd, &block.threshold.0, vector);
-        // The point itself adds nothing but to the count.
-        let mut count = F32s::splat(simd, -1.0);
-        let mut offset = [F32s::splat(simd, 0.0); 3];
-        let mut second = [F32s::splat(simd, 0.0); 6];
-        for (squared, &[qx, qy, qz]) in scratch.squared.iter().zip(&scratch.candidates) {
-            let within = F32s::load(simd, &squared.0, vector).at_most(threshold);
-            let dx = within.keep(F32s::splat(simd, qx) - x);
-            let dy = within.keep(F32s::splat(simd, qy) - y);
-            let dz = within.keep(F32s::splat(simd, qz) - z);
-            count += within.keep(one);
-            offset[0] += dx;
-            offset[1] += dy;
-            offset[2] += dz;
-            second[0] += dx * dx;
-            second[1] += dx * dy;
-            second[2] += dx * dz;
-            second[3] += dy * dy;
-            second[4] += dy * dz;
-            second[5] += dz * dz;
-        }
-        let sums = [count, threshold.sqrt()].into_iter().chain(offset).chain(second);
-        let outs = [&mut out.count, &mut out.k_radius].into_iter().chain(&mut out.offset).chain(&mut out.second);
-        for (out, sum) in outs.zip(sums) {
-            let mut lanes = Lanes::default();
-            sum.store(&mut lanes.0, vector);
-            for lane in vector * S::F32_LANES..(vector + 1) * S::F32_LANES {
-                out.0[lane] = if done[lane] { lanes.0[lane] } else { out.0[lane] };
-            }
-        }
-    }
 }

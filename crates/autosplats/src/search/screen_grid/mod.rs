@@ -13,7 +13,6 @@
 //! on search work ends a search, what is kept depends on what happened to be read.
 
 mod cpu;
-mod select;
 mod window;
 
 pub(crate) use cpu::search;

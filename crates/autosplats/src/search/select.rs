@@ -6,7 +6,7 @@ use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
 /// Candidates counted at a time, each into a sum of its own: one sum would wait for itself.
-pub(super) const GROUP: usize = 4;
+pub(crate) const GROUP: usize = 4;
 /// A threshold with no more than this many candidates too many is near enough: the largest distances below it are listed.
 const SURPLUS: usize = 3;
 /// Threshold moves after which the k-th smallest distance is given up to the interval's upper end. Every other move
@@ -14,7 +14,7 @@ const SURPLUS: usize = 3;
 const MOST_MOVES: usize = 80;
 
 /// Vectors that sixteen lanes take.
-pub(super) const fn vectors<S: Simd>() -> usize {
+pub(crate) const fn vectors<S: Simd>() -> usize {
     LANES / S::F32_LANES
 }
 
@@ -22,7 +22,7 @@ pub(super) const fn vectors<S: Simd>() -> usize {
 ///
 /// `threshold` holds first guesses; there are more than `k` candidates.
 #[inline(always)]
-pub(super) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
+pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
     // The point itself is among the candidates, at distance 0.
     let target = (k + 1) as f32;
     let mut low = [0f32; LANES];
@@ -102,7 +102,7 @@ fn count_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> Lanes 
 
 /// The N largest squared distances at or below each lane's threshold, descending.
 #[inline(always)]
-pub(super) fn largest_below<S: Simd, const N: usize>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lanes; N] {
+pub(crate) fn largest_below<S: Simd, const N: usize>(simd: S, squared: &[Lanes], threshold: &Lanes) -> [Lanes; N] {
     let mut largest = [Lanes::default(); N];
     for vector in 0..vectors::<S>() {
         let threshold = F32s::load(simd, &threshold.0, vector);

@@ -1,0 +1,104 @@
+//! `autosplats normals`: what the picture previews, for every point and into a file.
+
+use autosplats::cloud::glam::DVec3;
+use autosplats::{Error, NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
+use autosplats_cloud::{Axes, FieldValues, PointCloud, check_memory};
+
+use crate::args::{NormalsArgs, OrientChoice};
+use crate::exit::{Exit, Failure};
+use crate::input::{Inputs, read_failure};
+use crate::output::{check_cloud_target, write_cloud};
+use crate::progress::Bar;
+use crate::render::render_failure;
+use crate::threads::start_threads;
+
+/// Bytes for each point beside the cloud: the search tree and the result.
+const BYTES_PER_POINT: u64 = 40;
+
+/// Reads the inputs, estimates, and writes the file.
+pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
+    let NormalsArgs { input, output, force, k, orient, sensor, run } = args;
+    start_threads(run)?;
+    let inputs = Inputs::new(input)?.exactly();
+    check_cloud_target(output, *force, inputs.files())?;
+    let cloud = inputs.read(run.quiet)?;
+    check_memory(&format!("the normals of {} points", cloud.len()), cloud.len() as u64 * BYTES_PER_POINT)
+        .map_err(read_failure)?;
+    let (orientation, towards) = orientation(&cloud, *orient, *sensor)?;
+    let bar = Bar::new("estimating normals", run.quiet);
+    let normals =
+        estimate_normals(&cloud, &NormalSettings { k: *k, orientation }, &bar).map_err(|error| match error {
+            Error::Cancelled => Failure::interrupted(),
+            error => render_failure(error),
+        })?;
+    drop(bar);
+    let cloud = with_normals(cloud, normals)?;
+    let bytes = write_cloud(&cloud, output, run.quiet)?;
+    if !run.quiet {
+        eprintln!("{}: normals of {} points, turned {towards}; {bytes} bytes", output.display(), cloud.len());
+    }
+    Ok(())
+}
+
+/// The result as fields, in place of what the file may have had.
+fn with_normals(cloud: PointCloud, normals: Normals) -> Result<PointCloud, Failure> {
+    let Normals { normals, curvature, radius } = normals;
+    let axis = |axis: usize| FieldValues::F32(normals.iter().map(|normal| normal[axis]).collect());
+    let fields = [("NormalX", axis(0)), ("NormalY", axis(1)), ("NormalZ", axis(2))];
+    let fields = fields
+        .into_iter()
+        .chain([("Curvature", FieldValues::F32(curvature)), ("DensityRadius", FieldValues::F32(radius))]);
+    fields
+        .into_iter()
+        .try_fold(cloud, |cloud, (name, values)| cloud.with_field(name, values))
+        .map_err(|error| Failure::new(Exit::Input, error))
+}
+
+/// Which way normals are to point, and what that is called.
+fn orientation(
+    cloud: &PointCloud,
+    choice: OrientChoice,
+    sensor: Option<DVec3>,
+) -> Result<(Orientation, &'static str), Failure> {
+    let all_from = |position| Orientation::Viewpoints(vec![Viewpoint { position, points: 0..cloud.len() }]);
+    if let Some(position) = sensor {
+        return Ok((all_from(position), "to the given sensor"));
+    }
+    let known = || {
+        let camera = cloud.axes() == Some(Axes::Camera);
+        if cloud.scans().is_empty() {
+            return camera.then(|| all_from(DVec3::ZERO));
+        }
+        let viewpoints =
+            cloud.scans().iter().map(|scan| Viewpoint { position: scan.position(), points: scan.points.clone() });
+        Some(Orientation::Viewpoints(viewpoints.collect()))
+    };
+    match choice {
+        OrientChoice::Auto => Ok(known().map_or_else(
+            || if is_terrain(cloud) { UP } else { (Orientation::Outward, "outward") },
+            |orientation| (orientation, "to the sensor"),
+        )),
+        OrientChoice::Sensor => known().map(|orientation| (orientation, "to the sensor")).ok_or_else(|| {
+            Failure::usage("--orient sensor: the file does not say where the sensor stood; give --sensor X,Y,Z")
+        }),
+        OrientChoice::Up => Ok(UP),
+        OrientChoice::Outward => Ok((Orientation::Outward, "outward")),
+    }
+}
+
+const UP: (Orientation, &str) = (Orientation::Direction(DVec3::Z), "upward");
+
+/// Whether the points are a piece of land, seen from above: much wider than high.
+fn is_terrain(cloud: &PointCloud) -> bool {
+    let (min, max) = cloud.positions().iter().filter(|point| point.iter().all(|value| value.is_finite())).fold(
+        ([f32::MAX; 3], [f32::MIN; 3]),
+        |(min, max), point| {
+            (
+                std::array::from_fn(|axis| min[axis].min(point[axis])),
+                std::array::from_fn(|axis| max[axis].max(point[axis])),
+            )
+        },
+    );
+    let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| max[axis] - min[axis]);
+    cloud.axes() != Some(Axes::YUp) && z < 0.5 * x.min(y)
+}

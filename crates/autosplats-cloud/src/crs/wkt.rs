@@ -1,0 +1,221 @@
+//! Well-known text of coordinate systems, versions 1 and 2: as much as names, codes and units need.
+//!
+//! The text is a tree: a keyword with values in brackets, some of which are keywords with values themselves.
+
+use super::{Crs, Found, Unit};
+
+/// Depth of brackets and length of text beyond which it is rather broken than rich.
+const MAX_DEPTH: usize = 32;
+const MAX_LEN: usize = 1 << 20;
+
+/// A keyword with its values.
+struct Node<'a> {
+    keyword: String,
+    values: Vec<Value<'a>>,
+}
+
+enum Value<'a> {
+    /// In quotes, or bare as numbers are.
+    Text(&'a str),
+    Node(Node<'a>),
+}
+
+impl Node<'_> {
+    fn is(&self, keywords: &[&str]) -> bool {
+        keywords.contains(&self.keyword.as_str())
+    }
+
+    fn children(&self) -> impl Iterator<Item = &Self> {
+        self.values.iter().filter_map(|value| match value {
+            Value::Node(node) => Some(node),
+            Value::Text(_) => None,
+        })
+    }
+
+    fn child(&self, keywords: &[&str]) -> Option<&Self> {
+        self.children().find(|child| child.is(keywords))
+    }
+
+    fn text(&self, index: usize) -> Option<&str> {
+        match self.values.get(index)? {
+            Value::Text(text) => Some(text),
+            Value::Node(_) => None,
+        }
+    }
+
+    fn name(&self) -> Option<String> {
+        let name: String = self.text(0)?.chars().filter(|c| !c.is_control()).take(200).collect();
+        let name = name.trim();
+        (!name.is_empty() && !name.eq_ignore_ascii_case("unnamed")).then(|| name.to_owned())
+    }
+
+    fn epsg(&self) -> Option<u32> {
+        let authority = self.children().filter(|child| child.is(&["AUTHORITY", "ID"]));
+        let mut epsg = authority.filter(|child| child.text(0).is_some_and(|name| name.eq_ignore_ascii_case("EPSG")));
+        epsg.next()?.text(1)?.trim().parse().ok()
+    }
+
+    /// The unit among the values of a system or an axis.
+    fn unit(&self) -> Option<Unit> {
+        let unit = self.child(&["UNIT", "LENGTHUNIT", "ANGLEUNIT"])?;
+        let factor: f64 = unit.text(1)?.trim().parse().ok()?;
+        let degree = std::f64::consts::PI / 180.0;
+        if (factor / degree - 1.0).abs() < 1e-6 { Some(Unit::Degree) } else { Unit::of_metres(factor) }
+    }
+
+    /// The unit of an axis, which may have its own.
+    fn axis_unit(&self, index: usize) -> Option<Unit> {
+        let own = self.children().filter(|child| child.is(&["AXIS"])).nth(index).and_then(Node::unit);
+        own.or_else(|| self.unit())
+    }
+}
+
+/// What the text says.
+pub(super) fn read(text: &str) -> Found {
+    let text = text.trim_end_matches('\0').trim();
+    let mut found = Found { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, geocentric: false };
+    if text.is_empty() {
+        found.crs.wkt = None;
+    } else if text.len() <= MAX_LEN
+        && let Some(root) = parse(text)
+    {
+        system(&root, &mut found);
+    }
+    if found.crs.vertical_unit == found.crs.unit {
+        found.crs.vertical_unit = None;
+    }
+    found
+}
+
+/// Takes name, code and units of a system; of compound ones those of the parts, for what the whole does not say.
+fn system(node: &Node<'_>, found: &mut Found) {
+    let crs = &mut found.crs;
+    if node.is(&["BOUNDCRS", "SOURCECRS", "COORDINATEOPERATION"]) {
+        node.children().take(1).for_each(|child| system(child, found));
+        return;
+    }
+    let vertical = node.is(&["VERT_CS", "VERTCRS", "VERTICALCRS"]);
+    if !vertical {
+        crs.name = crs.name.take().or_else(|| node.name());
+        crs.epsg = crs.epsg.or_else(|| node.epsg());
+    }
+    if vertical {
+        crs.vertical_unit = node.axis_unit(0);
+    } else if node.is(&["COMPD_CS", "COMPOUNDCRS"]) {
+        node.children().for_each(|child| system(child, found));
+    } else if node.is(&["GEOCCS"]) || is_cartesian_3d(node) {
+        found.geocentric = true;
+        crs.unit = node.axis_unit(0);
+    } else if !node.is(&["AUTHORITY", "ID"]) && crs.unit.is_none() {
+        crs.unit = node.axis_unit(0);
+        // The third axis of a system of three.
+        if node.children().filter(|child| child.is(&["AXIS"])).count() > 2 {
+            crs.vertical_unit = node.axis_unit(2).filter(|unit| *unit != Unit::Degree);
+        }
+    }
+}
+
+/// Whether a geodetic system of version 2 has axes from the middle of the earth.
+fn is_cartesian_3d(node: &Node<'_>) -> bool {
+    let geodetic = node.is(&["GEODCRS", "GEODETICCRS", "GEOGCRS"]);
+    let cartesian = |cs: &Node<'_>| cs.text(0).is_some_and(|kind| kind.trim().eq_ignore_ascii_case("cartesian"));
+    geodetic && node.child(&["CS"]).is_some_and(cartesian)
+}
+
+/// The tree, if the text begins as one; what follows it is left alone, brackets that are missing at the end are forgiven.
+fn parse(text: &str) -> Option<Node<'_>> {
+    let mut open: Vec<Node<'_>> = Vec::new();
+    let mut rest = text;
+    loop {
+        rest = rest.trim_start_matches(|c: char| c.is_whitespace() || c == ',');
+        let Some(first) = rest.chars().next() else { break };
+        if first == '"' {
+            let end = rest[1..].find('"').map_or(rest.len(), |end| end + 1);
+            open.last_mut()?.values.push(Value::Text(&rest[1..end]));
+            rest = rest.get(end + 1..).unwrap_or_default();
+        } else if first == ']' || first == ')' {
+            rest = &rest[1..];
+            let done = open.pop()?;
+            match open.last_mut() {
+                Some(parent) => parent.values.push(Value::Node(done)),
+                None => return Some(done),
+            }
+        } else {
+            let end = rest.find(['[', '(', ']', ')', ',', '"']).unwrap_or(rest.len());
+            let word = rest[..end].trim();
+            if rest[end..].starts_with(['[', '(']) {
+                if word.is_empty() || open.len() == MAX_DEPTH {
+                    return None;
+                }
+                open.push(Node { keyword: word.to_ascii_uppercase(), values: Vec::new() });
+                rest = &rest[end + 1..];
+            } else {
+                open.last_mut()?.values.push(Value::Text(word));
+                rest = &rest[end..];
+            }
+        }
+    }
+    while open.len() > 1 {
+        let done = open.pop()?;
+        open.last_mut()?.values.push(Value::Node(done));
+    }
+    open.pop()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FEET: &str = r#"PROJCS["NAD83 / Oregon",GEOGCS["NAD83",DATUM["d",SPHEROID["s",6378137,298.25]],
+        PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["x"],UNIT["foot",0.3048,AUTHORITY["EPSG",
+        "9002"]],AUTHORITY["EPSG","2994"]]"#;
+
+    #[test]
+    fn names_codes_and_units() {
+        let facts = |text: &str| {
+            let Crs { name, epsg, unit, vertical_unit, .. } = Crs::from_wkt(text);
+            (name, epsg, unit, vertical_unit)
+        };
+        let name = |name: &str| Some(name.to_owned());
+        assert_eq!(facts(FEET), (name("NAD83 / Oregon"), Some(2994), Some(Unit::Foot), None), "projected, version 1");
+        let compound = format!(
+            r#"COMPD_CS["both",{FEET},VERT_CS["NAVD88",VERT_DATUM["v",2005],UNIT["US survey foot",0.3048006096012192]]]"#
+        );
+        let expected = (name("both"), Some(2994), Some(Unit::Foot), Some(Unit::UsSurveyFoot));
+        assert_eq!(facts(&compound), expected, "compound: the feet are told apart");
+        let second = r#"COMPOUNDCRS["c",PROJCRS["p",BASEGEOGCRS["b",DATUM["d",ELLIPSOID["e",6378137,298.2,
+            LENGTHUNIT["metre",1]]]],CONVERSION["u",METHOD["m"]],CS[Cartesian,2],AXIS["E",east,LENGTHUNIT["metre",1]],
+            AXIS["N",north,LENGTHUNIT["metre",1]],ID["EPSG",32632]],VERTCRS["v",VDATUM["w"],CS[vertical,1],
+            AXIS["H",up,LENGTHUNIT["metre",1]]],ID["EPSG",9999]]"#;
+        assert_eq!(facts(second), (name("c"), Some(9999), Some(Unit::Metre), None), "version 2, compound");
+        let degrees = r#"GEOGCS("WGS 84",DATUM("WGS_1984"),UNIT("degree",0.0174532925199433),AUTHORITY("EPSG",4326))"#;
+        assert_eq!(facts(degrees), (name("WGS 84"), Some(4326), Some(Unit::Degree), None), "other brackets");
+        let three = r#"GEOGCRS["WGS 84 3D",CS[ellipsoidal,3],AXIS["lat",north,ANGLEUNIT["degree",0.0174532925199433]],
+            AXIS["lon",east,ANGLEUNIT["degree",0.0174532925199433]],AXIS["h",up,LENGTHUNIT["metre",1]],ID["EPSG",4979]]"#;
+        assert_eq!(facts(three), (name("WGS 84 3D"), Some(4979), Some(Unit::Degree), Some(Unit::Metre)), "three axes");
+        let bound = format!("BOUNDCRS[SOURCECRS[{FEET}],TARGETCRS[{degrees}]]");
+        assert_eq!(facts(&bound), facts(FEET), "bound to another");
+    }
+
+    #[test]
+    fn geocentric_systems() {
+        assert!(read(r#"GEOCCS["unnamed",UNIT["metre",1]]"#).geocentric, "version 1");
+        let second = r#"GEODCRS["WGS 84",CS[Cartesian,3],AXIS["X",geocentricX],LENGTHUNIT["metre",1]]"#;
+        assert!(read(second).geocentric, "version 2");
+        assert!(!read(FEET).geocentric, "projected");
+    }
+
+    #[test]
+    fn text_of_any_kind_is_survived() {
+        let deep = "A[".repeat(100_000);
+        for text in ["", "\0\0", "no brackets", "[", "]", "A[", "A[\"", "A[\"b\"", "PROJCS[]", "é[é]", &deep] {
+            let crs = Crs::from_wkt(text);
+            assert_eq!((crs.epsg, crs.unit), (None, None), "{:?} says nothing", text.get(..20));
+        }
+        for end in 0..FEET.len() {
+            Crs::from_wkt(&FEET[..end]);
+        }
+        let long = "A[".to_owned() + &"1,".repeat(400_000) + "]";
+        assert_eq!(Crs::from_wkt(&long).unit, None, "many values");
+    }
+}

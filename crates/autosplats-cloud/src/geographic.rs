@@ -1,0 +1,121 @@
+//! Degrees to metres, so that a geographic cloud can be shown with equal units along all axes.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::{PointCloud, Unit, read::middle};
+
+/// Half the longer axis of the WGS 84 ellipsoid in metres, and the square of its eccentricity.
+const SEMI_MAJOR: f64 = 6_378_137.0;
+const ECCENTRICITY_2: f64 = 6.694_379_990_141_316e-3;
+
+/// Steps of a degree to which the middle is rounded: about 11 cm.
+const STEPS: f64 = 1e6;
+
+impl PointCloud {
+    /// Puts metres in the place of longitude and latitude, if that is what x and y [are](Unit::Degree): x to the east and
+    /// y to the north of the cloud's middle, z up from where it was, in metres. Says whether it did; other clouds stay as
+    /// they are.
+    ///
+    /// Lengths are right at the middle of the cloud. A hundred kilometres to the north or south of it, those to the east
+    /// are wrong by one or two parts in a hundred, as on any flat map. Residuals are taken up by the new positions,
+    /// scanner places are moved but not turned.
+    pub fn to_local_metres(&mut self) -> bool {
+        if self.crs.unit != Some(Unit::Degree) {
+            return false;
+        }
+        let count = self.len();
+        let middle = middle(count, |i| self.world_position(i) * STEPS) / STEPS;
+        let local = Local::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0));
+        let origin = DVec3::new(0.0, 0.0, (middle.z * local.scale.z).round());
+        let positions: Vec<[f32; 3]> = (0..count)
+            .into_par_iter()
+            .map(|i| (local.metres(self.world_position(i)) - origin).as_vec3().to_array())
+            .collect();
+        for scan in &mut self.scans {
+            scan.world_from_sensor.w_axis = local.metres(scan.position()).extend(1.0);
+        }
+        self.positions = positions;
+        self.origin = origin;
+        self.residuals = None;
+        self.resolution = self.resolution.map(|step| step * local.scale);
+        let name = format!("metres about {:.6}° E, {:.6}° N", middle.x, middle.y);
+        self.crs = crate::Crs { name: Some(name), unit: Some(Unit::Metre), ..crate::Crs::default() };
+        true
+    }
+}
+
+/// A flat map that touches the ellipsoid at one place.
+struct Local {
+    middle: DVec3,
+    /// Metres per unit.
+    scale: DVec3,
+}
+
+impl Local {
+    /// `height` is the length of z's unit in metres.
+    fn at(middle: DVec3, height: f64) -> Self {
+        let (sin, cos) = middle.y.clamp(-90.0, 90.0).to_radians().sin_cos();
+        let root = 1.0 - ECCENTRICITY_2 * sin * sin;
+        let meridian = SEMI_MAJOR * (1.0 - ECCENTRICITY_2) / root.powf(1.5);
+        let parallel = SEMI_MAJOR / root.sqrt() * cos;
+        Self { middle, scale: DVec3::new(parallel.to_radians(), meridian.to_radians(), height) }
+    }
+
+    fn metres(&self, degrees: DVec3) -> DVec3 {
+        // The short way round, across the 180th meridian too.
+        let east = (degrees.x - self.middle.x + 180.0).rem_euclid(360.0) - 180.0;
+        DVec3::new(east, degrees.y - self.middle.y, degrees.z) * self.scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Crs;
+
+    /// Length of a degree of longitude and of latitude, from published tables of WGS 84.
+    const TABLE: [(f64, f64, f64); 4] = [
+        (0.0, 111_320.0, 110_574.0),
+        (30.0, 96_486.0, 110_852.0),
+        (45.0, 78_847.0, 111_132.0),
+        (60.0, 55_800.0, 111_412.0),
+    ];
+
+    fn cloud(points: &[[f64; 3]]) -> PointCloud {
+        let origin = DVec3::from(points[0]);
+        let positions = points.iter().map(|&point| (DVec3::from(point) - origin).as_vec3().to_array()).collect();
+        let crs = Crs { unit: Some(Unit::Degree), vertical_unit: Some(Unit::Metre), ..Crs::default() };
+        PointCloud::new(origin, positions).with_crs(crs)
+    }
+
+    #[test]
+    fn a_degree_is_as_long_as_tables_say() {
+        for (latitude, east, north) in TABLE {
+            let step = 0.01;
+            let mut cloud = cloud(&[[10.0, latitude, 5.0], [10.0 + step, latitude, 5.0], [10.0, latitude + step, 7.5]]);
+            assert!(cloud.to_local_metres(), "degrees are converted");
+            let way = |i: usize| cloud.world_position(i) - cloud.world_position(0);
+            assert!((way(1).x / step - east).abs() < 12.0, "at {latitude}: {} is not {east}", way(1).x / step);
+            assert!((way(2).y / step - north).abs() < 12.0, "at {latitude}: {} is not {north}", way(2).y / step);
+            assert!((way(2).z - 2.5).abs() < 1e-6, "heights stay");
+            assert_eq!(cloud.crs().unit, Some(Unit::Metre), "and says so");
+        }
+    }
+
+    #[test]
+    fn other_units_and_places() {
+        let mut feet = cloud(&[[0.0, 0.0, 0.0], [0.0, 0.0, 100.0]]);
+        feet.crs.vertical_unit = Some(Unit::Foot);
+        feet.to_local_metres();
+        assert!((feet.world_position(1).z - feet.world_position(0).z - 30.48).abs() < 1e-5, "feet to metres");
+        let mut date_line = cloud(&[[179.999, 0.0, 0.0], [-179.999, 0.0, 0.0]]);
+        date_line.to_local_metres();
+        let way = date_line.world_position(1) - date_line.world_position(0);
+        // One f32 step of 360 degrees is 3 m.
+        assert!((way.x - 222.6).abs() < 3.5, "across the 180th meridian: {way}");
+        let mut metres = cloud(&[[1.0, 2.0, 3.0]]).with_crs(Crs::default());
+        let before = metres.clone();
+        assert!(!metres.to_local_metres() && metres == before, "a cloud in no degrees stays as it is");
+    }
+}

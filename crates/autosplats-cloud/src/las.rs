@@ -1,0 +1,124 @@
+//! The layout of LAS files: what reading and writing share.
+
+/// Bytes of a record, by point format.
+pub(crate) const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+
+/// Bytes before the data of a variable length record, and of an extended one.
+pub(crate) const VLR_HEADER: usize = 54;
+pub(crate) const EVLR_HEADER: usize = 60;
+
+/// Bytes that describe one extra value of a record.
+pub(crate) const EXTRA_DESCRIPTOR: usize = 192;
+
+/// Degrees of one step of the wide formats' scan angle.
+pub(crate) const ANGLE_STEP: f32 = 0.006;
+
+/// Who records are from, and their numbers.
+pub(crate) const SPEC: &str = "LASF_Spec";
+pub(crate) const EXTRA_BYTES: u16 = 4;
+pub(crate) const PROJECTION: &str = "LASF_Projection";
+pub(crate) const WKT: u16 = 2112;
+pub(crate) const GEO_KEYS: u16 = 34735;
+pub(crate) const GEO_DOUBLES: u16 = 34736;
+pub(crate) const GEO_ASCII: u16 = 34737;
+
+/// Where one value lies in a record, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// Some bits of a byte.
+    Bits { at: usize, shift: u8, mask: u8 },
+    /// A signed byte.
+    I8(usize),
+    /// An unsigned 16-bit number.
+    U16(usize),
+    /// An angle in steps of [`ANGLE_STEP`], 16 bits, signed.
+    Angle(usize),
+    /// A double.
+    F64(usize),
+}
+
+impl Place {
+    /// How it is stored, for people.
+    pub(crate) fn stored(self) -> String {
+        match self {
+            Self::Bits { mask: 255, .. } => "uint8".into(),
+            Self::Bits { mask: 1, .. } => "1 bit".into(),
+            Self::Bits { mask, .. } => format!("{} bits", mask.count_ones()),
+            Self::I8(_) => "int8".into(),
+            Self::U16(_) => "uint16".into(),
+            Self::Angle(_) => format!("int16 × {ANGLE_STEP}"),
+            Self::F64(_) => "float64".into(),
+        }
+    }
+}
+
+/// Whether records are of the kind that LAS 1.4 brought, with wider bit fields.
+pub(crate) fn is_wide(format: usize) -> bool {
+    format >= 6
+}
+
+/// Where the time of a point lies.
+fn time(format: usize) -> Option<usize> {
+    match format {
+        0 | 2 => None,
+        1..=5 => Some(20),
+        _ => Some(22),
+    }
+}
+
+/// Where red, green and blue lie, 16 bits each.
+pub(crate) fn colors(format: usize) -> Option<usize> {
+    match format {
+        2 => Some(20),
+        3 | 5 => Some(28),
+        7 | 8 | 10 => Some(30),
+        _ => None,
+    }
+}
+
+/// Whether records point to waveforms.
+pub(crate) fn has_waveforms(format: usize) -> bool {
+    matches!(format, 4 | 5 | 9 | 10)
+}
+
+/// Name and place of the values of a point format, coordinates, colours and waveforms left out.
+pub(crate) fn places(format: usize) -> Vec<(&'static str, Place)> {
+    let bits = |at, shift, mask| Place::Bits { at, shift, mask };
+    let mut places = vec![("Intensity", Place::U16(12))];
+    if is_wide(format) {
+        places.extend([
+            ("ReturnNumber", bits(14, 0, 15)),
+            ("NumberOfReturns", bits(14, 4, 15)),
+            ("Synthetic", bits(15, 0, 1)),
+            ("KeyPoint", bits(15, 1, 1)),
+            ("Withheld", bits(15, 2, 1)),
+            ("Overlap", bits(15, 3, 1)),
+            ("ScanChannel", bits(15, 4, 3)),
+            ("ScanDirectionFlag", bits(15, 6, 1)),
+            ("EdgeOfFlightLine", bits(15, 7, 1)),
+            ("Classification", bits(16, 0, 255)),
+            ("UserData", bits(17, 0, 255)),
+            ("ScanAngleRank", Place::Angle(18)),
+            ("PointSourceId", Place::U16(20)),
+        ]);
+    } else {
+        places.extend([
+            ("ReturnNumber", bits(14, 0, 7)),
+            ("NumberOfReturns", bits(14, 3, 7)),
+            ("ScanDirectionFlag", bits(14, 6, 1)),
+            ("EdgeOfFlightLine", bits(14, 7, 1)),
+            ("Classification", bits(15, 0, 31)),
+            ("Synthetic", bits(15, 5, 1)),
+            ("KeyPoint", bits(15, 6, 1)),
+            ("Withheld", bits(15, 7, 1)),
+            ("ScanAngleRank", Place::I8(16)),
+            ("UserData", bits(17, 0, 255)),
+            ("PointSourceId", Place::U16(18)),
+        ]);
+    }
+    places.extend(time(format).map(|at| ("GpsTime", Place::F64(at))));
+    if matches!(format, 8 | 10) {
+        places.push(("Infrared", Place::U16(36)));
+    }
+    places
+}

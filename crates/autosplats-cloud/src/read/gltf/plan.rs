@@ -1,0 +1,179 @@
+//! Which meshes a glTF shows, and where.
+
+use std::collections::HashMap;
+
+use glam::DMat4;
+
+use super::super::Job;
+use super::accessor;
+use super::json::{Attributes, Primitive, Root};
+use crate::Error;
+
+/// Points that a byte of the files may become by showing meshes at several places.
+const MAX_POINTS_PER_BYTE: usize = 64;
+
+/// Points that meshes shown at several places may become in any case.
+const ALWAYS: usize = 1 << 16;
+
+/// A primitive at one of the places where it is shown.
+pub(super) struct Shown<'a> {
+    pub(super) primitive: &'a Primitive,
+    pub(super) world_from_mesh: DMat4,
+    /// Its first point.
+    pub(super) first: usize,
+    /// Number of its points.
+    pub(super) count: usize,
+    /// Whether another primitive has brought its points already.
+    pub(super) shared: bool,
+}
+
+/// All that is shown.
+#[derive(Default)]
+pub(super) struct Plan<'a> {
+    pub(super) shown: Vec<Shown<'a>>,
+    pub(super) points: usize,
+    /// Corners of triangles and of strips of them.
+    pub(super) corners: usize,
+    pub(super) faces: usize,
+    pub(super) notes: Vec<String>,
+}
+
+/// Drawing modes, as glTF numbers them.
+pub(super) const TRIANGLES: u32 = 4;
+pub(super) const STRIP: u32 = 5;
+pub(super) const FAN: u32 = 6;
+
+impl<'a> Plan<'a> {
+    pub(super) fn of(job: &Job<'_>, root: &'a Root<'_>) -> Result<Self, Error> {
+        for extension in &root.extensions_required {
+            match &**extension {
+                "KHR_draco_mesh_compression" => return Err(draco(job)),
+                "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+                    return Err(accessor::unsupported_meshopt(job));
+                }
+                _ => {}
+            }
+        }
+        let mut plan = Self::default();
+        let (mut lines, mut morphed) = (0, 0);
+        let places = places(job, root, &mut plan.notes)?;
+        for (mesh, world_from_mesh) in places {
+            let Some(mesh) = root.meshes.get(mesh) else {
+                return Err(job.malformed(format!("mesh {mesh}"), "there is no such mesh; export the file again"));
+            };
+            let mut known: HashMap<Attributes, usize> = HashMap::new();
+            for primitive in &mesh.primitives {
+                if matches!(primitive.mode, 1..=3) {
+                    lines += 1;
+                    continue;
+                }
+                let Some(position) = primitive.attributes.position else { continue };
+                let Some(accessor) = root.accessors.get(position) else {
+                    let what = "there is no such accessor; export the file again";
+                    return Err(job.malformed(format!("accessor {position}"), what));
+                };
+                if primitive.is_draco() && accessor.buffer_view.is_none() {
+                    return Err(draco(job));
+                }
+                let shared = known.get(&primitive.attributes).copied();
+                let first = shared.unwrap_or(plan.points);
+                if shared.is_none() {
+                    known.insert(primitive.attributes, first);
+                    plan.points = plan.points.saturating_add(accessor.count);
+                }
+                let indices = primitive.indices.and_then(|index| root.accessors.get(index));
+                let corners = indices.map_or(accessor.count, |indices| indices.count);
+                let faces = match primitive.mode {
+                    TRIANGLES => corners / 3,
+                    STRIP | FAN => corners.saturating_sub(2),
+                    _ => 0,
+                };
+                if faces > 0 {
+                    plan.corners = plan.corners.saturating_add(corners);
+                    plan.faces = plan.faces.saturating_add(faces);
+                }
+                morphed += usize::from(primitive.has_targets());
+                let count = accessor.count;
+                plan.shown.push(Shown { primitive, world_from_mesh, first, count, shared: shared.is_some() });
+            }
+        }
+        if lines > 0 {
+            plan.notes.push(format!("{lines} primitives are lines; left out"));
+        }
+        if morphed > 0 {
+            plan.notes.push("the mesh has morph targets; its base shape is taken".into());
+        }
+        Ok(plan)
+    }
+
+    /// Refuses meshes shown so often that a small file would fill the memory.
+    pub(super) fn check_size(&self, job: &Job<'_>, bytes: usize) -> Result<(), Error> {
+        let bound = bytes.saturating_mul(MAX_POINTS_PER_BYTE).max(ALWAYS);
+        let most = self.points.max(if job.triangles { self.corners } else { 0 });
+        if most > bound {
+            let what = format!("its nodes repeat its meshes to {most} points from {bytes} bytes; split the file");
+            return Err(job.malformed("nodes", what));
+        }
+        // Positions are in f64 until their origin is known.
+        job.check_memory(self.points, 24 + 12)?;
+        job.check_memory(if job.triangles { self.corners } else { 0 }, 12)
+    }
+}
+
+fn draco(job: &Job<'_>) -> Error {
+    job.unsupported("the mesh is compressed by Draco, which is not read; export it without compression")
+}
+
+/// The meshes of the scene, each with the transform of its node. A node belongs to one parent, so each is visited once:
+/// cycles end, and nothing is repeated beyond the number of nodes.
+fn places(job: &Job<'_>, root: &Root<'_>, notes: &mut Vec<String>) -> Result<Vec<(usize, DMat4)>, Error> {
+    if root.nodes.is_empty() {
+        return Ok((0..root.meshes.len()).map(|mesh| (mesh, DMat4::IDENTITY)).collect());
+    }
+    let mut roots: Vec<usize> = match root.scene {
+        Some(scene) => {
+            let found = root.scenes.get(scene);
+            let what = "there is no such scene; export the file again";
+            found.ok_or_else(|| job.malformed(format!("scene {scene}"), what))?.nodes.clone()
+        }
+        None => root.scenes.iter().flat_map(|scene| &scene.nodes).copied().collect(),
+    };
+    if root.scenes.is_empty() {
+        let mut is_child = vec![false; root.nodes.len()];
+        for &child in root.nodes.iter().flat_map(|node| &node.children) {
+            is_child.get_mut(child).into_iter().for_each(|is_child| *is_child = true);
+        }
+        roots = (0..root.nodes.len()).filter(|&node| !is_child[node]).collect();
+    }
+    let mut visited = vec![false; root.nodes.len()];
+    let mut again = 0;
+    let (mut skinned, mut instanced) = (false, false);
+    let mut places = Vec::new();
+    let mut stack: Vec<(usize, DMat4)> = roots.into_iter().rev().map(|node| (node, DMat4::IDENTITY)).collect();
+    while let Some((index, world_from_parent)) = stack.pop() {
+        let Some(node) = root.nodes.get(index) else {
+            return Err(job.malformed(format!("node {index}"), "there is no such node; export the file again"));
+        };
+        if std::mem::replace(&mut visited[index], true) {
+            again += 1;
+            continue;
+        }
+        let world_from_node = world_from_parent * node.parent_from_node();
+        skinned |= node.mesh.is_some() && node.is_skinned();
+        instanced |= node.mesh.is_some() && node.is_instanced();
+        if let Some(mesh) = node.mesh {
+            places.push((mesh as usize, world_from_node));
+        }
+        stack.extend(node.children.iter().rev().map(|&child| (child, world_from_node)));
+    }
+    if again > 0 && root.scene.is_some() {
+        notes.push(format!("{again} times a node is listed again, which glTF forbids; shown once"));
+    }
+    if skinned {
+        notes.push("the mesh has a skeleton; it is taken as modelled, not as posed".into());
+    }
+    if instanced {
+        notes.push("the repeated instances of EXT_mesh_gpu_instancing are shown once".into());
+    }
+    Ok(places)
+}

@@ -1,0 +1,469 @@
+//! The values of the points, filled from records in pieces that threads work on side by side.
+//!
+//! # How it works
+//!
+//! All columns are allocated at once, but as zeros that the system hands out when they are first touched. A piece is a
+//! run of points with its part of every column. Values go into it only where some of them are not zero, so a column that
+//! stays zero takes no memory, and in the end it is left out: it was not recorded.
+//!
+//! Colours are 16 bits in the file, but many writers put 8-bit values there. A byte is kept of each: the low one as long
+//! as no value above 255 has been seen; when one is, all values before it are known to have been at most 255, so that
+//! their high bytes are zero.
+
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+use bytemuck::{Zeroable, allocation::try_zeroed_vec};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{super::table::Scalar, extra::Extra, header::Header};
+use crate::{
+    Axes, Error, Field, FieldValues, PointCloud,
+    las::{self, ANGLE_STEP, Place},
+    merge::residual,
+};
+
+/// Records that stay in the innermost cache while each of their values is taken.
+const CACHED: usize = 1 << 9;
+
+/// What a field is made of.
+#[derive(Clone, Debug)]
+pub(super) enum Source {
+    /// A value of the point format.
+    Own(Place),
+    /// One of red, green and blue as 16 bits.
+    Color(usize),
+    /// An extra value.
+    Extra(Extra),
+}
+
+/// A field to be: its name and where its values lie.
+#[derive(Clone, Debug)]
+pub(super) struct Dimension {
+    pub(super) name: String,
+    pub(super) source: Source,
+}
+
+impl Dimension {
+    fn zeros(&self, count: usize) -> Result<FieldValues, Error> {
+        macro_rules! zeros {
+            ($variant:ident) => {
+                FieldValues::$variant(zeroed(count, &self.name)?)
+            };
+        }
+        Ok(match &self.source {
+            Source::Own(Place::Bits { .. }) => zeros!(U8),
+            Source::Own(Place::I8(_)) => zeros!(I8),
+            Source::Own(Place::U16(_)) | Source::Color(_) => zeros!(U16),
+            Source::Own(Place::Angle(_)) => zeros!(F32),
+            Source::Own(Place::F64(_)) => zeros!(F64),
+            Source::Extra(extra) if extra.scaled.is_some() => zeros!(F64),
+            Source::Extra(extra) => match extra.scalar {
+                Scalar::I8 => zeros!(I8),
+                Scalar::U8 => zeros!(U8),
+                Scalar::I16 => zeros!(I16),
+                Scalar::U16 => zeros!(U16),
+                Scalar::I32 => zeros!(I32),
+                Scalar::U32 => zeros!(U32),
+                Scalar::I64 => zeros!(I64),
+                Scalar::U64 => zeros!(U64),
+                Scalar::F32 => zeros!(F32),
+                Scalar::F64 => zeros!(F64),
+            },
+        })
+    }
+
+    /// Bytes a value takes in the cloud.
+    pub(super) fn size(&self) -> usize {
+        match &self.source {
+            Source::Own(Place::Bits { .. } | Place::I8(_)) => 1,
+            Source::Own(Place::U16(_)) | Source::Color(_) => 2,
+            Source::Own(Place::Angle(_)) => 4,
+            Source::Own(Place::F64(_)) => 8,
+            Source::Extra(extra) => {
+                if extra.scaled.is_some() {
+                    8
+                } else {
+                    extra.scalar.size()
+                }
+            }
+        }
+    }
+}
+
+/// What was seen among the values of some points.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Seen {
+    /// By field, whether a value is not zero.
+    fields: Vec<bool>,
+    residuals: bool,
+    colors: bool,
+    /// Whether 8 bits lose something of a colour.
+    lossy_colors: bool,
+}
+
+impl Seen {
+    pub(super) fn add(&mut self, other: &Self) {
+        self.fields.resize(self.fields.len().max(other.fields.len()), false);
+        for (seen, other) in self.fields.iter_mut().zip(&other.fields) {
+            *seen |= other;
+        }
+        self.residuals |= other.residuals;
+        self.colors |= other.colors;
+        self.lossy_colors |= other.lossy_colors;
+    }
+}
+
+/// All values of all points.
+pub(super) struct Columns<'a> {
+    header: &'a Header,
+    origin: DVec3,
+    /// Where the colours lie in a record.
+    colors_at: Option<usize>,
+    dimensions: Vec<Dimension>,
+    positions: Vec<[f32; 3]>,
+    /// Empty unless all digits are wanted.
+    residuals: Vec<[f32; 3]>,
+    colors: Vec<[u8; 3]>,
+    fields: Vec<FieldValues>,
+    /// Whether a colour above 255 has been seen.
+    wide_colors: AtomicBool,
+    seen: Seen,
+}
+
+impl<'a> Columns<'a> {
+    /// Columns of zeros for `count` points.
+    pub(super) fn new(
+        header: &'a Header,
+        origin: DVec3,
+        exact: bool,
+        mut dimensions: Vec<Dimension>,
+        count: usize,
+    ) -> Result<Self, Error> {
+        let colors_at = las::colors(header.format);
+        if let (Some(at), true) = (colors_at, exact) {
+            let color =
+                |(index, name): (usize, &str)| Dimension { name: name.into(), source: Source::Color(at + 2 * index) };
+            dimensions.extend(["Red", "Green", "Blue"].into_iter().enumerate().map(color));
+        }
+        Ok(Self {
+            header,
+            origin,
+            colors_at,
+            positions: zeroed(count, "positions")?,
+            residuals: zeroed(if exact { count } else { 0 }, "residuals")?,
+            colors: zeroed(if colors_at.is_some() { count } else { 0 }, "colours")?,
+            fields: dimensions.iter().map(|dimension| dimension.zeros(count)).collect::<Result<_, _>>()?,
+            dimensions,
+            wide_colors: AtomicBool::new(false),
+            seen: Seen::default(),
+        })
+    }
+
+    /// Has `work` fill runs of so many points from point `start` on, side by side: it is given the index of the run and
+    /// its part of the columns. Returns what it said went wrong, by run.
+    pub(super) fn fill(
+        &mut self,
+        start: usize,
+        counts: &[usize],
+        work: impl Fn(usize, &mut Piece<'_>) -> Result<(), String> + Sync + Send,
+    ) -> Vec<Result<(), String>> {
+        let were_wide = *self.wide_colors.get_mut();
+        let mut positions = &mut self.positions[start..];
+        let mut residuals = self.residuals.get_mut(start..).unwrap_or_default();
+        let mut colors = self.colors.get_mut(start..).unwrap_or_default();
+        let mut fields: Vec<Slice<'_>> = self.fields.iter_mut().map(|values| Slice::from(values, start)).collect();
+        let pieces = counts.iter().map(|&count| Piece {
+            header: self.header,
+            origin: self.origin,
+            colors_at: self.colors_at,
+            dimensions: &self.dimensions,
+            wide: &self.wide_colors,
+            positions: split(&mut positions, count),
+            residuals: split(&mut residuals, count),
+            colors: split(&mut colors, count),
+            fields: fields.iter_mut().map(|slice| slice.split(count)).collect(),
+            seen: Seen { fields: vec![false; self.dimensions.len()], ..Seen::default() },
+            narrow: 0,
+            done: 0,
+        });
+        let pieces: Vec<Piece<'_>> = pieces.collect();
+        let outcomes: Vec<_> = pieces
+            .into_par_iter()
+            .enumerate()
+            .map(|(index, mut piece)| {
+                let outcome = work(index, &mut piece);
+                (outcome, piece.seen, piece.narrow)
+            })
+            .collect();
+        let wide = *self.wide_colors.get_mut();
+        if wide && !were_wide && !self.colors.is_empty() {
+            self.colors[..start].fill([0; 3]);
+        }
+        let mut at = start;
+        let mut errors = Vec::with_capacity(counts.len());
+        for ((outcome, seen, narrow), &count) in outcomes.into_iter().zip(counts) {
+            if wide && narrow > 0 {
+                self.colors[at..at + narrow].fill([0; 3]);
+            }
+            self.seen.add(&seen);
+            errors.push(outcome);
+            at += count;
+        }
+        errors
+    }
+
+    /// A copy of some points, as far as they are known.
+    pub(super) fn preview(&self, range: Range<usize>) -> Result<PointCloud, Error> {
+        let mut cloud = PointCloud::new(self.origin, self.positions[range.clone()].to_vec()).with_axes(Axes::ZUp);
+        if self.seen.colors {
+            cloud = cloud.with_colors(self.colors[range.clone()].to_vec())?;
+        }
+        for (index, dimension) in self.dimensions.iter().enumerate() {
+            if self.is_recorded(index) {
+                let values = match &self.fields[index] {
+                    FieldValues::U8(v) => FieldValues::U8(v[range.clone()].to_vec()),
+                    FieldValues::U16(v) => FieldValues::U16(v[range.clone()].to_vec()),
+                    FieldValues::F64(v) => FieldValues::F64(v[range.clone()].to_vec()),
+                    // Enough for a preview.
+                    _ => continue,
+                };
+                cloud = cloud.with_field(&dimension.name, values)?;
+            }
+        }
+        Ok(cloud)
+    }
+
+    /// Whether a field is worth keeping: not all zero, or one of three 16-bit colours of which 8 bits lose something.
+    fn is_recorded(&self, index: usize) -> bool {
+        match self.dimensions[index].source {
+            Source::Color(_) => self.seen.lossy_colors,
+            _ => self.seen.fields.get(index).copied().unwrap_or(false),
+        }
+    }
+
+    /// Makes the cloud; what is zero for every point was not recorded and is left out. The second value says whether the
+    /// colours were 8 bits in the 16 that the format has.
+    pub(super) fn into_cloud(mut self) -> (PointCloud, bool) {
+        let recorded: Vec<bool> = (0..self.fields.len()).map(|index| self.is_recorded(index)).collect();
+        let fields = self.dimensions.into_iter().zip(self.fields).zip(recorded).filter(|(_, recorded)| *recorded);
+        let fields = fields.map(|((dimension, values), _)| Field { name: dimension.name, values });
+        let cloud = PointCloud {
+            origin: self.origin,
+            fields: fields.collect(),
+            positions: self.positions,
+            residuals: self.seen.residuals.then_some(self.residuals),
+            colors: self.seen.colors.then_some(self.colors),
+            axes: Some(Axes::ZUp),
+            ..PointCloud::default()
+        };
+        let narrow = self.seen.colors && !*self.wide_colors.get_mut();
+        (cloud, narrow)
+    }
+}
+
+/// A run of points with its part of every column.
+pub(super) struct Piece<'a> {
+    header: &'a Header,
+    origin: DVec3,
+    colors_at: Option<usize>,
+    dimensions: &'a [Dimension],
+    wide: &'a AtomicBool,
+    positions: &'a mut [[f32; 3]],
+    residuals: &'a mut [[f32; 3]],
+    colors: &'a mut [[u8; 3]],
+    fields: Vec<Slice<'a>>,
+    seen: Seen,
+    /// Leading points whose colours were taken for 8 bits.
+    narrow: usize,
+    /// Points filled.
+    done: usize,
+}
+
+impl Piece<'_> {
+    /// Number of points.
+    pub(super) fn points(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Takes the values of the next points out of their records.
+    pub(super) fn take(&mut self, records: &[u8]) {
+        records.chunks(CACHED * self.header.record_len).for_each(|records| self.take_cached(records));
+    }
+
+    fn take_cached(&mut self, records: &[u8]) {
+        let len = self.header.record_len;
+        let range = self.done..self.done + records.len() / len;
+        let (header, origin) = (self.header, self.origin);
+        let records = || records.chunks_exact(len);
+        for (position, record) in self.positions[range.clone()].iter_mut().zip(records()) {
+            *position = (header.world(record) - origin).as_vec3().to_array();
+        }
+        if !self.residuals.is_empty() {
+            let mut any = false;
+            for (lost, record) in self.residuals[range.clone()].iter_mut().zip(records()) {
+                *lost = residual(header.world(record) - origin);
+                any |= *lost != [0.0; 3];
+            }
+            self.seen.residuals |= any;
+        }
+        if let Some(at) = self.colors_at {
+            self.take_colors(range.clone(), at, records());
+        }
+        for ((slice, dimension), seen) in self.fields.iter_mut().zip(self.dimensions).zip(&mut self.seen.fields) {
+            *seen |= slice.take(range.clone(), dimension, records());
+        }
+        self.done = range.end;
+    }
+
+    fn take_colors<'r>(&mut self, range: Range<usize>, at: usize, records: impl Iterator<Item = &'r [u8]> + Clone) {
+        let colors = records.map(|record| [u16_at(record, at), u16_at(record, at + 2), u16_at(record, at + 4)]);
+        let mut bits = 0;
+        let mut lossy = false;
+        for channel in colors.clone().flatten() {
+            bits |= channel;
+            lossy |= channel != (channel >> 8) * 257;
+        }
+        if bits == 0 {
+            return;
+        }
+        self.seen.colors = true;
+        self.seen.lossy_colors |= lossy;
+        if bits > 255 {
+            self.wide.store(true, Ordering::Relaxed);
+        }
+        let wide = self.wide.load(Ordering::Relaxed);
+        if !wide {
+            self.narrow = range.end;
+        }
+        let shift = if wide { 8 } else { 0 };
+        for (color, channels) in self.colors[range].iter_mut().zip(colors) {
+            *color = channels.map(|channel| (channel >> shift) as u8);
+        }
+    }
+}
+
+macro_rules! slices {
+    ($($variant:ident($type:ty)),*) => {
+        /// Values of a field to be filled.
+        enum Slice<'a> {
+            $($variant(&'a mut [$type])),*
+        }
+
+        impl<'a> Slice<'a> {
+            fn from(values: &'a mut FieldValues, start: usize) -> Self {
+                match values {
+                    $(FieldValues::$variant(values) => Self::$variant(&mut values[start..])),*
+                }
+            }
+
+            /// Takes the first values off.
+            fn split(&mut self, count: usize) -> Self {
+                match self {
+                    $(Self::$variant(values) => Self::$variant(split(values, count))),*
+                }
+            }
+
+            /// Takes the values of an unscaled extra value; whether any is not zero.
+            fn take_plain<'r>(
+                &mut self,
+                range: Range<usize>,
+                extra: &Extra,
+                records: impl Iterator<Item = &'r [u8]> + Clone,
+            ) -> bool {
+                match self {
+                    $(Self::$variant(values) => {
+                        put(&mut values[range], records, |record| <$type>::from_le_bytes(bytes_at(record, extra.at)))
+                    }),*
+                }
+            }
+        }
+    };
+}
+slices!(U8(u8), I8(i8), U16(u16), I16(i16), U32(u32), I32(i32), U64(u64), I64(i64), F32(f32), F64(f64));
+
+impl Slice<'_> {
+    /// Takes the values out of some records; whether any is not zero.
+    fn take<'r>(
+        &mut self,
+        range: Range<usize>,
+        dimension: &Dimension,
+        records: impl Iterator<Item = &'r [u8]> + Clone,
+    ) -> bool {
+        match (self, &dimension.source) {
+            (Self::U8(v), &Source::Own(Place::Bits { at, shift, mask })) => {
+                put(&mut v[range], records, |record| record[at] >> shift & mask)
+            }
+            (Self::I8(v), &Source::Own(Place::I8(at))) => put(&mut v[range], records, |record| record[at] as i8),
+            (Self::U16(v), &(Source::Own(Place::U16(at)) | Source::Color(at))) => {
+                put(&mut v[range], records, |record| u16_at(record, at))
+            }
+            (Self::F32(v), &Source::Own(Place::Angle(at))) => {
+                put(&mut v[range], records, |record| f32::from(u16_at(record, at) as i16) * ANGLE_STEP)
+            }
+            (Self::F64(v), &Source::Own(Place::F64(at))) => {
+                put(&mut v[range], records, |record| f64::from_le_bytes(bytes_at(record, at)))
+            }
+            (Self::F64(v), Source::Extra(extra @ Extra { scaled: Some((scale, offset)), .. })) => {
+                put(&mut v[range], records, |record| match extra.number(record) {
+                    Some(number) => number * scale + offset,
+                    None => f64::NAN,
+                })
+            }
+            // Floats have a value that means none, integers keep theirs.
+            (Self::F32(v), Source::Extra(extra)) if extra.no_data.is_some() => {
+                put(&mut v[range], records, |record| extra.number(record).map_or(f32::NAN, |number| number as f32))
+            }
+            (Self::F64(v), Source::Extra(extra)) if extra.no_data.is_some() => {
+                put(&mut v[range], records, |record| extra.number(record).unwrap_or(f64::NAN))
+            }
+            (slice, Source::Extra(extra)) => slice.take_plain(range, extra, records),
+            (_, Source::Own(_) | Source::Color(_)) => false,
+        }
+    }
+}
+
+/// Puts values into their places unless all are zero; whether any is not.
+fn put<'r, T: Copy + Default + PartialEq>(
+    values: &mut [T],
+    records: impl Iterator<Item = &'r [u8]> + Clone,
+    value: impl Fn(&[u8]) -> T,
+) -> bool {
+    let zero = T::default();
+    if records.clone().all(|record| value(record) == zero) {
+        return false;
+    }
+    for (place, record) in values.iter_mut().zip(records) {
+        *place = value(record);
+    }
+    true
+}
+
+/// Takes the first elements off.
+fn split<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    let whole = std::mem::take(slice);
+    let (first, rest) = whole.split_at_mut(count.min(whole.len()));
+    *slice = rest;
+    first
+}
+
+/// Memory of zeros, which is not touched before it is used.
+fn zeroed<T: Zeroable>(count: usize, what: &str) -> Result<Vec<T>, Error> {
+    try_zeroed_vec(count)
+        .map_err(|()| Error::OutOfMemory { what: what.into(), bytes: count.saturating_mul(size_of::<T>()) })
+}
+
+#[inline]
+pub(super) fn bytes_at<const LEN: usize>(record: &[u8], at: usize) -> [u8; LEN] {
+    let mut bytes = [0; LEN];
+    bytes.copy_from_slice(&record[at..at + LEN]);
+    bytes
+}
+
+#[inline]
+fn u16_at(record: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(bytes_at(record, at))
+}

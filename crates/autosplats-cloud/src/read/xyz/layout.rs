@@ -1,0 +1,461 @@
+//! What stands before the first point, and what the values of a row are.
+
+use super::{
+    super::{Job, MAX_HEADER_LINE, columns, shown, table::MAX_COLUMNS, text},
+    cells::{Dialect, Separator, is_missing, trimmed},
+};
+use crate::{Crs, Error, Unit};
+
+/// Rows looked at to guess what the columns are.
+const SAMPLE: usize = 1000;
+
+/// Rows from which on a text without header is taken for points.
+const SURE: usize = 2;
+
+/// What stands before the first point.
+pub(super) struct Preamble {
+    header: Option<Header>,
+    /// Points that a count line promises.
+    pub(super) promised: Option<usize>,
+    /// First byte of the first row.
+    pub(super) start: usize,
+    pub(super) byte_order_mark: bool,
+}
+
+impl Preamble {
+    pub(super) fn parse(job: &Job<'_>) -> Result<Self, Error> {
+        let bytes = job.bytes;
+        let byte_order_mark = bytes.starts_with(b"\xef\xbb\xbf");
+        let mut at = if byte_order_mark { 3 } else { 0 };
+        let mut header: Option<Header> = None;
+        let mut promised = None;
+        let mut header_seen = false;
+        let mut looks = 0;
+        while at < bytes.len() {
+            looks += 1;
+            if looks % (1 << 14) == 0 {
+                job.tick(0.0)?;
+            }
+            let line = bytes[at..text::line_end(bytes, at)].trim_ascii();
+            if text::is_blank(line) {
+                header = Header::parse(line).filter(Header::has_axes).or(header);
+            } else if text::is_count(line) {
+                promised = std::str::from_utf8(line).ok().and_then(|line| line.parse().ok());
+                if promised.is_none() {
+                    return Err(job.malformed(job.line(at), "this count of points is beyond all bounds"));
+                }
+            } else if is_row(line) || only_numbers(line) {
+                break;
+            } else if !header_seen && promised.is_none() {
+                header_seen = true;
+                header = Header::parse(line);
+            } else if let Some(named) = Header::parse(line).filter(|named| promised.is_none() && named.has_axes()) {
+                // The line before was a title.
+                header = Some(named);
+            } else {
+                let what = text::values(line).find_map(|value| Dialect::ANY.number(value).err()).unwrap_or_default();
+                return Err(job.malformed(job.line(at), what));
+            }
+            at = text::after_line_end(bytes, at);
+        }
+        if at >= bytes.len() && header_seen && !header.as_ref().is_some_and(Header::has_axes) {
+            return Err(job.malformed("line 1", "there are no points in this text: no line has x, y and z"));
+        }
+        Ok(Self { header, promised, start: at, byte_order_mark })
+    }
+}
+
+/// Whether a line is a row of values, most of them numbers, rather than a header.
+fn is_row(line: &[u8]) -> bool {
+    // Blanks stand inside names where something else separates these.
+    let separator = [b';', b'\t', b','].into_iter().find(|separator| line.contains(separator));
+    let numbers = |cells: &mut dyn Iterator<Item = &[u8]>| {
+        cells.take(MAX_COLUMNS + 1).filter(|cell| Dialect::COMMAS.number(cell).is_ok()).count()
+    };
+    3 <= match separator {
+        Some(separator) => numbers(&mut line.split(|&byte| byte == separator)),
+        None => numbers(&mut text::values(line)),
+    }
+}
+
+fn only_numbers(line: &[u8]) -> bool {
+    text::values(line).take(MAX_COLUMNS + 1).all(|value| Dialect::ANY.number(value).is_ok())
+}
+
+/// Whether a text of unknown name has rows of three numbers or more, perhaps after comments and a header.
+pub(in super::super) fn looks_like_rows(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(1 << 13)];
+    if start.contains(&0) || std::str::from_utf8(start).is_err_and(|error| error.error_len().is_some()) {
+        return false;
+    }
+    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    // The sample may end inside a line.
+    let end = if start.len() < bytes.len() { start.iter().rposition(|&byte| byte == b'\n') } else { Some(start.len()) };
+    let lines = start[..end.unwrap_or(0)].split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
+    let mut lines = lines.filter(|line| !text::is_blank(line) && !text::is_count(line)).peekable();
+    lines.next_if(|line| Header::parse(line).is_some_and(|header| header.has_axes()));
+    let rows = |line: &&[u8]| only_numbers(line) && text::values(line).count() >= 3;
+    let mut count = 0;
+    for line in lines.take(SURE) {
+        if !rows(&line) {
+            return false;
+        }
+        count += 1;
+    }
+    count > 0
+}
+
+/// Names of columns, and what they say of units.
+struct Header {
+    names: Vec<String>,
+    units: Vec<Option<Unit>>,
+}
+
+impl Header {
+    /// The names in a header line, which may be a comment. Names may hold blanks where something else separates them.
+    fn parse(line: &[u8]) -> Option<Self> {
+        if line.len() > MAX_HEADER_LINE {
+            return None;
+        }
+        let line = String::from_utf8_lossy(line);
+        let line = line.trim_start_matches(['#', '/', ' ', '\u{feff}']);
+        let separator = [';', '\t', ','].into_iter().find(|&separator| line.contains(separator));
+        let clean = |name: &str| name.trim().trim_matches(['"', '\'']).trim().to_owned();
+        let mut names: Vec<String> = Vec::new();
+        match separator {
+            Some(separator) => names.extend(line.split(separator).map(clean)),
+            None => {
+                // `x [m] y [m]`: a unit belongs to the name before it.
+                for word in line.split_ascii_whitespace() {
+                    match names.last_mut() {
+                        Some(last) if word.starts_with(['[', '(']) => *last += word,
+                        _ => names.push(clean(word)),
+                    }
+                }
+            }
+        }
+        if names.len() < 3 || names.len() > MAX_COLUMNS + 1 {
+            return None;
+        }
+        let mut units = Vec::with_capacity(names.len());
+        for name in &mut names {
+            let at = name.find(['[', '(']).filter(|&at| at > 0);
+            units.push(at.and_then(|at| unit_of(name[at..].trim_matches(['[', ']', '(', ')', ' ']))));
+            if let Some(at) = at {
+                name.truncate(name[..at].trim_end().len());
+            }
+        }
+        Some(Self { names, units })
+    }
+
+    fn has_axes(&self) -> bool {
+        columns::find_axes(&self.names).is_some()
+    }
+
+    /// The names if they are as many as the values of a row; a separator may stand after the last one.
+    fn fitting(&self, width: usize) -> Option<&[String]> {
+        let more = self.names.get(width..)?;
+        (more.is_empty() || more.len() == 1 && more[0].is_empty()).then(|| &self.names[..width])
+    }
+}
+
+fn unit_of(name: &str) -> Option<Unit> {
+    Some(match &*name.to_lowercase() {
+        "m" | "metre" | "meter" | "metres" | "meters" => Unit::Metre,
+        "mm" => Unit::Millimetre,
+        "ft" | "feet" | "foot" => Unit::Foot,
+        "usft" | "us ft" | "ftus" => Unit::UsSurveyFoot,
+        "deg" | "degree" | "degrees" | "°" => Unit::Degree,
+        _ => return None,
+    })
+}
+
+/// What becomes of a value of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    Skip,
+    Axis(usize),
+    Channel(usize),
+    Field(usize),
+}
+
+/// What the values of a row are and how they are written.
+pub(super) struct Layout {
+    pub(super) dialect: Dialect,
+    /// What becomes of each value.
+    pub(super) targets: Vec<Target>,
+    /// Names of the fields, and whether they need double precision.
+    pub(super) fields: Vec<(String, bool)>,
+    pub(super) has_color: bool,
+    pub(super) crs: Crs,
+    /// Names of all columns, nothing for those left out.
+    pub(super) names: Vec<Option<String>>,
+    /// What the user should know.
+    pub(super) notes: Vec<String>,
+}
+
+impl Layout {
+    /// Looks at the first rows; nothing if there is none.
+    pub(super) fn of(job: &Job<'_>, preamble: &Preamble) -> Result<Option<Self>, Error> {
+        let lines = sample(job.bytes, preamble.start);
+        let Some(&(first, _)) = lines.first() else { return Ok(None) };
+        let place = || job.line(first);
+        let rows: Vec<&[u8]> = lines.iter().map(|&(_, line)| line).collect();
+        let named_columns = preamble.header.as_ref().map(|header| header.names.len());
+        let (dialect, width) = Dialect::of(&rows, named_columns).map_err(|what| job.unsupported(what))?;
+        if width < 3 {
+            return Err(job.malformed(place(), format!("{width} values; a point needs x, y and z")));
+        }
+        if width > MAX_COLUMNS {
+            return Err(job.malformed(place(), format!("more than {MAX_COLUMNS} values; are there no line ends?")));
+        }
+        let mut notes = Vec::new();
+        let mut crs = Crs::default();
+        let rows = values(&dialect, &rows, width);
+        let given = columns::given(job)?;
+        let names: Vec<Option<String>> = if let Some(given) = given {
+            if given.len() != width {
+                let what = format!(
+                    "{width} values, but --columns names {}; name each column, with - for one to leave out",
+                    given.len()
+                );
+                return Err(job.malformed(place(), what));
+            }
+            given
+        } else if let Some((names, units)) =
+            preamble.header.as_ref().and_then(|header| Some((header.fitting(width)?, &header.units)))
+        {
+            named(names, units, &mut crs, &mut notes)
+        } else {
+            let names = guessed(&rows, width);
+            // Three columns leave nothing to guess, and PTS says itself what its columns are.
+            let pts = preamble.promised.is_some() && (width == 4 || width == 7 && names[4] == "red");
+            let names: Vec<Option<String>> = names.into_iter().map(Some).collect();
+            if width > 3 && !pts {
+                notes.push(columns::taken_for(&names));
+            }
+            names
+        };
+        Ok(Some(Self::from_names(names, dialect, crs, notes, &rows, job.options.exact)))
+    }
+
+    fn from_names(
+        mut names: Vec<Option<String>>,
+        dialect: Dialect,
+        crs: Crs,
+        mut notes: Vec<String>,
+        rows: &[Vec<Cell>],
+        exact: bool,
+    ) -> Self {
+        let known: Vec<String> = names.iter().map(|name| name.clone().unwrap_or_default()).collect();
+        let axes = columns::find_axes(&known).unwrap_or([0, 1, 2]);
+        let color = columns::find_color(&known);
+        let mut targets = Vec::with_capacity(names.len());
+        let mut fields: Vec<(String, bool)> = Vec::new();
+        for (index, name) in names.iter_mut().enumerate() {
+            let place = |three: [usize; 3]| three.iter().position(|&place| place == index);
+            targets.push(match name {
+                _ if place(axes).is_some() => Target::Axis(place(axes).unwrap_or_default()),
+                Some(_) if color.and_then(place).is_some() => {
+                    Target::Channel(color.and_then(place).unwrap_or_default())
+                }
+                Some(text) if words(rows, index) => {
+                    notes.push(format!("column '{}' holds words; left out", shown(text.as_bytes())));
+                    *name = None;
+                    Target::Skip
+                }
+                Some(text) => {
+                    let mut unique = columns::field_name(text);
+                    while fields.iter().any(|(other, _)| *other == unique) {
+                        unique.push('_');
+                    }
+                    fields.push((unique, text.to_lowercase().contains("time") || wide(rows, index, exact)));
+                    Target::Field(fields.len() - 1)
+                }
+                None => Target::Skip,
+            });
+        }
+        Self { dialect, targets, fields, has_color: color.is_some(), crs, names, notes }
+    }
+}
+
+/// A value of a sampled row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Cell {
+    Number(f64),
+    Missing,
+    Word,
+}
+
+impl Cell {
+    fn number(self) -> f64 {
+        if let Self::Number(number) = self { number } else { f64::NAN }
+    }
+}
+
+/// The first rows and where they are.
+fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
+    let mut lines = Vec::new();
+    let mut at = start;
+    while at < bytes.len() && lines.len() < SAMPLE && at - start < 1 << 20 {
+        let line = trimmed(&bytes[at..text::line_end(bytes, at)]);
+        if !text::is_blank(line.trim_ascii()) && !text::is_count(line.trim_ascii()) {
+            lines.push((at, line));
+        }
+        at = text::after_line_end(bytes, at);
+    }
+    lines
+}
+
+/// The values of the sampled rows, as far as these are as long as the first one.
+fn values(dialect: &Dialect, lines: &[&[u8]], width: usize) -> Vec<Vec<Cell>> {
+    let cell = |value: &[u8]| match dialect.number(value) {
+        _ if is_missing(value) => Cell::Missing,
+        Ok(number) => Cell::Number(number),
+        Err(_) => Cell::Word,
+    };
+    let row = |line: &&[u8]| dialect.cells(line).take(width).map(cell).collect::<Vec<_>>();
+    lines.iter().map(row).take_while(|row| row.len() == width).collect()
+}
+
+/// Names from a header, with what they say of units. Without x, y and z among them the first three are these.
+fn named(names: &[String], units: &[Option<Unit>], crs: &mut Crs, notes: &mut Vec<String>) -> Vec<Option<String>> {
+    let mut names = names.to_vec();
+    for (index, name) in names.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {
+        *name = format!("column_{}", index + 1);
+    }
+    if let Some([x, _, z]) = columns::find_axes(&names) {
+        crs.unit = if columns::is_longitude(&names[x]) { Some(Unit::Degree) } else { units[x] };
+        crs.vertical_unit = units[z].filter(|_| units[z] != crs.unit);
+        return names.into_iter().map(Some).collect();
+    }
+    for (name, axis) in names.iter_mut().zip(["x", "y", "z"]) {
+        *name = axis.into();
+    }
+    let names: Vec<Option<String>> = names.into_iter().map(Some).collect();
+    notes.push(format!("the header names no x, y and z; {}", columns::taken_for(&names)));
+    names
+}
+
+fn guessed(rows: &[Vec<Cell>], width: usize) -> Vec<String> {
+    let rest: &[&str] = match width {
+        4 => &["Intensity"],
+        6 if unit_vectors(rows, 3) => &["nx", "ny", "nz"],
+        6 if colors(rows, 3) => &["red", "green", "blue"],
+        7 if colors(rows, 3) && constant(rows, 6) => &["red", "green", "blue", "alpha"],
+        7 if colors(rows, 4) => &["Intensity", "red", "green", "blue"],
+        9 if unit_vectors(rows, 3) && colors(rows, 6) => &["nx", "ny", "nz", "red", "green", "blue"],
+        9 if colors(rows, 3) && unit_vectors(rows, 6) => &["red", "green", "blue", "nx", "ny", "nz"],
+        10 if colors(rows, 4) && unit_vectors(rows, 7) => &["Intensity", "red", "green", "blue", "nx", "ny", "nz"],
+        _ => &[],
+    };
+    let known = ["x", "y", "z"].iter().chain(rest).map(|&name| name.to_owned());
+    let unknown = (3 + rest.len()..width).map(|index| format!("column_{}", index + 1));
+    known.chain(unknown).collect()
+}
+
+/// Whether three columns are normals: all but a few of length 1, and not all along an axis, as pure colours would be.
+fn unit_vectors(rows: &[Vec<Cell>], first: usize) -> bool {
+    let three = |row: &Vec<Cell>| [0, 1, 2].map(|index| row[first + index].number());
+    let unit = |row: &&Vec<Cell>| {
+        let length = three(row).iter().map(|value| value * value).sum::<f64>().sqrt();
+        (0.95..1.05).contains(&length)
+    };
+    let fractional_or_negative =
+        rows.iter().any(|row| three(row).iter().any(|value| value.fract() != 0.0 || *value < 0.0));
+    fractional_or_negative && rows.iter().filter(unit).count() * 10 >= rows.len() * 9
+}
+
+/// Whether three columns can be colours: 0 to 1, to 255 or to 65535, and whole numbers beyond 1.
+fn colors(rows: &[Vec<Cell>], first: usize) -> bool {
+    let values = || rows.iter().flat_map(|row| &row[first..first + 3]).map(|cell| cell.number());
+    let largest = values().fold(0.0, f64::max);
+    values().all(|value| (0.0..=65535.0).contains(&value) && (largest <= 1.0 || value.fract() == 0.0))
+}
+
+fn constant(rows: &[Vec<Cell>], column: usize) -> bool {
+    let first = rows[0][column].number();
+    (first == 255.0 || first == 1.0) && rows.iter().all(|row| row[column].number() == first)
+}
+
+/// Whether a column has words and no number at all.
+fn words(rows: &[Vec<Cell>], column: usize) -> bool {
+    let mut cells = rows.iter().map(|row| row[column]).filter(|cell| *cell != Cell::Missing).peekable();
+    cells.peek().is_some() && cells.all(|cell| cell == Cell::Word)
+}
+
+/// Whether `f32` would not do for a column. Text does not say how wide its numbers are.
+fn wide(rows: &[Vec<Cell>], column: usize, exact: bool) -> bool {
+    rows.iter().map(|row| row[column].number()).any(|value| {
+        let lost = f64::from(value as f32) != value;
+        // Decimals are hardly ever binary fractions; nothing is lost if the same decimal comes out again.
+        let decimal = || format!("{}", value as f32).parse() == Ok(value);
+        value.is_finite() && lost && (value.abs() >= f64::from(1 << 24) || exact && !decimal())
+    })
+}
+
+impl Dialect {
+    /// How rows are written, and how many values they have. `named` is the number of names in a header.
+    fn of(lines: &[&[u8]], named: Option<usize>) -> Result<(Self, usize), String> {
+        let any = (Self::ANY, Self::ANY.cells(lines[0]).take(MAX_COLUMNS + 1).count());
+        let lines = &lines[..lines.len().min(200)];
+        for separator in [Separator::Semicolon, Separator::Tab, Separator::Comma] {
+            if !separator.byte().is_some_and(|byte| lines.iter().all(|line| line.contains(&byte))) {
+                continue;
+            }
+            if separator == Separator::Comma && decimal_commas(lines) {
+                let dialect = Self { separator: Separator::Blank, decimal_comma: true };
+                return Ok((dialect, dialect.cells(lines[0]).count()));
+            }
+            let strict = Self { separator, decimal_comma: false };
+            let Some(width) = strict.common_width(lines, named).filter(|&width| width >= 3) else { continue };
+            let cells = || lines.iter().flat_map(|line| strict.cells(line));
+            let with_comma = || cells().filter(|cell| cell.contains(&b','));
+            if separator != Separator::Comma && with_comma().any(|cell| Self::COMMAS.number(cell).is_ok()) {
+                if with_comma().all(one_decimal_comma) && !cells().any(|cell| cell.contains(&b'.')) {
+                    return Ok((Self { separator, decimal_comma: true }, width));
+                }
+                return Err("numbers with decimal commas among others; write all of them with points".into());
+            }
+            // Several tabs in a row align columns, if no header says otherwise.
+            let aligned = separator == Separator::Tab && named != Some(width) && cells().any(<[u8]>::is_empty);
+            let several = |cell: &[u8]| {
+                let mut numbers = text::values(cell).map(|value| Self::ANY.number(value));
+                text::values(cell).nth(1).is_some() && numbers.all(|number| number.is_ok())
+            };
+            if !aligned && !cells().any(several) {
+                return Ok((strict, width));
+            }
+        }
+        Ok(any)
+    }
+
+    /// The number of values that all lines have, one separator after the last value allowed.
+    fn common_width(&self, lines: &[&[u8]], named: Option<usize>) -> Option<usize> {
+        let count = |line: &[u8]| {
+            let mut last = &[][..];
+            let count = self.cells(line).take(MAX_COLUMNS + 2).inspect(|cell| last = cell).count();
+            (count, count - usize::from(last.is_empty()))
+        };
+        let counts: Vec<(usize, usize)> = lines.iter().map(|line| count(line)).collect();
+        let width = match named {
+            Some(named) if counts.iter().all(|&(all, _)| all == named) => named,
+            _ => counts.iter().map(|&(_, filled)| filled).max()?,
+        };
+        counts.iter().all(|&(all, filled)| all == width || filled == width).then_some(width)
+    }
+}
+
+/// Whether blanks separate the numbers and commas stand inside them.
+fn decimal_commas(lines: &[&[u8]]) -> bool {
+    lines.iter().all(|line| {
+        let words = || line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let fits = |word: &[u8]| !word.contains(&b'.') && (!word.contains(&b',') || one_decimal_comma(word));
+        words().count() >= 3 && words().all(fits)
+    })
+}
+
+fn one_decimal_comma(word: &[u8]) -> bool {
+    let inside = !word.starts_with(b",") && !word.ends_with(b",");
+    inside && word.iter().filter(|&&byte| byte == b',').count() == 1 && Dialect::COMMAS.number(word).is_ok()
+}

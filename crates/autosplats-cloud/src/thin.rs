@@ -1,0 +1,117 @@
+//! Fewer points, and noisier ones.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::{Error, PointCloud, Progress, merge::residual, progress::tick};
+
+/// Blocks of points between two looks at the caller's wish to stop.
+const BLOCK: usize = 1 << 20;
+
+impl PointCloud {
+    /// Keeps the points within a box of world coordinates, its faces included. Points without a finite position go.
+    pub fn crop(&mut self, min: DVec3, max: DVec3) {
+        let inside: Vec<bool> = (0..self.len())
+            .into_par_iter()
+            .map(|i| {
+                let point = self.world_position(i);
+                point.cmpge(min).all() && point.cmple(max).all()
+            })
+            .collect();
+        self.retain(|i| inside[i]);
+    }
+
+    /// Keeps the first of every `step` points, in the file's order.
+    ///
+    /// # Panics
+    /// If `step` is 0.
+    pub fn keep_every(&mut self, step: usize) {
+        assert!(step > 0, "every 0th point");
+        self.retain(|i| i.is_multiple_of(step));
+    }
+
+    /// Keeps one point for each cube of edge length `size` that has any: the one nearest to the mean of the cube's
+    /// points, with its own position and attributes. Cubes are counted from world coordinate zero, so that clouds of one
+    /// place are thinned alike. Points without a finite position go.
+    ///
+    /// # Errors
+    /// [`Error::BadValue`] if `size` is not above zero, or so small that cubes cannot be counted;
+    /// [`Error::Cancelled`] if `progress` says so.
+    pub fn thin_by_voxel(&mut self, size: f64, progress: &dyn Progress) -> Result<(), Error> {
+        if !(size > 0.0 && size.is_finite()) {
+            return Err(Error::BadValue { name: "voxel size", value: size, rule: "above 0" });
+        }
+        tick(progress, 0.0)?;
+        let mut cells: Vec<([i64; 3], u32)> = (0..self.len())
+            .into_par_iter()
+            .filter_map(|i| {
+                let cell = (self.world_position(i) / size).floor();
+                cell.is_finite().then(|| (cell.to_array().map(|value| value as i64), i as u32))
+            })
+            .collect();
+        if cells.par_iter().any(|(cell, _)| cell.iter().any(|&value| value.unsigned_abs() > 1 << 52)) {
+            return Err(Error::BadValue { name: "voxel size", value: size, rule: "larger for these coordinates" });
+        }
+        tick(progress, 0.2)?;
+        // Points of a cube side by side, in the file's order.
+        cells.par_sort_unstable();
+        tick(progress, 0.8)?;
+        let mut keep = vec![false; self.len()];
+        for cube in cells.chunk_by(|(a, _), (b, _)| a == b) {
+            let point = |&(_, index): &([i64; 3], u32)| self.world_position(index as usize) - self.origin;
+            let mean = cube.iter().map(point).sum::<DVec3>() / cube.len() as f64;
+            let distance = |entry: &&([i64; 3], u32)| point(entry).distance_squared(mean);
+            let nearest = cube.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            if let Some((_, index)) = nearest {
+                keep[*index as usize] = true;
+            }
+        }
+        drop(cells);
+        self.retain(|i| keep[i]);
+        tick(progress, 1.0)
+    }
+
+    /// Moves every point by normally distributed noise of standard deviation `sigma` along each axis, in the unit of the
+    /// positions; the same for the same `seed`.
+    ///
+    /// # Errors
+    /// [`Error::BadValue`] if `sigma` is not zero or above; [`Error::Cancelled`] if `progress` says so.
+    pub fn add_noise(&mut self, sigma: f64, seed: u64, progress: &dyn Progress) -> Result<(), Error> {
+        if !(sigma >= 0.0 && sigma.is_finite()) {
+            return Err(Error::BadValue { name: "noise", value: sigma, rule: "0 or above" });
+        }
+        self.resolution = None;
+        for start in (0..self.len()).step_by(BLOCK) {
+            tick(progress, start as f32 / self.len() as f32)?;
+            let end = self.len().min(start + BLOCK);
+            let moved = |i: usize| self.world_position(i) - self.origin + sigma * normal(seed, i as u64);
+            let moved: Vec<DVec3> = (start..end).into_par_iter().map(moved).collect();
+            for (position, moved) in self.positions[start..end].iter_mut().zip(&moved) {
+                *position = moved.as_vec3().to_array();
+            }
+            if let Some(residuals) = &mut self.residuals {
+                residuals[start..end].iter_mut().zip(&moved).for_each(|(lost, moved)| *lost = residual(*moved));
+            }
+        }
+        tick(progress, 1.0)
+    }
+}
+
+/// Three numbers of the normal distribution, by Box and Muller's method.
+fn normal(seed: u64, index: u64) -> DVec3 {
+    let mut state = seed ^ index.wrapping_mul(0xd134_2543_de82_ef95);
+    let mut unit = || {
+        // Splitmix; the result is above 0 and at most 1.
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (((z ^ (z >> 31)) >> 11) + 1) as f64 / (1_u64 << 53) as f64
+    };
+    let mut pair = || {
+        let (radius, angle) = ((-2.0 * unit().ln()).sqrt(), std::f64::consts::TAU * unit());
+        [radius * angle.cos(), radius * angle.sin()]
+    };
+    let ([x, y], [z, _]) = (pair(), pair());
+    DVec3::new(x, y, z)
+}

@@ -1,0 +1,159 @@
+//! PCD, binary little endian.
+
+use std::{
+    fs::File,
+    io::{BufWriter, Write as _},
+};
+
+use glam::{DMat4, DQuat, DVec3};
+use rayon::prelude::*;
+
+use super::{Format, Job, names::unique_names};
+use crate::{Axes, Crs, Error, Field, FieldValues, PointCloud, cloud::each_type};
+
+pub(super) const FORMAT: Format = Format { name: "PCD", extensions: &["pcd"], write };
+
+/// Bytes encoded before they are written.
+const BUFFER: usize = 4 << 20;
+
+/// Records that one thread encodes at a time.
+const PIECE: usize = 1 << 13;
+
+/// Positions are floats if the cloud's origin is zero and it has no residuals, else world coordinates in double
+/// precision. Colours are packed into a field `rgb`.
+fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
+    let cloud = job.cloud;
+    let layout = Layout::of(cloud);
+    note_losses(job);
+    file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
+    let block = (BUFFER / layout.stride).max(PIECE);
+    let mut buffer = vec![0; block.min(cloud.len()) * layout.stride];
+    for start in (0..cloud.len()).step_by(block) {
+        job.tick(start as f32 / cloud.len() as f32)?;
+        let records = &mut buffer[..block.min(cloud.len() - start) * layout.stride];
+        records
+            .par_chunks_mut(PIECE * layout.stride)
+            .enumerate()
+            .for_each(|(index, records)| layout.encode(cloud, start + index * PIECE, records));
+        file.write_all(records).map_err(|source| job.io(source))?;
+    }
+    Ok(())
+}
+
+fn note_losses(job: &Job<'_>) {
+    let cloud = job.cloud;
+    if *cloud.crs() != Crs::default() {
+        job.note("PCD does not hold the coordinate system");
+    }
+    if !cloud.scans().is_empty() && only_pose(cloud).is_none() {
+        job.note("PCD holds one place of a sensor for all points; the several ones are left out");
+    }
+}
+
+/// The pose of the sensor that saw all points.
+fn only_pose(cloud: &PointCloud) -> Option<DMat4> {
+    match cloud.scans() {
+        [scan] if scan.points == (0..cloud.len()) => Some(scan.world_from_sensor),
+        _ => None,
+    }
+}
+
+/// How a record is laid out: positions, colours, fields.
+struct Layout {
+    doubles: bool,
+    names: Vec<String>,
+    stride: usize,
+}
+
+impl Layout {
+    fn of(cloud: &PointCloud) -> Self {
+        let doubles = cloud.origin() != DVec3::ZERO || cloud.residuals().is_some();
+        let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
+        let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 4 } else { 0 } + fields;
+        let all: Vec<&Field> = cloud.fields().iter().collect();
+        // "_" would be padding.
+        Self { doubles, names: unique_names(&all, &["x", "y", "z", "rgb", "rgba", "_"]), stride }
+    }
+
+    fn header(&self, cloud: &PointCloud) -> String {
+        let position = if self.doubles { ('F', 8) } else { ('F', 4) };
+        let mut fields: Vec<(&str, char, usize)> = ["x", "y", "z"].map(|axis| (axis, position.0, position.1)).into();
+        if cloud.colors().is_some() {
+            fields.push(("rgb", 'U', 4));
+        }
+        for (field, name) in cloud.fields().iter().zip(&self.names) {
+            let (kind, size) = scalar(&field.values);
+            fields.push((name, kind, size));
+        }
+        let axes = match cloud.axes() {
+            Some(Axes::ZUp) => "# axes z-up\n",
+            Some(Axes::YUp) => "# axes y-up\n",
+            Some(Axes::Camera) => "# axes camera\n",
+            None => "",
+        };
+        let words =
+            |word: &dyn Fn(&(&str, char, usize)) -> String| fields.iter().map(word).collect::<Vec<_>>().join(" ");
+        format!(
+            "# .PCD v0.7 - Point Cloud Data file format\n{axes}VERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+             WIDTH {len}\nHEIGHT 1\nVIEWPOINT {}\nPOINTS {len}\nDATA binary\n",
+            words(&|field| field.0.into()),
+            words(&|field| field.2.to_string()),
+            words(&|field| field.1.into()),
+            words(&|_| "1".into()),
+            viewpoint(only_pose(cloud).unwrap_or(DMat4::IDENTITY)),
+            len = cloud.len(),
+        )
+    }
+
+    /// Encodes as many points from `first` on as there is room for.
+    fn encode(&self, cloud: &PointCloud, first: usize, records: &mut [u8]) {
+        let range = first..first + records.len() / self.stride;
+        let mut at = 0;
+        if self.doubles {
+            let world = range.clone().map(|i| cloud.world_position(i).to_array().map(f64::to_le_bytes));
+            self.place(records, &mut at, world.map(bytemuck::cast::<_, [u8; 24]>));
+        } else {
+            let positions = cloud.positions()[range.clone()].iter();
+            let bytes = positions.map(|position| bytemuck::cast::<_, [u8; 12]>(position.map(f32::to_le_bytes)));
+            self.place(records, &mut at, bytes);
+        }
+        if let Some(colors) = cloud.colors() {
+            self.place(records, &mut at, colors[range.clone()].iter().map(|&[red, green, blue]| [blue, green, red, 0]));
+        }
+        for field in cloud.fields() {
+            each_type!(&field.values, v => {
+                self.place(records, &mut at, v[range.clone()].iter().map(|value| value.to_le_bytes()));
+            });
+        }
+    }
+
+    /// Puts one value into every record at byte `at`, and moves `at` behind it.
+    fn place<const LEN: usize>(&self, records: &mut [u8], at: &mut usize, values: impl Iterator<Item = [u8; LEN]>) {
+        for (record, value) in records.chunks_exact_mut(self.stride).zip(values) {
+            record[*at..*at + LEN].copy_from_slice(&value);
+        }
+        *at += LEN;
+    }
+}
+
+/// A pose as tx ty tz qw qx qy qz.
+fn viewpoint(pose: DMat4) -> String {
+    let (_, DQuat { x, y, z, w }, place) = pose.to_scale_rotation_translation();
+    format!("{} {} {} {w} {x} {y} {z}", place.x, place.y, place.z)
+}
+
+/// PCD's letter and size of the values' type.
+fn scalar(values: &FieldValues) -> (char, usize) {
+    match values {
+        FieldValues::I8(_) => ('I', 1),
+        FieldValues::U8(_) => ('U', 1),
+        FieldValues::I16(_) => ('I', 2),
+        FieldValues::U16(_) => ('U', 2),
+        FieldValues::I32(_) => ('I', 4),
+        FieldValues::U32(_) => ('U', 4),
+        FieldValues::I64(_) => ('I', 8),
+        FieldValues::U64(_) => ('U', 8),
+        FieldValues::F32(_) => ('F', 4),
+        FieldValues::F64(_) => ('F', 8),
+    }
+}

@@ -1,0 +1,319 @@
+//! Mutated files for every reader: no panic, no long wait, no memory beyond a bound, one line of message.
+//!
+//! # How it works
+//!
+//! Each format has small seed files (see [`seeds`]). Every input is a seed, or an earlier input that was answered in a
+//! new way, changed by [`mutate`]; it depends on nothing but its number, so a finding can be repeated. An input is
+//! described and read from memory, on one thread; a child process per core does a share. Panics in code of others, which
+//! readers turn into errors, are counted; any other panic is a finding, as are time and memory beyond the limits. A
+//! finding is written to `target/fuzz`, and the program fails.
+
+mod meter;
+mod mutate;
+mod seeds;
+
+use std::{
+    collections::HashSet,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+    process::{Command, ExitCode, Stdio},
+    sync::{Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions, describe_bytes, read_bytes, read_mesh_bytes};
+use clap::Parser;
+
+use crate::mutate::{Random, mutate, repair_pages};
+use crate::seeds::{Seeds, all};
+
+/// What any input may take; far more than a sane answer needs, far less than a claimed count would.
+const TIME: Duration = Duration::from_secs(2);
+
+/// Bytes of memory for every byte of a file, and what any file may take. Compressed points can be many.
+const MEMORY_PER_BYTE: usize = 1 << 14;
+const MEMORY: usize = 64 << 20;
+
+/// Inputs that taught something new, kept to be changed further.
+const POOL: usize = 512;
+
+/// Findings of a format after which it is given up.
+const ENOUGH: usize = 10;
+
+/// Feeds changed files to every reader.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Formats to try, as the file extensions that seeds have [default: all]
+    #[arg(long = "reader", value_name = "EXTENSION")]
+    readers: Vec<String>,
+    /// Time for all formats together
+    #[arg(long, default_value_t = 60)]
+    seconds: u64,
+    /// Inputs for each format, however long that takes
+    #[arg(long, conflicts_with = "seconds")]
+    inputs: Option<u64>,
+    /// Another seed makes other inputs
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Share of this process among how many
+    #[arg(long, hide = true, value_parser = share)]
+    share: Option<[u64; 2]>,
+}
+
+fn share(text: &str) -> Result<[u64; 2], String> {
+    let (index, count) = text.split_once('/').ok_or("INDEX/COUNT")?;
+    Ok([index.parse().map_err(|_| "INDEX")?, count.parse().map_err(|_| "COUNT")?])
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match arguments.share {
+        Some(share) => work(&arguments, share),
+        None => start(),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One process per core, so that what is measured is one reader's doing.
+fn start() -> Result<()> {
+    let cores = std::thread::available_parallelism()?.get() as u64;
+    let start = Instant::now();
+    let children = (0..cores).map(|index| {
+        Command::new(std::env::current_exe()?)
+            .args(std::env::args_os().skip(1))
+            .args(["--share", &format!("{index}/{cores}")])
+            .env("RAYON_NUM_THREADS", "1")
+            .stdin(Stdio::null())
+            .spawn()
+    });
+    let children = children.collect::<std::io::Result<Vec<_>>>().context("cannot start a process")?;
+    let mut failed = 0;
+    for mut child in children {
+        failed += usize::from(!child.wait()?.success());
+    }
+    ensure!(failed == 0, "{failed} of {cores} processes found something; see above");
+    println!("nothing found in {:.0} s on {cores} cores", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+fn work(arguments: &Arguments, share: [u64; 2]) -> Result<()> {
+    // Inside the pool, parallel loops run here instead of being handed over.
+    rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
+    let mut formats = all()?;
+    if !arguments.readers.is_empty() {
+        for reader in &arguments.readers {
+            ensure!(formats.iter().any(|seeds| seeds.extension == *reader), "no seeds end in .{reader}");
+        }
+        formats.retain(|seeds| arguments.readers.iter().any(|reader| reader == seeds.extension));
+    }
+    let mut findings = 0;
+    let count = formats.len() as u32;
+    for seeds in formats {
+        let limit = match arguments.inputs {
+            Some(inputs) => Limit::Inputs(inputs.div_ceil(share[1])),
+            None => Limit::Time(Duration::from_secs(arguments.seconds) / count),
+        };
+        findings += Run::new(&seeds, arguments.seed, share).go(&limit)?;
+    }
+    if findings > 0 {
+        bail!("{findings} findings");
+    }
+    Ok(())
+}
+
+enum Limit {
+    Inputs(u64),
+    Time(Duration),
+}
+
+/// The inputs of one format.
+struct Run<'a> {
+    seeds: &'a Seeds,
+    seed: u64,
+    share: [u64; 2],
+    pool: Vec<Vec<u8>>,
+    /// Answers without their numbers; a new one is a new way through the reader.
+    answers: HashSet<String>,
+    accepted: u64,
+    contained: u64,
+    slowest: Duration,
+    most_memory: usize,
+    findings: usize,
+}
+
+impl<'a> Run<'a> {
+    fn new(seeds: &'a Seeds, seed: u64, share: [u64; 2]) -> Self {
+        Self {
+            seeds,
+            seed,
+            share,
+            pool: seeds.files.clone(),
+            answers: HashSet::new(),
+            accepted: 0,
+            contained: 0,
+            slowest: Duration::ZERO,
+            most_memory: 0,
+            findings: 0,
+        }
+    }
+
+    /// Tries inputs up to the limit; returns how many were findings.
+    fn go(mut self, limit: &Limit) -> Result<usize> {
+        let name = format!("a.{}", self.seeds.extension);
+        for (index, file) in self.seeds.files.iter().enumerate() {
+            let read = read_bytes(Path::new(&name), file, &ReadOptions::default(), &());
+            read.with_context(|| format!("seed {index} of .{} is not read", self.seeds.extension))?;
+        }
+        let start = Instant::now();
+        let mut done = 0;
+        loop {
+            let over = match limit {
+                Limit::Inputs(inputs) => done >= *inputs,
+                Limit::Time(time) => start.elapsed() >= *time,
+            };
+            if over || self.findings >= ENOUGH {
+                break;
+            }
+            let number = done * self.share[1] + self.share[0];
+            self.one(Path::new(&name), number)?;
+            done += 1;
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        println!(
+            "{:>9} {}/{}: {done} inputs, {:.0}/s, {} read, {} answers, {} panics contained, slowest {:.1} ms, memory up \
+             to {:.1} MB, {} findings",
+            self.seeds.extension,
+            self.share[0] + 1,
+            self.share[1],
+            done as f64 / seconds,
+            self.accepted,
+            self.answers.len(),
+            self.contained,
+            self.slowest.as_secs_f64() * 1e3,
+            self.most_memory as f64 / 1e6,
+            self.findings
+        );
+        Ok(self.findings)
+    }
+
+    fn one(&mut self, name: &Path, number: u64) -> Result<()> {
+        let mut random = Random(self.seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ number << 20);
+        // Half of the inputs begin with a sound file: what is broken already seldom gets far.
+        let from = if random.below(2) == 0 { &self.seeds.files } else { &self.pool };
+        let mut bytes = from[random.below(from.len())].clone();
+        mutate(&mut bytes, &self.seeds.files, &mut random);
+        if self.seeds.extension == "e57" && random.below(8) > 0 {
+            repair_pages(&mut bytes);
+        }
+        let options = ReadOptions {
+            exact: random.below(4) == 0,
+            keep_no_returns: random.below(8) == 0,
+            columns: (random.below(16) == 0).then(|| ["x", "y", "z", "-"].map(String::from).into()),
+            ..ReadOptions::default()
+        };
+        let mesh = random.below(4) == 0;
+        let watcher = Watcher { chunks: random.below(8) == 0, notes: Mutex::default() };
+
+        let before = Instant::now();
+        let (outcome, memory) = meter::measured(|| {
+            catch_unwind(AssertUnwindSafe(|| {
+                let described = describe_bytes(name, &bytes, &options).map(|description| description.format);
+                let read = if mesh {
+                    read_mesh_bytes(name, &bytes, &options, &watcher).map(|contents| contents.cloud.len())
+                } else {
+                    read_bytes(name, &bytes, &options, &watcher).map(|cloud| cloud.len())
+                };
+                (described, read)
+            }))
+        });
+        let time = before.elapsed();
+        self.slowest = self.slowest.max(time);
+        self.most_memory = self.most_memory.max(memory);
+
+        let mut faults = Vec::new();
+        let allowed = MEMORY + MEMORY_PER_BYTE.saturating_mul(bytes.len());
+        match outcome {
+            Err(_) => faults.push("panicked".to_owned()),
+            Ok((described, read)) => {
+                self.accepted += u64::from(read.is_ok());
+                let answers = [described.map(|_| String::new()), read.map(|points| format!("{} points", points > 0))];
+                for answer in answers {
+                    let answer = answer.unwrap_or_else(|error: Error| error.to_string());
+                    if answer.contains(char::is_control) {
+                        faults.push(format!("a message of more than one line: {answer:?}"));
+                    }
+                    self.contained += u64::from(answer.contains("the data are inconsistent"));
+                    self.learn(&answer, &bytes);
+                }
+                for note in watcher.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
+                    if note.contains(char::is_control) {
+                        faults.push(format!("a note of more than one line: {note:?}"));
+                    }
+                    self.learn(&note, &bytes);
+                }
+            }
+        }
+        if time > TIME {
+            faults.push(format!("took {time:?}"));
+        }
+        if memory > allowed {
+            faults.push(format!("took {memory} bytes of memory for a file of {}", bytes.len()));
+        }
+        if !faults.is_empty() {
+            self.findings += 1;
+            let path = keep(self.seeds.extension, number, &bytes)?;
+            eprintln!("{}: {} (mesh: {mesh}, {options:?})", path.display(), faults.join("; "));
+        }
+        Ok(())
+    }
+
+    /// Keeps an input that was answered in a new way.
+    fn learn(&mut self, answer: &str, bytes: &[u8]) {
+        // What stands in quotes comes out of the input.
+        let unquoted = answer.split('\'').next().unwrap_or_default();
+        let kind: String = unquoted.chars().filter(|c| !c.is_ascii_digit()).take(60).collect();
+        if self.answers.len() < 1 << 16 && self.answers.insert(kind) && self.pool.len() < POOL {
+            self.pool.push(bytes.to_vec());
+        }
+    }
+}
+
+/// Listens as the viewer would.
+struct Watcher {
+    chunks: bool,
+    notes: Mutex<Vec<String>>,
+}
+
+impl Progress for Watcher {
+    fn report(&self, fraction: f32) {
+        assert!((0.0..=1.0).contains(&fraction), "progress of {fraction}");
+    }
+
+    fn note(&self, note: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+    }
+
+    fn wants_chunks(&self) -> bool {
+        self.chunks
+    }
+
+    fn chunk(&self, points: PointCloud) {
+        assert!(!points.is_empty(), "a chunk without points");
+    }
+}
+
+/// Writes a finding where it can be looked at.
+fn keep(extension: &str, number: u64, bytes: &[u8]) -> Result<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
+    std::fs::create_dir_all(&folder)?;
+    let path = folder.join(format!("{number}.{extension}"));
+    std::fs::write(&path, bytes)?;
+    Ok(path)
+}
