@@ -13,9 +13,8 @@ const USAGE: &str = "\
 usage: cargo xtask test            format, lints, build, tests, documentation, the rules between crates and stages,
                                and a minute of broken files
        cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options
-       cargo xtask formats [--check]
-                               docs/FORMATS.md, from what the program says of its formats and of the test data; with
-                               --check only whether it is what this build makes";
+       cargo xtask formats         docs/FORMATS.md, from what the program says of its formats and of the test data;
+                               with --check only whether it is what this build makes";
 
 /// Seconds that the tests feed broken files to the readers.
 const FUZZ_SECONDS: &str = "60";

@@ -96,6 +96,14 @@ pub(crate) struct InputArgs {
     /// numbers tx ty tz qx qy qz qw
     #[arg(long = "pose", value_name = "INPUT=FILE")]
     pub(crate) poses: Vec<String>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
+}
+
+/// What files leave open.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Input")]
+pub(crate) struct ReadingArgs {
     /// Columns of text and of bare binary records, such as x,y,z,Intensity,red,green,blue; '-' leaves one out
     /// [default: by the header, or guessed and told]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -359,10 +367,8 @@ others shown."
     /// One JSON object on standard output, for several inputs an array of them (--help has its fields)
     #[arg(long)]
     pub(crate) json: bool,
-    /// Names of the columns of text and bare records, instead of what is guessed: x,y,z,Intensity,red,green,blue … in
-    /// the file's order; '-' for one to leave out
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    pub(crate) columns: Option<Vec<String>>,
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

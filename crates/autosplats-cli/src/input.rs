@@ -7,7 +7,7 @@ use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
 use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions, Scene, check_memory, read_with};
 use rayon::prelude::*;
 
-use crate::args::InputArgs;
+use crate::args::{InputArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
 use crate::progress::Bar;
 
@@ -22,6 +22,19 @@ const BYTES_PER_GENERATED_POINT: u64 = 16;
 pub(crate) struct Inputs {
     list: Vec<Input>,
     options: ReadOptions,
+}
+
+impl ReadingArgs {
+    /// The flags as the library takes them.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let Self { columns, depth_camera, keep_no_returns } = self;
+        ReadOptions {
+            columns: columns.clone(),
+            depth_camera: *depth_camera,
+            keep_no_returns: *keep_no_returns,
+            ..ReadOptions::default()
+        }
+    }
 }
 
 /// One input and where it stands in the world.
@@ -41,7 +54,7 @@ enum Source {
 impl Inputs {
     /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
     pub(crate) fn new(args: &InputArgs) -> Result<Self, Failure> {
-        let InputArgs { inputs: names, poses, columns, depth_camera, keep_no_returns } = args;
+        let InputArgs { inputs: names, poses, reading } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
         let generated = list.iter().map(Input::generated_points).sum::<u64>();
         check_memory(&format!("{generated} generated points"), generated * BYTES_PER_GENERATED_POINT)
@@ -63,13 +76,7 @@ impl Inputs {
                 })?;
             input.world_from_input = read_pose(Path::new(&matrix))?;
         }
-        let options = ReadOptions {
-            columns: columns.clone(),
-            depth_camera: *depth_camera,
-            keep_no_returns: *keep_no_returns,
-            ..ReadOptions::default()
-        };
-        Ok(Self { list, options })
+        Ok(Self { list, options: reading.options() })
     }
 
     /// A built-in scene alone.

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};
 use super::spacing;
 use super::statistics::{Statistics, Values};
+use crate::args::{InputArgs, ReadingArgs};
 use crate::exit::Failure;
 use crate::input::{Inputs, read_failure};
 use crate::progress::Bar;
@@ -64,7 +65,8 @@ impl Examiner {
     /// Finds out what there is to know.
     pub(super) fn examine(&self, name: &str) -> Examination {
         let mut report = Report { input: name.into(), ..Report::default() };
-        let outcome = Inputs::new(&[name.to_owned()], &[]).and_then(|inputs| {
+        let input = InputArgs { inputs: vec![name.into()], poses: Vec::new(), reading: ReadingArgs::default() };
+        let outcome = Inputs::new(&input).and_then(|inputs| {
             let path = inputs.files().next();
             match path {
                 Some(path) => self.file(path, &mut report).map_err(read_failure),
@@ -84,8 +86,7 @@ impl Examiner {
             return Ok(());
         }
         let _alone = (bytes >= LARGE).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-        let bar = Bar::new(&format!("reading {name}"), self.quiet);
+        let bar = Bar::on_file("reading", path, self.quiet);
         let listener = Listener { bar: &bar, notes: Mutex::default() };
         let cloud = read_with(path, &self.options, &listener);
         for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {

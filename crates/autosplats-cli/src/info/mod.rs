@@ -24,7 +24,7 @@ use crate::threads::start_threads;
 pub(crate) fn run(args: &InfoArgs) -> Result<(), Failure> {
     start_threads(&args.run)?;
     // All digits: what is said of the points is to be true of the file.
-    let options = ReadOptions { exact: true, columns: args.columns.clone(), ..ReadOptions::default() };
+    let options = ReadOptions { exact: true, ..args.reading.options() };
     let several = args.inputs.len() > 1;
     let examiner = Examiner::new(options, args.scan, args.run.quiet || several);
 
