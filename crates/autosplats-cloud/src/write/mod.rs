@@ -6,6 +6,7 @@
 //! failure, and then renamed, replacing what was there. What a format cannot hold is told through
 //! [`Progress::note`], once per kind of loss.
 
+mod las;
 mod ply;
 
 use std::{
@@ -26,7 +27,7 @@ struct Format {
 }
 
 /// All formats; longer extensions go before shorter ones.
-const FORMATS: &[Format] = &[ply::FORMAT];
+const FORMATS: &[Format] = &[ply::FORMAT, las::LAS, las::LAZ];
 
 /// Names and extensions of the formats that [`write`] makes.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -53,7 +54,6 @@ impl Job<'_> {
     }
 
     /// Tells the user what the format cannot hold.
-    #[allow(dead_code, reason = "PLY holds nearly everything")]
     fn note(&self, note: impl AsRef<str>) {
         self.progress.note(note.as_ref());
     }
@@ -88,6 +88,11 @@ pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result
 
 fn format(path: &Path) -> Result<&'static Format, Error> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    if name.ends_with(".copc.laz") {
+        // The name promises an octree to programs that read parts of the file.
+        let what = "COPC is not written; leave the '.copc' out of the name for plain LAZ";
+        return Err(Error::Unsupported { path: path.into(), what: what.into() });
+    }
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let format = FORMATS.iter().find(|format| format.extensions.iter().any(ends));
     format.ok_or_else(|| Error::UnknownOutput { path: path.into() })

@@ -284,11 +284,6 @@ pub(super) struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Number of points.
-    pub(super) fn points(&self) -> usize {
-        self.positions.len()
-    }
-
     /// Takes the values of the next points out of their records.
     pub(super) fn take(&mut self, records: &[u8]) {
         records.chunks(CACHED * self.header.record_len).for_each(|records| self.take_cached(records));
