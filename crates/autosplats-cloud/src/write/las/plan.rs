@@ -335,7 +335,7 @@ fn size(values: &FieldValues) -> usize {
 fn extra_name(name: &str, others: &[Extra<'_>]) -> String {
     let cut = |name: &str, len: usize| {
         let end = (0..=len.min(name.len())).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
-        name[..end].to_owned()
+        name[..end].trim_end().to_owned()
     };
     let clean: String = name.chars().filter(|c| !c.is_control()).collect();
     let clean = if clean.trim().is_empty() { "Extra".to_owned() } else { clean.trim().to_owned() };
