@@ -138,7 +138,7 @@ fn extra_bytes_of_every_type() {
         raw.push(200);
         raw.push((-100 * sign) as u8);
         raw.extend(60_000_u16.to_le_bytes());
-        raw.extend((-30_000 * sign as i16 as i32).to_le_bytes()[..2].to_vec());
+        raw.extend((-30_000 * sign as i16).to_le_bytes());
         raw.extend(4_000_000_000_u32.to_le_bytes());
         raw.extend((-2_000_000_000 * sign).to_le_bytes());
         raw.extend(u64::MAX.to_le_bytes());
@@ -216,8 +216,8 @@ fn extra_bytes_that_lie() {
 #[test]
 fn every_bit_of_a_record() {
     let mut narrow = vec![0; 20];
-    narrow[14] = 0b1_1_101_010;
-    narrow[15] = 0b1_0_1_01001;
+    narrow[14] = 0b1110_1010;
+    narrow[15] = 0b1010_1001;
     narrow[16] = -7_i8 as u8;
     narrow[17] = 201;
     let (cloud, _) = load(&file(2, 0, &[], &[narrow]));
@@ -231,7 +231,7 @@ fn every_bit_of_a_record() {
 
     let mut wide = vec![0; 30];
     wide[14] = 0b1011_1101;
-    wide[15] = 0b0_1_10_1010;
+    wide[15] = 0b0110_1010;
     wide[16] = 250;
     wide[17] = 3;
     wide[18..20].copy_from_slice(&(-2500_i16).to_le_bytes());
@@ -351,7 +351,7 @@ fn the_format_fits_the_fields() {
     let time = ("GpsTime", FieldValues::F64(vec![1e9, 0.5]));
     let cases: &[(&[(&str, FieldValues)], &str)] = &[
         (&[], "LAS 1.2, point format 0"),
-        (&[time.clone()], "LAS 1.2, point format 1"),
+        (std::slice::from_ref(&time), "LAS 1.2, point format 1"),
         (&[("Classification", bytes([31, 0]))], "LAS 1.2, point format 0"),
         (&[("Classification", bytes([32, 0]))], "LAS 1.4, point format 6"),
         (&[("ReturnNumber", bytes([5, 1]))], "LAS 1.2, point format 0"),

@@ -13,6 +13,7 @@ const REACH: f64 = 2_147_483_600.0;
 const PART: f64 = 1e-6;
 const STEP: f64 = 1e-3;
 const STEP_DEGREES: f64 = 1e-8;
+const FINEST: f64 = 1e-12;
 
 /// A part of a step by which coordinates may miss their integer, as those do that went through `f32`.
 const SLACK: f64 = 0.25;
@@ -35,13 +36,16 @@ impl Grid {
         let [low, high] =
             (0..count).into_par_iter().map(|i| [world(i); 2]).reduce(none, |[a, b], [c, d]| [a.min(c), b.max(d)]);
         let wished = known.unwrap_or_else(|| {
-            let fine = |size: f64| if size > 0.0 { 10_f64.powf((size * PART).log10().floor()) } else { STEP };
-            let step = fine((high - low).truncate().max_element()).min(STEP).max(1e-12);
+            let fine = |size: f64, coarsest: f64| {
+                let part = if size > 0.0 { 10_f64.powf((size * PART).log10().floor()) } else { coarsest };
+                part.clamp(FINEST, coarsest)
+            };
+            let size = high - low;
             if cloud.crs().unit == Some(Unit::Degree) {
-                let height = fine((high - low).z).clamp(1e-12, STEP);
-                DVec3::new(step.min(STEP_DEGREES), step.min(STEP_DEGREES), height)
+                let step = fine(size.truncate().max_element(), STEP_DEGREES);
+                DVec3::new(step, step, fine(size.z, STEP))
             } else {
-                DVec3::splat(fine((high - low).max_element()).clamp(1e-12, STEP))
+                DVec3::splat(fine(size.max_element(), STEP))
             }
         });
         let scale = DVec3::from_array([0, 1, 2].map(|axis| fitting(wished[axis], high[axis] - low[axis])));

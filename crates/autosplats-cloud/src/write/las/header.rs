@@ -8,7 +8,7 @@ use laz::LazVlr;
 use super::plan::Plan;
 use crate::{
     Crs,
-    crs::GeoKeys,
+    crs::{Found, GeoKeys},
     las::{self, EXTRA_DESCRIPTOR, VLR_HEADER},
 };
 
@@ -162,7 +162,9 @@ fn keys(plan: &Plan<'_>, crs: &Crs, wkt: bool) -> Option<GeoKeys> {
     };
     let own = crs.geotiff.clone().filter(fit);
     let known = crs.epsg.is_some() || crs.unit.is_some() || crs.name.is_some();
-    own.or_else(|| (known && !(wkt && plan.is_wide())).then(|| GeoKeys::describe(crs)))
+    // The keys for what is measured from the middle of the earth are not written.
+    let geocentric = || crs.wkt.as_deref().is_some_and(|text| Found::from_wkt(text).geocentric);
+    own.or_else(|| (known && !(wkt && plan.is_wide()) && !geocentric()).then(|| GeoKeys::describe(crs)))
 }
 
 fn put<const LEN: usize, const COUNT: usize>(bytes: &mut Vec<u8>, values: [[u8; LEN]; COUNT]) {
