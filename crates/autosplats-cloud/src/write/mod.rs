@@ -8,6 +8,7 @@
 
 mod decimal;
 mod e57;
+mod las;
 mod names;
 mod pcd;
 mod ply;
@@ -31,7 +32,7 @@ struct Format {
 }
 
 /// All formats; longer extensions go before shorter ones.
-const FORMATS: &[Format] = &[ply::FORMAT, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
+const FORMATS: &[Format] = &[ply::FORMAT, las::LAS, las::LAZ, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
 
 /// Names and extensions of the formats that [`write`] makes.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
@@ -92,6 +93,11 @@ pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result
 
 fn format(path: &Path) -> Result<&'static Format, Error> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    if name.ends_with(".copc.laz") {
+        // The name promises an octree to programs that read parts of the file.
+        let what = "COPC is not written; leave the '.copc' out of the name for plain LAZ";
+        return Err(Error::Unsupported { path: path.into(), what: what.into() });
+    }
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let format = FORMATS.iter().find(|format| format.extensions.iter().any(ends));
     format.ok_or_else(|| Error::UnknownOutput { path: path.into() })

@@ -222,17 +222,15 @@ impl<'a> Columns<'a> {
         if self.seen.colors {
             cloud = cloud.with_colors(self.colors[range.clone()].to_vec())?;
         }
-        for (index, dimension) in self.dimensions.iter().enumerate() {
-            if self.is_recorded(index) {
-                let values = match &self.fields[index] {
-                    FieldValues::U8(v) => FieldValues::U8(v[range.clone()].to_vec()),
-                    FieldValues::U16(v) => FieldValues::U16(v[range.clone()].to_vec()),
-                    FieldValues::F64(v) => FieldValues::F64(v[range.clone()].to_vec()),
-                    // Enough for a preview.
-                    _ => continue,
-                };
-                cloud = cloud.with_field(&dimension.name, values)?;
-            }
+        for (index, name) in self.names() {
+            let values = match &self.fields[index] {
+                FieldValues::U8(v) => FieldValues::U8(v[range.clone()].to_vec()),
+                FieldValues::U16(v) => FieldValues::U16(v[range.clone()].to_vec()),
+                FieldValues::F64(v) => FieldValues::F64(v[range.clone()].to_vec()),
+                // Enough for a preview.
+                _ => continue,
+            };
+            cloud = cloud.with_field(name, values)?;
         }
         Ok(cloud)
     }
@@ -245,12 +243,28 @@ impl<'a> Columns<'a> {
         }
     }
 
+    /// The fields worth keeping, by index, with names that are all different: an extra value may be called as one of the
+    /// point format's own is.
+    fn names(&self) -> Vec<(usize, String)> {
+        let mut names: Vec<(usize, String)> = Vec::new();
+        for (index, dimension) in self.dimensions.iter().enumerate().filter(|(index, _)| self.is_recorded(*index)) {
+            let mut name = dimension.name.clone();
+            while names.iter().any(|(_, other)| other.eq_ignore_ascii_case(&name)) {
+                name.push('_');
+            }
+            names.push((index, name));
+        }
+        names
+    }
+
     /// Makes the cloud; what is zero for every point was not recorded and is left out. The second value says whether the
     /// colours were 8 bits in the 16 that the format has.
     pub(super) fn into_cloud(mut self) -> (PointCloud, bool) {
-        let recorded: Vec<bool> = (0..self.fields.len()).map(|index| self.is_recorded(index)).collect();
-        let fields = self.dimensions.into_iter().zip(self.fields).zip(recorded).filter(|(_, recorded)| *recorded);
-        let fields = fields.map(|((dimension, values), _)| Field { name: dimension.name, values });
+        let mut names = self.names().into_iter().peekable();
+        let fields = self.fields.into_iter().enumerate().filter_map(|(index, values)| {
+            let (_, name) = names.next_if(|(recorded, _)| *recorded == index)?;
+            Some(Field { name, values })
+        });
         let cloud = PointCloud {
             origin: self.origin,
             fields: fields.collect(),
@@ -284,11 +298,6 @@ pub(super) struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Number of points.
-    pub(super) fn points(&self) -> usize {
-        self.positions.len()
-    }
-
     /// Takes the values of the next points out of their records.
     pub(super) fn take(&mut self, records: &[u8]) {
         records.chunks(CACHED * self.header.record_len).for_each(|records| self.take_cached(records));

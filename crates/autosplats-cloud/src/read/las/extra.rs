@@ -57,13 +57,13 @@ impl Extra {
     }
 }
 
-/// Reads the descriptions, which may be in several records; `taken` are names of other values. What is wrong is told in
-/// notes.
-pub(super) fn extras(header: &Header, records: &Records<'_>, taken: &[String]) -> (Vec<Extra>, Vec<String>) {
+/// Reads the descriptions, which may be in several records. What is wrong is told in notes.
+pub(super) fn extras(header: &Header, records: &Records<'_>) -> (Vec<Extra>, Vec<String>) {
     let base = las::RECORD_LEN[header.format];
     let mut at = base;
     let mut extras: Vec<Extra> = Vec::new();
-    let mut names: Vec<String> = taken.to_vec();
+    // Those that are no fields.
+    let mut names: Vec<String> = ["X", "Y", "Z", "Red", "Green", "Blue"].map(String::from).into();
     let mut notes = Vec::new();
     let described = records.all.iter().filter(|record| record.id == las::EXTRA_BYTES && record.user == las::SPEC);
     let descriptors = described.flat_map(|record| record.data.as_chunks::<{ las::EXTRA_DESCRIPTOR }>().0);

@@ -41,7 +41,7 @@ impl Header {
         if !bytes.starts_with(b"LASF") && bytes.len() >= 4 {
             return Err(fail(0, "a LAS file begins with 'LASF', this one does not".into()));
         }
-        let long = bytes.len() > 25 && (bytes[24], bytes[25]) >= (1, 4) && !(bytes[24] > 1);
+        let long = bytes.len() > 25 && bytes[24] == 1 && bytes[25] >= 4;
         let needed = if long { LONG } else { SHORT };
         if bytes.len() < needed || !bytes.starts_with(b"LASF") {
             let what = format!("the header of {needed} bytes is cut off; copy the file again");

@@ -108,9 +108,7 @@ fn dimensions(header: &Header, records: &Records<'_>) -> (Vec<Dimension>, Vec<St
     let own = las::places(header.format).into_iter();
     let own = own.map(|(name, place)| Dimension { name: name.into(), source: Source::Own(place) });
     let mut dimensions: Vec<Dimension> = own.collect();
-    let mut taken: Vec<String> = dimensions.iter().map(|dimension| dimension.name.clone()).collect();
-    taken.extend(["X", "Y", "Z", "Red", "Green", "Blue"].map(String::from));
-    let (extras, mut notes) = extra::extras(header, records, &taken);
+    let (extras, mut notes) = extra::extras(header, records);
     let extras = extras.into_iter().map(|extra| Dimension { name: extra.name.clone(), source: Source::Extra(extra) });
     dimensions.extend(extras);
     if las::has_waveforms(header.format) {
