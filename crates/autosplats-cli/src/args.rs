@@ -242,6 +242,7 @@ Examples:
   autosplats convert scan.laz scan.ply
   autosplats convert scan.e57 thin.laz --voxel 0.05
   autosplats convert survey.laz house.ply --bounds 512030,5403600,290,512080,5403640,320
+  autosplats convert statue.glb points.ply --sample 1M --noise 0.001
   autosplats convert scene:herd:10M herd.ply
   autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt";
 
@@ -265,6 +266,9 @@ pub(crate) struct ConvertArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Points, in this order")]
 pub(crate) struct ThinningArgs {
+    /// Strew so many points over the surface of each mesh, evenly by area, instead of taking its corners
+    #[arg(long, value_name = "COUNT", value_parser = values::count)]
+    pub(crate) sample: Option<usize>,
     /// Keep the points in a box of world coordinates
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", value_parser = values::bounds, allow_hyphen_values = true)]
     pub(crate) bounds: Option<[DVec3; 2]>,

@@ -15,7 +15,10 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     start_threads(run)?;
     let inputs = Inputs::new(input)?.exactly();
     check_cloud_target(output, *force, inputs.files())?;
-    let mut cloud = inputs.read(run.quiet)?;
+    let mut cloud = match thinning.sample {
+        Some(count) => inputs.sample(count, thinning.seed, run.quiet)?,
+        None => inputs.read(run.quiet)?,
+    };
     let read = cloud.len();
     thin(&mut cloud, thinning, run.quiet)?;
     if cloud.is_empty() {

@@ -4,7 +4,9 @@ use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
 
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
-use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions, Scene, check_memory, read_with};
+use autosplats_cloud::{
+    Error, PointCloud, Progress, ReadOptions, Scene, check_memory, read_mesh, read_with, sample_surface,
+};
 use rayon::prelude::*;
 
 use crate::args::{InputArgs, ReadingArgs};
@@ -116,6 +118,18 @@ impl Inputs {
         self.read_each(quiet, |input, progress| input.read(&self.options, progress))
     }
 
+    /// Reads meshes and strews `count` points over the surface of each, into one cloud.
+    pub(crate) fn sample(&self, count: usize, seed: u64, quiet: bool) -> Result<PointCloud, Failure> {
+        if let Some(input) = self.list.iter().find(|input| matches!(input.source, Source::Scene(..))) {
+            let name = &input.name;
+            return Err(Failure::usage(format!("--sample: {name} is no mesh; name the count with it: {name}:1M")));
+        }
+        self.read_each(quiet, |input, progress| match &input.source {
+            Source::File(path) => sample_surface(&read_mesh(path, &self.options, progress)?, count, seed, &()),
+            Source::Scene(..) => input.read(&self.options, progress),
+        })
+    }
+
     /// Reads the inputs side by side, each by `read`, and puts them together.
     fn read_each(
         &self,
@@ -129,7 +143,10 @@ impl Inputs {
         let bar = Bar::new(&title, quiet);
         let parts: Vec<_> = self.list.iter().map(|input| bar.part(self.list.len(), &input.name)).collect();
         let clouds = self.list.par_iter().zip(&parts).map(|(input, part)| {
-            let cloud = read(input, part).map_err(read_failure)?;
+            let cloud = read(input, part).map_err(|error| match error {
+                Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
+                error => read_failure(error),
+            })?;
             if cloud.is_empty() {
                 return Err(Failure::new(Exit::Input, format!("{}: there is no point in it", input.name)));
             }

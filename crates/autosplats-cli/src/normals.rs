@@ -1,8 +1,10 @@
 //! `autosplats normals`: what the picture previews, for every point and into a file.
 
+use std::borrow::Cow;
+
 use autosplats::cloud::glam::DVec3;
 use autosplats::{Error, NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
-use autosplats_cloud::{Axes, FieldValues, PointCloud, check_memory};
+use autosplats_cloud::{Axes, FieldValues, PointCloud, Unit, check_memory};
 
 use crate::args::{NormalsArgs, OrientChoice};
 use crate::exit::{Exit, Failure};
@@ -26,12 +28,17 @@ pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
         .map_err(read_failure)?;
     let (orientation, towards) = orientation(&cloud, *orient, *sensor)?;
     let bar = Bar::new("estimating normals", run.quiet);
+    // Degrees and metres do not make a sphere: such points get the normals that they have on the ground.
+    let mut local = Cow::Borrowed(&cloud);
+    if cloud.crs().unit == Some(Unit::Degree) {
+        local.to_mut().to_local_metres();
+    }
     let normals =
-        estimate_normals(&cloud, &NormalSettings { k: *k, orientation }, &bar).map_err(|error| match error {
+        estimate_normals(&local, &NormalSettings { k: *k, orientation }, &bar).map_err(|error| match error {
             Error::Cancelled => Failure::interrupted(),
             error => render_failure(error),
         })?;
-    drop(bar);
+    drop((bar, local));
     let cloud = with_normals(cloud, normals)?;
     let bytes = write_cloud(&cloud, output, run.quiet)?;
     if !run.quiet {

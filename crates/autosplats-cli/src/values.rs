@@ -3,8 +3,8 @@
 use std::str::FromStr;
 
 use autosplats::{Background, ColorMode, MAX_SIDE};
-use autosplats_cloud::DepthCamera;
 use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::{DepthCamera, parse_count};
 
 /// The colour modes by name; any other name is a field's.
 pub(crate) const COLOR_MODES: [&str; 11] = [
@@ -65,6 +65,11 @@ pub(crate) fn depth_camera(text: &str) -> Result<DepthCamera, String> {
     } else {
         Err("focal lengths and values per metre are above 0".into())
     }
+}
+
+/// `250000`, `250K` or `2.5M`
+pub(crate) fn count(text: &str) -> Result<usize, String> {
+    parse_count(text).ok_or_else(|| "a number of points is expected, such as 250000, 250K or 1.5M".into())
 }
 
 /// A whole number above zero.

@@ -64,6 +64,17 @@ fn points_are_taken_out_in_order() {
 }
 
 #[test]
+fn a_mesh_is_strewn_with_points() {
+    let folder = Folder::with_sphere();
+    folder.write("square.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n");
+    folder.succeed(&["convert", "square.obj", "out.ply", "--sample", "5K"]);
+    assert_eq!(points(&folder.read("out.ply")), 5000, "as many as asked for");
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--sample", "5K"], 3, &["sphere.ply", "no surface"]);
+    folder.fail(&["convert", "scene:statue", "b.ply", "--sample", "5K"], 2, &["scene:statue:1M"]);
+    folder.fail(&["convert", "square.obj", "b.ply", "--sample", "0"], 2, &["number of points"]);
+}
+
+#[test]
 fn only_known_formats_are_written() {
     let folder = Folder::with_sphere();
     folder.fail(&["convert", "sphere.ply", "out.doc"], 2, &["out.doc", ".ply"]);

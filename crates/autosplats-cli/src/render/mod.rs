@@ -23,7 +23,10 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let device = Device::cpu();
 
     let started = Instant::now();
-    let cloud = job.inputs.read(job.quiet)?;
+    let mut cloud = job.inputs.read(job.quiet)?;
+    if cloud.to_local_metres() && !job.quiet {
+        eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
+    }
     let read = milliseconds_since(started);
 
     job.check_color(&cloud)?;
