@@ -26,7 +26,7 @@ use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions, describe_bytes,
 use clap::Parser;
 
 use crate::mutate::{Random, mutate, repair_pages};
-use crate::seeds::{Seeds, all};
+use crate::seeds::{Seeds, add_corpus, all};
 
 /// What any input may take; far more than a sane answer needs, far less than a claimed count would.
 const TIME: Duration = Duration::from_secs(2);
@@ -56,6 +56,9 @@ struct Arguments {
     /// Another seed makes other inputs
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Take the files of a folder, up to 64 KB each, as further seeds
+    #[arg(long, value_name = "FOLDER")]
+    corpus: Option<PathBuf>,
     /// Share of this process among how many
     #[arg(long, hide = true, value_parser = share)]
     share: Option<[u64; 2]>,
@@ -107,6 +110,12 @@ fn work(arguments: &Arguments, share: [u64; 2]) -> Result<()> {
     // Inside the pool, parallel loops run here instead of being handed over.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
     let mut formats = all()?;
+    if let Some(folder) = &arguments.corpus {
+        let added = add_corpus(&mut formats, folder)?;
+        if share[0] == 0 {
+            println!("{added} files of {} are seeds, too", folder.display());
+        }
+    }
     if !arguments.readers.is_empty() {
         for reader in &arguments.readers {
             ensure!(formats.iter().any(|seeds| seeds.extension == *reader), "no seeds end in .{reader}");
@@ -167,7 +176,7 @@ impl<'a> Run<'a> {
     /// Tries inputs up to the limit; returns how many were findings.
     fn go(mut self, limit: &Limit) -> Result<usize> {
         let name = format!("a.{}", self.seeds.extension);
-        for (index, file) in self.seeds.files.iter().enumerate() {
+        for (index, file) in self.seeds.files.iter().enumerate().take(self.seeds.own) {
             let read = read_bytes(Path::new(&name), file, &ReadOptions::default(), &());
             read.with_context(|| format!("seed {index} of .{} is not read", self.seeds.extension))?;
         }

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, write};
+use autosplats_cloud::glam::{DMat4, DQuat, DVec3};
+use autosplats_cloud::{FieldValues, PointCloud, Scan, write};
 
 /// Files of one format.
 pub(crate) struct Seeds {
@@ -11,21 +12,72 @@ pub(crate) struct Seeds {
     pub(crate) extension: &'static str,
     /// Their contents.
     pub(crate) files: Vec<Vec<u8>>,
+    /// How many of them are made here, hence sound; those of a corpus need not be.
+    pub(crate) own: usize,
 }
 
 /// Points of a seed: few, so that many inputs fit into a second.
 const POINTS: usize = 24;
 
+/// Longer files of a corpus would only make the run slower.
+const MAX_SEED: u64 = 64 << 10;
+
 pub(crate) fn all() -> Result<Vec<Seeds>> {
-    let seeds = |extension, files: Vec<Vec<u8>>| Seeds { extension, files };
+    let seeds = |extension, files: Vec<Vec<u8>>| Seeds { extension, own: files.len(), files };
     let rows: String = (0..POINTS).map(|i| format!("{} {} {} {}\n", i, i * i % 7, 0.5 * i as f64, i * 10)).collect();
+    let positions: String = (0..POINTS).map(|i| format!("{} {} {}\n", i, i * i % 7, 0.5 * i as f64)).collect();
+    let faces = |word: &str, first: usize| -> String {
+        (first..first + POINTS - 2).map(|i| format!("{word} {i} {} {}\n", i + 1, i + 2)).collect()
+    };
+    let vertices: String = positions.lines().map(|row| format!("v {row}\n")).collect();
+    let sweep = |columns: usize| (0..POINTS * columns).flat_map(|i| (0.5 * (i % 40) as f32).to_le_bytes()).collect();
     Ok(vec![
-        seeds("ply", [written("ply")?, vec![ascii_ply(), list_ply()]].concat()),
-        seeds("pcd", vec![ascii_pcd()]),
-        seeds("xyz", vec![rows.clone().into_bytes()]),
-        seeds("pts", vec![format!("{POINTS}\n{rows}").into_bytes()]),
-        seeds("csv", vec![format!("x,y,z,Intensity\n{}", rows.replace(' ', ",")).into_bytes()]),
+        seeds("ply", [written("ply")?, vec![ascii_ply(), list_ply(), mesh_ply()]].concat()),
+        seeds("pcd", [written("pcd")?, vec![ascii_pcd(), compressed_pcd()]].concat()),
+        seeds("las", [written("las")?, las(false)?].concat()),
+        seeds("laz", [written("laz")?, las(true)?].concat()),
+        seeds("e57", written("e57")?),
+        seeds("ptx", vec![ptx()]),
+        seeds("xyz", [written("xyz")?, vec![rows.clone().into_bytes()]].concat()),
+        seeds("pts", [written("pts")?, vec![format!("{POINTS}\n{rows}").into_bytes()]].concat()),
+        seeds("csv", [written("csv")?, vec![odd_csv()]].concat()),
+        seeds("obj", vec![format!("# a\ng b\n{vertices}{}", faces("f", 1)).into_bytes(), odd_obj()]),
+        seeds("off", vec![format!("OFF\n{POINTS} {} 0\n{positions}{}", POINTS - 2, faces("3", 0)).into_bytes()]),
+        seeds("stl", vec![binary_stl(), text_stl()]),
+        seeds("glb", vec![glb()]),
+        seeds("gltf", vec![gltf()]),
+        seeds("bin", vec![sweep(4)]),
+        seeds("pcd.bin", vec![sweep(5)]),
+        seeds("pgm", vec![pgm(), b"P2\n# a\n3 2\n65535\n0 1000 2000\n3000 65535 7\n".to_vec()]),
+        seeds("png", vec![png()?]),
     ])
+}
+
+/// The files of a folder, and of those in it, as further seeds of the formats that their names tell.
+pub(crate) fn add_corpus(seeds: &mut [Seeds], folder: &Path) -> Result<usize> {
+    let mut added = 0;
+    let mut entries: Vec<_> = std::fs::read_dir(folder)
+        .with_context(|| format!("corpus {}", folder.display()))?
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<std::io::Result<_>>()?;
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            added += add_corpus(seeds, &path)?;
+            continue;
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let ends = |seeds: &&mut Seeds| name.strip_suffix(seeds.extension).is_some_and(|stem| stem.ends_with('.'));
+        // Of .bin and .pcd.bin the longer one is meant.
+        let of = seeds.iter_mut().filter(|seeds| ends(seeds)).max_by_key(|seeds| seeds.extension.len());
+        if let Some(seeds) = of
+            && path.metadata()?.len() <= MAX_SEED
+        {
+            seeds.files.push(std::fs::read(&path)?);
+            added += 1;
+        }
+    }
+    Ok(added)
 }
 
 /// Clouds of several kinds in a format that the project writes.
@@ -38,7 +90,11 @@ fn written(extension: &str) -> Result<Vec<Vec<u8>>> {
         .with_field("Classification", FieldValues::U8((0..POINTS).map(|i| byte(i % 6)).collect()))?
         .with_field("GpsTime", FieldValues::F64((0..POINTS).map(|i| 1e5 + i as f64).collect()))?
         .with_field("odd name", FieldValues::F32((0..POINTS).map(|i| i as f32 - 3.5).collect()))?;
-    let far = PointCloud::new(DVec3::new(5e5, 5e6, 300.0), bare.positions().to_vec());
+    let far = PointCloud::new(DVec3::new(5e5, 5e6, 300.0), bare.positions().to_vec()).with_scans(vec![Scan {
+        name: Some("a".into()),
+        world_from_sensor: DMat4::from_rotation_translation(DQuat::from_rotation_z(0.5), DVec3::new(5e5, 5e6, 300.0)),
+        points: 2..POINTS - 2,
+    }]);
     let folder = tempfile::tempdir()?;
     let path = folder.path().join(format!("a.{extension}"));
     [bare, rich, far].iter().map(|cloud| file(cloud, &path)).collect()
@@ -78,4 +134,153 @@ fn ascii_pcd() -> Vec<u8> {
     b"# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb label\nSIZE 4 4 4 4 2\nTYPE F F F F U\nCOUNT 1 1 1 1 1\nWIDTH 2\n\
       HEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 4\nDATA ascii\n1 2 3 4.2e-38 1\nnan nan nan 0 2\n0 0 0 0 3\n4 5 6 255 4\n"
         .to_vec()
+}
+
+/// Literal runs only, as a compressor that finds nothing makes them.
+fn compressed_pcd() -> Vec<u8> {
+    let mut bytes = b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 8\nHEIGHT 1\n\
+                      VIEWPOINT 1 2 3 1 0 0 0\nPOINTS 8\nDATA binary_compressed\n"
+        .to_vec();
+    let plain: Vec<u8> = (0..24).flat_map(|i| (i as f32).to_le_bytes()).collect();
+    let mut compressed = Vec::new();
+    for run in plain.chunks(32) {
+        compressed.push(run.len() as u8 - 1);
+        compressed.extend(run);
+    }
+    bytes.extend((compressed.len() as u32).to_le_bytes());
+    bytes.extend((plain.len() as u32).to_le_bytes());
+    bytes.extend(compressed);
+    bytes
+}
+
+fn mesh_ply() -> Vec<u8> {
+    let mut bytes = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                      property float z\nelement face 2\nproperty list uchar int vertex_indices\nelement tristrips 1\n\
+                      property list int int vertex_indices\nend_header\n"
+        .to_vec();
+    bytes.extend((0..12).flat_map(|i| (i as f32).to_le_bytes()));
+    for face in [[0_i32, 1, 2], [2, 1, 3]] {
+        bytes.push(3);
+        bytes.extend(face.map(i32::to_le_bytes).as_flattened());
+    }
+    bytes.extend(7_i32.to_le_bytes());
+    bytes.extend([0, 1, 2, -1, 1, 2, 3].map(i32::to_le_bytes).as_flattened());
+    bytes
+}
+
+/// Every point format, with a byte more than it needs where records may be longer.
+fn las(compressed: bool) -> Result<Vec<Vec<u8>>> {
+    let one = |format: u8| {
+        let mut builder = las::Builder::from(if format < 6 { (1, 3) } else { (1, 4) });
+        builder.point_format = las::point::Format::new(format)?;
+        builder.point_format.is_compressed = compressed;
+        builder.point_format.extra_bytes = u16::from(format % 3);
+        let format = builder.point_format;
+        let mut writer = las::Writer::new(std::io::Cursor::new(Vec::new()), builder.into_header()?)?;
+        for i in 0..POINTS as u16 {
+            writer.write_point(las::Point {
+                x: f64::from(i) * 0.5,
+                y: f64::from(i * i % 7),
+                intensity: i,
+                return_number: 1,
+                number_of_returns: 2,
+                gps_time: format.has_gps_time.then(|| f64::from(i)),
+                color: format.has_color.then(|| las::Color::new(i, 300, 7)),
+                nir: format.has_nir.then_some(i),
+                waveform: format.has_waveform.then(Default::default),
+                extra_bytes: vec![1; usize::from(format.extra_bytes)],
+                ..Default::default()
+            })?;
+        }
+        writer.close()?;
+        Ok(writer.into_inner()?.into_inner())
+    };
+    (0..=10).filter(|format| !compressed || ![4, 5, 9, 10].contains(format)).map(one).collect()
+}
+
+fn ptx() -> Vec<u8> {
+    b"2\n2\n10 20 30\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n10 20 30 1\n1 2 3 0.5\n0 0 0 0.5\n4 5 6 0.25\n\
+      7 8 9 1\n1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 2 3 0.5 255 0 7\n4 5 6 0.5 1 2 3\n"
+        .to_vec()
+}
+
+fn odd_csv() -> Vec<u8> {
+    "\u{feff}\"Easting [m]\";\"Northing\";\"Height\";\"R\";\"G\";\"B\"\r\n1,5;2,5;3,5;1;2;3\r\n4;5;6,25;;255;7;\r\n"
+        .into()
+}
+
+fn odd_obj() -> Vec<u8> {
+    b"v 1 2 3 0.5 0.5 1\r\nv 4 5 \\\n6 1 0 0\nv 7 8 9 0 1 0\nvt 0 0\nvn 0 0 1\nf -1/1/1 -2//1 -3/1\nf 1 2\nl 1 2\n"
+        .to_vec()
+}
+
+fn binary_stl() -> Vec<u8> {
+    let mut bytes = [&[b' '; 80][..], &4_u32.to_le_bytes()].concat();
+    for facet in 0..4 {
+        bytes.extend((0..12).flat_map(|i| ((facet + i) as f32).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+fn text_stl() -> Vec<u8> {
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    format!("solid a\n{}endsolid a\n", facet.repeat(3)).into_bytes()
+}
+
+/// Positions, colours and corners of a triangle, the first of them with a sparse change.
+fn scene(buffer: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"children":[1],"translation":[1,2,3]}},{{"mesh":0,"scale":[1,2,3]}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"COLOR_0":2}},"indices":1,"mode":4}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","sparse":{{"count":1,"indices":{{"bufferView":1,"componentType":5123}},"values":{{"bufferView":0}}}}}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}},{{"bufferView":2,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}}],"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}},{{"buffer":0,"byteOffset":44,"byteLength":12}}],"buffers":[{{{buffer}"byteLength":56}}]}}"#
+    )
+}
+
+fn scene_bytes() -> Vec<u8> {
+    let mut bytes: Vec<u8> = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat();
+    bytes.extend([0_u16, 1, 2, 0].map(u16::to_le_bytes).as_flattened());
+    bytes.extend([255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 128]);
+    bytes
+}
+
+fn glb() -> Vec<u8> {
+    let mut json = scene("").into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let data = scene_bytes();
+    let len = |len: usize| (len as u32).to_le_bytes();
+    [
+        &b"glTF\x02\0\0\0"[..],
+        &len(28 + json.len() + data.len()),
+        &len(json.len()),
+        b"JSON",
+        &json,
+        &len(data.len()),
+        b"BIN\0",
+        &data,
+    ]
+    .concat()
+}
+
+fn gltf() -> Vec<u8> {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for bytes in scene_bytes().chunks(3) {
+        let bits = bytes.iter().enumerate().fold(0, |bits, (at, &byte)| bits | u32::from(byte) << (16 - 8 * at));
+        for digit in 0..4 {
+            let value = (bits >> (18 - 6 * digit) & 63) as usize;
+            text.push(if digit <= bytes.len() { char::from(DIGITS[value]) } else { '=' });
+        }
+    }
+    scene(&format!("\"uri\":\"data:application/octet-stream;base64,{text}\",")).into_bytes()
+}
+
+fn pgm() -> Vec<u8> {
+    let values = (0..24_u16).flat_map(|i| (i * 500).to_be_bytes());
+    b"P5\n6 4\n65535\n".iter().copied().chain(values).collect()
+}
+
+fn png() -> Result<Vec<u8>> {
+    let depths = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(6, 4, |x, y| image::Luma([(x * y * 500) as u16]));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    depths.write_to(&mut bytes, image::ImageFormat::Png)?;
+    Ok(bytes.into_inner())
 }
