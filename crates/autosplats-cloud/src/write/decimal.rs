@@ -27,7 +27,12 @@ pub(super) fn push(text: &mut Vec<u8>, value: f64, same: impl Fn(f64) -> bool) {
         return;
     }
     // Very small, very large, infinite, or with all the digits there are.
-    let _ = write!(text, "{value:e}");
+    let single = format!("{:e}", value as f32);
+    if single.parse().is_ok_and(same) {
+        text.extend(single.as_bytes());
+    } else {
+        let _ = write!(text, "{value:e}");
+    }
 }
 
 /// Appends an integer.

@@ -34,7 +34,7 @@ struct Format {
 /// All formats; longer extensions go before shorter ones.
 const FORMATS: &[Format] = &[ply::FORMAT, las::LAS, las::LAZ, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
 
-/// Names and extensions of the formats that [`write`] makes.
+/// Names and extensions of the formats that [`write()`] makes.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
     FORMATS.iter().map(|format| (format.name, format.extensions))
 }
@@ -103,7 +103,7 @@ fn format(path: &Path) -> Result<&'static Format, Error> {
     format.ok_or_else(|| Error::UnknownOutput { path: path.into() })
 }
 
-/// Whether [`write`] knows a format for this name.
+/// Whether [`write()`] knows a format for this name.
 ///
 /// # Errors
 /// [`Error::UnknownOutput`] if not.
