@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::args::DoctorArgs;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
+use crate::info::wrapped;
 use crate::output::{print_bytes, print_line};
 use crate::render::scene_camera;
 
@@ -24,6 +25,9 @@ const PEAK: f64 = 2.3;
 /// Points and pixels of the self-test.
 const TEST_POINTS: usize = 20_000;
 const TEST_SIZE: [u32; 2] = [320, 200];
+
+/// Columns before what is said of a thing.
+const INDENT: usize = 20;
 
 /// Everything that was found out. Its JSON is what `--json` prints.
 #[derive(Debug, Serialize)]
@@ -213,7 +217,7 @@ impl Findings {
         line("terminal", format!("{progress}{kind}"));
         for (name, list) in [("reads", &self.formats.read), ("writes", &self.formats.written)] {
             let shown = |format: &Format| format!("{} (.{})", format.name, format.extensions.join(" ."));
-            line(name, list.iter().map(shown).collect::<Vec<_>>().join(", "));
+            line(name, wrapped(&list.iter().map(shown).collect::<Vec<_>>().join(", "), INDENT));
         }
         lines.join("\n") + "\n"
     }

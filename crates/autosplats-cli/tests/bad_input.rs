@@ -48,8 +48,8 @@ fn files_that_are_no_clouds() {
     let folder = Folder::with_sphere();
     folder.fail(&render("missing.ply"), 3, &["missing.ply"]);
     folder.fail(&render("."), 3, &["folder"]);
-    folder.write("unknown.stl", "solid cube\n");
-    folder.fail(&render("unknown.stl"), 3, &["unknown.stl", "PLY"]);
+    folder.write("unknown.doc", "no points\n");
+    folder.fail(&render("unknown.doc"), 3, &["unknown.doc", "PLY"]);
     folder.write("empty.ply", "");
     folder.fail(&render("empty.ply"), 3, &["empty.ply"]);
     folder.write("words.xyz", "this is no number\n");

@@ -58,7 +58,7 @@ fn a_temporary_folder_that_is_none_is_named() {
     assert!(text.contains("broken") && text.contains("absent cannot be written"), "{text}");
 }
 
-const COMMANDS: [&str; 7] = ["render", "convert", "demo", "info", "doctor", "completions", "man"];
+const COMMANDS: [&str; 8] = ["render", "convert", "normals", "demo", "info", "doctor", "completions", "man"];
 
 #[test]
 fn completions_know_all_commands() {

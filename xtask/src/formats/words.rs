@@ -40,7 +40,7 @@ pub(super) const WORDS: &[Words] = &[
     },
     Words {
         name: "PLY",
-        kept: "text and binary of both byte orders; all scalar properties of `vertex`, colours, faces for sampling",
+        kept: "text and binary of both byte orders; all scalar properties of `vertex`, colours; faces by the library's `read_mesh`",
         not_kept: "list properties of points, other elements",
     },
     Words {
@@ -78,14 +78,18 @@ pub(super) const WORDS: &[Words] = &[
     },
     Words {
         name: "OBJ",
-        kept: "vertices with colours and normals, faces for sampling",
+        kept: "vertices with colours and normals; faces by the library's `read_mesh`",
         not_kept: "materials, textures",
     },
-    Words { name: "OFF", kept: "vertices with colours and normals, faces for sampling", not_kept: "" },
-    Words { name: "STL", kept: "text and binary; corners as points, faces for sampling", not_kept: "attribute bytes" },
+    Words { name: "OFF", kept: "vertices with colours and normals; faces by the library's `read_mesh`", not_kept: "" },
+    Words {
+        name: "STL",
+        kept: "text and binary; corners as points; faces by the library's `read_mesh`",
+        not_kept: "attribute bytes",
+    },
     Words {
         name: "glTF",
-        kept: "GLB and glTF with embedded or neighbouring buffers: points and meshes of the scene, placed; colours, normals",
+        kept: "GLB and glTF with embedded or neighbouring buffers: points and meshes of the scene, placed; colours, normals; faces by the library's `read_mesh`",
         not_kept: "materials, textures, animation",
     },
     Words { name: "NPY", kept: "arrays of numbers with three or more columns", not_kept: "" },

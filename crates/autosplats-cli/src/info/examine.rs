@@ -218,12 +218,15 @@ impl Report {
             return;
         }
         let mut off = Vec::new();
+        let largest = |values: [f64; 3]| values.into_iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+        // Programs round what they write there.
+        let rounding = 1e-5 * largest(bounds.size).max(0.01 * largest(bounds.max).max(largest(bounds.min)));
         for (axis, name) in ["x", "y", "z"].iter().enumerate() {
-            let step = self.resolution.map_or(0.0, |step| step[axis]);
-            let allowed = 1.5 * step.max(header.max[axis].abs().max(header.min[axis].abs()) * 1e-7);
+            let allowed = rounding.max(self.resolution.map_or(0.0, |step| 1.5 * step[axis]));
             let ends = [(header.min, bounds.min), (header.max, bounds.max)];
             if ends.iter().any(|(claimed, found)| (claimed[axis] - found[axis]).abs() > allowed) {
-                off.push(format!("{name} {} to {}", header.min[axis], header.max[axis]));
+                let [low, high] = [header.min, header.max].map(|end| tidy(end[axis], largest(header.max)));
+                off.push(format!("{name} {low} to {high}"));
             }
         }
         if !off.is_empty() {
@@ -249,15 +252,15 @@ impl Report {
                 }
                 _ => continue,
             };
-            coarse.push(format!("{} in steps of {step}", attribute.name));
+            coarse.push((attribute.name.as_str(), step));
         }
-        if !coarse.is_empty() {
-            self.warn(format!(
-                "coordinates are coarse for points {} apart: {}; surfaces will look stepped",
-                super::text::short(spacing.median),
-                coarse.join(", ")
-            ));
-        }
+        let steps = match coarse.as_slice() {
+            [] => return,
+            [(_, step), (_, y), (_, z)] if step == y && step == z => format!("steps of {step}"),
+            some => some.iter().map(|(name, step)| format!("{name} in steps of {step}")).collect::<Vec<_>>().join(", "),
+        };
+        let apart = super::text::short(spacing.median);
+        self.warn(format!("coordinates are coarse for points {apart} apart: {steps}; surfaces will look stepped"));
     }
 }
 

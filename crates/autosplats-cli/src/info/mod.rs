@@ -15,6 +15,7 @@ use autosplats_cloud::ReadOptions;
 
 use self::examine::{Examination, Examiner};
 pub(crate) use self::report::SCHEMA;
+pub(crate) use self::text::wrapped;
 use crate::args::InfoArgs;
 use crate::exit::{Exit, Failure};
 use crate::output::{print_bytes, print_line};

@@ -124,7 +124,12 @@ impl Report {
             let [x, y, z] = bounds.size.map(|size| short(size * metres));
             format!(" ({x} × {y} × {z} m)")
         });
-        format!("{x} × {y} × {z}{}{metric}", self.symbol())
+        match self.crs.vertical_unit.map(symbol) {
+            Some(vertical) if vertical != self.symbol() => {
+                format!("{x} × {y}{}, {z}{vertical} high", self.symbol())
+            }
+            _ => format!("{x} × {y} × {z}{}{metric}", self.symbol()),
+        }
     }
 
     fn shown_unit(&self) -> String {
@@ -148,14 +153,7 @@ impl Report {
 
     /// The unit behind a number, with a blank before it.
     fn symbol(&self) -> &'static str {
-        match self.crs.unit {
-            Some("metre") => " m",
-            Some("millimetre") => " mm",
-            Some("foot") => " ft",
-            Some("US survey foot") => " ft",
-            Some("degree") => " °",
-            _ => "",
-        }
+        self.crs.unit.map_or("", symbol)
     }
 
     fn in_metres(&self, value: f64) -> String {
@@ -184,9 +182,12 @@ impl Report {
             return;
         }
         let coordinates = self.bounds.as_ref().map(|bounds| self.decimals(bounds));
-        let rows: Vec<[String; 6]> = self
+        let (shown, hidden): (Vec<_>, Vec<_>) = self
             .attributes
             .iter()
+            .partition(|attribute| !self.scanned || attribute.statistics != Statistics::default());
+        let rows: Vec<[String; 6]> = shown
+            .into_iter()
             .map(|AttributeFound { name, stored, statistics }| {
                 let Statistics { min, max, mean, histogram, not_finite, .. } = statistics;
                 let axis = ["x", "y", "z"].iter().position(|axis| {
@@ -202,16 +203,10 @@ impl Report {
                 // Coordinates without a place are counted above.
                 let bad = not_finite.filter(|count| *count > 0 && axis.is_none());
                 let bad = bad.map_or_else(String::new, |count| format!(" {} not finite", counted(count)));
-                let bars = match histogram {
-                    Some(histogram) => sparkline(histogram),
-                    None if self.scanned && ["rgb", "rgba"].contains(&&*name.to_ascii_lowercase()) => {
-                        "a colour: red, green, blue below".into()
-                    }
-                    None => String::new(),
-                };
+                let bars = histogram.as_ref().map_or_else(String::new, sparkline);
                 [
                     clipped(&plain(name), 22),
-                    clipped(&plain(stored), 16),
+                    clipped(&plain(stored), 24),
                     shown(min, decimals),
                     shown(max, decimals),
                     shown(mean, mean_decimals),
@@ -236,6 +231,11 @@ impl Report {
                 };
             }
             let _ = writeln!(page, "{}", format!("{line}  {}", row[5]).trim_end());
+        }
+        if !hidden.is_empty() {
+            let names: Vec<_> = hidden.iter().map(|attribute| clipped(&plain(&attribute.name), 22)).collect();
+            let text = format!("not shown (0 everywhere, or read as something else): {}", names.join(", "));
+            let _ = writeln!(page, "  {}", wrapped(&text, 4));
         }
     }
 
@@ -287,6 +287,17 @@ impl Report {
     }
 }
 
+/// What stands behind a number of a unit, with a blank before it.
+fn symbol(unit: &str) -> &'static str {
+    match unit {
+        "metre" => " m",
+        "millimetre" => " mm",
+        "foot" | "US survey foot" => " ft",
+        "degree" => " °",
+        _ => "",
+    }
+}
+
 /// A histogram in one line, a character per bin; a bin with anything in it is never empty.
 fn sparkline(histogram: &Histogram) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
@@ -302,7 +313,9 @@ fn sparkline(histogram: &Histogram) -> String {
 fn value_decimals(min: f64, max: f64, statistics: &Statistics) -> usize {
     let whole = statistics.distinct.is_some() || (min.fract() == 0.0 && max.fract() == 0.0 && max - min >= 1000.0);
     let range = if max > min { max - min } else { max.abs() };
-    if whole { 0 } else { decimals_for(range, 5) }
+    // Eleven digits in all are enough for anyone who looks.
+    let integer = min.abs().max(max.abs()).max(1.0).log10().floor() as usize + 1;
+    if whole { 0 } else { decimals_for(range, 5).min(11_usize.saturating_sub(integer).max(1)) }
 }
 
 /// Decimals that show `digits` digits of a value.
@@ -368,7 +381,7 @@ fn clipped(text: &str, most: usize) -> String {
 }
 
 /// Breaks lines between words; those after the first are indented.
-fn wrapped(text: &str, indent: usize) -> String {
+pub(crate) fn wrapped(text: &str, indent: usize) -> String {
     let mut lines = String::new();
     let mut column = indent;
     for word in text.split(' ') {
