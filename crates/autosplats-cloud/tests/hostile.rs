@@ -8,7 +8,7 @@ mod common;
 use std::time::{Duration, Instant};
 
 use autosplats_cloud::{PointCloud, ReadOptions, describe, read, read_mesh, write};
-use common::{Random, error, las_bytes, pcd_bytes, read_bytes, rich_cloud};
+use common::{Random, error, las_bytes, pcd_bytes, ptx_bytes, read_bytes, rich_cloud};
 
 /// Far above what any of these small files takes, far below what a loop over a claimed count would.
 const LIMIT: Duration = Duration::from_secs(5);
@@ -20,6 +20,8 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
     write(&rich_cloud(POINTS), &path, &()).unwrap();
+    let scanned = folder.path().join("a.e57");
+    write(&rich_cloud(POINTS), &scanned, &()).unwrap();
     let rows: String = rich_cloud(POINTS).positions().iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
     let header =
         "element vertex 300\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nend_header\n";
@@ -41,6 +43,8 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("a.pcd", pcd_bytes("ascii", POINTS)),
         ("b.pcd", pcd_bytes("binary", POINTS)),
         ("c.pcd", pcd_bytes("binary_compressed", POINTS)),
+        ("a.e57", std::fs::read(&scanned).unwrap()),
+        ("a.ptx", ptx_bytes(POINTS)),
         ("a.xyz", rows.clone().into_bytes()),
         ("a.pts", format!("{POINTS}\n{rows}").into_bytes()),
         ("a.csv", format!("x,y,z\n{}", rows.replace(' ', ",")).into_bytes()),

@@ -152,3 +152,16 @@ pub(crate) fn pcd_bytes(encoding: &str, count: usize) -> Vec<u8> {
     }
     bytes
 }
+
+/// A PTX of two scans, with intensities and colours.
+pub(crate) fn ptx_bytes(count: usize) -> Vec<u8> {
+    let rows: Vec<String> = positions(count)
+        .into_iter()
+        .zip(colors(count))
+        .map(|([x, y, z], [red, green, blue])| format!("{x} {y} {z} 0.5 {red} {green} {blue}\n"))
+        .collect();
+    let map = "9 8 7\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n9 8 7 1\n";
+    let (first, second) = rows.split_at(count / 2);
+    let scan = |rows: &[String]| format!("{}\n1\n{map}{}", rows.len(), rows.concat());
+    (scan(first) + &scan(second)).into_bytes()
+}

@@ -98,7 +98,7 @@ impl<'a> Source<'a> {
         dropped.nothing += without - directions;
         dropped.at_scanner += if drop_zeros { zeros } else { 0 };
         dropped.kept_at_scanner += if drop_zeros || zeros < 2 { 0 } else { zeros };
-        let keep = |i: &u32| !invalid(*i) && !(drop_zeros && at_scanner(*i));
+        let keep = |i: &u32| !(invalid(*i) || drop_zeros && at_scanner(*i));
         (without > 0 || drop_zeros).then(|| (0..count).into_par_iter().filter(keep).collect())
     }
 
@@ -367,10 +367,10 @@ fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<Wanted>) {
         let have: usize = field.taken.iter().map(stored).map(|(len, _)| len).sum();
         let constant: usize =
             field.taken.iter().map(stored).map(|(len, constant)| if constant { len } else { 0 }).sum();
-        if have < total {
-            if let Kind::Integer { min, max } = field.kind {
-                field.kind = Kind::Integer { min: min.min(0), max: max.max(0) };
-            }
+        if let Kind::Integer { min, max } = field.kind
+            && have < total
+        {
+            field.kind = Kind::Integer { min: min.min(0), max: max.max(0) };
         }
         let cost = (total - have + constant).saturating_mul(field.kind.size());
         if cost > budget {

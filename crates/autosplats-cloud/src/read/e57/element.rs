@@ -116,8 +116,8 @@ impl Kind {
             Self::Double => FieldValues::F64(Vec::new()),
             Self::Integer { min: 0.., max } => match max {
                 ..=0xff => FieldValues::U8(Vec::new()),
-                ..=0xffff => FieldValues::U16(Vec::new()),
-                ..=0xffff_ffff => FieldValues::U32(Vec::new()),
+                0x100..=0xffff => FieldValues::U16(Vec::new()),
+                0x1_0000..=0xffff_ffff => FieldValues::U32(Vec::new()),
                 _ => FieldValues::I64(Vec::new()),
             },
             Self::Integer { min, max } => {

@@ -196,7 +196,7 @@ pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool)
             "NumberOfReturns" if counted => add("returnCount", field(values)),
             "GpsTime" => add("timeStamp", Source::Double(values)),
             "rowIndex" | "columnIndex" | "isIntensityInvalid" | "isColorInvalid" if integers => {
-                add(name, field(values))
+                add(name, field(values));
             }
             "NormalX" | "NormalY" | "NormalZ" if normals.is_some() => {
                 if let Some((axis, fields)) =

@@ -69,10 +69,10 @@ impl ScanEntry {
             let translation = [("x", translation.x), ("y", translation.y), ("z", translation.z)];
             let all =
                 |values: &[(&str, f64)]| values.iter().map(|(name, value)| float(name, *value)).collect::<String>();
-            let _ = write!(
+            let _ = writeln!(
                 xml,
                 "<pose type=\"Structure\"><rotation type=\"Structure\">{}</rotation>\
-                 <translation type=\"Structure\">{}</translation></pose>\n",
+                 <translation type=\"Structure\">{}</translation></pose>",
                 all(&rotation),
                 all(&translation)
             );
@@ -100,11 +100,11 @@ impl ScanEntry {
             }
             *xml += "</colorLimits>\n";
         }
-        let _ = write!(
+        let _ = writeln!(
             xml,
             "<points type=\"CompressedVector\" fileOffset=\"{}\" recordCount=\"{}\">\n\
              <prototype type=\"Structure\">\n{}</prototype>\n\
-             <codecs type=\"Vector\" allowHeterogeneousChildren=\"1\"></codecs>\n</points>\n",
+             <codecs type=\"Vector\" allowHeterogeneousChildren=\"1\"></codecs>\n</points>",
             self.offset, self.points, self.prototype
         );
     }
