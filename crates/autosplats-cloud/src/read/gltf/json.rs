@@ -292,6 +292,7 @@ impl<'a> Container<'a> {
         let Some((JSON, json)) = chunk() else {
             return Err(job.malformed("byte 12", "the first chunk is not JSON or does not fit; copy the file again"));
         };
+        job.check_not_text_converted(20 + json.len())?;
         let chunk = chunk().filter(|(kind, _)| *kind == BIN).map(|(_, content)| content);
         Ok(Self { binary: true, json, chunk })
     }
