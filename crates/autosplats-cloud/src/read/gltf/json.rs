@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use glam::{DMat4, DQuat, DVec3};
 use serde::{Deserialize, de::IgnoredAny};
 
-use super::super::Job;
+use super::super::{Job, guard};
 use crate::Error;
 
 /// All of it.
@@ -299,7 +299,9 @@ impl<'a> Container<'a> {
 
     pub(super) fn root(&self, job: &Job<'_>) -> Result<Root<'a>, Error> {
         job.check_memory(self.json.len(), 64)?;
-        let root: Root<'a> = serde_json::from_slice(self.json).map_err(|error| {
+        let parsed: serde_json::Result<Root<'a>> =
+            guard(|| Ok(serde_json::from_slice(self.json))).map_err(|what| job.malformed("JSON", what))?;
+        let root = parsed.map_err(|error| {
             let (line, column) = (error.line(), error.column());
             let place = if self.binary {
                 format!("JSON chunk, column {column}")
