@@ -128,7 +128,9 @@ fn mesh_ply() -> Vec<u8> {
 fn survive(name: &str, what: &str, bytes: &[u8]) -> Option<PointCloud> {
     let start = Instant::now();
     let result = read_bytes(name, bytes);
-    survive_as_mesh(name, what, bytes, result.is_ok());
+    if ["ply", "obj", "off", "stl", "glb"].iter().any(|extension| name.ends_with(extension)) {
+        survive_as_mesh(name, what, bytes, result.is_ok());
+    }
     assert!(start.elapsed() < LIMIT, "{name}, {what}: took {:?}", start.elapsed());
     match result {
         Ok(cloud) => {

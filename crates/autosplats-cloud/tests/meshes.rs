@@ -101,7 +101,7 @@ fn ply(encoding: &str, order: Order) -> Vec<u8> {
     let byte = |bytes: &mut Vec<u8>, value: u8| number(bytes, vec![value], value.to_string());
     let end = |bytes: &mut Vec<u8>| {
         if ascii {
-            bytes.push(b'\n')
+            bytes.push(b'\n');
         }
     };
 
@@ -258,7 +258,7 @@ fn long_obj_is_read_in_pieces() {
     assert_eq!(mesh.triangles.len(), 119_999, "all faces");
     for (i, triangle) in mesh.triangles[..119_998].iter().enumerate() {
         let i = i as u32;
-        assert_eq!(*triangle, if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 2, i + 1, i] }, "face {i}");
+        assert_eq!(*triangle, if i.is_multiple_of(2) { [i, i + 1, i + 2] } else { [i + 2, i + 1, i] }, "face {i}");
     }
     assert_eq!(mesh.triangles[119_998], [0, 1, 119_999], "the one before its vertices comes last");
     let alone =
@@ -272,7 +272,7 @@ fn off_of_every_kind() {
     let vertices = |more: &dyn Fn(usize) -> &'static str| -> String {
         FIVE.iter().enumerate().map(|(i, [x, y, z])| format!("{x} {y} {z} {}\n", more(i))).collect()
     };
-    let even = |even, odd| move |i: usize| if i % 2 == 0 { even } else { odd };
+    let even = |even, odd| move |i: usize| if i.is_multiple_of(2) { even } else { odd };
     let plain = vertices(&|_| "");
     let ints = vertices(&even("255 128 0 255", "1 0 0 255"));
     let floats = vertices(&even("1.0 0.5 0 1", "0 0 1 1.0"));

@@ -94,7 +94,7 @@ fn facets(job: &Job<'_>) -> Result<(usize, Option<String>), Error> {
         return Ok((count, None));
     }
     // Programs that write without knowing the count leave it empty.
-    if (count == 0 || count == u32::MAX as usize) && there > 0 && (len - HEADER) % FACET == 0 {
+    if (count == 0 || count == u32::MAX as usize) && there > 0 && (len - HEADER).is_multiple_of(FACET) {
         return Ok((there, Some(format!("the header says {count} triangles, there are {there}; all are taken"))));
     }
     if count > there {

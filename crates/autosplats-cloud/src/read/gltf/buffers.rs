@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 use base64::{Engine as _, alphabet, engine};
 
-use super::super::{Bytes, Job, shown};
+use super::super::{Bytes, Job, guard, shown};
 use super::json::Root;
 use crate::Error;
 
@@ -90,9 +90,8 @@ fn decode(job: &Job<'_>, place: &str, uri: &str) -> Result<Vec<u8>, Error> {
         return Ok(percent_decoded(content));
     }
     job.check_memory(content.len(), 1)?;
-    BASE64
-        .decode(content)
-        .map_err(|error| job.malformed(place, format!("it is no base64: {error}; export the file again")))
+    let decoded = guard(|| BASE64.decode(content).map_err(|error| format!("it is no base64: {error}")));
+    decoded.map_err(|what| job.malformed(place, format!("{what}; export the file again")))
 }
 
 /// A file in the same folder or below it. Other places are not looked at, whatever a file says.

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use glam::{DMat4, DQuat, DVec3};
 use serde::{Deserialize, de::IgnoredAny};
 
-use super::super::Job;
+use super::super::{Job, guard};
 use crate::Error;
 
 /// All of it.
@@ -292,13 +292,16 @@ impl<'a> Container<'a> {
         let Some((JSON, json)) = chunk() else {
             return Err(job.malformed("byte 12", "the first chunk is not JSON or does not fit; copy the file again"));
         };
+        job.check_not_text_converted(20 + json.len())?;
         let chunk = chunk().filter(|(kind, _)| *kind == BIN).map(|(_, content)| content);
         Ok(Self { binary: true, json, chunk })
     }
 
     pub(super) fn root(&self, job: &Job<'_>) -> Result<Root<'a>, Error> {
         job.check_memory(self.json.len(), 64)?;
-        let root: Root<'a> = serde_json::from_slice(self.json).map_err(|error| {
+        let parsed: serde_json::Result<Root<'a>> =
+            guard(|| Ok(serde_json::from_slice(self.json))).map_err(|what| job.malformed("JSON", what))?;
+        let root = parsed.map_err(|error| {
             let (line, column) = (error.line(), error.column());
             let place = if self.binary {
                 format!("JSON chunk, column {column}")
