@@ -33,7 +33,7 @@ const TIME: Duration = Duration::from_secs(2);
 
 /// Bytes of memory for every byte of a file, and what any file may take. Compressed points can be many.
 const MEMORY_PER_BYTE: usize = 1 << 14;
-const MEMORY: usize = 64 << 20;
+const MEMORY: usize = 16 << 20;
 
 /// Inputs that taught something new, kept to be changed further.
 const POOL: usize = 512;

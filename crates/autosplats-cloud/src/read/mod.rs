@@ -243,6 +243,17 @@ impl Job<'_> {
         self.progress.note(note.as_ref());
     }
 
+    /// Hands out points before the end, if somebody wants to see them.
+    fn preview(&self, points: impl FnOnce() -> Result<PointCloud, Error>) -> Result<(), Error> {
+        if self.progress.wants_chunks() {
+            let points = points()?;
+            if !points.is_empty() {
+                self.progress.chunk(points);
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses what would not fit into memory, before anything is allocated: `count` points of so many bytes.
     fn check_memory(&self, count: usize, bytes_per_point: usize) -> Result<(), Error> {
         let bytes = (count as u64).saturating_mul(bytes_per_point as u64);

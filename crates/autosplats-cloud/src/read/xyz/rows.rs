@@ -49,11 +49,11 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
             cuts.push(at);
         }
         let pieces: Vec<Piece> = cuts.par_windows(2).map(|cut| parser.piece(&text[cut[0]..cut[1]], cut[0])).collect();
-        if job.progress.wants_chunks() {
+        job.preview(|| {
             let mut chunk = Columns::new(layout);
             pieces.iter().try_for_each(|piece| chunk.append(&piece.columns))?;
-            job.progress.chunk(chunk.into_cloud(layout, origin, false)?);
-        }
+            chunk.into_cloud(layout, origin, false)
+        })?;
         for piece in pieces {
             if let Some((offset, what)) = piece.error {
                 return Err(job.malformed(job.line(offset), what));
