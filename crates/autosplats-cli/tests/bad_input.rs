@@ -30,8 +30,14 @@ fn clouds_that_show_nothing() {
 fn more_neighbours_than_points() {
     let folder = Folder::new();
     folder.write("four.ply", &points_ply(&["0 0 0", "1 0 0", "0 0 1", "1 0 1"]));
-    folder.fail(&[&render("four.ply")[..], &["-k", "64"]].concat(), 3, &["4 points", "-k 3"]);
-    folder.succeed(&[&render("four.ply")[..], &["-k", "3", "--size", "64x64", "--view", "front"]].concat());
+    let front = ["--size", "64x64", "--view", "front"];
+    let fewer = folder.succeed(&[&render("four.ply")[..], &front].concat());
+    assert!(fewer.stderr.contains("4 points cannot have 10 neighbours"), "it is told: {}", fewer.stderr);
+    let picture = folder.read("out.png");
+    folder.succeed(&[&render("four.ply")[..], &front, &["-k", "3"]].concat());
+    assert_eq!(folder.read("out.png"), picture, "as many neighbours as there are");
+    folder.write("one.ply", &points_ply(&["0 0 0"]));
+    folder.fail(&render("one.ply"), 3, &["one point"]);
 }
 
 #[test]

@@ -64,16 +64,16 @@ impl Job {
         self.settings.shading.background == Background::Transparent
     }
 
-    /// Refuses a cloud that is smaller than the neighbourhoods asked for.
-    pub(super) fn check_neighbors(&self, cloud: &PointCloud) -> Result<(), Failure> {
-        let (points, k) = (cloud.len(), self.settings.reconstruction.k);
-        match points {
+    /// Lowers k to the neighbours that a small cloud has, with a note of it, and refuses one that has none.
+    pub(super) fn fit_neighbors(&mut self, cloud: &PointCloud) -> Result<Option<String>, Failure> {
+        let k = &mut self.settings.reconstruction.k;
+        match cloud.len() {
             0 | 1 => Err(Failure::new(Exit::Input, "one point makes no surface")),
-            _ if points <= k as usize => Err(Failure::new(
-                Exit::Input,
-                format!("{points} points are too few for {k} neighbours each; use -k {} or less", points - 1),
-            )),
-            _ => Ok(()),
+            points if points <= *k as usize => {
+                let wanted = std::mem::replace(k, points as u32 - 1);
+                Ok(Some(format!("{points} points cannot have {wanted} neighbours each; {k} are taken")))
+            }
+            _ => Ok(None),
         }
     }
 

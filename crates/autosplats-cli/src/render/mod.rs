@@ -19,18 +19,16 @@ use crate::progress::Bar;
 
 /// Renders one picture to one file or several.
 pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
-    let job = Job::new(args)?;
+    let mut job = Job::new(args)?;
     let device = Device::cpu();
 
     let started = Instant::now();
     let mut cloud = job.inputs.read(job.quiet)?;
-    if cloud.to_local_metres() && !job.quiet {
-        eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
-    }
+    let degrees = cloud.to_local_metres();
     let read = milliseconds_since(started);
 
     job.check_color(&cloud)?;
-    job.check_neighbors(&cloud)?;
+    let fewer = job.fit_neighbors(&cloud)?;
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
@@ -39,6 +37,14 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
     drop(bar);
     check_visible(&frame)?;
+    if !job.quiet {
+        if degrees {
+            eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
+        }
+        if let Some(note) = fewer {
+            eprintln!("note: {note}");
+        }
+    }
 
     let started = Instant::now();
     let mut written = Vec::new();
