@@ -6,7 +6,8 @@
 //! new way, changed by [`mutate`]; it depends on nothing but its number, so a finding can be repeated. An input is
 //! described and read from memory, on one thread; a child process per core does a share. Panics in code of others, which
 //! readers turn into errors, are counted; any other panic is a finding, as are time and memory beyond the limits. A
-//! finding is written to `target/fuzz`, and the program fails.
+//! finding is written to `target/fuzz`, and the program fails. An input that ends the process, as by overflowing the stack, is
+//! found there too: each is left in a file of the process before it is tried.
 
 mod meter;
 mod mutate;
@@ -14,6 +15,8 @@ mod seeds;
 
 use std::{
     collections::HashSet,
+    fs::File,
+    io::{Seek as _, SeekFrom, Write as _},
     panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
     process::{Command, ExitCode, Stdio},
@@ -98,15 +101,45 @@ fn start() -> Result<()> {
     });
     let children = children.collect::<std::io::Result<Vec<_>>>().context("cannot start a process")?;
     let mut failed = 0;
-    for mut child in children {
-        failed += usize::from(!child.wait()?.success());
+    for (index, mut child) in children.into_iter().enumerate() {
+        let status = child.wait()?;
+        failed += usize::from(!status.success());
+        if status.code().is_none_or(|code| code > 1) {
+            eprintln!(
+                "process {} of {cores} ended by {status}; its last input: {}",
+                index + 1,
+                last_input(index)?.display()
+            );
+        }
     }
     ensure!(failed == 0, "{failed} of {cores} processes found something; see above");
     println!("nothing found in {:.0} s on {cores} cores", start.elapsed().as_secs_f64());
     Ok(())
 }
 
+/// Where findings are kept.
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz")
+}
+
+/// The file in which a process leaves each input before it is tried: the name's length, the input's, the name, the input.
+fn last_file(share: usize) -> PathBuf {
+    folder().join(format!("last-{share}"))
+}
+
+/// Takes the input out of such a file and keeps it as a finding.
+fn last_input(share: usize) -> Result<PathBuf> {
+    let left = std::fs::read(last_file(share))?;
+    let number = |at: usize| left.get(at..at + 8).and_then(|raw| raw.try_into().ok()).map(u64::from_le_bytes);
+    let (name, len) = (number(0).context("no input")? as usize, number(8).context("no input")? as usize);
+    let name_bytes = left.get(16..16 + name).context("no name")?;
+    let path = folder().join(format!("last-{}", String::from_utf8_lossy(name_bytes)));
+    std::fs::write(&path, left.get(16 + name..16 + name + len).context("no input")?)?;
+    Ok(path)
+}
+
 fn work(arguments: &Arguments, share: [u64; 2]) -> Result<()> {
+    std::fs::create_dir_all(folder())?;
     // Inside the pool, parallel loops run here instead of being handed over.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
     let mut formats = all()?;
@@ -129,7 +162,7 @@ fn work(arguments: &Arguments, share: [u64; 2]) -> Result<()> {
             Some(inputs) => Limit::Inputs(inputs.div_ceil(share[1])),
             None => Limit::Time(Duration::from_secs(arguments.seconds) / count),
         };
-        findings += Run::new(&seeds, arguments.seed, share).go(&limit)?;
+        findings += Run::new(&seeds, arguments.seed, share)?.go(&limit)?;
     }
     if findings > 0 {
         bail!("{findings} findings");
@@ -155,11 +188,12 @@ struct Run<'a> {
     slowest: Duration,
     most_memory: usize,
     findings: usize,
+    last: File,
 }
 
 impl<'a> Run<'a> {
-    fn new(seeds: &'a Seeds, seed: u64, share: [u64; 2]) -> Self {
-        Self {
+    fn new(seeds: &'a Seeds, seed: u64, share: [u64; 2]) -> Result<Self> {
+        Ok(Self {
             seeds,
             seed,
             share,
@@ -170,7 +204,8 @@ impl<'a> Run<'a> {
             slowest: Duration::ZERO,
             most_memory: 0,
             findings: 0,
-        }
+            last: File::create(last_file(share[0] as usize))?,
+        })
     }
 
     /// Tries inputs up to the limit; returns how many were findings.
@@ -230,6 +265,7 @@ impl<'a> Run<'a> {
         let mesh = random.below(4) == 0;
         let watcher = Watcher { chunks: random.below(8) == 0, notes: Mutex::default() };
 
+        self.leave(name, &bytes)?;
         let before = Instant::now();
         let (outcome, memory) = meter::measured(|| {
             catch_unwind(AssertUnwindSafe(|| {
@@ -283,6 +319,15 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
+    /// Leaves an input where it is found should it end the process.
+    fn leave(&mut self, name: &Path, bytes: &[u8]) -> Result<()> {
+        let name = name.as_os_str().as_encoded_bytes();
+        let lens = [name.len() as u64, bytes.len() as u64].map(u64::to_le_bytes);
+        self.last.seek(SeekFrom::Start(0))?;
+        self.last.write_all(&[lens.as_flattened(), name, bytes].concat())?;
+        Ok(())
+    }
+
     /// Keeps an input that was answered in a new way.
     fn learn(&mut self, answer: &str, bytes: &[u8]) {
         // What stands in quotes comes out of the input.
@@ -320,9 +365,7 @@ impl Progress for Watcher {
 
 /// Writes a finding where it can be looked at.
 fn keep(extension: &str, number: u64, bytes: &[u8]) -> Result<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/fuzz");
-    std::fs::create_dir_all(&folder)?;
-    let path = folder.join(format!("{number}.{extension}"));
+    let path = folder().join(format!("{number}.{extension}"));
     std::fs::write(&path, bytes)?;
     Ok(path)
 }
