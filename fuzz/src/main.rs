@@ -133,7 +133,7 @@ fn last_input(share: usize) -> Result<PathBuf> {
     let number = |at: usize| left.get(at..at + 8).and_then(|raw| raw.try_into().ok()).map(u64::from_le_bytes);
     let (name, len) = (number(0).context("no input")? as usize, number(8).context("no input")? as usize);
     let name_bytes = left.get(16..16 + name).context("no name")?;
-    let path = folder().join(format!("last-{}", String::from_utf8_lossy(name_bytes)));
+    let path = folder().join(format!("last-{share}-{}", String::from_utf8_lossy(name_bytes)));
     std::fs::write(&path, left.get(16 + name..16 + name + len).context("no input")?)?;
     Ok(path)
 }

@@ -49,8 +49,8 @@ pub(crate) enum Command {
 }
 
 const INPUT_HELP: &str = "\
-A point cloud file (.ply .las .laz .pcd .xyz .txt …), or a generated scene as scene:NAME[:COUNT], such as \
-scene:statue or scene:herd:2M. Several inputs are shown together.";
+A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
+generated scene as scene:NAME[:COUNT], such as scene:statue or scene:herd:2M. Several inputs become one cloud.";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -64,6 +64,8 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_help = RENDER_EXAMPLES, after_long_help = format!("{RENDER_EXAMPLES}\n\n{EXIT_CODES}"))]
 pub(crate) struct RenderArgs {
+    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP)]
+    pub(crate) inputs: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
     /// Picture to write: .png (8 bit) or .exr (32-bit float: R G B A Z N.X N.Y N.Z radius kradius curvature index).
@@ -86,12 +88,10 @@ pub(crate) struct RenderArgs {
     pub(crate) json: bool,
 }
 
-/// What is read, and how.
-#[derive(Args, Debug)]
+/// How inputs are placed and read.
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct InputArgs {
-    #[arg(required = true, value_name = "INPUT", help = INPUT_HELP, help_heading = None::<&'static str>)]
-    pub(crate) inputs: Vec<String>,
     /// Place an input by a text file: a row-major 4x4 (or 3x4) matrix from its own to world coordinates, or the seven
     /// numbers tx ty tz qx qy qz qw
     #[arg(long = "pose", value_name = "INPUT=FILE")]
@@ -247,12 +247,13 @@ Examples:
   autosplats convert bun000.ply bun045.ply all.ply --pose bun045.ply=bun045.txt";
 
 #[derive(Args, Debug)]
-#[command(after_help = CONVERT_EXAMPLES)]
+#[command(after_help = CONVERT_EXAMPLES, override_usage = "autosplats convert [OPTIONS] <INPUT>... <OUT>")]
 pub(crate) struct ConvertArgs {
+    // One list, so that options may stand anywhere between the names.
+    #[arg(required = true, value_names = ["INPUT", "OUT"], num_args = 1.., help = paths_help())]
+    pub(crate) paths: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    #[arg(value_name = "OUT", help = output_help(), help_heading = None::<&'static str>)]
-    pub(crate) output: PathBuf,
     /// Replace an existing file
     #[arg(long, help_heading = "Running")]
     pub(crate) force: bool,
@@ -286,10 +287,11 @@ pub(crate) struct ThinningArgs {
     pub(crate) seed: u64,
 }
 
-/// What can be written, by its extensions.
-fn output_help() -> String {
+/// What the names are, and what can be written.
+fn paths_help() -> String {
     let formats = written_formats().flat_map(|(_, extensions)| extensions).map(|extension| format!(".{extension}"));
-    format!("File to write; its name tells the format: {}", formats.collect::<Vec<_>>().join(" "))
+    let formats = formats.collect::<Vec<_>>().join(" ");
+    format!("{INPUT_HELP} The last name is the file to write; it tells the format: {formats}")
 }
 
 const NORMALS_EXAMPLES: &str = "\
@@ -298,16 +300,19 @@ Examples:
   autosplats normals survey.laz normals.laz -k 20 --orient up
   autosplats normals sweep.bin normals.ply --sensor 0,0,1.8
 
-The file gets all that the input has and the fields NormalX, NormalY, NormalZ, Curvature (0 flat, 1/3 no surface) and
-DensityRadius (twice the radius of the circle that each neighbour covers on average).";
+The file gets all that the input has, and:
+  NormalX NormalY NormalZ  unit normal (nx ny nz in PLY)
+  Curvature                0 where flat, 1/3 where there is no surface
+  DensityRadius            twice the radius of the circle that each neighbour covers on average";
 
 #[derive(Args, Debug)]
-#[command(after_help = NORMALS_EXAMPLES)]
+#[command(after_help = NORMALS_EXAMPLES, override_usage = "autosplats normals [OPTIONS] <INPUT>... <OUT>")]
 pub(crate) struct NormalsArgs {
+    // One list, so that options may stand anywhere between the names.
+    #[arg(required = true, value_names = ["INPUT", "OUT"], num_args = 1.., help = paths_help())]
+    pub(crate) paths: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
-    #[arg(value_name = "OUT", help = output_help(), help_heading = None::<&'static str>)]
-    pub(crate) output: PathBuf,
     /// Neighbours of each point that a plane is fitted to, 3 to 1024; more is smoother
     #[arg(short, value_name = "COUNT", default_value_t = NormalSettings::default().k, allow_negative_numbers = true, help_heading = "Normals")]
     pub(crate) k: u32,

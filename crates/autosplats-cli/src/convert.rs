@@ -1,6 +1,6 @@
 //! `autosplats convert`: any input, or several as one, to a file of another kind.
 
-use autosplats_cloud::{Error, PointCloud};
+use autosplats_cloud::{Error, PointCloud, Unit};
 
 use crate::args::{ConvertArgs, ThinningArgs};
 use crate::exit::{Exit, Failure};
@@ -11,20 +11,23 @@ use crate::threads::start_threads;
 
 /// Reads the inputs and writes the file.
 pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
-    let ConvertArgs { input, output, force, thinning, run } = args;
+    let ConvertArgs { paths, input, force, thinning, run } = args;
     start_threads(run)?;
-    let inputs = Inputs::new(input)?.exactly();
-    check_cloud_target(output, *force, inputs.files())?;
+    let (inputs, output) = Inputs::with_output(paths, input)?;
+    check_cloud_target(&output, *force, inputs.files())?;
     let mut cloud = match thinning.sample {
         Some(count) => inputs.sample(count, thinning.seed, run.quiet)?,
         None => inputs.read(run.quiet)?,
     };
     let read = cloud.len();
+    if cloud.crs().unit == Some(Unit::Degree) && (thinning.voxel.is_some() || thinning.noise.is_some()) && !run.quiet {
+        eprintln!("note: the coordinates are degrees, so sizes are, too");
+    }
     thin(&mut cloud, thinning, run.quiet)?;
     if cloud.is_empty() {
         return Err(Failure::new(Exit::Input, format!("none of the {read} points is left; widen --bounds")));
     }
-    let bytes = write_cloud(&cloud, output, run.quiet)?;
+    let bytes = write_cloud(&cloud, &output, run.quiet)?;
     if !run.quiet {
         let of = if cloud.len() < read { format!(" of {read}") } else { String::new() };
         eprintln!("{}: {}{of} points, {bytes} bytes", output.display(), cloud.len());

@@ -1,5 +1,6 @@
 //! Inputs: files and generated scenes, each perhaps placed by a pose, read into one cloud.
 
+use std::collections::BTreeSet;
 use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
 
@@ -55,8 +56,8 @@ enum Source {
 
 impl Inputs {
     /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
-    pub(crate) fn new(args: &InputArgs) -> Result<Self, Failure> {
-        let InputArgs { inputs: names, poses, reading } = args;
+    pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
+        let InputArgs { poses, reading } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
         let generated = list.iter().map(Input::generated_points).sum::<u64>();
         check_memory(&format!("{generated} generated points"), generated * BYTES_PER_GENERATED_POINT)
@@ -81,6 +82,14 @@ impl Inputs {
         Ok(Self { list, options: reading.options() })
     }
 
+    /// Of several names the last is the output's.
+    pub(crate) fn with_output(paths: &[String], args: &InputArgs) -> Result<(Self, PathBuf), Failure> {
+        match paths {
+            [inputs @ .., output] if !inputs.is_empty() => Ok((Self::new(inputs, args)?.exactly(), output.into())),
+            _ => Err(Failure::usage(format!("{}: the name of the file to write is missing", paths.join(" ")))),
+        }
+    }
+
     /// A built-in scene alone.
     pub(crate) fn scene(name: &str) -> Result<Self, Failure> {
         let input = Input::new(&format!("{SCENE_PREFIX}{name}"))?;
@@ -88,7 +97,7 @@ impl Inputs {
     }
 
     /// Asks for all the digits there are, for what is to be written again.
-    pub(crate) fn exactly(mut self) -> Self {
+    fn exactly(mut self) -> Self {
         self.options.exact = true;
         self
     }
@@ -154,7 +163,13 @@ impl Inputs {
         });
         // Of several failures, the first input's is told, whichever came first.
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
-        Ok(PointCloud::merge(clouds.into_iter().collect::<Result<_, _>>()?))
+        let clouds: Vec<(PointCloud, DMat4)> = clouds.into_iter().collect::<Result<_, _>>()?;
+        drop(parts);
+        drop(bar);
+        if !quiet {
+            merge_losses(&clouds).iter().for_each(|note| eprintln!("note: {note}"));
+        }
+        Ok(PointCloud::merge(clouds))
     }
 }
 
@@ -208,6 +223,23 @@ impl Input {
             }),
         }
     }
+}
+
+/// What several clouds lose when they become one.
+fn merge_losses(clouds: &[(PointCloud, DMat4)]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let names: BTreeSet<&str> =
+        clouds.iter().flat_map(|(cloud, _)| cloud.fields()).map(|field| field.name.as_str()).collect();
+    let everywhere =
+        |name: &&str| clouds.iter().all(|(cloud, _)| cloud.fields().iter().any(|field| field.name == *name));
+    let lost: Vec<&str> = names.into_iter().filter(|name| !everywhere(name)).collect();
+    if !lost.is_empty() {
+        notes.push(format!("left out, as not all inputs have them: {}", lost.join(", ")));
+    }
+    if clouds.iter().any(|(cloud, _)| cloud.crs() != clouds[0].0.crs()) {
+        notes.push("the inputs' coordinate systems differ; their numbers are taken as they are".into());
+    }
+    notes
 }
 
 fn unknown_scene(error: Error) -> Failure {

@@ -19,20 +19,26 @@ const BYTES_PER_POINT: u64 = 40;
 
 /// Reads the inputs, estimates, and writes the file.
 pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
-    let NormalsArgs { input, output, force, k, orient, sensor, run } = args;
+    let NormalsArgs { paths, input, force, k, orient, sensor, run } = args;
     start_threads(run)?;
-    let inputs = Inputs::new(input)?.exactly();
-    check_cloud_target(output, *force, inputs.files())?;
+    let (inputs, output) = Inputs::with_output(paths, input)?;
+    if output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("pts")) {
+        return Err(Failure::usage(format!(
+            "{}: PTS has no place for normals; .xyz, .ply and others do",
+            output.display()
+        )));
+    }
+    check_cloud_target(&output, *force, inputs.files())?;
     let cloud = inputs.read(run.quiet)?;
     check_memory(&format!("the normals of {} points", cloud.len()), cloud.len() as u64 * BYTES_PER_POINT)
         .map_err(read_failure)?;
-    let (orientation, towards) = orientation(&cloud, *orient, *sensor)?;
     let bar = Bar::new("estimating normals", run.quiet);
     // Degrees and metres do not make a sphere: such points get the normals that they have on the ground.
     let mut local = Cow::Borrowed(&cloud);
     if cloud.crs().unit == Some(Unit::Degree) {
         local.to_mut().to_local_metres();
     }
+    let (orientation, towards) = orientation(&local, *orient, *sensor)?;
     let normals =
         estimate_normals(&local, &NormalSettings { k: *k, orientation }, &bar).map_err(|error| match error {
             Error::Cancelled => Failure::interrupted(),
@@ -40,7 +46,7 @@ pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
         })?;
     drop((bar, local));
     let cloud = with_normals(cloud, normals)?;
-    let bytes = write_cloud(&cloud, output, run.quiet)?;
+    let bytes = write_cloud(&cloud, &output, run.quiet)?;
     if !run.quiet {
         eprintln!("{}: normals of {} points, turned {towards}; {bytes} bytes", output.display(), cloud.len());
     }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::report::{AttributeFound, AxesFound, Bounds, CrsFound, Detail, Report, ScanFound};
 use super::spacing;
 use super::statistics::{Statistics, Values};
-use crate::args::{InputArgs, ReadingArgs};
+use crate::args::InputArgs;
 use crate::exit::Failure;
 use crate::input::{Inputs, read_failure};
 use crate::progress::Bar;
@@ -65,8 +65,7 @@ impl Examiner {
     /// Finds out what there is to know.
     pub(super) fn examine(&self, name: &str) -> Examination {
         let mut report = Report { input: name.into(), ..Report::default() };
-        let input = InputArgs { inputs: vec![name.into()], poses: Vec::new(), reading: ReadingArgs::default() };
-        let outcome = Inputs::new(&input).and_then(|inputs| {
+        let outcome = Inputs::new(&[name.into()], &InputArgs::default()).and_then(|inputs| {
             let path = inputs.files().next();
             match path {
                 Some(path) => self.file(path, &mut report).map_err(read_failure),

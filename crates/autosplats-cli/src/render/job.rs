@@ -34,7 +34,7 @@ pub(super) struct Job {
 impl Job {
     /// Checks the flags, the inputs' existence and the outputs' places.
     pub(super) fn new(args: RenderArgs) -> Result<Self, Failure> {
-        let RenderArgs { input, outputs, size, camera, surface, look, run, json } = args;
+        let RenderArgs { inputs, input, outputs, size, camera, surface, look, run, json } = args;
         choose_backend(surface.backend)?;
         start_threads(&run)?;
         let pictures = outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?;
@@ -43,7 +43,7 @@ impl Job {
         settings.check().map_err(render_failure)?;
 
         let save_camera = camera.save_camera.clone();
-        let inputs = Inputs::new(&input)?;
+        let inputs = Inputs::new(&inputs, &input)?;
         let camera = CameraJob::new(&camera)?;
         let targets = pictures.iter().map(|picture| &picture.path).chain(&save_camera);
         let mut seen = HashSet::new();

@@ -40,9 +40,10 @@ pub use self::{
     describe::{Attribute, Description},
     options::{DepthCamera, ReadOptions},
 };
+use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{Error, PointCloud, Progress, memory::check_memory, progress::tick};
+use crate::{Error, PointCloud, Progress, Scan, memory::check_memory, progress::tick};
 
 /// A kind of file: how to tell it from others, and what to do with it.
 struct Format {
@@ -88,8 +89,7 @@ pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])
 
 /// The names of all formats, for a message.
 pub(crate) fn format_names() -> String {
-    let shown = |format: &&Format| format!("{} (.{})", format.name, format.extensions.join(" ."));
-    FORMATS.iter().map(shown).collect::<Vec<_>>().join(", ")
+    FORMATS.iter().map(|format| format.name).collect::<Vec<_>>().join(", ")
 }
 
 /// What a file has: points, and triangles between them if it is a mesh.
@@ -184,6 +184,10 @@ pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Resul
 }
 
 fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
+    if job.bytes.starts_with(b"version https://git-lfs") {
+        let what = "a pointer of Git LFS stands in the file's place; 'git lfs pull' fetches the file";
+        return Err(job.malformed("line 1", what));
+    }
     let name = job.path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
@@ -202,13 +206,39 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
+    drop_far_sensors(job, &mut contents.cloud);
     job.tick(1.0)?;
     Ok(contents)
 }
 
+/// Sensors stand this many times the size of what they saw away from it at most.
+const FAR: f64 = 20.0;
+
+/// Poses are often left out where points were moved into a survey's coordinates; the origin is then no place of a sensor.
+fn drop_far_sensors(job: &Job<'_>, cloud: &mut PointCloud) {
+    let far = |scan: &Scan| {
+        let step = scan.points.len().div_ceil(1000).max(1);
+        let sample = scan.points.clone().step_by(step).map(|i| cloud.world_position(i));
+        let sample = sample.filter(|point| point.is_finite());
+        let bounds = sample.fold(None, |bounds: Option<[DVec3; 2]>, point| {
+            Some(bounds.map_or([point; 2], |[min, max]| [min.min(point), max.max(point)]))
+        });
+        bounds.is_some_and(|[min, max]| {
+            let size = min.distance(max);
+            size > 0.0 && scan.position().distance(0.5 * (min + max)) > FAR * size
+        })
+    };
+    let kept: Vec<Scan> = cloud.scans.iter().filter(|scan| !far(scan)).cloned().collect();
+    let count = cloud.scans.len() - kept.len();
+    if count > 0 {
+        job.note(format!("{count} of the sensors' places are far from all that was seen; taken for unknown"));
+        cloud.scans = kept;
+    }
+}
+
 /// Scanners write (0, 0, 0) where nothing came back. One such point alone may be a real one, unless a sensor stands there.
 fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
-    let absent = |i: usize| cloud.world_position(i) == glam::DVec3::ZERO;
+    let absent = |i: usize| cloud.world_position(i) == DVec3::ZERO;
     let count = (0..cloud.len()).into_par_iter().filter(|&i| absent(i)).count();
     let least = if format.sensor_frame { 1 } else { 2 };
     if count < least || count == cloud.len() {

@@ -19,8 +19,9 @@ const BUFFER: usize = 4 << 20;
 /// Records that one thread encodes at a time.
 const PIECE: usize = 1 << 13;
 
-/// Positions are floats if the cloud's origin is zero and it has no residuals, else world coordinates in double
-/// precision. Colours are packed into a field `rgb`.
+/// Positions are floats if the cloud's origin is zero, else world coordinates in double precision: most programs read
+/// nothing but floats, so that doubles are left to coordinates that floats would ruin. Colours are packed into a field
+/// `rgb`.
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let layout = Layout::of(cloud);
@@ -42,6 +43,11 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
 
 fn note_losses(job: &Job<'_>) {
     let cloud = job.cloud;
+    if cloud.origin() != DVec3::ZERO {
+        job.note("coordinates this large are written as 64-bit floats, which some programs do not read");
+    } else if cloud.residuals().is_some() {
+        job.note("coordinates are rounded to 32-bit floats, which is what programs read from PCD");
+    }
     if *cloud.crs() != Crs::default() {
         job.note("PCD does not hold the coordinate system");
     }
@@ -67,7 +73,7 @@ struct Layout {
 
 impl Layout {
     fn of(cloud: &PointCloud) -> Self {
-        let doubles = cloud.origin() != DVec3::ZERO || cloud.residuals().is_some();
+        let doubles = cloud.origin() != DVec3::ZERO;
         let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
         let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 4 } else { 0 } + fields;
         let all: Vec<&Field> = cloud.fields().iter().collect();
@@ -83,6 +89,15 @@ impl Layout {
         }
         for (field, name) in cloud.fields().iter().zip(&self.names) {
             let (kind, size) = scalar(&field.values);
+            // What other programs look for.
+            let name = match name.as_str() {
+                "NormalX" => "normal_x",
+                "NormalY" => "normal_y",
+                "NormalZ" => "normal_z",
+                "Curvature" => "curvature",
+                "Intensity" => "intensity",
+                name => name,
+            };
             fields.push((name, kind, size));
         }
         let axes = match cloud.axes() {

@@ -151,7 +151,12 @@ impl Layout<'_> {
             if axis > 0 {
                 text.push(self.separator);
             }
+            // A product of an integer and a step has digits at its end that mean nothing.
+            let meaningless = cloud.resolution().map_or(0.0, |step| 1e-6 * step[axis].abs());
             decimal::push(text, world[axis], |read| {
+                if (read - world[axis]).abs() < meaningless {
+                    return true;
+                }
                 let local = read - origin[axis];
                 let near = local as f32;
                 near == position[axis]

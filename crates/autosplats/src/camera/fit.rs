@@ -15,6 +15,10 @@ const KEEP: f64 = 0.2;
 /// Share of the picture left free at each side.
 const BORDER: f64 = 0.04;
 
+/// Free space around the points in mean distances between them, so that the discs at the rim of a sparse cloud end within
+/// the picture. One that is cut by the picture's edge cannot be told from a surface that goes on.
+const RIM: f64 = 2.5;
+
 /// Where to stand in relation to the cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -107,6 +111,7 @@ impl Camera {
         // All points in one place still need a picture of some size.
         let least = (1e-6 * cloud.origin().abs().max_element()).max(1e-3);
         let extent = extent.map(|e| e.max(if extent == [0.0; 3] { least } else { 0.0 }));
+        let rim = RIM * (extent[0] * extent[1] / cloud.len() as f64).sqrt();
         let to_world = |p: [f64; 3]| cloud.origin() + axes[0] * p[0] + axes[1] * p[1] + axes[2] * p[2];
         let half_room = 0.5 - BORDER;
         camera.look_at = to_world(middle);
@@ -116,7 +121,8 @@ impl Camera {
         }
         let distance = match &mut camera.projection {
             Projection::OrthographicHeight(height) => {
-                *height = (extent[1] / (2.0 * half_room)).max(extent[0] / (2.0 * half_room * aspect)).max(1e-12);
+                let [width, upright] = [0, 1].map(|i| (extent[i] + 2.0 * rim) / (2.0 * half_room));
+                *height = upright.max(width / aspect).max(1e-12);
                 // In front of everything, trimmed points included as far as they are near.
                 2.0 * extent[2] + *height
             }
@@ -124,7 +130,7 @@ impl Camera {
                 let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
                 let distance = kept.iter().fold(0.0f64, |distance, p| {
                     let [x, y, z] = [0, 1, 2].map(|i| p[i] - middle[i]);
-                    distance.max(y.abs() / slope - z).max(x.abs() / (slope * aspect) - z)
+                    distance.max((y.abs() + rim) / slope - z).max((x.abs() + rim) / (slope * aspect) - z)
                 });
                 distance.max(0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * 0.05)
             }

@@ -228,14 +228,15 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], done: f32) -> Result<
         }
         cloud = cloud.with_field(&field.name, values)?;
     }
-    if sources.iter().any(|source| is_of_scanner(source.header)) {
-        cloud = cloud.with_axes(Axes::ZUp);
-    }
+    // The standard does not say which way is up, but those who write the format stand upright.
+    cloud = cloud.with_axes(Axes::ZUp);
     let mut start = 0;
-    let scans = sources.iter().map(|source| {
+    let scans = sources.iter().filter_map(|source| {
         let points = start..start + source.len();
         start = points.end;
-        Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points }
+        let scan = Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
+        // Programs that merge clouds write them without a pose, too; no scanner stood at their origin.
+        is_of_scanner(source.header).then_some(scan)
     });
     let scans = scans.collect();
     Ok(cloud.with_scans(scans))

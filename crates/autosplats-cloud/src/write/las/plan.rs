@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{super::Job, grid};
 use crate::{
-    Error, Field, FieldValues, PointCloud,
+    Axes, Error, Field, FieldValues, PointCloud,
     cloud::each_type,
     las::{self, ANGLE_STEP, EXTRA_DESCRIPTOR, Place},
 };
@@ -59,6 +59,9 @@ impl<'a> Plan<'a> {
         }
         if !cloud.scans().is_empty() {
             job.note("LAS has no place for the scanners' positions; they are left out");
+        }
+        if matches!(cloud.axes(), Some(Axes::YUp | Axes::Camera)) {
+            job.note("LAS does not say which way is up, and z is taken for it; here it is y");
         }
         let point = |i: usize| kept.as_ref().map_or(i, |kept| kept[i]);
         let grid = grid::Grid::of(job, count, |i| cloud.world_position(point(i)))?;
