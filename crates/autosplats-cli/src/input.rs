@@ -11,13 +11,16 @@ use rayon::prelude::*;
 
 use crate::args::{InputArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
-use crate::progress::Bar;
+use crate::progress::{Bar, Part};
 
 /// What begins the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
 
 /// Bytes a generated point takes: position, and colour or class.
 const BYTES_PER_GENERATED_POINT: u64 = 16;
+
+/// Fields left out that are named.
+const LISTED: usize = 10;
 
 /// The inputs of one command, known to exist.
 #[derive(Debug)]
@@ -154,7 +157,30 @@ impl Inputs {
         });
         // Of several failures, the first input's is told, whichever came first.
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
-        Ok(PointCloud::merge(clouds.into_iter().collect::<Result<_, _>>()?))
+        let clouds = clouds.into_iter().collect::<Result<Vec<_>, _>>()?;
+        tell_disagreements(&clouds, &parts);
+        Ok(PointCloud::merge(clouds))
+    }
+}
+
+/// Tells what one cloud cannot have because not all of its parts do.
+fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
+    let [(first, _), others @ ..] = clouds else { return };
+    for ((cloud, _), part) in clouds.iter().zip(parts) {
+        let has = |(other, _): &(PointCloud, DMat4), name: &str| other.fields().iter().any(|field| field.name == name);
+        let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| has(other, &field.name)));
+        let lost: Vec<String> = lost.map(|field| field.name.escape_debug().take(40).collect()).collect();
+        if !lost.is_empty() {
+            let more = if lost.len() > LISTED { format!(" and {} more", lost.len() - LISTED) } else { String::new() };
+            let names = lost[..lost.len().min(LISTED)].join(", ");
+            part.note(&format!("not all inputs have {names}{more}; left out"));
+        }
+    }
+    if others.iter().any(|(other, _)| other.crs() != first.crs()) {
+        let unit = |cloud: &PointCloud| cloud.crs().unit;
+        let units = others.iter().any(|(other, _)| unit(other) != unit(first));
+        let what = if units { "coordinate systems and units" } else { "coordinate systems" };
+        parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, none is kept"));
     }
 }
 
