@@ -86,7 +86,7 @@ fn pts<'a>(job: &Job<'a>) -> (Layout<'a>, String) {
     let lost: Vec<&str> =
         cloud.fields().iter().map(|field| field.name.as_str()).filter(|name| *name != "Intensity").collect();
     if !lost.is_empty() {
-        job.note(format!("PTS holds intensities and colours of 8 bits alone; left out: {}", lost.join(", ")));
+        job.note(format!("PTS holds intensities and colours alone; left out: {}", lost.join(", ")));
     }
     let colors = cloud.colors().map(Channels::Bytes);
     (Layout { separator: b' ', colors, fields, fields_first: true }, format!("{}\n", cloud.len()))
