@@ -1,6 +1,5 @@
 //! Inputs: files and generated scenes, each perhaps placed by a pose, read into one cloud.
 
-use std::collections::BTreeSet;
 use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
 
@@ -12,13 +11,16 @@ use rayon::prelude::*;
 
 use crate::args::{InputArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
-use crate::progress::Bar;
+use crate::progress::{Bar, Part};
 
 /// What begins the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
 
 /// Bytes a generated point takes: position, and colour or class.
 const BYTES_PER_GENERATED_POINT: u64 = 16;
+
+/// Fields left out that are named.
+const LISTED: usize = 10;
 
 /// The inputs of one command, known to exist.
 #[derive(Debug)]
@@ -163,13 +165,30 @@ impl Inputs {
         });
         // Of several failures, the first input's is told, whichever came first.
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
-        let clouds: Vec<(PointCloud, DMat4)> = clouds.into_iter().collect::<Result<_, _>>()?;
-        drop(parts);
-        drop(bar);
-        if !quiet {
-            merge_losses(&clouds).iter().for_each(|note| eprintln!("note: {note}"));
-        }
+        let clouds = clouds.into_iter().collect::<Result<Vec<_>, _>>()?;
+        tell_disagreements(&clouds, &parts);
         Ok(PointCloud::merge(clouds))
+    }
+}
+
+/// Tells what one cloud cannot have because not all of its parts do.
+fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
+    let [(first, _), others @ ..] = clouds else { return };
+    for ((cloud, _), part) in clouds.iter().zip(parts) {
+        let has = |(other, _): &(PointCloud, DMat4), name: &str| other.fields().iter().any(|field| field.name == name);
+        let lost = cloud.fields().iter().filter(|field| !clouds.iter().all(|other| has(other, &field.name)));
+        let lost: Vec<String> = lost.map(|field| field.name.escape_debug().take(40).collect()).collect();
+        if !lost.is_empty() {
+            let more = if lost.len() > LISTED { format!(" and {} more", lost.len() - LISTED) } else { String::new() };
+            let names = lost[..lost.len().min(LISTED)].join(", ");
+            part.note(&format!("not all inputs have {names}{more}; left out"));
+        }
+    }
+    if others.iter().any(|(other, _)| other.crs() != first.crs()) {
+        let unit = |cloud: &PointCloud| cloud.crs().unit;
+        let units = others.iter().any(|(other, _)| unit(other) != unit(first));
+        let what = if units { "coordinate systems and units" } else { "coordinate systems" };
+        parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, none is kept"));
     }
 }
 
@@ -223,23 +242,6 @@ impl Input {
             }),
         }
     }
-}
-
-/// What several clouds lose when they become one.
-fn merge_losses(clouds: &[(PointCloud, DMat4)]) -> Vec<String> {
-    let mut notes = Vec::new();
-    let names: BTreeSet<&str> =
-        clouds.iter().flat_map(|(cloud, _)| cloud.fields()).map(|field| field.name.as_str()).collect();
-    let everywhere =
-        |name: &&str| clouds.iter().all(|(cloud, _)| cloud.fields().iter().any(|field| field.name == *name));
-    let lost: Vec<&str> = names.into_iter().filter(|name| !everywhere(name)).collect();
-    if !lost.is_empty() {
-        notes.push(format!("left out, as not all inputs have them: {}", lost.join(", ")));
-    }
-    if clouds.iter().any(|(cloud, _)| cloud.crs() != clouds[0].0.crs()) {
-        notes.push("the inputs' coordinate systems differ; their numbers are taken as they are".into());
-    }
-    notes
 }
 
 fn unknown_scene(error: Error) -> Failure {

@@ -78,6 +78,6 @@ fn a_mesh_is_strewn_with_points() {
 fn only_known_formats_are_written() {
     let folder = Folder::with_sphere();
     folder.fail(&["convert", "sphere.ply", "out.doc"], 2, &["out.doc", ".ply"]);
-    folder.fail(&["convert", "sphere.ply"], 2, &["INPUT"]);
+    folder.fail(&["convert", "sphere.ply"], 2, &["sphere.ply", "the file to write is missing"]);
     folder.fail(&["convert", "missing.las", "out.ply"], 3, &["missing.las"]);
 }

@@ -95,3 +95,14 @@ pub enum Error {
     #[error("cancelled")]
     Cancelled,
 }
+
+/// Letters of a message, which may have pieces of a file in it.
+const MAX_MESSAGE: usize = 600;
+
+/// A message that is no longer than a few lines and does nothing to a terminal.
+pub(crate) fn message(text: &str) -> String {
+    if text.len() <= MAX_MESSAGE && !text.contains(char::is_control) {
+        return text.to_owned();
+    }
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_MESSAGE).collect()
+}

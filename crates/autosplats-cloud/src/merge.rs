@@ -1,6 +1,6 @@
 //! Several clouds to one.
 
-use glam::{DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 
 use crate::{Crs, Field, FieldValues, PointCloud, Scan, cloud::each_type, read::SMALL, read::middle};
@@ -15,7 +15,7 @@ impl PointCloud {
     ///   one common origin and no pose keep it, and their bits.
     /// * If any part has colours, the points of the others become mid grey.
     /// * A field is kept if every part has one of that name, letter case included; as `f64` where its widths differ.
-    ///   Fields are not moved: normals keep their old directions.
+    ///   Normals of floats are turned with their points, their lengths kept; other fields stay as they are.
     /// * Axes, coordinate system and resolution are kept if all parts agree on them; scans stay known, each moved with
     ///   its part.
     /// * Residuals are kept if any part has some, and made anew for parts that a pose moves.
@@ -63,7 +63,9 @@ impl PointCloud {
             colors
         });
         let first = &parts[0].0;
-        let fields = first.fields().iter().filter_map(|field| common_field(&parts, &field.name)).collect();
+        let mut fields: Vec<Field> =
+            first.fields().iter().filter_map(|field| common_field(&parts, &field.name)).collect();
+        turn_normals(&mut fields, &parts);
         let agreed = |same: fn(&Self, &Self) -> bool| parts.iter().all(|(cloud, _)| same(cloud, first));
         let mut scans = Vec::new();
         let mut start = 0;
@@ -85,6 +87,49 @@ impl PointCloud {
             scans,
             crs: if agreed(|a, b| a.crs == b.crs) { first.crs().clone() } else { Crs::default() },
             resolution: first.resolution().filter(|_| agreed(|a, b| a.resolution == b.resolution)),
+        }
+    }
+}
+
+/// What normals are multiplied by where positions are by `matrix`: its inverse transposed, but for a positive factor, so
+/// that it is there for flat ones too.
+pub(crate) fn normal_matrix(matrix: DMat3) -> DMat3 {
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = matrix;
+    let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
+    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign
+}
+
+/// Has normals follow the poses of their parts.
+fn turn_normals(fields: &mut [Field], parts: &[(PointCloud, DMat4)]) {
+    let find = |name: &str| {
+        fields.iter().position(|Field { name: own, values }| {
+            own == name && matches!(values, FieldValues::F32(_) | FieldValues::F64(_))
+        })
+    };
+    let [Some(x), Some(y), Some(z)] = ["NormalX", "NormalY", "NormalZ"].map(find) else { return };
+    let mut start = 0;
+    for (cloud, pose) in parts {
+        let points = start..start + cloud.len();
+        start = points.end;
+        if *pose == DMat4::IDENTITY {
+            continue;
+        }
+        let matrix = normal_matrix(DMat3::from_mat4(*pose));
+        let turned = |i: usize| {
+            let normal = DVec3::from([x, y, z].map(|field| fields[field].values.get(i)));
+            (matrix * normal).normalize_or_zero() * normal.length()
+        };
+        let turned: Vec<DVec3> = points.clone().into_par_iter().map(turned).collect();
+        for (axis, field) in [x, y, z].into_iter().enumerate() {
+            match &mut fields[field].values {
+                FieldValues::F32(v) => {
+                    v[points.clone()].iter_mut().zip(&turned).for_each(|(value, normal)| *value = normal[axis] as f32);
+                }
+                FieldValues::F64(v) => {
+                    v[points.clone()].iter_mut().zip(&turned).for_each(|(value, normal)| *value = normal[axis]);
+                }
+                _ => {}
+            }
         }
     }
 }

@@ -11,11 +11,7 @@ impl PointCloud {
         if keep.iter().all(|&keep| keep) {
             return;
         }
-        for scan in &mut self.scans {
-            let kept = |range: std::ops::Range<usize>| keep[range].iter().filter(|&&keep| keep).count();
-            let start = kept(0..scan.points.start);
-            scan.points = start..start + kept(scan.points.clone());
-        }
+        self.move_scans(&keep);
         compact(&mut self.positions, &keep);
         if let Some(residuals) = &mut self.residuals {
             compact(residuals, &keep);
@@ -25,6 +21,27 @@ impl PointCloud {
         }
         for field in &mut self.fields {
             each_type!(&mut field.values, v => compact(v, &keep));
+        }
+    }
+
+    /// Has the scans follow their points. There may be as many scans as points, so that all their ends are found on one
+    /// way through the points.
+    fn move_scans(&mut self, keep: &[bool]) {
+        let mut ends: Vec<usize> = self.scans.iter().flat_map(|scan| [scan.points.start, scan.points.end]).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        let (mut before, mut at) = (0, 0);
+        let kept: Vec<usize> = ends
+            .iter()
+            .map(|&end| {
+                before += keep[at..end].iter().filter(|&&keep| keep).count();
+                at = end;
+                before
+            })
+            .collect();
+        for scan in &mut self.scans {
+            let moved = |end: usize| ends.binary_search(&end).map_or(0, |index| kept[index]);
+            scan.points = moved(scan.points.start)..moved(scan.points.end);
         }
     }
 }

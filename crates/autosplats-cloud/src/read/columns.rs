@@ -21,10 +21,14 @@ pub(super) fn given(job: &Job<'_>) -> Result<Option<Vec<Option<String>>>, Error>
     Ok(Some(names.iter().map(name).collect()))
 }
 
+/// Columns that a note lists.
+const LISTED: usize = 24;
+
 /// What columns were taken for, for a note.
 pub(super) fn taken_for(names: &[Option<String>]) -> String {
-    let names = names.iter().map(|name| name.as_deref().map_or("-".into(), |name| shown(name.as_bytes())));
-    format!("columns taken for {}; --columns overrides", names.collect::<Vec<_>>().join(" "))
+    let shown = names.iter().map(|name| name.as_deref().map_or("-".into(), |name| shown(name.as_bytes())));
+    let more = if names.len() > LISTED { format!(" and {} more", names.len() - LISTED) } else { String::new() };
+    format!("columns taken for {}{more}; --columns overrides", shown.take(LISTED).collect::<Vec<_>>().join(" "))
 }
 
 /// Names of coordinates, the surer ones first.

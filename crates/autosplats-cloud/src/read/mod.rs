@@ -35,7 +35,7 @@ mod xyz;
 use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
 use self::guard::guard;
-pub(crate) use self::table::{SMALL, middle};
+pub(crate) use self::table::{ColorScale, SMALL, middle};
 pub use self::{
     describe::{Attribute, Description},
     options::{DepthCamera, ReadOptions},
@@ -43,7 +43,7 @@ pub use self::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{Error, PointCloud, Progress, Scan, memory::check_memory, progress::tick};
+use crate::{Error, PointCloud, Progress, Scan, error::message, memory::check_memory, progress::tick};
 
 /// A kind of file: how to tell it from others, and what to do with it.
 struct Format {
@@ -79,7 +79,7 @@ const FORMATS: &[&Format] = &[
     &stl::FORMAT,
 ];
 
-/// Formats of models, of which (0, 0, 0) is a point like any.
+/// Formats of models alone, of which (0, 0, 0) is a point like any.
 const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
@@ -201,7 +201,7 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     job.tick(0.0)?;
     let format = format(job)?;
     let mut contents = (format.read)(job)?;
-    let model = MODELS.iter().any(|model| model.name == format.name);
+    let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
     // A mesh would lose its corners.
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
@@ -270,12 +270,18 @@ impl Job<'_> {
 
     /// Tells the user what is no error.
     fn note(&self, note: impl AsRef<str>) {
-        self.progress.note(note.as_ref());
+        self.progress.note(&message(note.as_ref()));
+    }
+
+    /// Stops if the caller wants that, without news of how far the work is.
+    fn go_on(&self) -> Result<(), Error> {
+        if self.progress.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// Hands out points before the end, if somebody wants to see them.
     fn preview(&self, points: impl FnOnce() -> Result<PointCloud, Error>) -> Result<(), Error> {
         if self.progress.wants_chunks() {
+            self.go_on()?;
             let points = points()?;
             if !points.is_empty() {
                 self.progress.chunk(points);
@@ -292,11 +298,11 @@ impl Job<'_> {
     }
 
     fn malformed(&self, place: impl Into<String>, what: impl Into<String>) -> Error {
-        Error::Malformed { path: self.path.into(), place: place.into(), what: what.into() }
+        Error::Malformed { path: self.path.into(), place: place.into(), what: message(&what.into()) }
     }
 
     fn unsupported(&self, what: impl Into<String>) -> Error {
-        Error::Unsupported { path: self.path.into(), what: what.into() }
+        Error::Unsupported { path: self.path.into(), what: message(&what.into()) }
     }
 
     /// The line that the byte at `offset` is in, as a place in an error.

@@ -330,13 +330,13 @@ fn preview(job: &Job<'_>, records: &Records) -> Result<(), Error> {
     let nothing = Part { start: 0.0, len: 0.0 };
     for start in (0..records.len()).step_by(CHUNK) {
         let lens = [CHUNK.min(records.len() - start)];
-        let mut chunk = place(&quiet, &lens, nothing, |_| move |i| records.world(start + i))?;
-        if records.color.is_some() {
-            let colors = fill(&quiet, "colours", &lens, nothing, |_| move |i| records.color(start + i))?;
-            chunk = chunk.with_colors(colors)?;
-        }
-        job.tick(0.0)?;
-        job.progress.chunk(chunk);
+        job.preview(|| {
+            let cloud = place(&quiet, &lens, nothing, |_| move |i| records.world(start + i))?;
+            if records.color.is_none() {
+                return Ok(cloud);
+            }
+            cloud.with_colors(fill(&quiet, "colours", &lens, nothing, |_| move |i| records.color(start + i))?)
+        })?;
     }
     Ok(())
 }

@@ -168,7 +168,12 @@ impl Table<'_> {
         for column in &self.columns {
             let values = self.field(job, column, part(step))?;
             step += 1;
-            cloud = cloud.with_field(field_name(&column.name), values)?;
+            // Two columns may be called as one, as `intensity` and `scalar_Intensity` are.
+            let mut name = field_name(&column.name);
+            while cloud.fields().iter().any(|field| field.name == name) {
+                name.push('_');
+            }
+            cloud = cloud.with_field(name, values)?;
         }
         Ok(cloud)
     }
@@ -187,8 +192,7 @@ impl Table<'_> {
             let count = CHUNK.min(self.count - start);
             let piece = Self { bytes: self.bytes, columns: columns.collect(), count, ..*self };
             let quiet = Job { progress: &(), ..*job };
-            job.tick(0.0)?;
-            job.progress.chunk(piece.into_cloud(&quiet, place)?);
+            job.preview(|| piece.into_cloud(&quiet, place))?;
         }
         Ok(())
     }
@@ -322,21 +326,22 @@ impl Table<'_> {
 
 /// How colours of any number type become 8 bits.
 #[derive(Clone, Copy)]
-pub(super) struct ColorScale(f64);
+pub(crate) struct ColorScale(f64);
 
 impl ColorScale {
     /// Wide types often hold 8-bit values, and floats 0 to 1 or 0 to 255, so the largest value decides.
-    pub(super) fn of(largest: f64, float: bool) -> Self {
-        Self(if largest > 255.0 {
+    pub(crate) fn of(largest: f64, float: bool) -> Self {
+        // Full brightness may be exceeded a little, where colours were mixed.
+        Self(if largest >= 256.0 {
             1.0 / 256.0
-        } else if float && largest <= 1.0 {
+        } else if float && largest <= 1.01 {
             255.0
         } else {
             1.0
         })
     }
 
-    pub(super) fn byte(self, value: f64) -> u8 {
+    pub(crate) fn byte(self, value: f64) -> u8 {
         // 16-bit values are cut, not rounded: that returns the byte both of v * 256 and of v * 257.
         let round = if self.0 < 1.0 { 0.0 } else { 0.5 };
         (value * self.0 + round) as u8

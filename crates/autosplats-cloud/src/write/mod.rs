@@ -6,6 +6,7 @@
 //! failure, and then renamed, replacing what was there. What a format cannot hold is told through
 //! [`Progress::note`], once per kind of loss.
 
+mod colors;
 mod decimal;
 mod e57;
 mod las;
@@ -20,7 +21,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{Error, PointCloud, Progress, progress::tick};
+use crate::{Crs, Error, PointCloud, Progress, error::message, progress::tick};
 
 /// A kind of file that is written.
 struct Format {
@@ -60,7 +61,21 @@ impl Job<'_> {
 
     /// Tells the user what the format cannot hold.
     fn note(&self, note: impl AsRef<str>) {
-        self.progress.note(note.as_ref());
+        self.progress.note(&message(note.as_ref()));
+    }
+}
+
+/// Tells of sensors and coordinate system, if the cloud has such, and of what else is lost, that a format does not hold
+/// them.
+fn note_left_out(job: &Job<'_>, format: &str, others: &[(bool, &str)]) {
+    let cloud = job.cloud;
+    let all = [
+        (!cloud.scans().is_empty(), "where the sensors stood"),
+        (*cloud.crs() != Crs::default(), "the coordinate system"),
+    ];
+    let losses: Vec<&str> = all.iter().chain(others).filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();
+    if !losses.is_empty() {
+        job.note(format!("{format} does not hold {}", losses.join(", ")));
     }
 }
 

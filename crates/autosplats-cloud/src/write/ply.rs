@@ -1,19 +1,27 @@
-//! PLY, binary little endian: the one format that keeps all a cloud has.
+//! PLY, binary little endian: positions, colours and fields of any type, all their digits.
 
 use std::{
     fs::File,
     io::{BufWriter, Write as _},
+    ops::Range,
 };
 
 use rayon::prelude::*;
 
-use super::{Format, Job};
+use super::{
+    Format, Job,
+    colors::{CHANNELS, wide_colors},
+    note_left_out,
+};
 use crate::{Axes, Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "PLY", extensions: &["ply"], write };
 
 /// Bytes encoded before they are written.
 const BUFFER: usize = 4 << 20;
+
+/// Integers that doubles hold.
+const WHOLE: u64 = 1 << 53;
 
 /// Records that one thread encodes at a time.
 const PIECE: usize = 1 << 13;
@@ -23,6 +31,7 @@ const PIECE: usize = 1 << 13;
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let layout = Layout::of(cloud);
+    note_losses(job);
     file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
     let block = (BUFFER / layout.stride).max(PIECE);
     let mut buffer = vec![0; block.min(cloud.len()) * layout.stride];
@@ -38,19 +47,46 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     Ok(())
 }
 
+fn note_losses(job: &Job<'_>) {
+    note_left_out(job, "PLY", &[]);
+    for field in job.cloud.fields() {
+        let beyond = match &field.values {
+            FieldValues::U64(values) => values.par_iter().any(|&value| value > WHOLE),
+            FieldValues::I64(values) => values.par_iter().any(|&value| value.unsigned_abs() > WHOLE),
+            _ => false,
+        };
+        if beyond {
+            job.note(format!("{}: integers beyond 53 bits are rounded", field.name));
+        }
+    }
+}
+
 /// How a record is laid out: positions, colours, fields.
-struct Layout {
+struct Layout<'a> {
     doubles: bool,
+    colors: Option<Colors<'a>>,
+    fields: Vec<&'a Field>,
     names: Vec<String>,
     stride: usize,
 }
 
-impl Layout {
-    fn of(cloud: &PointCloud) -> Self {
+/// Colours, with all their digits where the cloud has them.
+enum Colors<'a> {
+    Bytes(&'a [[u8; 3]]),
+    Wide([&'a FieldValues; 3]),
+}
+
+impl<'a> Layout<'a> {
+    fn of(cloud: &'a PointCloud) -> Self {
         let doubles = cloud.origin() != glam::DVec3::ZERO || cloud.residuals().is_some();
-        let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
-        let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 3 } else { 0 } + fields;
-        Self { doubles, names: property_names(cloud.fields()), stride }
+        let wide = wide_colors(cloud);
+        let is_color = |field: &&Field| wide.is_some() && CHANNELS.contains(&&*field.name);
+        let fields: Vec<&Field> = cloud.fields().iter().filter(|field| !is_color(field)).collect();
+        let colors = wide.map(Colors::Wide).or_else(|| cloud.colors().map(Colors::Bytes));
+        let color = colors.as_ref().map_or(0, |colors| 3 * colors.scalar().1);
+        let others: usize = fields.iter().map(|field| scalar(&field.values).1).sum();
+        let stride = if doubles { 24 } else { 12 } + color + others;
+        Self { doubles, colors, names: property_names(&fields), fields, stride }
     }
 
     fn header(&self, cloud: &PointCloud) -> String {
@@ -65,10 +101,12 @@ impl Layout {
         for axis in ["x", "y", "z"] {
             header += &format!("property {} {axis}\n", if self.doubles { "double" } else { "float" });
         }
-        if cloud.colors().is_some() {
-            header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+        if let Some(colors) = &self.colors {
+            for channel in ["red", "green", "blue"] {
+                header += &format!("property {} {channel}\n", colors.scalar().0);
+            }
         }
-        for (field, name) in cloud.fields().iter().zip(&self.names) {
+        for (field, name) in self.fields.iter().zip(&self.names) {
             header += &format!("property {} {name}\n", scalar(&field.values).0);
         }
         header + "end_header\n"
@@ -86,19 +124,24 @@ impl Layout {
             let bytes = positions.map(|position| bytemuck::cast::<_, [u8; 12]>(position.map(f32::to_le_bytes)));
             self.place(records, &mut at, bytes);
         }
-        if let Some(colors) = cloud.colors() {
-            self.place(records, &mut at, colors[range.clone()].iter().copied());
+        match &self.colors {
+            Some(Colors::Bytes(colors)) => self.place(records, &mut at, colors[range.clone()].iter().copied()),
+            Some(Colors::Wide(wide)) => wide.iter().for_each(|values| self.values(records, &mut at, values, &range)),
+            None => {}
         }
-        for field in cloud.fields() {
-            match &field.values {
-                FieldValues::U64(_) | FieldValues::I64(_) => {
-                    let doubles = range.clone().map(|i| field.values.get(i).to_le_bytes());
-                    self.place(records, &mut at, doubles);
-                }
-                values => each_type!(values, v => {
-                    self.place(records, &mut at, v[range.clone()].iter().map(|value| value.to_le_bytes()));
-                }),
+        for field in &self.fields {
+            self.values(records, &mut at, &field.values, &range);
+        }
+    }
+
+    fn values(&self, records: &mut [u8], at: &mut usize, values: &FieldValues, range: &Range<usize>) {
+        match values {
+            FieldValues::U64(_) | FieldValues::I64(_) => {
+                self.place(records, at, range.clone().map(|i| values.get(i).to_le_bytes()));
             }
+            values => each_type!(values, v => {
+                self.place(records, at, v[range.clone()].iter().map(|value| value.to_le_bytes()));
+            }),
         }
     }
 
@@ -108,6 +151,15 @@ impl Layout {
             record[*at..*at + LEN].copy_from_slice(&value);
         }
         *at += LEN;
+    }
+}
+
+impl Colors<'_> {
+    fn scalar(&self) -> (&'static str, usize) {
+        match self {
+            Self::Bytes(_) => ("uchar", 1),
+            Self::Wide([first, ..]) => scalar(first),
+        }
     }
 }
 
@@ -127,7 +179,7 @@ fn scalar(values: &FieldValues) -> (&'static str, usize) {
 }
 
 /// Names without blanks, all different, none of them a coordinate's or a colour's.
-fn property_names(fields: &[Field]) -> Vec<String> {
+fn property_names(fields: &[&Field]) -> Vec<String> {
     let mut taken: Vec<String> = ["x", "y", "z", "red", "green", "blue"].map(String::from).into();
     for field in fields {
         let blank = |c: char| c.is_whitespace() || c.is_control();

@@ -12,8 +12,14 @@ use std::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Format, Job, decimal, names::unique_names};
-use crate::{Crs, Error, Field, FieldValues, PointCloud, cloud::each_type};
+use super::{
+    Format, Job,
+    colors::{CHANNELS, wide_colors},
+    decimal,
+    names::unique_names,
+    note_left_out,
+};
+use crate::{Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "text", extensions: &["xyz", "txt", "csv", "asc", "pts"], write };
 
@@ -42,7 +48,8 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let extension = job.path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
     let (layout, header) = if extension == "pts" { pts(job) } else { table(cloud, Path::new(&extension)) };
-    note_losses(job);
+    let up = (cloud.axes().is_some(), "which way is up");
+    note_left_out(job, "text", &[up]);
     file.write_all(header.as_bytes()).map_err(|source| job.io(source))?;
     for start in (0..cloud.len()).step_by(PIECE * BATCH) {
         job.tick(start as f32 / cloud.len() as f32)?;
@@ -56,34 +63,11 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Says what no text can hold.
-fn note_losses(job: &Job<'_>) {
-    let cloud = job.cloud;
-    let losses = [
-        (!cloud.scans().is_empty(), "where the sensors stood"),
-        (*cloud.crs() != Crs::default(), "the coordinate system"),
-        (cloud.axes().is_some(), "which way is up"),
-    ];
-    let losses: Vec<&str> = losses.iter().filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();
-    if !losses.is_empty() {
-        job.note(format!("text does not hold {}", losses.join(", ")));
-    }
-}
-
-/// The fields that are the colours with all their digits.
-fn wide_colors(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
-    let find = |name: &str| cloud.fields().iter().find(|field| field.name == name).map(|field| &field.values);
-    Some([find("Red")?, find("Green")?, find("Blue")?]).filter(|_| cloud.colors().is_some())
-}
-
-fn is_wide_color(field: &Field) -> bool {
-    ["Red", "Green", "Blue"].contains(&&*field.name)
-}
-
 /// A line of names and all that there is.
 fn table<'a>(cloud: &'a PointCloud, extension: &Path) -> (Layout<'a>, String) {
     let wide = wide_colors(cloud);
-    let fields: Vec<&Field> = cloud.fields().iter().filter(|field| wide.is_none() || !is_wide_color(field)).collect();
+    let is_color = |field: &&Field| wide.is_some() && CHANNELS.contains(&&*field.name);
+    let fields: Vec<&Field> = cloud.fields().iter().filter(|field| !is_color(field)).collect();
     let colors = wide.map(Channels::Wide).or_else(|| cloud.colors().map(Channels::Bytes));
     let mut names: Vec<String> = ["x", "y", "z"].map(String::from).into();
     if colors.is_some() {

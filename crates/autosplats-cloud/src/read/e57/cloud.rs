@@ -181,12 +181,11 @@ pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     let colors = Colors::new(&quiet, source);
     for start in (0..source.len()).step_by(CHUNK) {
         let lens = [CHUNK.min(source.len() - start)];
-        let mut cloud = place(&quiet, &lens, part, |_| move |i| source.world(start + i))?;
-        if let Some(colors) = &colors {
-            cloud = cloud.with_colors(fill(&quiet, "colours", &lens, part, |_| move |i| colors.bytes(start + i))?)?;
-        }
-        job.tick(0.0)?;
-        job.progress.chunk(cloud);
+        job.preview(|| {
+            let cloud = place(&quiet, &lens, part, |_| move |i| source.world(start + i))?;
+            let Some(colors) = &colors else { return Ok(cloud) };
+            cloud.with_colors(fill(&quiet, "colours", &lens, part, |_| move |i| colors.bytes(start + i))?)
+        })?;
     }
     Ok(())
 }

@@ -23,6 +23,9 @@ use crate::Error;
 /// The first bytes of a file.
 const MAGIC: &[u8] = b"ASTM-E57";
 
+/// Losses in scans that are told one by one.
+const TOLD: usize = 10;
+
 /// Part of the work that putting the values together is.
 const GATHERING: f32 = 0.4;
 
@@ -53,13 +56,14 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let mut done = 0.0;
     let mut sources: Vec<Source<'_>> = Vec::new();
     let mut dropped = Dropped::default();
-    let mut faults = Vec::new();
+    let (mut faults, mut told) = (Vec::new(), Vec::new());
     for (index, header) in root.scans.iter().enumerate() {
         let share = GATHERING / root.scans.len() as f32;
-        let source = source(job, &pages, header, index, (&mut left, &mut dropped), done..done + share);
+        let source = source(job, &pages, header, (&mut left, &mut dropped), done..done + share);
         done += share;
         match source {
             Ok(source) => {
+                told.extend(losses(header, &source).map(|what| format!("{}: {what}", header.shown(index))));
                 if job.progress.wants_chunks() {
                     cloud::preview(job, &source)?;
                 }
@@ -73,12 +77,11 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         if sources.iter().all(|source| source.len() == 0) {
             return Err(job.malformed(place, format!("{scan}: {what}")));
         }
-        for (scan, place, what) in faults.iter().take(10) {
-            job.note(format!("{scan} is left out: {place}: {what}"));
-        }
-        if faults.len() > 10 {
-            job.note(format!("{} more scans are left out", faults.len() - 10));
-        }
+        told.extend(faults.iter().map(|(scan, place, what)| format!("{scan} is left out: {place}: {what}")));
+    }
+    told.iter().take(TOLD).for_each(|note| job.note(note));
+    if told.len() > TOLD {
+        job.note(format!("{} more losses in scans", told.len() - TOLD));
     }
     dropped.note(job);
     Ok(cloud::cloud(job, &sources, GATHERING)?.with_crs(root.crs).into())
@@ -89,7 +92,6 @@ fn source<'a>(
     job: &Job<'_>,
     pages: &Pages<'_>,
     header: &'a ScanHeader,
-    index: usize,
     (left, dropped): (&mut usize, &mut Dropped),
     part: std::ops::Range<f32>,
 ) -> Result<Source<'a>, Error> {
@@ -98,12 +100,13 @@ fn source<'a>(
         return Err(job.malformed("XML section", what));
     }
     let values = packets::gather(job, pages, header, left, part)?;
-    if (values.count as u64) < header.points {
-        let (count, points) = (values.count, header.points);
-        job.note(format!("{}: the data end after {count} of {points} points", header.shown(index)));
-    }
-    if header.elements.iter().any(|element| element.stored == element::Stored::Text) {
-        job.note(format!("{}: values that are text are left out", header.shown(index)));
-    }
     Source::new(job, header, values, dropped)
+}
+
+/// What of a scan is not there or not read.
+fn losses(header: &ScanHeader, source: &Source<'_>) -> impl Iterator<Item = String> {
+    let (count, points) = (source.values.count, header.points);
+    let cut = ((count as u64) < points).then(|| format!("the data end after {count} of {points} points"));
+    let text = header.elements.iter().any(|element| element.stored == element::Stored::Text);
+    cut.into_iter().chain(text.then(|| "values that are text are left out".into()))
 }

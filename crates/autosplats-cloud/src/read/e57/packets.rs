@@ -120,9 +120,7 @@ fn survey(
     let mut enough = false;
     while at < section.end && !enough {
         if groups.last().is_none_or(|group| at - group.range.start >= GROUP) {
-            if job.progress.cancelled() {
-                return Err(Error::Cancelled);
-            }
+            job.go_on()?;
             groups.push(Group { range: at..at, filled: filled.clone() });
         }
         let packet = match packet(job, pages, at..section.end, needed.len(), &mut lengths) {

@@ -102,9 +102,7 @@ impl<'a> Pages<'a> {
         let data = self.size - CHECKSUM;
         let pages = range.start / data..range.end.div_ceil(data).min(self.bytes.len() / self.size);
         for start in pages.clone().step_by(BLOCK) {
-            if job.progress.cancelled() {
-                return Err(Error::Cancelled);
-            }
+            job.go_on()?;
             let wrong = |page: &usize| {
                 let (data, checksum) = self.bytes[page * self.size..][..self.size].split_at(data);
                 // Big endian, unlike all else in the file.

@@ -12,6 +12,9 @@ use crate::{Crs, Error, Unit};
 /// Bytes of a tag beyond which it is rather broken than long: attributes are compared with one another.
 const MAX_TAG: usize = 1 << 13;
 
+/// Letters of the name of a coordinate system.
+const MAX_NAME: usize = 200;
+
 /// Declarations of namespaces beyond which they are an attack: nested ones are all kept at every level.
 const MAX_NAMESPACES: usize = 1 << 10;
 
@@ -99,12 +102,18 @@ impl Root {
             return Err(format!("it begins with '{}', not with e57Root", shown(root.tag_name().name().as_bytes())));
         }
         let mut scans = Vec::new();
+        let mut empty = Vec::new();
         for (index, node) in children(root, "data3D").enumerate() {
             if child(node, "points").is_none() {
-                notes.push(format!("scan {} has no points", index + 1));
+                empty.push(index + 1);
                 continue;
             }
             scans.push(scan(node).map_err(|what| format!("scan {}: {what}", index + 1))?);
+        }
+        match empty[..] {
+            [] => {}
+            [index] => notes.push(format!("scan {index} has no points")),
+            [first, ..] => notes.push(format!("{} scans have no points, the first is scan {first}", empty.len())),
         }
         Ok(Self {
             library: text(root, "e57LibraryVersion"),
@@ -258,13 +267,14 @@ fn crs(metadata: Option<&str>) -> Crs {
     let keyword = metadata.split(['[', '(']).next().unwrap_or_default().trim();
     let wkt =
         metadata.contains('[') && keyword.len() > 4 && keyword.bytes().all(|b| b.is_ascii_uppercase() || b == b'_');
-    if wkt {
-        crs.name = metadata.split('"').nth(1).map(String::from);
+    let name = if wkt {
         crs.wkt = Some(metadata.into());
+        metadata.split('"').nth(1)
     } else {
         crs.epsg = metadata.strip_prefix("EPSG:").and_then(|code| code.trim().parse().ok());
-        crs.name = Some(metadata.into());
-    }
+        Some(metadata)
+    };
+    crs.name = name.map(|name| name.chars().map(|c| if c.is_control() { ' ' } else { c }).take(MAX_NAME).collect());
     crs
 }
 

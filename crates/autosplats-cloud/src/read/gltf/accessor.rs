@@ -94,6 +94,10 @@ impl<'a> Values<'a> {
                 let kind =
                     self::scalar(sparse.indices.component_type).ok_or_else(|| fail("its indices are unknown"))?;
                 let (indices, values) = (&sparse.indices, &sparse.values);
+                if sparse.count > accessor.count {
+                    let what = format!("{} sparse values for {} elements", sparse.count, accessor.count);
+                    return Err(fail(&what));
+                }
                 Some((
                     elements(indices.buffer_view, indices.byte_offset, kind, kind.size(), sparse.count, false)?,
                     elements(values.buffer_view, values.byte_offset, scalar, size, sparse.count, false)?,

@@ -14,6 +14,9 @@ const BASE64: engine::GeneralPurpose = engine::GeneralPurpose::new(
     engine::GeneralPurposeConfig::new().with_decode_padding_mode(engine::DecodePaddingMode::Indifferent),
 );
 
+/// Bytes of a file's name, with folders.
+const MAX_NAME: usize = 1024;
+
 /// The buffers that were asked for.
 pub(super) struct Buffers<'a> {
     loaded: Vec<Option<Data<'a>>>,
@@ -100,7 +103,9 @@ fn beside(job: &Job<'_>, place: &str, uri: &str) -> Result<Bytes, Error> {
     let name = String::from_utf8_lossy(&decoded);
     let relative = Path::new(&*name);
     let inside = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !inside || name.is_empty() || name.contains([':', '\\', '\0']) {
+    // The name would stand in messages as it is.
+    let fit = name.len() <= MAX_NAME && !name.contains(|c: char| c.is_control() || matches!(c, ':' | '\\'));
+    if !inside || name.is_empty() || !fit {
         let what =
             format!("it is at '{}', and only files beside this one are read; put it there", shown(uri.as_bytes()));
         return Err(job.malformed(place, what));

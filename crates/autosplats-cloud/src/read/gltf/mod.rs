@@ -24,7 +24,7 @@ use super::{
     mesh::{self, Faces},
     table::{Part, reserve},
 };
-use crate::{Axes, Crs, Error, FieldValues, Unit};
+use crate::{Axes, Crs, Error, FieldValues, Unit, merge::normal_matrix};
 
 pub(super) const FORMAT: Format = Format {
     name: "glTF",
@@ -207,14 +207,6 @@ impl Points {
         }
         Ok(())
     }
-}
-
-/// What normals are multiplied by where positions are by `matrix`: its inverse transposed, but for a positive factor, so
-/// that it is there for flat ones too.
-fn normal_matrix(matrix: DMat3) -> DMat3 {
-    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = matrix;
-    let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
-    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign
 }
 
 fn base_color(root: &Root<'_>, shown: &Shown<'_>) -> [f32; 3] {

@@ -15,6 +15,10 @@ const MAX_POINTS_PER_BYTE: usize = 64;
 /// Points that meshes shown at several places may become in any case.
 const ALWAYS: usize = 1 << 16;
 
+/// Bytes of the file for each primitive shown, beyond those that may be shown in any case: a node that shows a mesh
+/// takes more, and so does a primitive.
+const BYTES_PER_SHOWN: usize = 8;
+
 /// A primitive at one of the places where it is shown.
 pub(super) struct Shown<'a> {
     pub(super) primitive: &'a Primitive,
@@ -57,10 +61,17 @@ impl<'a> Plan<'a> {
         let mut plan = Self::default();
         let (mut lines, mut morphed) = (0, 0);
         let places = places(job, root, &mut plan.notes)?;
+        let most = (job.bytes.len() / BYTES_PER_SHOWN).max(ALWAYS);
+        let mut looked_at = 0;
         for (mesh, world_from_mesh) in places {
             let Some(mesh) = root.meshes.get(mesh) else {
                 return Err(job.malformed(format!("mesh {mesh}"), "there is no such mesh; export the file again"));
             };
+            looked_at += mesh.primitives.len();
+            if looked_at > most {
+                let what = format!("they show more than {most} primitives, too many for this file; split it");
+                return Err(job.malformed("nodes", what));
+            }
             let mut known: HashMap<Attributes, usize> = HashMap::new();
             for primitive in &mesh.primitives {
                 if matches!(primitive.mode, 1..=3) {

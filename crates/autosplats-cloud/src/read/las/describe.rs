@@ -1,7 +1,5 @@
 //! What the header and the records around the points say.
 
-use glam::DVec3;
-
 use super::super::{Attribute, Description, Job};
 use super::{
     columns::{Source, bytes_at},
@@ -99,7 +97,7 @@ fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {
     let flags = ["GPS time is standard time", "waveforms inside", "waveforms outside", "returns are synthetic", "WKT"];
     let set = flags.into_iter().enumerate().filter(|(bit, _)| header.global_encoding >> bit & 1 == 1);
     detail("global encoding", set.map(|(_, flag)| flag).collect::<Vec<_>>().join(", "));
-    detail("offset", header.offset.to_string());
+    detail("offset of coordinates", header.offset.to_array().map(|value| value.to_string()).join(", "));
     detail("variable length records", records.all.len().to_string());
     let returns = &header.points_by_return;
     let last = returns.iter().rposition(|&count| count > 0).map_or(0, |index| index + 1);
@@ -121,14 +119,20 @@ fn date((day, year): (u16, u16)) -> String {
     String::new()
 }
 
+/// A number as a text of digits has it, without zeros at the end.
+fn short(digits: &str) -> String {
+    digits.parse::<f64>().map_or_else(|_| digits.to_owned(), |value| value.to_string())
+}
+
 /// What COPC says of its octree.
 fn tree_details(info: &[u8]) -> Vec<(String, String)> {
     let double = |index: usize| f64::from_le_bytes(bytes_at(info, 8 * index));
-    let center = DVec3::new(double(0), double(1), double(2));
+    let center = [0, 1, 2].map(|axis| short(&format!("{:.3}", double(axis)))).join(", ");
+    let six = |value: f64| short(&format!("{value:.5e}"));
     let times = format!("{} to {}", double(7), double(8));
     vec![
-        ("COPC root cube".into(), format!("{} wide about {center}", 2.0 * double(3))),
-        ("COPC spacing".into(), format!("{} at the root", double(4))),
+        ("COPC root cube".into(), format!("{} wide about {center}", six(2.0 * double(3)))),
+        ("COPC spacing".into(), format!("{} at the root", six(double(4)))),
         ("COPC times".into(), times),
     ]
 }

@@ -166,8 +166,5 @@ fn uncompressed(job: &Job<'_>, header: &Header, columns: &mut Columns<'_>, point
 
 /// Shows points that were just filled.
 fn preview(job: &Job<'_>, columns: &Columns<'_>, start: usize, count: usize) -> Result<(), Error> {
-    if job.progress.wants_chunks() && count > 0 {
-        job.progress.chunk(columns.preview(start..start + count)?);
-    }
-    Ok(())
+    job.preview(|| columns.preview(start..start + count))
 }

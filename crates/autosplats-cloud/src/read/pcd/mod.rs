@@ -15,7 +15,7 @@ use super::{
 use crate::{Axes, Error, PointCloud, Scan};
 
 pub(super) const FORMAT: Format =
-    Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
+    Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: false, describe, read };
 
 /// Part of the work that parsing text is.
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
@@ -68,7 +68,8 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         return (xyz::FORMAT.read)(job);
     }
     let header = Header::parse(job)?;
-    for field in header.fields.iter().filter(|field| field.name != "_" && field.count > MAX_COUNT) {
+    let long = |field: &&header::Field| field.name != "_" && field.count > MAX_COUNT;
+    for field in header.fields.iter().filter(long).take(LISTED) {
         let name = shown(field.name.as_bytes());
         job.note(format!("{name} has {} values a point; left out, {MAX_COUNT} at most are read", field.count));
     }
@@ -103,6 +104,9 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let cloud = cloud.with_scans(scans);
     Ok(if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud }.into())
 }
+
+/// Fields left out that are told one by one.
+const LISTED: usize = 10;
 
 /// Values that a field may have for each of them to become one of its own. Descriptors have more.
 const MAX_COUNT: usize = 16;
@@ -200,6 +204,7 @@ fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, 
     if plain / lzf::MAX_RATIO > compressed {
         return Err(fail(header.end, "the compressed data are too short for so many points"));
     }
+    job.check_memory(header.points, stride)?;
     let mut bytes = Vec::new();
     reserve(&mut bytes, plain, "compressed points")?;
     let go_on = |made: usize| job.tick(0.5 * made as f32 / plain as f32);

@@ -21,6 +21,9 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
+/// Other elements that are listed.
+const LISTED: usize = 100;
+
 /// Part of the work that packing text or lists into records is.
 const PACKING: Part = Part { start: 0.0, len: 0.8 };
 
@@ -31,7 +34,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         Some(_) => format!("list of {}", property.scalar.name()),
         None => property.scalar.name().into(),
     };
-    let others = header.elements.iter().filter(|element| element.name != "vertex");
+    let others = header.elements.iter().filter(|element| element.name != "vertex").take(LISTED);
     Ok(Description {
         format: format!("PLY, {}", header.encoding.name()),
         points: Some(vertex.count as u64),
@@ -40,6 +43,12 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         details: others.map(|e| (format!("element {}", shown(e.name.as_bytes())), e.count.to_string())).collect(),
         ..Description::default()
     })
+}
+
+/// Whether the file is a PLY with faces.
+pub(super) fn is_mesh(job: &Job<'_>) -> bool {
+    let faces = |element: &Element| ["face", "tristrips"].contains(&&*element.name) && element.count > 0;
+    (FORMAT.recognised)(job.bytes) && Header::parse(job).is_ok_and(|header| header.elements.iter().any(faces))
 }
 
 fn vertices(job: &Job<'_>, header: &Header) -> Result<usize, Error> {

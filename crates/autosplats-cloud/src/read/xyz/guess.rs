@@ -14,8 +14,10 @@ impl Cell {
     }
 }
 
-pub(super) fn guessed(rows: &[Vec<Cell>], width: usize) -> Vec<String> {
+/// Names for columns; `pts` if a count of points stands before them.
+pub(super) fn guessed(rows: &[Vec<Cell>], width: usize, pts: bool) -> Vec<String> {
     let rest: &[&str] = match width {
+        7 if pts && colors(rows, 4) => &["Intensity", "red", "green", "blue"],
         4 => &["Intensity"],
         6 if unit_vectors(rows, 3) => &["nx", "ny", "nz"],
         6 if colors(rows, 3) => &["red", "green", "blue"],

@@ -164,7 +164,7 @@ impl Layout {
         {
             named(names, units, &mut crs, &mut notes)
         } else {
-            let names = guessed(&rows, width);
+            let names = guessed(&rows, width, preamble.promised.is_some());
             // Three columns leave nothing to guess, and PTS says itself what its columns are.
             let pts = preamble.promised.is_some() && (width == 4 || width == 7 && names[4] == "red");
             let names: Vec<Option<String>> = names.into_iter().map(Some).collect();

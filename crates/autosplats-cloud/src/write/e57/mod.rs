@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use self::{
     pages::Pages,
-    values::{Frame, Value, beyond, values, wide_colors, xml_name},
+    values::{Frame, Known, Value, values, xml_name},
     xml::ScanEntry,
 };
 use super::{Format, Job};
@@ -38,12 +38,13 @@ struct Run {
 }
 
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
-    notes(job);
+    let known = Known::of(job.cloud);
+    notes(job, &known);
     let mut pages = Pages::new(file);
     let mut entries = Vec::new();
     let mut done = 0;
     for run in runs(job) {
-        let entry = scan(job, &mut pages, &run, done)?;
+        let entry = scan(job, &known, &mut pages, &run, done)?;
         done += run.len;
         entries.push(entry);
     }
@@ -52,7 +53,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
 }
 
 /// Tells what cannot be held.
-fn notes(job: &Job<'_>) {
+fn notes(job: &Job<'_>, known: &Known<'_>) {
     let cloud = job.cloud;
     if let Some(unit) = cloud.crs().unit.filter(|unit| *unit != Unit::Metre) {
         job.note(format!("E57 means metres; the coordinates are written as they are, in {}", unit.name()));
@@ -61,7 +62,7 @@ fn notes(job: &Job<'_>) {
         job.note("E57 does not say which way is up");
     }
     for field in cloud.fields() {
-        if beyond(&field.values) {
+        if known.beyond.contains(&&*field.name) {
             job.note(format!("{}: integers beyond 63 bits are written as floats", field.name));
         }
         if xml_name(&field.name) != field.name {
@@ -117,7 +118,13 @@ fn rigid(map: DMat4) -> Option<DMat4> {
 }
 
 /// Writes the packets of one scan.
-fn scan(job: &Job<'_>, pages: &mut Pages<'_, '_>, run: &Run, done: usize) -> Result<ScanEntry, Error> {
+fn scan<'a>(
+    job: &Job<'a>,
+    known: &Known<'a>,
+    pages: &mut Pages<'_, '_>,
+    run: &Run,
+    done: usize,
+) -> Result<ScanEntry, Error> {
     let cloud = job.cloud;
     let frame = run.pose.map_or(Frame::WORLD, |pose| {
         // The turn as readers will have it: from the quaternion.
@@ -131,7 +138,7 @@ fn scan(job: &Job<'_>, pages: &mut Pages<'_, '_>, run: &Run, done: usize) -> Res
     let join =
         |[low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]| [low.min(other_low), high.max(other_high)];
     let bounds = points().filter(valid).map(|i| [frame.local(cloud.world_position(i)); 2]).reduce(nothing, join);
-    let values = values(job, frame, single, !points().all(|i| valid(&i)));
+    let values = values(job, known, frame, single, !points().all(|i| valid(&i)));
 
     let fixed = 6 + 2 * values.len() + 4;
     let bits: usize = values.iter().map(|value| value.source.bits()).sum();
@@ -175,7 +182,7 @@ fn scan(job: &Job<'_>, pages: &mut Pages<'_, '_>, run: &Run, done: usize) -> Res
         name: run.name.clone(),
         pose: run.pose,
         bounds: (bounds[0].x <= bounds[1].x).then_some(bounds),
-        max_color: match wide_colors(cloud) {
+        max_color: match known.wide_colors {
             Some(_) => Some(u16::MAX),
             None => cloud.colors().map(|_| 255),
         },

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::super::Job;
+use super::super::{Job, colors::wide_colors};
 use crate::{Field, FieldValues, PointCloud};
 
 /// One value of each point: how it is called, stored and had.
@@ -161,8 +161,33 @@ fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
     }
 }
 
+/// What takes a look at all points, of which there may be many scans.
+pub(super) struct Known<'a> {
+    /// Colours of 16 bits.
+    pub(super) wide_colors: Option<[&'a FieldValues; 3]>,
+    /// Whether [returns] are counted from 1.
+    counted: bool,
+    /// Names of fields with integers [beyond] 63 bits.
+    pub(super) beyond: Vec<&'a str>,
+}
+
+impl<'a> Known<'a> {
+    pub(super) fn of(cloud: &'a PointCloud) -> Self {
+        Self {
+            wide_colors: wide_colors(cloud).filter(|[red, ..]| matches!(red, FieldValues::U16(_))),
+            counted: returns(cloud),
+            beyond: cloud.fields().iter().filter(|field| beyond(&field.values)).map(|field| &*field.name).collect(),
+        }
+    }
+
+    /// A field as it is, but for integers that E57 cannot hold.
+    fn source(&self, field: &'a Field) -> Source<'a> {
+        if self.beyond.contains(&&*field.name) { Source::Double(&field.values) } else { Source::Field(&field.values) }
+    }
+}
+
 /// All values of the points of a cloud: `single` positions or double ones, with `state` if some have none.
-pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool) -> Vec<Value<'a>> {
+pub(super) fn values<'a>(job: &Job<'a>, known: &Known<'a>, frame: Frame, single: bool, state: bool) -> Vec<Value<'a>> {
     let cloud = job.cloud;
     let mut all = Vec::new();
     let mut add = |name: &str, source| all.push(Value { name: name.into(), source });
@@ -176,7 +201,7 @@ pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool)
         let found = names.map(|name| named(cloud, name));
         Some([found[0]?, found[1]?, found[2]?])
     };
-    let wide = wide_colors(cloud);
+    let wide = known.wide_colors;
     for (channel, name) in ["colorRed", "colorGreen", "colorBlue"].into_iter().enumerate() {
         match wide {
             Some(wide) => add(name, Source::Field(wide[channel])),
@@ -185,18 +210,18 @@ pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool)
         }
     }
     let normals = three(["NormalX", "NormalY", "NormalZ"]);
-    let counted = returns(cloud);
     let mut names: Vec<String> = Vec::new();
-    for Field { name, values } in cloud.fields() {
+    for one in cloud.fields() {
+        let Field { name, values } = one;
         let integers = !matches!(values, FieldValues::F32(_) | FieldValues::F64(_));
         match &**name {
             "Red" | "Green" | "Blue" if wide.is_some() => {}
-            "Intensity" => add("intensity", field(values)),
-            "ReturnNumber" if counted => add("returnIndex", Source::FromZero(values)),
-            "NumberOfReturns" if counted => add("returnCount", field(values)),
+            "Intensity" => add("intensity", known.source(one)),
+            "ReturnNumber" if known.counted => add("returnIndex", Source::FromZero(values)),
+            "NumberOfReturns" if known.counted => add("returnCount", known.source(one)),
             "GpsTime" => add("timeStamp", Source::Double(values)),
             "rowIndex" | "columnIndex" | "isIntensityInvalid" | "isColorInvalid" if integers => {
-                add(name, field(values));
+                add(name, known.source(one));
             }
             "NormalX" | "NormalY" | "NormalZ" if normals.is_some() => {
                 if let Some((axis, fields)) =
@@ -212,7 +237,7 @@ pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool)
                 while names.contains(&fit) {
                     fit.push('_');
                 }
-                add(&format!("autosplats:{fit}"), field(values));
+                add(&format!("autosplats:{fit}"), known.source(one));
                 names.push(fit);
             }
         }
@@ -220,25 +245,13 @@ pub(super) fn values<'a>(job: &Job<'a>, frame: Frame, single: bool, state: bool)
     all
 }
 
-/// A field as it is, but for integers that E57 cannot hold.
-fn field(values: &FieldValues) -> Source<'_> {
-    if beyond(values) { Source::Double(values) } else { Source::Field(values) }
-}
-
 /// Whether integers are beyond 63 bits.
-pub(super) fn beyond(values: &FieldValues) -> bool {
+fn beyond(values: &FieldValues) -> bool {
     matches!(values, FieldValues::U64(values) if values.iter().any(|&value| i64::try_from(value).is_err()))
 }
 
 fn named<'a>(cloud: &'a PointCloud, name: &str) -> Option<&'a FieldValues> {
     cloud.fields().iter().find(|field| field.name == name).map(|field| &field.values)
-}
-
-/// Colours of 16 bits, if the cloud has some.
-pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
-    let [red, green, blue] = ["Red", "Green", "Blue"].map(|name| named(cloud, name));
-    let all = [red?, green?, blue?];
-    all.iter().all(|values| matches!(values, FieldValues::U16(_))).then_some(all)
 }
 
 /// Whether returns are counted from 1, as they should be, so that E57's own elements can hold them.

@@ -4,7 +4,10 @@ use rayon::prelude::*;
 
 use glam::DVec3;
 
-use super::{super::Job, grid};
+use super::{
+    super::{Job, colors},
+    grid,
+};
 use crate::{
     Axes, Error, Field, FieldValues, PointCloud,
     cloud::each_type,
@@ -68,9 +71,7 @@ impl<'a> Plan<'a> {
 
         let wide_colors = wide_colors(cloud);
         let colored = wide_colors.is_some() || cloud.colors().is_some();
-        let is_color = |field: &Field| {
-            wide_colors.is_some() && ["Red", "Green", "Blue"].iter().any(|name| field.name.eq_ignore_ascii_case(name))
-        };
+        let is_color = |field: &Field| wide_colors.is_some() && colors::CHANNELS.contains(&&*field.name);
         let fields: Vec<(&Field, Range)> = cloud
             .fields()
             .iter()
@@ -220,11 +221,10 @@ fn angles_are_rounded(values: &FieldValues) -> bool {
 
 /// Three fields of 16-bit colours.
 fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
-    let channel = |name: &str| match &cloud.field(name)?.values {
-        FieldValues::U16(values) => Some(values.as_slice()),
+    match colors::wide_colors(cloud)? {
+        [FieldValues::U16(red), FieldValues::U16(green), FieldValues::U16(blue)] => Some([red, green, blue]),
         _ => None,
-    };
-    Some([channel("Red")?, channel("Green")?, channel("Blue")?])
+    }
 }
 
 /// The smallest and the largest value of a field.
