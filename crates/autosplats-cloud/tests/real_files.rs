@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use autosplats_cloud::{Axes, Error, PointCloud, ReadOptions, describe, glam::DVec3, read, read_mesh};
+use autosplats_cloud::{Axes, PointCloud, ReadOptions, describe, glam::DVec3, read, read_mesh};
 
 fn data() -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");

@@ -325,7 +325,8 @@ fn written_pcd_reads_back() {
             "{count} points come back as they were"
         );
     }
-    let pose = DMat4::from_rotation_translation(DQuat::from_axis_angle(DVec3::Z, 0.5), DVec3::new(512_001.0, 5.4e6, 312.0));
+    let pose =
+        DMat4::from_rotation_translation(DQuat::from_axis_angle(DVec3::Z, 0.5), DVec3::new(512_001.0, 5.4e6, 312.0));
     let exact = ReadOptions { exact: true, ..ReadOptions::default() };
     let text = "x y z\n512000.1234567 5400000.25 310.1\n512001.7 5400001.3 311\n";
     let survey = read_bytes(Path::new("a.xyz"), text.as_bytes(), &exact, &()).unwrap();

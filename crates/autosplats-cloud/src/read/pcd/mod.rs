@@ -15,7 +15,7 @@ use super::{
 use crate::{Axes, Error, PointCloud, Scan};
 
 pub(super) const FORMAT: Format =
-    Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: false, describe, read };
+    Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
 
 /// Part of the work that parsing text is.
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
