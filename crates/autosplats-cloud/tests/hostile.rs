@@ -8,6 +8,7 @@ mod common;
 use std::time::{Duration, Instant};
 
 use autosplats_cloud::{PointCloud, ReadOptions, describe, read, read_mesh, write};
+use base64::Engine as _;
 use common::{Random, error, las_bytes, pcd_bytes, ptx_bytes, read_bytes, rich_cloud};
 
 /// Far above what any of these small files takes, far below what a loop over a claimed count would.
@@ -259,4 +260,26 @@ fn folders_and_missing_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     assert!(read(folder.path(), &()).is_err(), "a folder");
     assert!(read(&folder.path().join("missing.ply"), &()).is_err(), "a missing file");
+}
+
+/// A file that was made here, compressed and then damaged, of whose times one switches between scanners for ever.
+const SWITCHING: &str = "\
+    TEFTRgAAEAAAAAAAAAAAAAAAAAAAAAAAAQQAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA\
+    AAAAAAAAAAAAAHcB4QEAAAEAAACHJQAYAAAAGAAAAAAAAAAAAAAAAAAAAAAAAAD8qfHSTWJQP/yp8dJNYlA//Knx0k1iUD8AAAAAAAAAAAAAAAAA\
+    AAAAAAAAAAAAAAAAAAAAAAAnQAAAAAAAAAAAAAAAAAAAEEAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAABgAAAAA\
+    AAAAGAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA\
+    AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAABsYXN6aXAgZW5jb2RlZAAAvFY0AGh0dHBzOi8vbGFzemlwLm9yZwAAAAAA\
+    AAAAAAAAAAAAAwAAAAICAAAAAAAAUMMAAP////////////////////8DAAoAHgADAAsABgADAA4AAQADAIIDAAAAAAAAAAAAAAAAAAAAAAAAAAAh\
+    AAAAAAAAAAAAAAAAAAAAAAAsAQcAARgAAABTAAAAEwAAAAAAAAAAAAAADAAAAAAAAAAAAAAAAAAAAKMAAAAvAAAAAAAAACCaiuvVJSXoc4V7LHr2\
+    pvAGO8wTsXQ1bYxM6sFGYbGeeAAAAAAAAAAAAAAAAGxhc3ppcCBlbmNvZGVkAAC8VigAaHR0cHM6Ly9sYXN6aXAub3JnAAAAAAAAAAAAAAAAAAAC\
+    AAAAAgIAAAAAAABQwwAA/////////////////////wEABgAUAAIAzQEAAAAAAAAAAAAAAAAAAGNgkoAAAYaFK/zgAAHJVWNBYAACBnN04EAABMA+\
+    JfMAAAshC11fgAAclu0hSAAAYXwH2PYAAStRMK3AAANzvdWmwAAKEQzWtAAAG/ZK/s4AANfE5OKAAAU2NJhtgAAZ2VGVcgABycrI9YAAHUTX8pUA\
+    Agc3wXUAAAEAAACCAsJFBooNFBooNFBooNFBooNFBooNFBooNFBooNFBooNFBooNFBooNFBoYAAAAAAAAAABAAAAS/8AAAA=";
+
+#[test]
+fn a_time_that_belongs_to_no_scanner() {
+    let bytes = base64::prelude::BASE64_STANDARD.decode(SWITCHING).unwrap();
+    survive("a.laz", "switching", &bytes);
+    let damaged = error("a.laz", &bytes);
+    assert!(damaged.contains("the compressed data are damaged (a GPS time belongs to no sequence)"), "{damaged}");
 }

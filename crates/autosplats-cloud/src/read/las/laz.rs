@@ -18,7 +18,9 @@ use super::{
     super::{Job, guard},
     BATCH,
     columns::Columns,
+    gps_time::GpsTime11,
     header::Header,
+    point14::{self, Point14},
     preview,
     records::Records,
 };
@@ -307,11 +309,11 @@ fn chunks(bytes: &[u8], header: &Header, vlr: &LazVlr, chunked: bool) -> Result<
 
 /// A layered chunk gives, after its first record and the number of points, the length of each layer; the decompressor
 /// allocates them as they are claimed, so they must be in the chunk.
-fn layers_fit(chunk: &[u8], items: &[LazItem], record_len: usize) -> bool {
+pub(super) fn layers_fit(chunk: &[u8], items: &[LazItem], record_len: usize) -> bool {
     let layers: usize = items
         .iter()
         .map(|item| match item.item_type() {
-            LazItemType::Point14 => 9,
+            LazItemType::Point14 => point14::LAYERS,
             LazItemType::RGBNIR14 => 2,
             LazItemType::Byte14(count) => count.into(),
             _ => 1,
@@ -322,16 +324,31 @@ fn layers_fit(chunk: &[u8], items: &[LazItem], record_len: usize) -> bool {
     claimed <= (chunk.len() - record_len - 4 - 4 * layers) as u64
 }
 
-type Decompressor<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a>;
+pub(super) type Decompressor<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a>;
 
-fn decompressor<'a>(items: &Vec<LazItem>, chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {
-    let mut decompressor: Decompressor<'a> = if layered(items) {
-        Box::new(LayeredPointRecordDecompressor::new(Cursor::new(chunk)))
-    } else {
-        Box::new(SequentialPointRecordDecompressor::new(Cursor::new(chunk)))
+/// Parts are ours where damaged data would fill the stack of the crate's.
+pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {
+    let theirs = |decompressor: &mut dyn RecordDecompressor<Cursor<&'a [u8]>>, item: LazItem| {
+        decompressor.set_fields_from(&vec![item]).map_err(|error| error.to_string())
     };
-    decompressor.set_fields_from(items).map_err(|error| error.to_string())?;
-    Ok(decompressor)
+    if layered(items) {
+        let mut decompressor = LayeredPointRecordDecompressor::new(Cursor::new(chunk));
+        for &item in items {
+            match (item.item_type(), item.version()) {
+                (LazItemType::Point14, version @ 3..=4) => decompressor.add_field_decompressor(Point14::new(version)),
+                _ => theirs(&mut decompressor, item)?,
+            }
+        }
+        return Ok(Box::new(decompressor));
+    }
+    let mut decompressor = SequentialPointRecordDecompressor::new(Cursor::new(chunk));
+    for &item in items {
+        match (item.item_type(), item.version()) {
+            (LazItemType::GpsTime, 2) => decompressor.add_field_decompressor(GpsTime11::default()),
+            _ => theirs(&mut decompressor, item)?,
+        }
+    }
+    Ok(Box::new(decompressor))
 }
 
 /// Decompresses the next records; an error comes with the number of those before it.

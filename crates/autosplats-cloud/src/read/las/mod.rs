@@ -13,8 +13,10 @@ mod columns;
 mod coordinates;
 mod describe;
 mod extra;
+mod gps_time;
 mod header;
 mod laz;
+mod point14;
 mod records;
 
 use glam::DVec3;
