@@ -34,18 +34,19 @@ pub(super) struct Words {
 pub(super) const WORDS: &[Words] = &[
     Words {
         name: "LAS",
-        kept: "LAS 1.0 to 1.4, LAZ and COPC, point formats 0 to 10: coordinates, colours, all attributes, units and \
-               coordinate system, scale as resolution",
+        kept: "LAS 1.0 to 1.4, LAZ and COPC, point formats 0 to 10: coordinates, colours, all attributes, extra bytes, units \
+               and coordinate system, scale as resolution",
         not_kept: "waveforms; of COPC the tree, as all points are read",
     },
     Words {
         name: "PLY",
-        kept: "text and binary of both byte orders; all scalar properties of `vertex`, colours; faces by the library's `read_mesh`",
+        kept: "text and binary of both byte orders; all scalar properties of `vertex`, colours; faces for `convert --sample`",
         not_kept: "list properties of points, other elements",
     },
     Words {
         name: "PCD",
-        kept: "text, binary and compressed; all fields with one value, colours packed into `rgb` or `rgba`, the viewpoint",
+        kept: "text, binary and compressed; fields of up to 16 values, colours packed into `rgb` or `rgba` or apart, the \
+               viewpoint as the sensor's place",
         not_kept: "the grid of organised clouds",
     },
     Words {
@@ -54,7 +55,6 @@ pub(super) const WORDS: &[Words] = &[
                or values, `--columns` states them",
         not_kept: "words and comments",
     },
-    Words { name: "PTS", kept: "coordinates, intensity, colours", not_kept: "" },
     Words {
         name: "PTX",
         kept: "all scans, placed by their matrices; sensor positions, intensity, colours",
@@ -62,8 +62,9 @@ pub(super) const WORDS: &[Words] = &[
     },
     Words {
         name: "E57",
-        kept: "all scans, cartesian and spherical, placed by their poses; sensor positions, intensity, colours",
-        not_kept: "embedded pictures, the grid of each scan",
+        kept: "all scans, cartesian and spherical, placed by their poses; sensor positions, intensity, colours, row and \
+               column, fields of extensions",
+        not_kept: "embedded pictures",
     },
     Words {
         name: "bare floats",
@@ -78,21 +79,20 @@ pub(super) const WORDS: &[Words] = &[
     },
     Words {
         name: "OBJ",
-        kept: "vertices with colours and normals; faces by the library's `read_mesh`",
-        not_kept: "materials, textures",
+        kept: "vertices with colours; faces for `convert --sample`",
+        not_kept: "normals, which belong to corners of faces; materials, textures",
     },
-    Words { name: "OFF", kept: "vertices with colours and normals; faces by the library's `read_mesh`", not_kept: "" },
+    Words { name: "OFF", kept: "vertices with colours and normals; faces for `convert --sample`", not_kept: "" },
     Words {
         name: "STL",
-        kept: "text and binary; corners as points; faces by the library's `read_mesh`",
+        kept: "text and binary; corners as points; faces for `convert --sample`",
         not_kept: "attribute bytes",
     },
     Words {
         name: "glTF",
-        kept: "GLB and glTF with embedded or neighbouring buffers: points and meshes of the scene, placed; colours, normals; faces by the library's `read_mesh`",
+        kept: "GLB and glTF with embedded or neighbouring buffers: points and meshes of the scene, placed; colours, normals; faces for `convert --sample`",
         not_kept: "materials, textures, animation",
     },
-    Words { name: "NPY", kept: "arrays of numbers with three or more columns", not_kept: "" },
 ];
 
 /// What stands before the table of files.
