@@ -3,11 +3,11 @@
 //! # How it works
 //!
 //! Each format has small seed files (see [`seeds`]). Every input is a seed, or an earlier input that was answered in a
-//! new way, changed by [`mutate`]; it depends on nothing but its number, so a finding can be repeated. An input is
-//! described and read from memory, on one thread; a child process per core does a share. Panics in code of others, which
-//! readers turn into errors, are counted; any other panic is a finding, as are time and memory beyond the limits. A
-//! finding is written to `target/fuzz`, and the program fails. An input that ends the process, as by overflowing the stack, is
-//! found there too: each is left in a file of the process before it is tried.
+//! new way, changed by [`mod@mutate`]; the same `--seed` on as many cores makes the same inputs in the same order. An input
+//! is described and read from memory, on one thread; a child process per core does a share. Panics in code of others,
+//! which readers turn into errors, are counted; any other panic is a finding, as are time and memory beyond the limits. A
+//! finding is written to `target/fuzz`, and the program fails. An input that ends the process, as by overflowing the
+//! stack, is found there too: each is left in a file of its process before it is tried.
 
 mod meter;
 mod mutate;
