@@ -13,6 +13,7 @@ mod las;
 mod names;
 mod pcd;
 mod ply;
+mod records;
 mod xyz;
 
 use std::{

@@ -6,18 +6,11 @@ use std::{
 };
 
 use glam::{DMat4, DQuat, DVec3};
-use rayon::prelude::*;
 
-use super::{Format, Job, names::unique_names};
+use super::{Format, Job, names::unique_names, records::write_records};
 use crate::{Axes, Crs, Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "PCD", extensions: &["pcd"], write };
-
-/// Bytes encoded before they are written.
-const BUFFER: usize = 4 << 20;
-
-/// Records that one thread encodes at a time.
-const PIECE: usize = 1 << 13;
 
 /// Positions are floats if the cloud's origin is zero, else world coordinates in double precision: most programs read
 /// nothing but floats, so that doubles are left to coordinates that floats would ruin. Colours are packed into a field
@@ -27,18 +20,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let layout = Layout::of(cloud);
     note_losses(job);
     file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
-    let block = (BUFFER / layout.stride).max(PIECE);
-    let mut buffer = vec![0; block.min(cloud.len()) * layout.stride];
-    for start in (0..cloud.len()).step_by(block) {
-        job.tick(start as f32 / cloud.len() as f32)?;
-        let records = &mut buffer[..block.min(cloud.len() - start) * layout.stride];
-        records
-            .par_chunks_mut(PIECE * layout.stride)
-            .enumerate()
-            .for_each(|(index, records)| layout.encode(cloud, start + index * PIECE, records));
-        file.write_all(records).map_err(|source| job.io(source))?;
-    }
-    Ok(())
+    write_records(job, file, layout.stride, |first, records| layout.encode(cloud, first, records))
 }
 
 fn note_losses(job: &Job<'_>) {

@@ -12,19 +12,14 @@ use super::{
     Format, Job,
     colors::{CHANNELS, wide_colors},
     note_left_out,
+    records::write_records,
 };
 use crate::{Axes, Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "PLY", extensions: &["ply"], write };
 
-/// Bytes encoded before they are written.
-const BUFFER: usize = 4 << 20;
-
 /// Integers that doubles hold.
 const WHOLE: u64 = 1 << 53;
-
-/// Records that one thread encodes at a time.
-const PIECE: usize = 1 << 13;
 
 /// Positions are floats if the cloud's origin is zero and it has no residuals, else world coordinates in double
 /// precision. Blanks in field names become underscores.
@@ -33,18 +28,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let layout = Layout::of(cloud);
     note_losses(job);
     file.write_all(layout.header(cloud).as_bytes()).map_err(|source| job.io(source))?;
-    let block = (BUFFER / layout.stride).max(PIECE);
-    let mut buffer = vec![0; block.min(cloud.len()) * layout.stride];
-    for start in (0..cloud.len()).step_by(block) {
-        job.tick(start as f32 / cloud.len() as f32)?;
-        let records = &mut buffer[..block.min(cloud.len() - start) * layout.stride];
-        records
-            .par_chunks_mut(PIECE * layout.stride)
-            .enumerate()
-            .for_each(|(index, records)| layout.encode(cloud, start + index * PIECE, records));
-        file.write_all(records).map_err(|source| job.io(source))?;
-    }
-    Ok(())
+    write_records(job, file, layout.stride, |first, records| layout.encode(cloud, first, records))
 }
 
 fn note_losses(job: &Job<'_>) {
