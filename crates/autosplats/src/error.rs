@@ -39,6 +39,28 @@ pub enum Error {
     /// No surface would be seen: its message says why.
     #[error("nothing to show: {0}")]
     NothingVisible(String),
+    /// There is no GPU to render on, or it cannot do what is needed: its message says why.
+    #[error("GPU: {0}")]
+    Device(String),
+    /// The GPU binds no buffer as large as the frame needs.
+    #[error(
+        "GPU: {what} takes {needed} bytes, the device allows {allowed}; use a smaller picture or cloud, or the CPU backend"
+    )]
+    DeviceLimit {
+        /// What the buffer holds.
+        what: &'static str,
+        /// Bytes it takes.
+        needed: u64,
+        /// Bytes the device allows.
+        allowed: u64,
+    },
+    /// The GPU has no memory left for so many bytes, where the number is known.
+    #[error("GPU: out of memory{}; use a smaller picture or cloud, or the CPU backend",
+        .0.map(|bytes| format!(" for {bytes} bytes")).unwrap_or_default())]
+    DeviceMemory(Option<u64>),
+    /// The GPU stopped working, by its driver's message; a new renderer may find it working again.
+    #[error("GPU: the device was lost: {0}; make a new renderer, or use the CPU backend")]
+    DeviceLost(String),
     /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) asked to stop.
     #[error("cancelled")]
     Cancelled,

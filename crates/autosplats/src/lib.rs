@@ -28,6 +28,7 @@
 mod camera;
 mod error;
 mod fit;
+mod gpu;
 mod normals;
 mod project;
 mod renderer;

@@ -92,6 +92,7 @@ fn fit_blocks_with<'a, S: Simd>(
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
+            surfel.screen = query;
         }
     }
 }

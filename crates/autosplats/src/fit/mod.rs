@@ -14,7 +14,7 @@ pub(crate) mod tests;
 pub(crate) use cpu::{FitRules, Fitted, fit};
 
 /// An oriented disc in view space.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Surfel {
     /// The point itself, view space.
@@ -35,6 +35,8 @@ pub(crate) struct Surfel {
     pub(crate) pixel: u32,
     /// Index in the cloud.
     pub(crate) source: u32,
+    /// Index among the screen points.
+    pub(crate) screen: u32,
 }
 
 /// The surfels of a list of screen points, in that list's order.

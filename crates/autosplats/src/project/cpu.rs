@@ -17,7 +17,7 @@ const LANES: usize = 16;
 const EMPTY: u64 = u64::MAX;
 /// A strip is this many mean distances between screen points high: with one strip more above and below, sixteen points
 /// of a strip see their ten nearest neighbours among about a hundred candidates.
-const STRIP_SPACINGS: f32 = 3.0;
+pub(super) const STRIP_SPACINGS: f32 = 3.0;
 /// Side in pixels of the blocks that tell covered from empty screen when the density is measured.
 const OCCUPANCY_PX: usize = 16;
 

@@ -10,15 +10,20 @@
 //! nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 
 mod cpu;
+mod device_cloud;
+pub(crate) mod gpu;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use cpu::Projector;
+pub(crate) use device_cloud::{DeviceCloud, PointValues, Uploader};
+
+use bytemuck::{Pod, Zeroable};
 
 use crate::camera::View;
 
 /// A projected point: one that owns its pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ScreenPoint {
     /// View space (x right, y down, z forward), world units.

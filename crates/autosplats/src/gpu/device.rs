@@ -1,0 +1,163 @@
+//! Devices: which there are, and one made ready.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::Error;
+
+/// A device that could be rendered on.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct AdapterSummary {
+    /// What the driver calls it.
+    pub name: String,
+    /// Vulkan, Metal, Dx12 …
+    pub backend: String,
+    /// DiscreteGpu, IntegratedGpu, Cpu (software) …
+    pub kind: String,
+    /// Driver name and version.
+    pub driver: String,
+    /// Whether it is a program on the CPU, slower than the CPU backend.
+    pub software: bool,
+    /// Whether depth and index of a point fit one atomic operation; without it points are projected in two passes.
+    pub int64_atomics: bool,
+    /// Whether the device can time its passes.
+    pub timestamps: bool,
+    /// Points in one storage binding; larger clouds are split.
+    pub points_per_binding: u64,
+}
+
+/// A device and its queue.
+#[derive(Clone, Debug)]
+pub(crate) struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    /// Why the device was lost, once it is.
+    lost: Arc<Mutex<Option<String>>>,
+}
+
+/// All devices that can be rendered on, hardware first.
+pub fn adapters() -> Vec<AdapterSummary> {
+    usable_adapters().iter().map(summary).collect()
+}
+
+fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
+    let info = adapter.get_info();
+    let features = adapter.features();
+    AdapterSummary {
+        software: info.device_type == wgpu::DeviceType::Cpu,
+        driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
+        name: info.name,
+        backend: format!("{:?}", info.backend),
+        kind: format!("{:?}", info.device_type),
+        int64_atomics: features.contains(INT64_ATOMICS),
+        timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+        points_per_binding: adapter.limits().max_storage_buffer_binding_size / 12,
+    }
+}
+
+/// What one 64-bit atomic minimum needs.
+pub(crate) const INT64_ATOMICS: wgpu::Features =
+    wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
+
+fn usable_adapters() -> Vec<wgpu::Adapter> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::PRIMARY;
+    descriptor.flags = wgpu::InstanceFlags::empty().with_env();
+    let instance = wgpu::Instance::new(descriptor);
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    adapters
+        .retain(|adapter| adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
+    // The sort is stable: among devices of a kind the driver's order stays.
+    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    adapters
+}
+
+impl Gpu {
+    /// The best device there is.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there is none, or it does not start.
+    pub(crate) fn new() -> Result<Self, Error> {
+        let adapter = usable_adapters().into_iter().next().ok_or_else(|| {
+            Error::Device(
+                "there is none: no Vulkan, Metal or DirectX 12 driver was found; install one or use the CPU backend"
+                    .into(),
+            )
+        })?;
+        let optional = INT64_ATOMICS | wgpu::Features::TIMESTAMP_QUERY;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("autosplats"),
+            required_features: adapter.features() & optional,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|error| Error::Device(format!("{} does not start: {error}", adapter.get_info().name)))?;
+        Ok(Self::from_parts(device, queue))
+    }
+
+    /// The caller's own device.
+    pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let lost = Arc::new(Mutex::new(None));
+        let reason = Arc::clone(&lost);
+        device.set_device_lost_callback(move |_, message| {
+            *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
+        });
+        Self { device, queue, lost }
+    }
+
+    /// Whether the device is a program on the CPU.
+    pub(crate) fn is_software(&self) -> bool {
+        self.device.adapter_info().device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether depth and index of a point fit one atomic operation.
+    pub(crate) fn int64_atomics(&self) -> bool {
+        self.device.features().contains(INT64_ATOMICS)
+    }
+
+    /// What was made by `make`, if the device accepted it.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`] if there was no room for it, [`Error::Device`] if the device refused it,
+    /// [`Error::DeviceLost`].
+    pub(crate) fn checked<T>(&self, make: impl FnOnce() -> T) -> Result<T, Error> {
+        let invalid = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let full = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let made = make();
+        let [full, invalid] = [full, invalid].map(|scope| pollster::block_on(scope.pop()));
+        self.check_lost()?;
+        match (full, invalid) {
+            (None, None) => Ok(made),
+            (Some(_), _) => Err(Error::DeviceMemory(None)),
+            (_, Some(error)) => Err(Error::Device(error.to_string())),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::DeviceLost`] if the device is.
+    pub(crate) fn check_lost(&self) -> Result<(), Error> {
+        match &*self.lost.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(message) => Err(Error::DeviceLost(message.clone())),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The device to test on. Where there is none tests say that they check nothing, and where `CI` is set they fail.
+#[cfg(test)]
+pub(crate) fn test_gpu() -> Option<Gpu> {
+    match Gpu::new() {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            assert!(std::env::var_os("CI").is_none(), "{error}");
+            eprintln!("nothing checked: {error}");
+            None
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! What all passes of a frame are told.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::camera::View;
+
+/// The camera and the settings, as `shared/frame.wgsl` has them.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FrameUniform {
+    /// Columns, each padded to four numbers.
+    pub(crate) view_from_world: [[f32; 4]; 3],
+    pub(crate) eye_local: [f32; 3],
+    pub(crate) focal_px: f32,
+    pub(crate) size: [u32; 2],
+    pub(crate) near: f32,
+    pub(crate) perspective: u32,
+    pub(crate) k: u32,
+    pub(crate) grid_culling: u32,
+    pub(crate) ellipses: u32,
+    pub(crate) keep_outliers: u32,
+    pub(crate) splat_scale: f32,
+    /// Radius within which a point must have a neighbour, in first search radii.
+    pub(crate) outlier_growth: f32,
+    /// √λ; infinite if any gap is bridged.
+    pub(crate) gap_growth: f32,
+    /// Points in the cloud.
+    pub(crate) points: u32,
+}
+
+impl FrameUniform {
+    /// The camera; settings are the simplest there are.
+    pub(crate) fn new(view: &View, points: usize, k: u32) -> Self {
+        let column = |axis: glam::Vec3| [axis.x, axis.y, axis.z, 0.0];
+        let axes = view.view_from_world;
+        Self {
+            view_from_world: [column(axes.x_axis), column(axes.y_axis), column(axes.z_axis)],
+            eye_local: view.eye_local.to_array(),
+            focal_px: view.focal_px,
+            size: [view.width, view.height],
+            near: view.near,
+            perspective: view.perspective.into(),
+            k,
+            grid_culling: 0,
+            ellipses: 0,
+            keep_outliers: 0,
+            splat_scale: 1.0,
+            outlier_growth: f32::INFINITY,
+            gap_growth: f32::INFINITY,
+            points: points as u32,
+        }
+    }
+}

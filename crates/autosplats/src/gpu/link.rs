@@ -1,0 +1,49 @@
+//! Links WGSL: `#import name` pulls in `shared/name.wgsl`, once.
+
+/// What several passes share, by name; a file may import only files that stand before it.
+const SHARED: &[(&str, &str)] = &[
+    ("frame", include_str!("../shared/frame.wgsl")),
+    ("groups", include_str!("../shared/groups.wgsl")),
+    ("counters", include_str!("../shared/counters.wgsl")),
+    ("rank", include_str!("../shared/rank.wgsl")),
+    ("project_point", include_str!("../shared/project_point.wgsl")),
+    ("count_dropped", include_str!("../shared/count_dropped.wgsl")),
+    ("keys", include_str!("../shared/keys.wgsl")),
+    ("density", include_str!("../shared/density.wgsl")),
+    ("cell_order", include_str!("../shared/cell_order.wgsl")),
+    ("screen", include_str!("../shared/screen.wgsl")),
+    ("culled", include_str!("../shared/culled.wgsl")),
+    ("surfel", include_str!("../shared/surfel.wgsl")),
+];
+
+/// The source of a pass with all it imports.
+///
+/// # Panics
+/// If a name is unknown; every pass is linked in the tests.
+pub(super) fn link(source: &str) -> String {
+    let mut wanted = vec![false; SHARED.len()];
+    want(source, &mut wanted);
+    for at in (0..SHARED.len()).rev() {
+        if wanted[at] {
+            want(SHARED[at].1, &mut wanted);
+        }
+    }
+    let shared = SHARED.iter().zip(wanted).filter(|&(_, wanted)| wanted).map(|((_, source), _)| *source);
+    shared.chain([source]).map(without_imports).collect()
+}
+
+fn imports(source: &str) -> impl Iterator<Item = &str> {
+    source.lines().filter_map(|line| line.strip_prefix("#import "))
+}
+
+fn want(source: &str, wanted: &mut [bool]) {
+    for name in imports(source) {
+        let at = SHARED.iter().position(|&(known, _)| known == name);
+        wanted[at.unwrap_or_else(|| panic!("no shared/{name}.wgsl"))] = true;
+    }
+}
+
+/// Lines stay where they are, so that messages tell the right one of a file that imports nothing.
+fn without_imports(source: &str) -> String {
+    source.lines().map(|line| if line.starts_with("#import ") { "\n".into() } else { format!("{line}\n") }).collect()
+}

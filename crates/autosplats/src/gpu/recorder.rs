@@ -1,0 +1,150 @@
+//! Records the passes of a frame, each labelled and timed.
+
+use std::time::Instant;
+
+use super::buffers::map;
+use super::{Gpu, Step};
+use crate::Error;
+
+/// Workgroups in a row of a dispatch: more than 65535 need a second dimension. `shared/groups.wgsl` undoes this.
+const GROUPS_PER_ROW: u32 = 32768;
+
+/// Most passes of a frame that can be timed.
+const MOST_PASSES: u32 = 512;
+
+/// The time that one pass took.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct PassTime {
+    /// Stage and pass: `project.compact`.
+    pub pass: String,
+    /// Milliseconds.
+    pub ms: f64,
+}
+
+/// How passes are timed.
+#[derive(Debug)]
+pub(crate) enum Clock {
+    /// Not at all.
+    Off,
+    /// By the device, as it runs.
+    Timestamps { queries: wgpu::QuerySet, resolved: wgpu::Buffer, mapped: wgpu::Buffer },
+    /// Each pass is submitted and waited for: software devices' timestamps are not to be trusted.
+    Wall,
+}
+
+/// Commands of one frame.
+#[derive(Debug)]
+pub(crate) struct Recorder<'a> {
+    pub(crate) gpu: &'a Gpu,
+    pub(crate) encoder: wgpu::CommandEncoder,
+    clock: &'a Clock,
+    times: Vec<PassTime>,
+}
+
+impl Clock {
+    /// The clock that suits a device.
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        if gpu.is_software() || !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return Self::Wall;
+        }
+        let buffer = |label, usage| {
+            let size = u64::from(2 * MOST_PASSES) * 8;
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        Self::Timestamps {
+            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("autosplats.timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * MOST_PASSES,
+            }),
+            resolved: buffer("autosplats.timestamps", wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
+            mapped: buffer("autosplats.timestamps.mapped", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+        }
+    }
+}
+
+impl Clock {
+    /// Fills in the times of a frame that was submitted, waiting for it.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`].
+    pub(crate) fn read(&self, gpu: &Gpu, times: &mut [PassTime]) -> Result<(), Error> {
+        let Self::Timestamps { mapped, .. } = self else { return Ok(()) };
+        let timed = times.len().min(MOST_PASSES as usize);
+        if timed == 0 {
+            return Ok(());
+        }
+        let period_ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
+        map(gpu, mapped, 16 * timed as u64, |bytes| {
+            let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+            for (time, ticks) in times.iter_mut().zip(ticks.chunks_exact(2)) {
+                time.ms = ticks[1].saturating_sub(ticks[0]) as f64 * period_ms;
+            }
+        })
+    }
+}
+
+impl<'a> Recorder<'a> {
+    pub(crate) fn new(gpu: &'a Gpu, clock: &'a Clock) -> Self {
+        Self { gpu, encoder: encoder(gpu), clock, times: Vec::new() }
+    }
+
+    /// Runs a step.
+    pub(crate) fn run(&mut self, step: &Step) {
+        let groups = step.groups;
+        if groups == 0 {
+            return;
+        }
+        let at = 2 * self.times.len() as u32;
+        let timestamp_writes = match self.clock {
+            Clock::Timestamps { queries, .. } if at < 2 * MOST_PASSES => Some(wgpu::ComputePassTimestampWrites {
+                query_set: queries,
+                beginning_of_pass_write_index: Some(at),
+                end_of_pass_write_index: Some(at + 1),
+            }),
+            _ => None,
+        };
+        let label = Some(step.label.as_str());
+        let mut compute = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
+        compute.set_pipeline(&step.pipeline);
+        compute.set_bind_group(0, &step.bindings, &[]);
+        compute.dispatch_workgroups(groups.min(GROUPS_PER_ROW), groups.div_ceil(GROUPS_PER_ROW), 1);
+        drop(compute);
+        if matches!(self.clock, Clock::Off) {
+            return;
+        }
+        let name = step.label.strip_prefix("autosplats.").unwrap_or(&step.label);
+        let ms = if matches!(self.clock, Clock::Wall) { self.submit() } else { 0.0 };
+        self.times.push(PassTime { pass: name.into(), ms });
+    }
+
+    /// Submits what was recorded and waits for it; the milliseconds that took.
+    fn submit(&mut self) -> f64 {
+        let commands = std::mem::replace(&mut self.encoder, encoder(self.gpu)).finish();
+        let start = Instant::now();
+        self.gpu.queue.submit([commands]);
+        // A lost device is noticed when the frame ends.
+        let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
+        start.elapsed().as_secs_f64() * 1e3
+    }
+
+    /// Submits the rest of the frame. [`Clock::read`] completes the times once the device is done.
+    pub(crate) fn finish(mut self) -> Vec<PassTime> {
+        if let Clock::Timestamps { queries, resolved, mapped } = self.clock {
+            let count = (2 * self.times.len() as u32).min(2 * MOST_PASSES);
+            self.encoder.resolve_query_set(queries, 0..count, resolved, 0);
+            self.encoder.copy_buffer_to_buffer(resolved, 0, mapped, 0, u64::from(count) * 8);
+        }
+        self.gpu.queue.submit([self.encoder.finish()]);
+        self.times
+    }
+}
+
+fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
+    gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("autosplats.frame") })
+}

@@ -1,0 +1,40 @@
+//! What holds of all passes, without a device.
+
+use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+
+use super::PassSource;
+use super::device::INT64_ATOMICS;
+
+fn passes() -> impl Iterator<Item = &'static PassSource> {
+    [crate::project::gpu::PASSES].into_iter().flatten()
+}
+
+/// What naga calls the features a pass declares: nothing beyond WebGPU's core but that.
+fn capabilities(pass: &PassSource) -> Capabilities {
+    if pass.needs.contains(INT64_ATOMICS) {
+        Capabilities::SHADER_INT64 | Capabilities::SHADER_INT64_ATOMIC_MIN_MAX
+    } else {
+        Capabilities::empty()
+    }
+}
+
+#[test]
+fn passes_are_valid_with_what_they_declare() {
+    for pass in passes() {
+        let module = pass.module();
+        let validated = Validator::new(ValidationFlags::all(), capabilities(pass)).validate(&module);
+        assert!(validated.is_ok(), "{}: {:?}", pass.path, validated.err());
+        let entries: Vec<_> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
+        assert_eq!(entries, [pass.entry_point()], "{}: one entry point, named after the file", pass.path);
+    }
+}
+
+#[test]
+fn what_a_pass_does_not_declare_is_refused() {
+    let pass = PassSource {
+        needs: wgpu::Features::empty(),
+        ..*passes().find(|pass| pass.needs == INT64_ATOMICS).expect("one")
+    };
+    let validated = Validator::new(ValidationFlags::all(), capabilities(&pass)).validate(&pass.module());
+    assert!(validated.is_err(), "64-bit atomics are not core");
+}

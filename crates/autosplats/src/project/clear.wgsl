@@ -1,0 +1,25 @@
+// Empties what the frame before left: keys, density cells and counters.
+//
+// Writes: keys, density, counters.
+
+#import frame
+#import groups
+#import keys
+
+@group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
+@group(0) @binding(2) var<storage, read_write> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read_write> counters: array<u32>;
+
+@compute @workgroup_size(256)
+fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index < arrayLength(&keys) {
+        keys[index] = vec2u(EMPTY_KEY);
+    }
+    if index < arrayLength(&density) {
+        density[index] = vec2u(0u, EMPTY_KEY);
+    }
+    if index < arrayLength(&counters) {
+        counters[index] = 0u;
+    }
+}

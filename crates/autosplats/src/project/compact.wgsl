@@ -1,0 +1,56 @@
+// Lists the owners of pixels in cell order, and where each cell begins.
+//
+// Reads: keys, counters, block_sums. Writes: source, pixels, cell_start.
+
+#import frame
+#import groups
+#import counters
+#import rank
+#import keys
+#import cell_order
+
+@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(2) var<storage, read> counters: array<u32>;
+@group(0) @binding(3) var<storage, read> block_sums: array<u32>;
+@group(0) @binding(4) var<storage, read_write> source: array<u32>;
+@group(0) @binding(5) var<storage, read_write> pixels: array<u32>;
+@group(0) @binding(6) var<storage, read_write> cell_start: array<u32>;
+
+@compute @workgroup_size(256)
+fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    rank_clear(local);
+    let block = group_index(workgroup);
+    let area = frame.size.x * frame.size.y;
+    let strip_px = counters[STRIP_PX];
+    for (var step = 0u; step < 8u; step++) {
+        let flag = step * 256u + local;
+        let at = block * 2048u + flag;
+        if at < area {
+            let pixel = cell_pixel(at, strip_px).pixel;
+            if keys[pixel.y * frame.size.x + pixel.x].x != EMPTY_KEY {
+                rank_set(flag);
+            }
+        }
+    }
+    rank_finish(local);
+    for (var step = 0u; step < 8u; step++) {
+        let flag = step * 256u + local;
+        let at = block * 2048u + flag;
+        if at < area {
+            let place = cell_pixel(at, strip_px);
+            let index = block_sums[block] + rank_of(flag);
+            if place.first {
+                cell_start[place.cell] = index;
+            }
+            let key = keys[place.pixel.y * frame.size.x + place.pixel.x];
+            if key.x != EMPTY_KEY {
+                source[index] = key.x;
+                pixels[index] = place.pixel.y << 16u | place.pixel.x;
+            }
+            if at == area - 1u {
+                // The end of the last cell.
+                cell_start[place.cell + 1u] = counters[VISIBLE];
+            }
+        }
+    }
+}

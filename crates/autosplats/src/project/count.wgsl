@@ -1,0 +1,47 @@
+// Counts the screen points of each block of 2048 pixels in cell order, and of each density cell, whose nearest depth it
+// finds too [Paper, §5.1].
+//
+// Reads: keys, counters. Writes: block_sums, density.
+
+#import frame
+#import groups
+#import counters
+#import keys
+#import density
+#import cell_order
+
+@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(2) var<storage, read> counters: array<u32>;
+@group(0) @binding(3) var<storage, read_write> block_sums: array<u32>;
+@group(0) @binding(4) var<storage, read_write> density: array<atomic<u32>>;
+
+var<workgroup> owned: atomic<u32>;
+
+@compute @workgroup_size(256)
+fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    if local == 0u {
+        atomicStore(&owned, 0u);
+    }
+    workgroupBarrier();
+    let block = group_index(workgroup);
+    let cell_px = counters[CELL_PX];
+    var own = 0u;
+    for (var step = 0u; step < 8u; step++) {
+        let at = block * 2048u + step * 256u + local;
+        if at < frame.size.x * frame.size.y {
+            let pixel = cell_pixel(at, counters[STRIP_PX]).pixel;
+            let key = keys[pixel.y * frame.size.x + pixel.x];
+            if key.x != EMPTY_KEY {
+                own += 1u;
+                let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
+                atomicAdd(&density[2u * cell], 1u);
+                atomicMin(&density[2u * cell + 1u], key.y);
+            }
+        }
+    }
+    atomicAdd(&owned, own);
+    workgroupBarrier();
+    if local == 0u {
+        block_sums[block] = atomicLoad(&owned);
+    }
+}

@@ -1,0 +1,193 @@
+//! Projection on the GPU: the CPU form's steps, a pass each.
+
+use super::ScreenPoint;
+use super::cpu::STRIP_SPACINGS;
+use super::device_cloud::DeviceCloud;
+use crate::Error;
+use crate::gpu::{Gpu, INT64_ATOMICS, Pass, PassSource, Step};
+
+pub(crate) const PASSES: &[PassSource] =
+    &[CLEAR, PROJECT, PROJECT_DEPTH, PROJECT_INDEX, OCCUPANCY, GRID, COUNT, SCAN, COMPACT, GATHER, SPLIT_COUNT, SPLIT];
+const CLEAR: PassSource = PassSource::new("project/clear", include_str!("clear.wgsl"));
+const PROJECT: PassSource =
+    PassSource { needs: INT64_ATOMICS, ..PassSource::new("project/project", include_str!("project.wgsl")) };
+const PROJECT_DEPTH: PassSource = PassSource::new("project/project_depth", include_str!("project_depth.wgsl"));
+const PROJECT_INDEX: PassSource = PassSource::new("project/project_index", include_str!("project_index.wgsl"));
+const OCCUPANCY: PassSource = PassSource::new("project/occupancy", include_str!("occupancy.wgsl"));
+const GRID: PassSource = PassSource::new("project/grid", include_str!("grid.wgsl"));
+const COUNT: PassSource = PassSource::new("project/count", include_str!("count.wgsl"));
+pub(crate) const SCAN: PassSource = PassSource::new("project/scan", include_str!("scan.wgsl"));
+const COMPACT: PassSource = PassSource::new("project/compact", include_str!("compact.wgsl"));
+const GATHER: PassSource = PassSource::new("project/gather", include_str!("gather.wgsl"));
+const SPLIT_COUNT: PassSource = PassSource::new("project/split_count", include_str!("split_count.wgsl"));
+const SPLIT: PassSource = PassSource::new("project/split", include_str!("split.wgsl"));
+
+/// Invocations in a workgroup of most passes.
+const GROUP: u32 = 256;
+/// Flags that one workgroup ranks.
+pub(crate) const BLOCK: u32 = 2048;
+
+/// Indices into [`ScreenBuffers::counters`], as `shared/counters.wgsl` has them.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs, reason = "the shader says it")]
+pub(crate) enum Counter {
+    NotFinite,
+    Behind,
+    Outside,
+    Visible,
+    Blocks,
+    StripPx,
+    CellPx,
+    CellColumns,
+    Active,
+    Passive,
+    Recovered,
+    Clamped,
+    Bounded,
+    Outliers,
+    RangeLow,
+    RangeHigh,
+}
+
+/// Length of [`ScreenBuffers::counters`].
+pub(crate) const COUNTERS: usize = 16;
+
+/// [`ScreenPoints`](super::ScreenPoints) on the device.
+#[derive(Debug)]
+pub(crate) struct ScreenBuffers {
+    pub(crate) size: [u32; 2],
+    /// Most screen points that there can be.
+    pub(crate) capacity: u32,
+    /// `u32` per [`Counter`].
+    pub(crate) counters: wgpu::Buffer,
+    keys: wgpu::Buffer,
+    /// Count and bits of the nearest depth per density cell.
+    pub(crate) density: wgpu::Buffer,
+    /// First screen point of each cell.
+    pub(crate) cell_start: wgpu::Buffer,
+    /// Index in the cloud of each screen point.
+    pub(crate) source: wgpu::Buffer,
+    pixels: wgpu::Buffer,
+    /// [`ScreenPoint`]s in cell order.
+    pub(crate) points: wgpu::Buffer,
+    /// Of each screen point, what [`DeviceCloud`] has of its values.
+    pub(crate) values: wgpu::Buffer,
+    /// Screen points to reconstruct: the active ones, and after them those recovered.
+    pub(crate) queries: wgpu::Buffer,
+    pub(crate) passive: wgpu::Buffer,
+    pub(crate) block_sums: wgpu::Buffer,
+}
+
+impl ScreenBuffers {
+    /// Room for a picture of `size` of a cloud of `points` points with `values` values each.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], points: usize, values: u32) -> Result<Self, Error> {
+        let [width, height] = size.map(|side| side as usize);
+        let pixels = width * height;
+        let capacity = points.min(pixels);
+        Ok(Self {
+            size,
+            capacity: capacity as u32,
+            counters: gpu.storage::<u32>("counters", COUNTERS)?,
+            keys: gpu.storage::<[u32; 2]>("keys of pixels", pixels)?,
+            // Cells are two pixels wide at least.
+            density: gpu.storage::<[u32; 2]>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
+            cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
+            source: gpu.storage::<u32>("sources of screen points", capacity)?,
+            pixels: gpu.storage::<u32>("pixels of screen points", capacity)?,
+            points: gpu.storage::<ScreenPoint>("screen points", capacity)?,
+            values: gpu.storage::<u32>("values of screen points", capacity * values as usize)?,
+            queries: gpu.storage::<u32>("queries", capacity)?,
+            passive: gpu.storage::<u32>("passive points", capacity)?,
+            block_sums: gpu.storage::<u32>("sums of blocks", pixels.div_ceil(BLOCK as usize))?,
+        })
+    }
+}
+
+/// The passes of projection.
+#[derive(Debug)]
+pub(crate) struct ProjectPasses {
+    clear: Pass,
+    nearest: Vec<Pass>,
+    occupancy: Pass,
+    grid: Pass,
+    count: Pass,
+    scan_visible: Pass,
+    compact: Pass,
+    gather: Pass,
+    split_count: Pass,
+    scan_active: Pass,
+    split: Pass,
+}
+
+impl ProjectPasses {
+    /// Compiles them; `int64` asks for one pass with 64-bit atomics instead of two with 32 bits.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
+        let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
+        let scan = |total: Counter| Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32))]);
+        Ok(Self {
+            clear: pass(&CLEAR)?,
+            nearest: if int64 { vec![pass(&PROJECT)?] } else { vec![pass(&PROJECT_DEPTH)?, pass(&PROJECT_INDEX)?] },
+            occupancy: pass(&OCCUPANCY)?,
+            grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
+            count: pass(&COUNT)?,
+            scan_visible: scan(Counter::Visible)?,
+            compact: pass(&COMPACT)?,
+            gather: pass(&GATHER)?,
+            split_count: pass(&SPLIT_COUNT)?,
+            scan_active: scan(Counter::Active)?,
+            split: pass(&SPLIT)?,
+        })
+    }
+
+    /// Projects `cloud` into `screen`.
+    pub(crate) fn steps(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        cloud: &DeviceCloud,
+        screen: &ScreenBuffers,
+    ) -> Vec<Step> {
+        let ScreenBuffers { counters, keys, density, cell_start, source, pixels, points, values, block_sums, .. } =
+            screen;
+        let [width, height] = screen.size;
+        let area = width * height;
+        let pixel_blocks = area.div_ceil(BLOCK);
+        let point_groups = screen.capacity.div_ceil(GROUP);
+        let point_blocks = screen.capacity.div_ceil(BLOCK);
+        let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], area.div_ceil(GROUP))];
+        for pass in &self.nearest {
+            for chunk in cloud.chunks() {
+                // The last of two passes has nothing left to count.
+                let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters];
+                let bound = if pass.bindings() == 4 { &buffers[..4] } else { &buffers };
+                steps.push(pass.step(gpu, bound, chunk.len.div_ceil(GROUP)));
+            }
+        }
+        let blocks_16 = width.div_ceil(16) * height.div_ceil(16);
+        steps.push(self.occupancy.step(gpu, &[frame, keys, counters], blocks_16));
+        steps.push(self.grid.step(gpu, &[frame, counters], 1));
+        steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], pixel_blocks));
+        steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));
+        let compact = [frame, keys, counters, block_sums, source, pixels, cell_start];
+        steps.push(self.compact.step(gpu, &compact, pixel_blocks));
+        for chunk in cloud.chunks() {
+            let gather =
+                [frame, &chunk.uniform, &chunk.positions, &chunk.values, counters, source, pixels, points, values];
+            steps.push(self.gather.step(gpu, &gather, point_groups));
+        }
+        steps.push(self.split_count.step(gpu, &[frame, points, density, counters, block_sums], pixel_blocks));
+        steps.push(self.scan_active.step(gpu, &[frame, block_sums, counters], 1));
+        let split = [frame, points, density, counters, block_sums, &screen.queries, &screen.passive];
+        steps.push(self.split.step(gpu, &split, point_blocks));
+        steps
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,116 @@
+//! Projection on the GPU against that on the CPU.
+
+use autosplats_cloud::PointCloud;
+use autosplats_cloud::glam::DVec3;
+
+use super::*;
+use crate::camera::{Camera, Projection, View};
+use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::project::{PointValues, Projector, ScreenPoints, Uploader};
+use crate::test_clouds::{self, EYE};
+
+const K: u32 = 10;
+
+/// A screen as the device has it, brought into the host's form.
+pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, Vec<u32>) {
+    let counters: Vec<u32> = read_back(gpu, &screen.counters, COUNTERS).expect("counters");
+    let counter = |counter: Counter| counters[counter as usize] as usize;
+    let list = |buffer, len| read_back::<u32>(gpu, buffer, len).expect("a list");
+    let [width, height] = screen.size.map(|side| side as usize);
+    let (strip_px, cell_px) = (counter(Counter::StripPx), counter(Counter::CellPx));
+    let columns = counter(Counter::CellColumns);
+    let cells = columns * height.div_ceil(cell_px);
+    let density: Vec<[u32; 2]> = read_back(gpu, &screen.density, cells).expect("a grid");
+    let mut read = ScreenPoints {
+        points: read_back(gpu, &screen.points, counter(Counter::Visible)).expect("points"),
+        source: list(&screen.source, counter(Counter::Visible)),
+        active: list(&screen.queries, counter(Counter::Active)),
+        passive: list(&screen.passive, counter(Counter::Passive)),
+        ..ScreenPoints::default()
+    };
+    read.cells.strip_px = strip_px;
+    read.cells.columns = width;
+    read.cells.start = list(&screen.cell_start, height.div_ceil(strip_px) * width + 1);
+    read.density.cell_px = cell_px;
+    read.density.columns = columns;
+    read.density.count = density.iter().map(|cell| cell[0]).collect();
+    let nearest = |bits: u32| if bits == u32::MAX { f32::INFINITY } else { f32::from_bits(bits) };
+    read.density.nearest = density.iter().map(|cell| nearest(cell[1])).collect();
+    read.dropped.not_finite = counter(Counter::NotFinite);
+    read.dropped.behind = counter(Counter::Behind);
+    read.dropped.outside = counter(Counter::Outside);
+    (read, counters)
+}
+
+fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, culling: bool) -> ScreenPoints {
+    let mut uploader = Uploader::new(gpu);
+    let mut device_cloud = DeviceCloud::default();
+    device_cloud.resize(gpu, cloud.len(), 0).expect("room");
+    uploader.positions(gpu, cloud, &device_cloud, &|_| true).expect("an upload");
+    uploader.values(gpu, &PointValues::default(), &device_cloud, &|_| true).expect("an upload");
+    let screen = ScreenBuffers::new(gpu, [view.width, view.height], cloud.len(), 0).expect("room");
+    let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
+    let told = FrameUniform { grid_culling: culling.into(), ..FrameUniform::new(view, cloud.len(), K) };
+    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
+    let mut recorder = Recorder::new(gpu, &Clock::Off);
+    passes.steps(gpu, &frame, &device_cloud, &screen).iter().for_each(|step| recorder.run(step));
+    recorder.finish();
+    read_screen(gpu, &screen).0
+}
+
+/// Points of the first that own another pixel, or none, in the second, relative to all.
+fn moved(a: &ScreenPoints, b: &ScreenPoints) -> f64 {
+    let owners = |screen: &ScreenPoints| -> std::collections::HashSet<(u32, u32)> {
+        screen.source.iter().copied().zip(screen.points.iter().map(|point| point.pixel)).collect()
+    };
+    owners(a).difference(&owners(b)).count() as f64 / a.source.len().max(1) as f64
+}
+
+#[test]
+fn the_device_finds_what_the_host_finds() {
+    let Some(gpu) = test_gpu() else { return };
+    let forms: Vec<bool> = [true, false].into_iter().filter(|&int64| !int64 || gpu.int64_atomics()).collect();
+    let forms: Vec<_> = forms.iter().map(|&int64| (int64, ProjectPasses::new(&gpu, int64).expect("passes"))).collect();
+    for (name, mut positions) in test_clouds::all(4000) {
+        positions.extend([[f32::NAN, 0.0, 0.0], [f32::INFINITY, 1.0, 0.0], [3e38, 3e38, -3e38]]);
+        let cloud = PointCloud::new(DVec3::ZERO, positions);
+        for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
+            let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+            for (size, culling) in [([1, 1], true), ([300, 2], false), ([121, 90], true), ([97, 250], false)] {
+                let view = camera.view(DVec3::ZERO, size).expect("a view");
+                let mut projector = Projector::default();
+                let host = projector.project(&cloud, &view, K, culling);
+                for (int64, passes) in &forms {
+                    let device = project(&gpu, passes, &cloud, &view, culling);
+                    let case = format!("{name} {projection:?} {size:?} {int64}");
+                    assert_eq!(device.dropped, host.dropped, "{case}");
+                    // Divisions may be off by some units in the last place on a device, which moves a few points of ten
+                    // thousand over a pixel's border.
+                    let moved = moved(host, &device);
+                    assert!(moved < 2e-3, "{case}: {moved} of the points own another pixel");
+                    if moved == 0.0 {
+                        assert_same(host, &device, &case);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn assert_same(host: &ScreenPoints, device: &ScreenPoints, case: &str) {
+    assert_eq!(device.source, host.source, "{case}: order");
+    assert_eq!(device.cells.strip_px, host.cells.strip_px, "{case}: strips");
+    assert_eq!(device.cells.start, host.cells.start, "{case}: cells");
+    assert_eq!(device.density.cell_px, host.density.cell_px, "{case}: size of density cells");
+    assert_eq!(device.density.count, host.density.count, "{case}: density");
+    assert_eq!(device.active, host.active, "{case}: active points");
+    assert_eq!(device.passive, host.passive, "{case}: passive points");
+    for (a, b) in device.points.iter().zip(&host.points) {
+        let near = (0..3).all(|axis| {
+            let [a, b] = [a.position_view[axis], b.position_view[axis]];
+            // Sums of three products about the eye, whose distance is 4: some units in its last place.
+            (a - b).abs() <= 4e-6 * b.abs().max(4.0)
+        });
+        assert!(near && a.pixel == b.pixel, "{case}: {a:?} is not {b:?}");
+    }
+}

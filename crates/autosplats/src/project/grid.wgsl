@@ -1,0 +1,22 @@
+// Chooses the sizes of cells from the mean distance between screen points where there are any [Paper, §5.1].
+//
+// Reads and writes: counters. One invocation.
+// Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
+
+#import frame
+#import counters
+
+@group(0) @binding(1) var<storage, read_write> counters: array<u32>;
+
+// A strip is this many mean distances high: see the CPU form.
+override STRIP_SPACINGS: f32;
+
+@compute @workgroup_size(1)
+fn grid() {
+    let covered_px = f32(counters[BLOCKS] * 256u);
+    let spacing_px = max(sqrt(covered_px / f32(max(counters[VISIBLE], 1u))), 1.0);
+    counters[STRIP_PX] = clamp(u32(round(STRIP_SPACINGS * spacing_px)), 1u, 256u);
+    let cell_px = max(u32(round(spacing_px * sqrt(f32(frame.k)))), 2u);
+    counters[CELL_PX] = cell_px;
+    counters[CELL_COLUMNS] = (frame.size.x + cell_px - 1u) / cell_px;
+}

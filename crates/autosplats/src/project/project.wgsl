@@ -1,0 +1,31 @@
+// Every point to its pixel, the nearest wins [Paper, §3]: depth and index in one 64-bit atomic minimum.
+//
+// Reads: a chunk of the cloud. Writes: keys, counters. `project_depth` and `project_index` do the same with 32 bits.
+
+#import frame
+#import groups
+#import counters
+#import project_point
+#import count_dropped
+
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+@group(0) @binding(2) var<storage, read> positions: array<f32>;
+@group(0) @binding(3) var<storage, read_write> keys: array<atomic<u64>>;
+@group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
+
+@compute @workgroup_size(256)
+fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    count_dropped_clear(local);
+    let index = group_index(workgroup) * 256u + local;
+    if index < chunk.len {
+        let at = 3u * index;
+        let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));
+        if projected.pixel >= PIXEL_OUTSIDE {
+            count_dropped(projected.pixel);
+        } else {
+            let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(chunk.first + index);
+            atomicMin(&keys[projected.pixel], key);
+        }
+    }
+    count_dropped_finish(local);
+}

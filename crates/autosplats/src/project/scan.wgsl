@@ -1,0 +1,42 @@
+// Turns the sums of blocks into what goes before each block; their total becomes a counter.
+//
+// Reads and writes: block_sums. Writes: counters. One workgroup, each invocation takes a run of blocks.
+
+#import frame
+#import counters
+
+@group(0) @binding(1) var<storage, read_write> block_sums: array<u32>;
+@group(0) @binding(2) var<storage, read_write> counters: array<u32>;
+
+// Which counter becomes the total.
+override TOTAL: u32;
+
+var<workgroup> before: array<u32, 257>;
+
+@compute @workgroup_size(256)
+fn scan(@builtin(local_invocation_index) local: u32) {
+    let blocks = arrayLength(&block_sums);
+    let each = (blocks + 255u) / 256u;
+    let first = min(local * each, blocks);
+    let end = min(first + each, blocks);
+    var sum = 0u;
+    for (var block = first; block < end; block++) {
+        sum += block_sums[block];
+    }
+    before[local + 1u] = sum;
+    workgroupBarrier();
+    if local == 0u {
+        before[0] = 0u;
+        for (var run = 1u; run <= 256u; run++) {
+            before[run] += before[run - 1u];
+        }
+        counters[TOTAL] = before[256];
+    }
+    workgroupBarrier();
+    sum = before[local];
+    for (var block = first; block < end; block++) {
+        let own = block_sums[block];
+        block_sums[block] = sum;
+        sum += own;
+    }
+}

@@ -1,0 +1,50 @@
+// Lists active and passive screen points, both ascending [Paper, §7, Grid Culling].
+//
+// Reads: points, density, block_sums. Writes: queries, passive, counters.
+
+#import frame
+#import groups
+#import counters
+#import rank
+#import density
+#import screen
+#import culled
+
+@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read_write> counters: array<u32>;
+@group(0) @binding(4) var<storage, read> block_sums: array<u32>;
+@group(0) @binding(5) var<storage, read_write> queries: array<u32>;
+@group(0) @binding(6) var<storage, read_write> passive: array<u32>;
+
+@compute @workgroup_size(256)
+fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    rank_clear(local);
+    let block = group_index(workgroup);
+    let visible = counters[VISIBLE];
+    var is_active = 0u;
+    for (var step = 0u; step < 8u; step++) {
+        let flag = step * 256u + local;
+        let index = block * 2048u + flag;
+        if index < visible && !(frame.grid_culling == 1u && is_culled(points[index])) {
+            rank_set(flag);
+            is_active |= 1u << step;
+        }
+    }
+    rank_finish(local);
+    for (var step = 0u; step < 8u; step++) {
+        let flag = step * 256u + local;
+        let index = block * 2048u + flag;
+        let before = block_sums[block] + rank_of(flag);
+        if index < visible {
+            if (is_active & (1u << step)) != 0u {
+                queries[before] = index;
+            } else {
+                passive[index - before] = index;
+            }
+        }
+    }
+    if block == 0u && local == 0u {
+        counters[PASSIVE] = visible - counters[ACTIVE];
+    }
+}

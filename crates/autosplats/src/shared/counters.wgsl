@@ -1,0 +1,22 @@
+// What is counted and chosen on the device, as indices into one buffer, so that some passes can bind it as atomics.
+
+const NOT_FINITE = 0u;
+const BEHIND = 1u;
+const OUTSIDE = 2u;
+// Screen points, and blocks of the screen that hold any.
+const VISIBLE = 3u;
+const BLOCKS = 4u;
+// Height of a strip of cells and side of a density cell in pixels, density cells in a row.
+const STRIP_PX = 5u;
+const CELL_PX = 6u;
+const CELL_COLUMNS = 7u;
+const ACTIVE = 8u;
+const PASSIVE = 9u;
+const RECOVERED = 10u;
+// Points whose neighbourhood a gap or the bound on work cut short, those that met the bound, and surfels discarded.
+const CLAMPED = 11u;
+const BOUNDED = 12u;
+const OUTLIERS = 13u;
+// Ends of the colour map, as bits of f32.
+const RANGE_LOW = 14u;
+const RANGE_HIGH = 15u;

@@ -1,0 +1,19 @@
+// The low-resolution grid of [Paper, §5.1]: square cells of about k screen points; x of a cell is its number of screen points,
+// y the bits of its nearest depth. Imports: frame. The including pass binds `density` and `counters`.
+
+// Index of the density cell of a pixel.
+fn density_cell(pixel: vec2u, cell_px: u32, columns: u32) -> u32 {
+    return pixel.y / cell_px * columns + pixel.x / cell_px;
+}
+
+// Depth beyond which points of a cell are probably hidden: the nearest, and the width of the cell in world units there
+// [Paper, §7, Grid Culling].
+fn culling_depth(nearest: f32, cell_px: u32) -> f32 {
+    return nearest + f32(cell_px) * pixel_size(nearest);
+}
+
+// First search radius in world units: that of the circle which holds k points at the cell's density [Paper, §5.1].
+fn first_radius(count: u32, cell_px: u32, depth: f32) -> f32 {
+    let area_px = f32(cell_px * cell_px);
+    return sqrt(area_px * f32(frame.k) / (3.14159265 * f32(count))) * pixel_size(depth);
+}

@@ -1,0 +1,39 @@
+// Neighbourhoods and surfels, as the search and the fit leave them.
+
+// Sums over a point's neighbours, about the point itself, which is not counted.
+struct Neighborhood {
+    // Σ(q - p), view space.
+    offset: vec3f,
+    // 0 if the point is an outlier.
+    count: f32,
+    // Σ(q - p)(q - p)ᵀ: xx, xy, xz.
+    second_x: vec3f,
+    // Distance to the furthest neighbour, world units.
+    k_radius: f32,
+    // yy, yz, zz.
+    second_yz: vec3f,
+    padding: u32,
+}
+
+// An oriented disc in view space.
+struct Surfel {
+    // The point itself.
+    center: vec3f,
+    // Semi-minor axis, world units; 0 if the point was discarded.
+    radius: f32,
+    // Unit normal towards the eye.
+    normal: vec3f,
+    k_radius: f32,
+    // Unit direction of the semi-major axis.
+    major_axis: vec3f,
+    // Semi-major over semi-minor axis; 1 for circles.
+    major_ratio: f32,
+    // Surface variation, 0 to 1/3.
+    curvature: f32,
+    // Pixel column in the low, row in the high 16 bits.
+    pixel: u32,
+    // Index in the cloud.
+    source: u32,
+    // Index among the screen points.
+    screen: u32,
+}
