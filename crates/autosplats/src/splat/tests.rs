@@ -288,6 +288,7 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
             curvature: 0.3 * random.unit(),
             pixel: (px[1] as u32) << 16 | px[0] as u32,
             source: source as u32,
+            screen: source as u32,
         }
     };
     (0..count).map(&mut one).collect()
