@@ -4,7 +4,7 @@ use std::{ops::Range, path::Path};
 
 use glam::{DMat4, DVec3};
 
-use crate::{Crs, Error, Progress};
+use crate::{Crs, Error, Progress, identity::Identity};
 
 /// Points of one frame: positions, and whatever else the scanner recorded.
 ///
@@ -22,6 +22,7 @@ pub struct PointCloud {
     pub(crate) scans: Vec<Scan>,
     pub(crate) crs: Crs,
     pub(crate) resolution: Option<DVec3>,
+    pub(crate) identity: Identity,
 }
 
 /// A run of points that one sensor saw from one place.
@@ -149,6 +150,7 @@ impl PointCloud {
     /// [`Error::AttributeLength`] if there is not exactly one per point.
     pub fn with_colors(mut self, colors: Vec<[u8; 3]>) -> Result<Self, Error> {
         self.check_length("colours", colors.len())?;
+        self.identity = Identity::default();
         self.colors = Some(colors);
         Ok(self)
     }
@@ -160,6 +162,7 @@ impl PointCloud {
     pub fn with_field(mut self, name: impl Into<String>, values: FieldValues) -> Result<Self, Error> {
         let name = name.into();
         self.check_length(&name, values.len())?;
+        self.identity = Identity::default();
         self.fields.retain(|field| field.name != name);
         self.fields.push(Field { name, values });
         Ok(self)
@@ -223,6 +226,12 @@ impl PointCloud {
     /// Whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
+    }
+
+    /// A number that tells this cloud's points and attributes from all others' in this process: clones have the same, and
+    /// whatever changes a cloud changes it. So whoever keeps a copy, as on a graphics card, knows when it is out of date.
+    pub fn identity(&self) -> u64 {
+        self.identity.0
     }
 
     /// What has to be added to a position to get world coordinates.
@@ -293,5 +302,34 @@ impl PointCloud {
             + self.residuals.as_ref().map_or(0, |residuals| size_of_val(residuals.as_slice()))
             + self.colors.as_ref().map_or(0, |colors| size_of_val(colors.as_slice()))
             + self.fields.iter().map(|field| field.values.byte_len()).sum::<usize>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_changes_a_cloud_changes_its_identity() {
+        let new = || PointCloud::new(DVec3::ZERO, vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        let cloud = new();
+        assert_eq!(cloud.clone().identity(), cloud.identity(), "a clone is the same cloud");
+        assert_eq!(new(), cloud, "identities do not matter to equality");
+        type Change = fn(&mut PointCloud);
+        let changes: [Change; 7] = [
+            |cloud| *cloud = PointCloud::new(DVec3::ZERO, cloud.positions.clone()),
+            |cloud| *cloud = cloud.clone().with_colors(vec![[1, 2, 3]; 2]).expect("a colour each"),
+            |cloud| *cloud = cloud.clone().with_field("A", FieldValues::U8(vec![1, 2])).expect("a value each"),
+            |cloud| cloud.retain(|index| index == 1),
+            |cloud| cloud.crop(DVec3::ZERO, DVec3::splat(3.5)),
+            |cloud| cloud.add_noise(0.1, 1, &()).expect("noise"),
+            |cloud| assert!(cloud.to_local_metres(), "it was in degrees"),
+        ];
+        for (number, change) in changes.into_iter().enumerate() {
+            let degrees = Crs { unit: Some(crate::Unit::Degree), ..Crs::default() };
+            let mut changed = cloud.clone().with_crs(degrees);
+            change(&mut changed);
+            assert_ne!(changed.identity(), cloud.identity(), "change {number}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{PointCloud, Unit, read::middle};
+use crate::{PointCloud, Unit, identity::Identity, read::middle};
 
 /// Half the longer axis of the WGS 84 ellipsoid in metres, and the square of its eccentricity.
 const SEMI_MAJOR: f64 = 6_378_137.0;
@@ -37,6 +37,7 @@ impl PointCloud {
         }
         self.positions = positions;
         self.origin = origin;
+        self.identity = Identity::default();
         self.residuals = None;
         self.resolution = self.resolution.map(|step| step * local.scale);
         let name = format!("metres about {:.6}° E, {:.6}° N", middle.x, middle.y);

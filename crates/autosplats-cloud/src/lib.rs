@@ -20,6 +20,7 @@ mod cloud;
 mod crs;
 mod error;
 mod geographic;
+mod identity;
 mod las;
 mod memory;
 mod merge;

@@ -3,7 +3,9 @@
 use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 
-use crate::{Crs, Field, FieldValues, PointCloud, Scan, cloud::each_type, read::SMALL, read::middle};
+use crate::{
+    Crs, Field, FieldValues, PointCloud, Scan, cloud::each_type, identity::Identity, read::SMALL, read::middle,
+};
 
 /// Colour of the points of a part that has none, beside parts that have.
 const GREY: [u8; 3] = [200; 3];
@@ -87,6 +89,7 @@ impl PointCloud {
             scans,
             crs: if agreed(|a, b| a.crs == b.crs) { first.crs().clone() } else { Crs::default() },
             resolution: first.resolution().filter(|_| agreed(|a, b| a.resolution == b.resolution)),
+            identity: Identity::default(),
         }
     }
 }

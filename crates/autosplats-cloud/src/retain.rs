@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::{PointCloud, cloud::each_type};
+use crate::{PointCloud, cloud::each_type, identity::Identity};
 
 impl PointCloud {
     /// Keeps the points that `keep` says yes to, by their index, with all attributes and in the same order.
@@ -11,6 +11,7 @@ impl PointCloud {
         if keep.iter().all(|&keep| keep) {
             return;
         }
+        self.identity = Identity::default();
         self.move_scans(&keep);
         compact(&mut self.positions, &keep);
         if let Some(residuals) = &mut self.residuals {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{Error, PointCloud, Progress, merge::residual, progress::tick};
+use crate::{Error, PointCloud, Progress, identity::Identity, merge::residual, progress::tick};
 
 /// Blocks of points between two looks at the caller's wish to stop.
 const BLOCK: usize = 1 << 20;
@@ -81,6 +81,7 @@ impl PointCloud {
             return Err(Error::BadValue { name: "noise", value: sigma, rule: "0 or above" });
         }
         self.resolution = None;
+        self.identity = Identity::default();
         for start in (0..self.len()).step_by(BLOCK) {
             tick(progress, start as f32 / self.len() as f32)?;
             let end = self.len().min(start + BLOCK);
