@@ -389,6 +389,35 @@ fn the_format_fits_the_fields() {
 }
 
 #[test]
+fn keys_say_what_text_of_a_horizontal_system_does_not() {
+    let unit = |name: &str, metres: f64| format!(r#"UNIT["{name}",{metres}]"#);
+    let horizontal = format!(r#"PROJCS["p",GEOGCS["g"],{}]"#, unit("foot", 0.3048));
+    let both = format!(r#"COMPD_CS["c",{horizontal},VERT_CS["v",{}]]"#, unit("foot", 0.3048));
+    let centre = format!(r#"GEOCCS["e",{}]"#, unit("metre", 1.0));
+    let keys = |units: &[[u16; 4]]| {
+        let keys = [&[[1, 1, 0, units.len() as u16]], units].concat();
+        keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>()
+    };
+    let (heights, x_and_y) = ([4099, 0, 1, 9001], [3076, 0, 1, 9001]);
+    let metre = Some(Unit::Metre);
+    let cases = [
+        (&*horizontal, vec![heights], Some(Unit::Foot), metre),
+        (&horizontal, vec![x_and_y, heights], Some(Unit::Foot), metre),
+        (&horizontal, vec![x_and_y], Some(Unit::Foot), None),
+        (&both, vec![heights], Some(Unit::Foot), None),
+        (&centre, vec![[4099, 0, 1, 9002]], metre, None),
+        (r#"PROJCS["p"]"#, vec![[3076, 0, 1, 9002], heights], Some(Unit::Foot), metre),
+    ];
+    for (text, units, unit, vertical) in cases {
+        let vlrs = [("LASF_Projection", 2112, text.as_bytes().to_vec()), ("LASF_Projection", 34735, keys(&units))];
+        let (cloud, _) = load(&file(2, 0, &vlrs, &[vec![1; 20], vec![2; 20]]));
+        assert_eq!((cloud.crs().unit, cloud.crs().vertical_unit), (unit, vertical), "{text}, {units:?}");
+        let back = load(&written(&cloud, "a.las").0).0;
+        assert_eq!(back.crs(), cloud.crs(), "{text}, {units:?}: and comes back");
+    }
+}
+
+#[test]
 fn written_clouds_come_back() {
     let long = "a name that is much longer than the 32 bytes there are";
     let mut cloud =
