@@ -181,9 +181,12 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
         column.stride = offset;
     }
     let rows = Rows { tokens: &tokens, count: Some(header.points), counts_between: false };
-    let (bytes, count) = rows.parse(job, header.end, PARSING)?;
-    Table { bytes: &bytes, count, big_endian: false, columns, packed_rgb: true, done: PARSING.len }
-        .into_cloud(job, "header")
+    let done = PARSING.len;
+    let (bytes, count) = rows.parse_and_show(job, header.end, PARSING, |bytes, count| {
+        Table { bytes, count, big_endian: false, columns: columns.clone(), packed_rgb: true, done }
+            .preview(job, "header")
+    })?;
+    Table { bytes: &bytes, count, big_endian: false, columns, packed_rgb: true, done }.into_cloud(job, "header")
 }
 
 fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, Error> {

@@ -94,7 +94,9 @@ fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -
         offset += scalar.size();
     }
     let rows = Rows { tokens: &tokens, count: Some(vertex.count), counts_between: false };
-    let (records, count) = rows.parse(job, start, PACKING)?;
+    let (records, count) = rows.parse_and_show(job, start, PACKING, |records, count| {
+        packed_table(records, count, false, columns.clone(), offset).preview(job, "header")
+    })?;
     packed_table(&records, count, false, columns, offset).into_cloud(job, "header")
 }
 
@@ -143,7 +145,9 @@ fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Eleme
         Ok(())
     })?;
     let big_endian = header.encoding == Encoding::Big;
-    packed_table(&records, vertex.count, big_endian, columns, stride).into_cloud(job, "header")
+    let table = packed_table(&records, vertex.count, big_endian, columns, stride);
+    table.preview(job, "header")?;
+    table.into_cloud(job, "header")
 }
 
 fn packed_table(bytes: &[u8], count: usize, big_endian: bool, mut columns: Vec<Column>, stride: usize) -> Table<'_> {
