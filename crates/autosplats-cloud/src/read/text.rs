@@ -14,6 +14,14 @@ use crate::Error;
 /// Bytes of text that one thread parses at a time.
 const PIECE: usize = 1 << 19;
 
+/// How coordinates in text are stored: it may hold more digits than the type declared for it, and all of them are read.
+pub(super) const TEXT: &str = "text";
+
+/// Whether a value is one that keeps all its digits.
+pub(super) fn is_coordinate(name: &str) -> bool {
+    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+}
+
 /// What to do with the next value of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Token {

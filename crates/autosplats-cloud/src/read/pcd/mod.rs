@@ -9,7 +9,7 @@ use self::header::{Encoding, Header, Viewpoint};
 use super::{
     Attribute, Contents, Description, Format, Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
-    text::{Rows, Token},
+    text::{Rows, TEXT, Token, is_coordinate},
     xyz,
 };
 use crate::{Axes, Error, PointCloud, Scan};
@@ -28,6 +28,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     }
     let header = Header::parse(job)?;
     let stored = |field: &header::Field| match field.count {
+        1 if header.encoding == Encoding::Ascii && is_coordinate(&field.name) => TEXT.to_owned(),
         1 => field.scalar.name().to_owned(),
         count => format!("{count} × {}", field.scalar.name()),
     };
@@ -164,10 +165,8 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
             tokens.extend(std::iter::repeat_n(Token::Skip, field.count));
             continue;
         }
-        let name = field.name.to_ascii_lowercase();
-        let (scalar, token) = match name.as_str() {
-            // Text may hold more digits than the type declared for it; coordinates need them.
-            "x" | "y" | "z" => (Scalar::F64, Token::Store(Scalar::F64)),
+        let (scalar, token) = match &*field.name.to_ascii_lowercase() {
+            name if is_coordinate(name) => (Scalar::F64, Token::Store(Scalar::F64)),
             "rgb" | "rgba" if field.scalar.size() == 4 => (Scalar::U32, Token::Packed),
             _ => (field.scalar, Token::Store(field.scalar)),
         };
