@@ -59,7 +59,8 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
 /// A file of this name without any header can only be meant as rows of numbers, so nothing is gained by refusing it.
 const NO_HEADER: &str = "there is no PCD header; read as text";
 
-fn without_header(job: &Job<'_>) -> bool {
+/// Whether the file is no PCD but for its name.
+pub(super) fn without_header(job: &Job<'_>) -> bool {
     !header::recognised(job.bytes) && xyz::looks_like_rows(job.bytes)
 }
 
