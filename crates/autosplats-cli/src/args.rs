@@ -230,7 +230,7 @@ pub(crate) struct LookArgs {
 #[command(next_help_heading = "Running")]
 pub(crate) struct RunArgs {
     /// Threads to use; the result does not depend on it [default: one per core]
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "COUNT", value_parser = values::threads)]
     pub(crate) threads: Option<u16>,
     /// No progress and no summary on standard error, only errors
     #[arg(long)]

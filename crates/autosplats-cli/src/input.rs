@@ -19,7 +19,7 @@ const SCENE_PREFIX: &str = "scene:";
 /// Bytes a generated point takes: position, and colour or class.
 const BYTES_PER_GENERATED_POINT: u64 = 16;
 
-/// Fields left out that are named.
+/// Fields left out, and inputs, that are named.
 const LISTED: usize = 10;
 
 /// The inputs of one command, known to exist.
@@ -64,6 +64,9 @@ impl Inputs {
         let generated = list.iter().map(Input::generated_points).sum::<u64>();
         check_memory(&format!("{generated} generated points"), generated * BYTES_PER_GENERATED_POINT)
             .map_err(read_failure)?;
+        if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
+            return Err(Failure::usage("--columns: no input is text; scenes have no columns to name"));
+        }
         for pose in poses {
             let (input, matrix) = list
                 .iter_mut()
@@ -110,6 +113,13 @@ impl Inputs {
             Source::File(path) => Some(path.as_path()),
             Source::Scene(..) => None,
         })
+    }
+
+    /// The names as typed, for a message.
+    pub(crate) fn names(&self) -> String {
+        let names: Vec<&str> = self.list.iter().take(LISTED).map(|input| &*input.name).collect();
+        let more = self.list.len() - names.len();
+        names.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
     }
 
     /// The scene, if one scene is all there is, where it was generated.

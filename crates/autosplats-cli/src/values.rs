@@ -77,6 +77,12 @@ pub(crate) fn step(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|step| *step > 0).ok_or_else(|| "a whole number above 0 is expected".into())
 }
 
+/// A number of threads.
+pub(crate) fn threads(text: &str) -> Result<u16, String> {
+    let count = text.parse().ok().filter(|count| (1..=1024).contains(count));
+    count.ok_or_else(|| "a number from 1 to 1024 is expected; without --threads there is one per core".into())
+}
+
 /// A number above zero.
 pub(crate) fn above_zero(text: &str) -> Result<f64, String> {
     number(text).filter(|value| *value > 0.0).ok_or_else(|| "a number above 0 is expected".into())

@@ -76,8 +76,24 @@ fn poses_and_cameras_that_are_none() {
     for (pose, word) in [("sphere.ply=short.txt", "4x4"), ("sphere.ply=missing.txt", "missing.txt")] {
         folder.fail(&[&render("sphere.ply")[..], &["--pose", pose]].concat(), 3, &[word]);
     }
-    folder.write("cam.json", "{\"eye\": [0, 0, 0]}");
-    folder.fail(&[&render("sphere.ply")[..], &["--camera", "cam.json"]].concat(), 3, &["cam.json", "--save-camera"]);
+    let camera = |eye: &str, projection: &str| {
+        format!(r#"{{"eye": {eye}, "look_at": [0, 0, 0], "up": [0, 0, 1], "projection": {projection}}}"#)
+    };
+    let fov = r#"{"perspective_fov_deg": 40}"#;
+    for (text, words) in [
+        ("{\"eye\": [0, 0, 0]}".into(), &["cam.json", "line 1", "look_at", "--save-camera"][..]),
+        (camera("[0, 0]", fov), &["line 1", "three numbers"]),
+        (camera("[0, -4, 0]", r#""fisheye""#), &["line 1", "projection"]),
+        (camera("[0, 0, 0]", fov), &["cam.json", "same point"]),
+        ("{\n\"eye\": oops".into(), &["cam.json", "line 2", "JSON"]),
+        (String::new(), &["JSON"]),
+    ] {
+        folder.write("cam.json", &text);
+        let arguments = [&render("sphere.ply")[..], &["--camera", "cam.json"]].concat();
+        folder.fail(&arguments, 2, words);
+        let message = folder.run(&arguments).stderr;
+        assert!(!["DVec3", "tuple", "variant", "expected"].iter().any(|word| message.contains(word)), "{message}");
+    }
     folder.fail(&[&render("sphere.ply")[..], &["--camera", "none.json"]].concat(), 3, &["none.json"]);
 }
 

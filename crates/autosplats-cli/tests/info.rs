@@ -144,9 +144,15 @@ fn what_the_header_says_of_a_broken_file_is_shown() {
 #[test]
 fn notes_and_contradictions_are_warnings() {
     let folder = Folder::new();
-    let mut rows: Vec<String> = (0..100).map(|i| format!("{}.5 {} 1", 5_400_000 + i / 10, i % 10)).collect();
-    rows.extend(["0 0 0".into(), "0 0 0".into()]);
-    folder.write("coarse.ply", &ply(&["float x", "float y", "float z"], rows.into_iter()));
+    let mut points: Vec<[f32; 3]> =
+        (0..100_u16).map(|i| [5_400_000.5 + f32::from(i / 10), f32::from(i % 10), 1.0]).collect();
+    points.extend([[0.0; 3]; 2]);
+    let header = ply(&["float x", "float y", "float z"], (0..102).map(|_| String::new()))
+        .replace("ascii", "binary_little_endian");
+    let mut bytes = header.trim_end().to_owned().into_bytes();
+    bytes.push(b'\n');
+    bytes.extend(points.iter().flatten().flat_map(|value| value.to_le_bytes()));
+    std::fs::write(folder.path("coarse.ply"), bytes).expect("a file can be written");
     let outcome = folder.succeed(&["info", "coarse.ply", "--json"]);
     assert_eq!(outcome.stderr, "", "notes are in the report, not on standard error");
     let report = json(&outcome.stdout);
@@ -156,6 +162,53 @@ fn notes_and_contradictions_are_warnings() {
     assert!(warnings.contains("x in steps of 0.5"), "float32 has no more digits there: {warnings}");
     let text = folder.succeed(&["info", "coarse.ply"]).stdout;
     assert_eq!(text.matches("  warning: ").count(), 2, "{text}");
+}
+
+#[test]
+fn text_has_the_digits_that_it_has() {
+    // Whatever type it declares: these are finer than that type could be.
+    let folder = Folder::new();
+    let rows: Vec<String> =
+        (0..100).map(|i| format!("{} {} 1", 5_400_000.0 + 0.125 * f64::from(i / 10), i % 10)).collect();
+    folder.write("fine.ply", &ply(&["float x", "float y", "float z"], rows.clone().into_iter()));
+    let header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 100\nHEIGHT 1\nPOINTS 100\nDATA ascii\n";
+    folder.write("fine.pcd", &format!("{header}{}\n", rows.join("\n")));
+    for name in ["fine.ply", "fine.pcd"] {
+        let report = report(&folder, &[name]);
+        assert_eq!([&report["spacing"]["median"], &report["warnings"]], [&json("0.125"), &json("[]")], "{name}");
+        assert_eq!(attribute(&report, "x")["stored"], "text", "{name}");
+    }
+}
+
+#[test]
+fn colors_are_told_as_stored() {
+    let folder = Folder::new();
+    let fields = ["float x", "float y", "float z", "ushort red", "ushort green", "ushort blue"];
+    let rows = (0..20).map(|i| format!("{i} 0 0 {} 0 65535", 257 * i));
+    folder.write("wide.ply", &ply(&fields, rows));
+    folder.succeed(&["convert", "wide.ply", "wide.las"]);
+    for name in ["wide.ply", "wide.las"] {
+        let report = report(&folder, &["--scan", name]);
+        let blue = attribute(&report, if name == "wide.ply" { "blue" } else { "Blue" });
+        assert_eq!([&blue["max"], &blue["stored"]], [&json("255.0"), &json(r#""uint16, shown as 8 bits""#)], "{name}");
+    }
+    let text = folder.succeed(&["info", "wide.las", "--scan"]).stdout;
+    assert!(text.contains("0 at every point: Intensity") && !text.contains("no values of their own"), "{text}");
+    let rgb = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n1 2 3 255\n4 5 6 7\n";
+    folder.write("packed.pcd", rgb);
+    let text = folder.succeed(&["info", "packed.pcd"]).stdout;
+    assert!(text.contains("no values of their own (part of others, or not read): rgb"), "{text}");
+}
+
+#[test]
+fn strips_have_faces() {
+    let folder = Folder::new();
+    let points = "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 0\n";
+    let strips = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    let text =
+        ply(&["float x", "float y", "float z"], points.lines().map(str::to_owned)).replace("end_header\n", strips);
+    folder.write("strip.ply", &format!("{}\n9 0 1 2 3 -1 2 3 4 1\n", text.trim_end()));
+    assert_eq!(report(&folder, &["strip.ply"])["faces"], 4, "two in each strip");
 }
 
 #[test]

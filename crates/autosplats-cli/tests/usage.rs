@@ -34,7 +34,8 @@ fn options_that_do_not_fit() {
         (&["--fov", "40", "--ortho", "2"], &["--ortho"]),
         (&["--ortho", "-1"], &["above 0"]),
         (&["--engine", "magic"], &["screen-grid"]),
-        (&["--threads", "0"], &["1"]),
+        (&["--threads", "0"], &["--threads", "from 1 to 1024", "one per core"]),
+        (&["--threads", "many"], &["from 1 to 1024"]),
         (&["--pose", "other.ply=pose.txt"], &["sphere.ply"]),
         (&["--collor", "rgb"], &["--color"]),
         (&["--color", "hieght"], &["did you mean 'height'"]),
@@ -47,6 +48,24 @@ fn options_that_do_not_fit() {
     for (options, words) in cases {
         folder.fail(&[&RENDER[..], options].concat(), 2, words);
     }
+}
+
+#[test]
+fn columns_that_nothing_has() {
+    let folder = Folder::with_sphere();
+    folder.fail(&["render", "scene:figure:1K", "-o", "out.png", "--columns", "x,y,z"], 2, &["--columns", "no input"]);
+    let told = folder.succeed(&[&RENDER[..], &["--size", "32x32", "--columns", "x,y,z"]].concat()).stderr;
+    assert!(told.contains("sphere.ply") && told.contains("--columns is for text"), "{told}");
+}
+
+#[test]
+fn messages_name_the_inputs() {
+    let folder = Folder::with_sphere();
+    folder.write("one.ply", &common::points_ply(&["1 2 3"]));
+    folder.fail(&["render", "one.ply", "-o", "out.png"], 3, &["one.ply: one point"]);
+    let away = ["--eye", "0,0,9", "--look-at", "0,0,99"];
+    let both = ["render", "sphere.ply", "one.ply", "-o", "out.png", "--quiet"];
+    folder.fail(&[&both[..], &away].concat(), 3, &["sphere.ply, one.ply: nothing to show"]);
 }
 
 #[test]

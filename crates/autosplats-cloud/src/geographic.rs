@@ -1,9 +1,9 @@
-//! Degrees to metres, so that a geographic cloud can be shown with equal units along all axes.
+//! Degrees and feet to metres: for pictures, which need equal units along all axes, and for files that mean metres.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{PointCloud, Unit, identity::Identity, read::middle};
+use crate::{Crs, PointCloud, Unit, identity::Identity, merge::residual, read::middle};
 
 /// Half the longer axis of the WGS 84 ellipsoid in metres, and the square of its eccentricity.
 const SEMI_MAJOR: f64 = 6_378_137.0;
@@ -41,8 +41,30 @@ impl PointCloud {
         self.residuals = None;
         self.resolution = self.resolution.map(|step| step * local.scale);
         let name = format!("metres about {:.6}° E, {:.6}° N", middle.x, middle.y);
-        self.crs = crate::Crs { name: Some(name), unit: Some(Unit::Metre), ..crate::Crs::default() };
+        self.crs = Crs { name: Some(name), unit: Some(Unit::Metre), ..Crs::default() };
         true
+    }
+
+    /// Metres per unit of x, y and z, where they are lengths.
+    pub(crate) fn metres_per_unit(&self) -> Option<DVec3> {
+        let Crs { unit, vertical_unit, .. } = &self.crs;
+        let across = (*unit)?.metres()?;
+        Some(DVec3::new(across, across, vertical_unit.map_or(Some(across), Unit::metres)?))
+    }
+
+    /// Multiplies coordinates by what makes them metres, and forgets the coordinate system, which has another unit. Scanner
+    /// places are moved but not turned.
+    pub(crate) fn scale_to_metres(&mut self, scale: DVec3) {
+        let world = |i: usize| self.world_position(i) * scale;
+        let origin = (self.origin * scale).round();
+        let positions = (0..self.len()).into_par_iter().map(|i| (world(i) - origin).as_vec3().to_array()).collect();
+        let residuals = (0..self.len()).into_par_iter().map(|i| residual(world(i) - origin)).collect();
+        (self.origin, self.positions, self.residuals) = (origin, positions, Some(residuals));
+        for scan in &mut self.scans {
+            scan.world_from_sensor.w_axis = (scan.position() * scale).extend(1.0);
+        }
+        self.resolution = self.resolution.map(|step| step * scale);
+        self.crs = Crs { unit: Some(Unit::Metre), ..Crs::default() };
     }
 }
 
@@ -73,7 +95,6 @@ impl Local {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Crs;
 
     /// Length of a degree of longitude and of latitude, from published tables of WGS 84.
     const TABLE: [(f64, f64, f64); 4] = [

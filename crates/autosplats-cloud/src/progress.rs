@@ -27,7 +27,9 @@ pub trait Progress: Sync {
     /// before the file ends.
     ///
     /// Chunks are a preview: each has its own origin, colours are scaled by the chunk alone, and points without a return
-    /// are still there. The cloud that reading returns in the end is the result.
+    /// are still there. The vertices of OBJ, STL and glTF come without their attributes and when all of them are known;
+    /// depth images, each of which is one picture, come only whole. The cloud that reading returns in the end is the
+    /// result.
     fn chunk(&self, _points: PointCloud) {}
 }
 

@@ -383,9 +383,71 @@ fn the_format_fits_the_fields() {
     let (bytes, notes) = written(&odd, "a.laz");
     let back = load(&bytes).0;
     assert_eq!(back.field("Classification").unwrap().values, FieldValues::I32(vec![-1, 300]), "kept as extra bytes");
-    let intensity = values(&back, "Intensity");
-    assert!(intensity[0] == 0.25 && intensity[1].is_nan(), "{intensity:?}");
-    assert!(notes.iter().filter(|note| note.contains("extra bytes")).count() == 2, "and that is told: {notes:?}");
+    assert!(notes.iter().filter(|note| note.contains("extra bytes")).count() == 1, "and that is told: {notes:?}");
+}
+
+#[test]
+fn intensities_of_any_range_fill_their_place() {
+    let nan = f32::NAN;
+    let cases: &[(FieldValues, &[f64], &str)] = &[
+        (FieldValues::F32(vec![0.25, 0.75, nan]), &[16_384.0, 49_151.0, 0.0], "intensities of 0 to 1 are scaled"),
+        (FieldValues::F64(vec![0.5; 3]), &[32_768.0; 3], "intensities of 0 to 1 are scaled"),
+        (FieldValues::I16(vec![-2048, 2047, -2048]), &[0.0, 65_535.0, 0.0], "intensities of -2048 to 2047 are scaled"),
+        (FieldValues::F32(vec![12.5, 200.0, 387.5]), &[0.0, 32_768.0, 65_535.0], "intensities of 12.5 to 387.5"),
+        (FieldValues::F64(vec![-f64::MAX, 0.0, f64::MAX]), &[0.0, 32_768.0, 65_535.0], "are scaled"),
+        (FieldValues::F32(vec![0.0, 255.0, 65_535.0]), &[0.0, 255.0, 65_535.0], ""),
+        (FieldValues::U8(vec![0, 1, 1]), &[0.0, 1.0, 1.0], ""),
+    ];
+    for (intensities, expected, told) in cases {
+        let cloud = PointCloud::new(DVec3::ZERO, positions(3)).with_field("Intensity", intensities.clone()).unwrap();
+        let (bytes, notes) = written(&cloud, "a.laz");
+        let (back, _) = load(&bytes);
+        assert_eq!(values(&back, "Intensity"), *expected, "{intensities:?}");
+        let scaled = notes.iter().any(|note| note.contains(told) && note.contains("ExactIntensity"));
+        assert_eq!(scaled, !told.is_empty(), "{intensities:?}: {notes:?}");
+        let exact = back.field("ExactIntensity").map(|field| format!("{:?}", field.values));
+        assert_eq!(exact, scaled.then(|| format!("{intensities:?}")), "what scaling changes is kept as well");
+        // Once they are scaled, nothing is to be scaled again.
+        let (again, _) = load(&written(&back, "a.las").0);
+        assert_eq!(format!("{:?}", again.fields()), format!("{:?}", back.fields()), "and stays as it is");
+    }
+    for values in [vec![70_000.5; 3], vec![0.5, f32::INFINITY, 2.0], vec![nan; 3]] {
+        let cloud =
+            PointCloud::new(DVec3::ZERO, positions(3)).with_field("Intensity", FieldValues::F32(values)).unwrap();
+        let (bytes, notes) = written(&cloud, "a.las");
+        let back = load(&bytes).0;
+        assert_eq!(format!("{:?}", back.fields()), format!("{:?}", cloud.fields()), "no range, no scale");
+        assert!(notes.iter().any(|note| note.contains("do not fit their place")), "{notes:?}");
+    }
+}
+
+#[test]
+fn keys_say_what_text_of_a_horizontal_system_does_not() {
+    let unit = |name: &str, metres: f64| format!(r#"UNIT["{name}",{metres}]"#);
+    let horizontal = format!(r#"PROJCS["p",GEOGCS["g"],{}]"#, unit("foot", 0.3048));
+    let both = format!(r#"COMPD_CS["c",{horizontal},VERT_CS["v",{}]]"#, unit("foot", 0.3048));
+    let centre = format!(r#"GEOCCS["e",{}]"#, unit("metre", 1.0));
+    let keys = |units: &[[u16; 4]]| {
+        let keys = [&[[1, 1, 0, units.len() as u16]], units].concat();
+        keys.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>()
+    };
+    let (heights, x_and_y) = ([4099, 0, 1, 9001], [3076, 0, 1, 9001]);
+    let metre = Some(Unit::Metre);
+    let cases = [
+        (&*horizontal, vec![heights], Some(Unit::Foot), metre),
+        (&horizontal, vec![x_and_y, heights], Some(Unit::Foot), metre),
+        (&horizontal, vec![x_and_y], Some(Unit::Foot), None),
+        (&both, vec![heights], Some(Unit::Foot), None),
+        (&centre, vec![[4099, 0, 1, 9002]], metre, None),
+        (r#"PROJCS["p"]"#, vec![[3076, 0, 1, 9002], heights], Some(Unit::Foot), metre),
+    ];
+    for (text, units, unit, vertical) in cases {
+        let vlrs = [("LASF_Projection", 2112, text.as_bytes().to_vec()), ("LASF_Projection", 34735, keys(&units))];
+        let (cloud, _) = load(&file(2, 0, &vlrs, &[vec![1; 20], vec![2; 20]]));
+        assert_eq!((cloud.crs().unit, cloud.crs().vertical_unit), (unit, vertical), "{text}, {units:?}");
+        let back = load(&written(&cloud, "a.las").0).0;
+        assert_eq!(back.crs(), cloud.crs(), "{text}, {units:?}: and comes back");
+    }
 }
 
 #[test]

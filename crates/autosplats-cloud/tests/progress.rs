@@ -53,17 +53,60 @@ impl Progress for Watcher {
     }
 }
 
-/// One file of every format that is written.
+/// Files of formats that are read alone: text where the writers have bytes, lists, and meshes.
+fn unwritten(folder: &Path, points: &[[f32; 3]]) -> Vec<PathBuf> {
+    let count = points.len();
+    let xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
+    let floats = |point: &[f32; 3]| point.map(f32::to_le_bytes).into_iter().flatten().collect::<Vec<u8>>();
+    let rows = |before: &str| points.iter().map(|[x, y, z]| format!("{before}{x} {y} {z}\n")).collect::<String>();
+    let header = format!("element vertex {count}\n");
+    let text_ply = format!("ply\nformat ascii 1.0\n{header}{xyz}{}", rows(""));
+    let list = "property list uchar uchar ids\n";
+    let mut list_ply = format!("ply\nformat binary_little_endian 1.0\n{header}{list}{xyz}").into_bytes();
+    list_ply.extend(points.iter().flat_map(|point| [vec![1, 7], floats(point)].concat()));
+    let text_pcd = format!(
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {count}\nHEIGHT 1\nPOINTS {count}\nDATA ascii\n{}",
+        rows("")
+    );
+    let mut stl = [&[b' '; 80][..], &(count as u32 / 3).to_le_bytes()].concat();
+    for corners in points.chunks_exact(3) {
+        stl.extend([0; 12]);
+        stl.extend(corners.iter().flat_map(floats));
+        stl.extend([0; 2]);
+    }
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},
+        "mode":0}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{0}}}],"buffers":[{{"uri":"a.bin","byteLength":{0}}}]}}"#,
+        12 * count
+    );
+    std::fs::write(folder.join("a.bin"), points.iter().flat_map(floats).collect::<Vec<u8>>()).unwrap();
+    let files = [
+        ("text.ply", text_ply.into_bytes()),
+        ("list.ply", list_ply),
+        ("text.pcd", text_pcd.into_bytes()),
+        ("a.off", format!("OFF\n{count} 0 0\n{}", rows("")).into_bytes()),
+        ("a.obj", rows("v ").into_bytes()),
+        ("a.stl", stl),
+        ("a.gltf", json.into_bytes()),
+    ];
+    let write = |(name, bytes): (&str, Vec<u8>)| {
+        std::fs::write(folder.join(name), bytes).unwrap();
+        folder.join(name)
+    };
+    files.into_iter().map(write).collect()
+}
+
+/// One file of every format.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let cloud = PointCloud::new(DVec3::new(5e5, 5e6, 0.0), positions(POINTS)).with_colors(colors(POINTS)).unwrap();
     let names = written_formats().flat_map(|(_, extensions)| extensions).filter(|extension| !extension.contains('.'));
-    names
-        .map(|extension| {
-            let path = folder.join(format!("a.{extension}"));
-            write(&cloud, &path, &()).unwrap();
-            path
-        })
-        .collect()
+    let written = names.map(|extension| {
+        let path = folder.join(format!("a.{extension}"));
+        write(&cloud, &path, &()).unwrap();
+        path
+    });
+    written.chain(unwritten(folder, cloud.positions())).collect()
 }
 
 #[test]

@@ -64,6 +64,31 @@ fn names(cloud: &PointCloud) -> Vec<&str> {
     cloud.fields().iter().map(|field| field.name.as_str()).collect()
 }
 
+#[test]
+fn too_few_columns_are_told() {
+    let named = |names: &str| {
+        let columns = Some(names.split(',').map(str::to_owned).collect());
+        ReadOptions { columns, ..ReadOptions::default() }
+    };
+    for (width, names, told) in [
+        (4, "x,y,z", Some("points of 4 floats (x y z intensity)")),
+        (5, "x,y,z,Intensity", Some("points of 5 floats")),
+        (4, "x,y,z,-", None),
+        (3, "x,y,z", None),
+    ] {
+        let (_, notes) = noted("a.bin", &sweep(600, width), &named(names)).unwrap();
+        let found = notes.iter().any(|note| told.is_some_and(|told| note.contains(told) && note.contains("'-'")));
+        assert_eq!(found, told.is_some(), "{names} of {width}: {notes:?}");
+    }
+    let says_itself = |notes: Vec<String>| notes.iter().any(|note| note.contains("--columns is for text"));
+    let text = b"1 2 3\n4 5 6\n";
+    assert!(!says_itself(noted("a.xyz", text, &named("x,y,z")).unwrap().1), "text is what it is for");
+    assert!(!says_itself(noted("a.pcd", text, &named("x,y,z")).unwrap().1), "whatever it is called");
+    let ply =
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3\n";
+    assert!(says_itself(noted("a.ply", ply, &named("x,y,z")).unwrap().1), "PLY names its own");
+}
+
 /// Rows of floats: x y z, then intensity and ring as far as `columns` goes.
 fn sweep(count: usize, columns: usize) -> Vec<u8> {
     let mut random = Random(9);

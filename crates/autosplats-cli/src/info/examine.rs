@@ -325,7 +325,11 @@ fn values_of(cloud: &PointCloud, attributes: &[Attribute]) -> Vec<AttributeFound
             _ => None,
         };
         meanings.extend(known);
-        rows.push((name.clone(), stored.clone(), values));
+        // What colours of other types are read as is not what the file has.
+        let bytes = matches!(values, Some(Values::Channel(..)))
+            && (stored.starts_with("uint16") || stored.starts_with("float"));
+        let stored = if bytes { format!("{stored}, shown as 8 bits") } else { stored.clone() };
+        rows.push((name.clone(), stored, values));
     }
     let mut first = Vec::new();
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {

@@ -234,7 +234,11 @@ impl Report {
         }
         if !hidden.is_empty() {
             let names: Vec<_> = hidden.iter().map(|attribute| clipped(&plain(&attribute.name), 22)).collect();
-            let text = format!("not shown (0 everywhere, or read as something else): {}", names.join(", "));
+            // Of LAS, all values are read, and those that are nothing but zeros are left out.
+            let las =
+                self.format.as_ref().is_some_and(|format| format.starts_with("LAS") || format.starts_with("COPC"));
+            let why = if las { "0 at every point" } else { "no values of their own (part of others, or not read)" };
+            let text = format!("{why}: {}", names.join(", "));
             let _ = writeln!(page, "  {}", wrapped(&text, 4));
         }
     }

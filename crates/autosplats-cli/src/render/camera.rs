@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use autosplats::{Camera, Projection, ViewDirection, guess_axes};
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{Axes, PointCloud, Scene, View};
+use serde_json::error::Category;
 
 use super::render_failure;
 use crate::args::{AxesChoice, CameraArgs, Side};
@@ -140,11 +141,15 @@ fn upward(axes: Axes, sight: DVec3) -> DVec3 {
 
 fn load(path: &Path) -> Result<Camera, Failure> {
     let shown = path.display();
-    let failure = |what: &str| Failure::new(Exit::Input, format!("{shown}: {what}"));
-    let text = read_to_string(path).map_err(|error| failure(&error.to_string()))?;
-    let camera: Camera = serde_json::from_str(&text)
-        .map_err(|error| failure(&format!("not a camera as --save-camera writes it: {error}")))?;
-    camera.check().map_err(|error| failure(&error.to_string()))?;
+    let text = read_to_string(path).map_err(|error| Failure::new(Exit::Input, format!("{shown}: {error}")))?;
+    let camera: Camera = serde_json::from_str(&text).map_err(|error| {
+        let why = match error.classify() {
+            Category::Data => "eye, look_at and up are three numbers each, projection is one that --save-camera writes",
+            _ => "this is no JSON; --save-camera writes such a file",
+        };
+        Failure::usage(format!("{shown}, line {}, column {}: no camera: {why}", error.line(), error.column()))
+    })?;
+    camera.check().map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     Ok(camera)
 }
 

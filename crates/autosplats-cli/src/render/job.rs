@@ -68,7 +68,7 @@ impl Job {
     pub(super) fn fit_neighbors(&mut self, cloud: &PointCloud) -> Result<Option<String>, Failure> {
         let k = &mut self.settings.reconstruction.k;
         match cloud.len() {
-            0 | 1 => Err(Failure::new(Exit::Input, "one point makes no surface")),
+            0 | 1 => Err(Failure::new(Exit::Input, format!("{}: one point makes no surface", self.inputs.names()))),
             points if points <= *k as usize => {
                 let wanted = std::mem::replace(k, points as u32 - 1);
                 Ok(Some(format!("{points} points cannot have {wanted} neighbours each; {k} are taken")))

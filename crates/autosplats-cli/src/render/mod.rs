@@ -14,6 +14,7 @@ use self::report::Report;
 use crate::args::RenderArgs;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
+use crate::input::Inputs;
 use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
 use crate::progress::Bar;
 
@@ -36,7 +37,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let bar = Bar::spinner("rendering", job.quiet);
     let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
     drop(bar);
-    check_visible(&frame)?;
+    check_visible(&frame, &job.inputs)?;
     if !job.quiet {
         if degrees {
             eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
@@ -75,7 +76,7 @@ fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, alpha: b
 }
 
 /// Refuses a picture without a surface.
-fn check_visible(frame: &Frame<'_>) -> Result<(), Failure> {
+fn check_visible(frame: &Frame<'_>, inputs: &Inputs) -> Result<(), Failure> {
     if frame.layers.weight.iter().any(|weight| *weight > 0.0) {
         return Ok(());
     }
@@ -88,7 +89,7 @@ fn check_visible(frame: &Frame<'_>) -> Result<(), Failure> {
              picture; --view iso finds the rest"
         )
     };
-    Err(Failure::new(Exit::Input, format!("nothing to show: {why}")))
+    Err(Failure::new(Exit::Input, format!("{}: nothing to show: {why}", inputs.names())))
 }
 
 /// What failing to render is to the caller of the program.

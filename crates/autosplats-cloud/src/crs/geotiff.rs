@@ -101,7 +101,7 @@ impl GeoKeys {
             vertical_unit: vertical.filter(|&vertical| Some(vertical) != unit),
             geotiff: Some(self.clone()),
         };
-        Found { crs, geocentric: model == Some(3) }
+        Found { crs, geocentric: model == Some(3), heights: vertical }
     }
 
     /// Keys that say what is known of a system.

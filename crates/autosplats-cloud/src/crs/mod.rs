@@ -28,6 +28,8 @@ pub(crate) struct Found {
     pub(crate) crs: Crs,
     /// Whether coordinates are from the middle of the earth.
     pub(crate) geocentric: bool,
+    /// Unit of z where it is said, even if it is that of x and y.
+    pub(crate) heights: Option<Unit>,
 }
 
 impl Crs {

@@ -73,7 +73,7 @@ impl Node<'_> {
 /// What the text says.
 pub(super) fn read(text: &str) -> Found {
     let text = text.trim_end_matches('\0').trim();
-    let mut found = Found { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, geocentric: false };
+    let mut found = Found { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, ..Found::default() };
     if text.is_empty() {
         found.crs.wkt = None;
     } else if text.len() <= MAX_LEN
@@ -81,8 +81,10 @@ pub(super) fn read(text: &str) -> Found {
     {
         system(&root, &mut found);
     }
-    if found.crs.vertical_unit == found.crs.unit {
-        found.crs.vertical_unit = None;
+    let Found { crs, geocentric, heights } = &mut found;
+    *heights = if *geocentric { crs.unit } else { crs.vertical_unit };
+    if crs.vertical_unit == crs.unit {
+        crs.vertical_unit = None;
     }
     found
 }

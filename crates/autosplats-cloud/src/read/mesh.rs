@@ -103,7 +103,7 @@ impl Faces {
     }
 }
 
-/// A cloud of positions in world coordinates; `done` is the part of the work done before.
+/// A cloud of positions in world coordinates, of which previews are handed out; `done` is the part of the work done before.
 pub(super) fn cloud(job: &Job<'_>, positions: &[[f64; 3]], done: f32) -> Result<PointCloud, Error> {
     columns(job, bytemuck::cast_slice(positions), Scalar::F64, done)
 }
@@ -125,6 +125,7 @@ fn columns(job: &Job<'_>, bytes: &[u8], scalar: Scalar, done: f32) -> Result<Poi
         packed_rgb: false,
         done,
     };
+    table.preview(job, "points")?;
     table.into_cloud(job, "points")
 }
 
@@ -176,7 +177,12 @@ pub(super) fn weld<K: Hash + Eq + Send>(
         let mut seen = std::collections::HashMap::with_hasher(hash);
         for corner in 0..count {
             if corner % (1 << 16) == 0 {
-                job.tick(part.start + part.len * corner as f32 / count as f32)?;
+                // All go the same way side by side; one speaks for them, so that progress never falls.
+                if shard == 0 {
+                    job.tick(part.start + part.len * corner as f32 / count as f32)?;
+                } else {
+                    job.go_on()?;
+                }
             }
             let key = key(corner);
             // The map itself uses the upper and the lower bits.

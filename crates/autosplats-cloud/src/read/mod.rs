@@ -200,6 +200,9 @@ fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
 fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     job.tick(0.0)?;
     let format = format(job)?;
+    if job.options.columns.is_some() && !takes_columns(job, format) {
+        job.note(format!("--columns is for text and bare records; {} says itself what its columns are", format.name));
+    }
     let mut contents = (format.read)(job)?;
     let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
     // A mesh would lose its corners.
@@ -209,6 +212,12 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     drop_far_sensors(job, &mut contents.cloud);
     job.tick(1.0)?;
     Ok(contents)
+}
+
+/// Whether the caller may say what the columns are.
+fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
+    [xyz::FORMAT.name, raw::FORMAT.name].contains(&format.name)
+        || format.name == pcd::FORMAT.name && pcd::without_header(job)
 }
 
 /// Sensors stand this many times the size of what they saw away from it at most.

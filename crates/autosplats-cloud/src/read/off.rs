@@ -201,17 +201,20 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 fn read_rows(job: &Job<'_>, header: &Header) -> Result<Contents, Error> {
     let (names, tokens): (Vec<_>, Vec<_>) = header.tokens(job)?.into_iter().unzip();
     let rows = Rows { tokens: &tokens, count: Some(header.vertices), counts_between: false };
-    let (records, count) = rows.parse(job, header.end, PARSING)?;
     let stride = tokens.iter().map(|token| token.size()).sum();
     let mut offset = 0;
     let mut columns = Vec::new();
-    for (name, token) in names.into_iter().zip(tokens) {
-        if let Token::Store(scalar) = token {
+    for (name, token) in names.into_iter().zip(&tokens) {
+        if let &Token::Store(scalar) = token {
             columns.push(Column { name: name.into(), scalar, offset, stride });
         }
         offset += token.size();
     }
     let done = PARSING.len;
+    let (records, count) = rows.parse_and_show(job, header.end, PARSING, |bytes, count| {
+        let columns = columns.clone();
+        Table { bytes, count, big_endian: false, columns, packed_rgb: false, done }.preview(job, "vertices")
+    })?;
     let table = Table { bytes: &records, count, big_endian: false, columns, packed_rgb: false, done };
     let cloud = table.into_cloud(job, "vertices")?;
     let triangles = if job.triangles { triangles(job, header)? } else { Vec::new() };

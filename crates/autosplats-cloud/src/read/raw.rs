@@ -33,7 +33,8 @@ const RANGE: f32 = 1e4;
 /// What the numbers of a point are.
 struct Layout {
     names: Vec<Option<String>>,
-    guessed: bool,
+    /// What the user should know of it.
+    note: Option<String>,
 }
 
 impl Layout {
@@ -42,6 +43,10 @@ impl Layout {
         if len == 0 {
             return Err(job.malformed("byte 0", "the file is empty; copy it again"));
         }
+        // Any data of more columns pass for three, so these come last.
+        let with_ring: &[&str] = &["x", "y", "z", "intensity", "ring"];
+        let guess =
+            || [&with_ring[..4], with_ring, &with_ring[..3]].into_iter().find(|names| plausible(job.bytes, names));
         if let Some(names) = columns::given(job)? {
             let stride = SIZE * names.len();
             if !len.is_multiple_of(stride) {
@@ -51,19 +56,27 @@ impl Layout {
                 );
                 return Err(job.malformed(format!("byte {len}"), what));
             }
-            return Ok(Self { names, guessed: false });
+            let note = guess().filter(|guess| guess.len() > names.len()).map(|guess| {
+                format!(
+                    "these look like points of {} floats ({}) and are read as {}; --columns has to name all of them, '-' \
+                     leaves one out",
+                    guess.len(),
+                    guess.join(" "),
+                    names.len()
+                )
+            });
+            return Ok(Self { names, note });
         }
-        // Any data of more columns pass for three, so these come last.
-        let with_ring: &[&str] = &["x", "y", "z", "intensity", "ring"];
-        let guess = [&with_ring[..4], with_ring, &with_ring[..3]].into_iter().find(|names| plausible(job.bytes, names));
-        let Some(names) = guess else {
+        let Some(names) = guess() else {
             return Err(job.malformed(
                 "byte 0",
                 "these are no plausible points of 4, 5 or 3 floats (x y z intensity ring); name what they are by \
                  --columns",
             ));
         };
-        Ok(Self { names: names.iter().map(|&name| Some(name.into())).collect(), guessed: true })
+        let names: Vec<Option<String>> = names.iter().map(|&name| Some(name.into())).collect();
+        let note = Some(columns::taken_for(&names));
+        Ok(Self { names, note })
     }
 
     fn stride(&self) -> usize {
@@ -123,16 +136,14 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         points: Some(points as u64),
         attributes: layout.columns().iter().map(Column::attribute).collect(),
         scans: vec![at_the_origin(points)],
-        notes: if layout.guessed { vec![columns::taken_for(&layout.names)] } else { Vec::new() },
+        notes: layout.note.into_iter().collect(),
         ..Description::default()
     })
 }
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let layout = Layout::of(job)?;
-    if layout.guessed {
-        job.note(columns::taken_for(&layout.names));
-    }
+    layout.note.iter().for_each(|note| job.note(note));
     let count = job.bytes.len() / layout.stride();
     let table =
         Table { bytes: job.bytes, count, big_endian: false, columns: layout.columns(), packed_rgb: false, done: 0.0 };

@@ -96,7 +96,7 @@ impl Column {
 }
 
 /// Points of a preview, about 16 MB of a file.
-const CHUNK: usize = 1 << 20;
+pub(super) const CHUNK: usize = 1 << 20;
 
 /// Columns over some bytes.
 pub(super) struct Table<'a> {

@@ -7,12 +7,20 @@ use rayon::prelude::*;
 
 use super::{
     Job, shown,
-    table::{Part, Scalar, reserve},
+    table::{CHUNK, Part, Scalar, reserve},
 };
 use crate::Error;
 
 /// Bytes of text that one thread parses at a time.
 const PIECE: usize = 1 << 19;
+
+/// How coordinates in text are stored: it may hold more digits than the type declared for it, and all of them are read.
+pub(super) const TEXT: &str = "text";
+
+/// Whether a value is one that keeps all its digits.
+pub(super) fn is_coordinate(name: &str) -> bool {
+    ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+}
 
 /// What to do with the next value of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,10 +65,23 @@ struct Piece {
 impl Rows<'_> {
     /// Parses rows from byte `start` on. Returns the records and how many there are.
     pub(super) fn parse(&self, job: &Job<'_>, start: usize, part: Part) -> Result<(Vec<u8>, usize), Error> {
+        self.parse_and_show(job, start, part, |_, _| Ok(()))
+    }
+
+    /// [Parses](Self::parse), and has `show` look at records and their number, about a million at a time, before those
+    /// after them are parsed.
+    pub(super) fn parse_and_show(
+        &self,
+        job: &Job<'_>,
+        start: usize,
+        part: Part,
+        show: impl Fn(&[u8], usize) -> Result<(), Error>,
+    ) -> Result<(Vec<u8>, usize), Error> {
+        let len = self.record_len();
         let text = job.bytes;
         let wanted = self.count.unwrap_or(usize::MAX);
         let mut records = Vec::new();
-        let mut rows = 0;
+        let (mut rows, mut shown) = (0, 0);
         let mut at = start;
         while at < text.len() && rows < wanted {
             job.tick(part.start + part.len * (at - start) as f32 / (text.len() - start) as f32)?;
@@ -73,7 +94,7 @@ impl Rows<'_> {
                 cuts.par_windows(2).map(|cut| self.parse_piece(&text[cut[0]..cut[1]], cut[0])).collect();
             for piece in pieces {
                 let take = piece.rows.min(wanted - rows);
-                let bytes = take * self.record_len();
+                let bytes = take * len;
                 reserve(&mut records, bytes, "the points of a text file")?;
                 records.extend_from_slice(&piece.records[..bytes]);
                 rows += take;
@@ -84,6 +105,10 @@ impl Rows<'_> {
                     return Err(job.malformed(job.line(offset), what));
                 }
             }
+            if rows - shown >= CHUNK {
+                show(&records[shown * len..], rows - shown)?;
+                shown = rows;
+            }
         }
         if self.count.is_some() && rows < wanted {
             return Err(job.malformed(
@@ -91,6 +116,7 @@ impl Rows<'_> {
                 format!("the file ends after {rows} of {wanted} points; it is cut off, copy it again"),
             ));
         }
+        show(&records[shown * len..], rows - shown)?;
         Ok((records, rows))
     }
 

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use super::{super::table::Scalar, extra::Extra, header::Header};
 use crate::{
     Axes, Error, Field, FieldValues, PointCloud,
+    cloud::each_type,
     las::{self, ANGLE_STEP, Place},
     merge::residual,
 };
@@ -201,19 +202,30 @@ impl<'a> Columns<'a> {
             .collect();
         let wide = *self.wide_colors.get_mut();
         if wide && !were_wide && !self.colors.is_empty() {
-            self.colors[..start].fill([0; 3]);
+            clear(&mut self.colors[..start]);
         }
         let mut at = start;
         let mut errors = Vec::with_capacity(counts.len());
         for ((outcome, seen, narrow), &count) in outcomes.into_iter().zip(counts) {
             if wide && narrow > 0 {
-                self.colors[at..at + narrow].fill([0; 3]);
+                clear(&mut self.colors[at..at + narrow]);
             }
             self.seen.add(&seen);
             errors.push(outcome);
             at += count;
         }
         errors
+    }
+
+    /// Takes points out, whose ranges are in order. Those that are kept move down and nothing is noted of single points:
+    /// a small file may claim millions that cannot be decompressed, and their memory was never touched.
+    pub(super) fn remove(&mut self, ranges: &[Range<usize>]) {
+        remove(&mut self.positions, ranges);
+        remove(&mut self.residuals, ranges);
+        remove(&mut self.colors, ranges);
+        for values in &mut self.fields {
+            each_type!(values, v => remove(v, ranges));
+        }
     }
 
     /// A copy of some points, as far as they are known.
@@ -457,6 +469,27 @@ fn split<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let (first, rest) = whole.split_at_mut(count.min(whole.len()));
     *slice = rest;
     first
+}
+
+/// Takes ranges of elements out, which are in order.
+fn remove<T: Copy>(values: &mut Vec<T>, ranges: &[Range<usize>]) {
+    if values.is_empty() {
+        return;
+    }
+    let (mut kept, mut at) = (0, 0);
+    for range in ranges.iter().cloned().chain(std::iter::once(values.len()..values.len())) {
+        values.copy_within(at..range.start, kept);
+        kept += range.start - at;
+        at = range.end;
+    }
+    values.truncate(kept);
+    values.shrink_to_fit();
+}
+
+/// Makes colours black. Those that are black are not written to: they may be points that could not be decompressed, whose
+/// memory was never touched.
+fn clear(colors: &mut [[u8; 3]]) {
+    colors.iter_mut().filter(|color| **color != [0; 3]).for_each(|color| *color = [0; 3]);
 }
 
 /// Memory of zeros, which is not touched before it is used.

@@ -27,7 +27,7 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
         let (doubles, ascii) = (data(las::GEO_DOUBLES), data(las::GEO_ASCII));
         GeoKeys::from_bytes(directory, doubles.unwrap_or_default(), ascii.unwrap_or_default()).read()
     });
-    let Found { mut crs, geocentric } = match (wkt, keys) {
+    let Found { mut crs, geocentric, .. } = match (wkt, keys) {
         (Some(wkt), Some(keys)) => {
             if let (Some(text), Some(key)) = (wkt.crs.epsg, keys.crs.epsg)
                 && text != key
@@ -37,11 +37,12 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
             let mut crs = wkt.crs;
             crs.epsg = crs.epsg.or(keys.crs.epsg);
             crs.name = crs.name.or(keys.crs.name);
-            if crs.unit.is_none() {
-                (crs.unit, crs.vertical_unit) = (keys.crs.unit, keys.crs.vertical_unit);
-            }
+            crs.unit = crs.unit.or(keys.crs.unit);
+            // Text of a horizontal system says nothing of heights.
+            let heights = wkt.heights.or(keys.heights);
+            crs.vertical_unit = heights.filter(|&unit| Some(unit) != crs.unit);
             crs.geotiff = keys.crs.geotiff;
-            Found { crs, geocentric: wkt.geocentric }
+            Found { crs, geocentric: wkt.geocentric, heights }
         }
         (found, other) => found.or(other).unwrap_or_default(),
     };

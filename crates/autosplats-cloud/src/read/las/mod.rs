@@ -80,7 +80,8 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         }
     };
 
-    let (mut cloud, narrow) = columns.into_cloud();
+    columns.remove(&damaged);
+    let (cloud, narrow) = columns.into_cloud();
     if narrow {
         notes.push("colours have no value above 255; taken for 8 bits in the 16 of the format".into());
     }
@@ -93,11 +94,6 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         notes.push(format!(
             "compressed data are damaged: {damaged_points} of {claimed} points are lost; copy the file again"
         ));
-        let mut keep = vec![true; cloud.len()];
-        for range in damaged {
-            keep[range].fill(false);
-        }
-        cloud.retain(|i| keep[i]);
     }
     let meaning = coordinates::of(&header, &records);
     notes.extend(meaning.notes);

@@ -9,7 +9,7 @@ use self::header::{Encoding, Header, Viewpoint};
 use super::{
     Attribute, Contents, Description, Format, Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
-    text::{Rows, Token},
+    text::{Rows, TEXT, Token, is_coordinate},
     xyz,
 };
 use crate::{Axes, Error, PointCloud, Scan};
@@ -28,6 +28,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     }
     let header = Header::parse(job)?;
     let stored = |field: &header::Field| match field.count {
+        1 if header.encoding == Encoding::Ascii && is_coordinate(&field.name) => TEXT.to_owned(),
         1 => field.scalar.name().to_owned(),
         count => format!("{count} × {}", field.scalar.name()),
     };
@@ -58,7 +59,8 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
 /// A file of this name without any header can only be meant as rows of numbers, so nothing is gained by refusing it.
 const NO_HEADER: &str = "there is no PCD header; read as text";
 
-fn without_header(job: &Job<'_>) -> bool {
+/// Whether the file is no PCD but for its name.
+pub(super) fn without_header(job: &Job<'_>) -> bool {
     !header::recognised(job.bytes) && xyz::looks_like_rows(job.bytes)
 }
 
@@ -164,10 +166,8 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
             tokens.extend(std::iter::repeat_n(Token::Skip, field.count));
             continue;
         }
-        let name = field.name.to_ascii_lowercase();
-        let (scalar, token) = match name.as_str() {
-            // Text may hold more digits than the type declared for it; coordinates need them.
-            "x" | "y" | "z" => (Scalar::F64, Token::Store(Scalar::F64)),
+        let (scalar, token) = match &*field.name.to_ascii_lowercase() {
+            name if is_coordinate(name) => (Scalar::F64, Token::Store(Scalar::F64)),
             "rgb" | "rgba" if field.scalar.size() == 4 => (Scalar::U32, Token::Packed),
             _ => (field.scalar, Token::Store(field.scalar)),
         };
@@ -181,9 +181,12 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
         column.stride = offset;
     }
     let rows = Rows { tokens: &tokens, count: Some(header.points), counts_between: false };
-    let (bytes, count) = rows.parse(job, header.end, PARSING)?;
-    Table { bytes: &bytes, count, big_endian: false, columns, packed_rgb: true, done: PARSING.len }
-        .into_cloud(job, "header")
+    let done = PARSING.len;
+    let (bytes, count) = rows.parse_and_show(job, header.end, PARSING, |bytes, count| {
+        Table { bytes, count, big_endian: false, columns: columns.clone(), packed_rgb: true, done }
+            .preview(job, "header")
+    })?;
+    Table { bytes: &bytes, count, big_endian: false, columns, packed_rgb: true, done }.into_cloud(job, "header")
 }
 
 fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, Error> {

@@ -8,7 +8,7 @@ use self::header::{Element, Encoding, Header};
 use super::{
     Attribute, Contents, Description, Format, Job, lines, shown,
     table::{Column, Part, Scalar, Table, reserve},
-    text::{Rows, Token},
+    text::{Rows, TEXT, Token, is_coordinate},
 };
 use crate::{Error, PointCloud};
 
@@ -24,6 +24,9 @@ pub(super) const FORMAT: Format = Format {
 /// Other elements that are listed.
 const LISTED: usize = 100;
 
+/// Files up to this size are counted through when they are described: that takes milliseconds.
+const COUNTED: usize = 4 << 20;
+
 /// Part of the work that packing text or lists into records is.
 const PACKING: Part = Part { start: 0.0, len: 0.8 };
 
@@ -32,13 +35,20 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let vertex = &header.elements[vertices(job, &header)?];
     let stored = |property: &header::Property| match property.list {
         Some(_) => format!("list of {}", property.scalar.name()),
+        None if header.encoding == Encoding::Ascii && is_coordinate(&property.name) => TEXT.into(),
         None => property.scalar.name().into(),
+    };
+    let count = |name: &str| header.elements.iter().find(|element| element.name == name).map(|element| element.count);
+    // How many triangles a strip has is known when it is read.
+    let in_strips = || {
+        count("tristrips").filter(|_| job.bytes.len() <= COUNTED)?;
+        faces::triangles(job, &header, vertex.count).ok().map(|triangles| triangles.len())
     };
     let others = header.elements.iter().filter(|element| element.name != "vertex").take(LISTED);
     Ok(Description {
         format: format!("PLY, {}", header.encoding.name()),
         points: Some(vertex.count as u64),
-        faces: header.elements.iter().find(|element| element.name == "face").map(|face| face.count as u64),
+        faces: count("face").or_else(in_strips).map(|faces| faces as u64),
         attributes: vertex.properties.iter().map(|p| Attribute::new(shown(p.name.as_bytes()), stored(p))).collect(),
         details: others.map(|e| (format!("element {}", shown(e.name.as_bytes())), e.count.to_string())).collect(),
         ..Description::default()
@@ -86,15 +96,15 @@ fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -
             tokens.push(Token::SkipList);
             continue;
         }
-        // Text may hold more digits than the type declared for it; coordinates need them.
-        let coordinate = ["x", "y", "z"].contains(&&*property.name.to_ascii_lowercase());
-        let scalar = if coordinate { Scalar::F64 } else { property.scalar };
+        let scalar = if is_coordinate(&property.name) { Scalar::F64 } else { property.scalar };
         columns.push(Column { name: property.name.clone(), scalar, offset, stride: 0 });
         tokens.push(Token::Store(scalar));
         offset += scalar.size();
     }
     let rows = Rows { tokens: &tokens, count: Some(vertex.count), counts_between: false };
-    let (records, count) = rows.parse(job, start, PACKING)?;
+    let (records, count) = rows.parse_and_show(job, start, PACKING, |records, count| {
+        packed_table(records, count, false, columns.clone(), offset).preview(job, "header")
+    })?;
     packed_table(&records, count, false, columns, offset).into_cloud(job, "header")
 }
 
@@ -143,7 +153,9 @@ fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Eleme
         Ok(())
     })?;
     let big_endian = header.encoding == Encoding::Big;
-    packed_table(&records, vertex.count, big_endian, columns, stride).into_cloud(job, "header")
+    let table = packed_table(&records, vertex.count, big_endian, columns, stride);
+    table.preview(job, "header")?;
+    table.into_cloud(job, "header")
 }
 
 fn packed_table(bytes: &[u8], count: usize, big_endian: bool, mut columns: Vec<Column>, stride: usize) -> Table<'_> {

@@ -1,7 +1,8 @@
 //! E57: a scan for each place of a scanner, positions in its frame, in double precision where `f32` would lose digits.
 //!
 //! Kept are positions to some 1e-15 of the largest coordinate, colours of 8 and 16 bits, fields of any type but unsigned
-//! integers beyond 63 bits, and poses. Points that no scanner has seen come last.
+//! integers beyond 63 bits, and poses. Points that no scanner has seen come last. E57 means metres, so coordinates in
+//! other units are converted.
 
 mod pages;
 mod values;
@@ -18,7 +19,7 @@ use self::{
     xml::ScanEntry,
 };
 use super::{Format, Job};
-use crate::{Axes, Error, FieldValues, Unit};
+use crate::{Axes, Error, FieldValues, PointCloud, Unit, check_memory};
 
 pub(super) const FORMAT: Format = Format { name: "E57", extensions: &["e57"], write };
 
@@ -38,6 +39,8 @@ struct Run {
 }
 
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
+    let metric = in_metres(job)?;
+    let job = &Job { cloud: metric.as_ref().unwrap_or(job.cloud), ..*job };
     let known = Known::of(job.cloud);
     notes(job, &known);
     let mut pages = Pages::new(file);
@@ -52,12 +55,34 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     pages.finish(&xml).map_err(|source| job.io(source))
 }
 
+/// The cloud in metres, if it says that it is in something else.
+fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
+    let cloud = job.cloud;
+    let Some(unit) = cloud.crs().unit else { return Ok(None) };
+    let scale = cloud.metres_per_unit();
+    if scale == Some(DVec3::ONE) || scale.is_none() && unit != Unit::Degree {
+        return Ok(None);
+    }
+    // A copy, and what `f32` loses of its positions.
+    let bytes = cloud.byte_len() + 12 * cloud.len();
+    check_memory(&format!("{} points in metres", cloud.len()), bytes as u64)?;
+    let mut metric = cloud.clone();
+    let what = if let Some(scale) = scale {
+        metric.scale_to_metres(scale);
+        let heights = cloud.crs().vertical_unit.filter(|other| *other != unit);
+        let heights = heights.map_or_else(String::new, |other| format!(", heights in {}", other.name()));
+        format!("coordinates in {}{heights} are scaled", unit.name())
+    } else {
+        metric.to_local_metres();
+        "degrees become metres about the middle of the points, east, north and up".into()
+    };
+    job.note(format!("E57 means metres: {what}; the coordinate system is left out"));
+    Ok(Some(metric))
+}
+
 /// Tells what cannot be held.
 fn notes(job: &Job<'_>, known: &Known<'_>) {
     let cloud = job.cloud;
-    if let Some(unit) = cloud.crs().unit.filter(|unit| *unit != Unit::Metre) {
-        job.note(format!("E57 means metres; the coordinates are written as they are, in {}", unit.name()));
-    }
     if matches!(cloud.axes(), Some(Axes::YUp | Axes::Camera)) {
         job.note("E57 does not say which way is up");
     }

@@ -1,8 +1,9 @@
 //! Which point format a cloud gets, and where each of its values goes.
 
-use rayon::prelude::*;
+use std::borrow::Cow;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{
     super::{Job, colors},
@@ -30,7 +31,7 @@ pub(super) struct Plan<'a> {
     pub(super) offset: DVec3,
     /// The points that are written, if not all.
     kept: Option<Vec<usize>>,
-    own: Vec<(Place, &'a FieldValues)>,
+    own: Vec<(Place, Cow<'a, FieldValues>)>,
     colors: Option<(usize, Colors<'a>)>,
     extras: Vec<Extra<'a>>,
 }
@@ -91,19 +92,27 @@ impl<'a> Plan<'a> {
                     if matches!(place, Place::Angle(_)) && angles_are_rounded(&field.values) {
                         job.note(format!("scan angles are rounded to steps of {ANGLE_STEP} degrees"));
                     }
-                    own.push((place, &field.values));
+                    own.push((place, Cow::Borrowed(&field.values)));
                 }
                 // What is not recorded is zero.
                 None if range.is_zero() && is_known(&field.name) => {}
                 place => {
-                    if place.is_some() || is_known(&field.name) {
+                    let scale = IntensityScale::of(field, range).zip(place);
+                    if let Some((scale, place)) = scale {
+                        own.push((place, Cow::Owned(scale.apply(&field.values))));
+                        let [low, high] = [scale.low, scale.high].map(|end| end as f32);
+                        job.note(format!(
+                            "intensities of {low} to {high} are scaled to 0 to 65535; {EXACT_INTENSITY} has them as they were"
+                        ));
+                    } else if place.is_some() || is_known(&field.name) {
                         job.note(format!(
                             "the values of {} do not fit their place; they become extra bytes",
                             field.name
                         ));
                     }
-                    let name = extra_name(&field.name, &extras);
-                    if name != field.name {
+                    let wished = if scale.is_some() { EXACT_INTENSITY } else { &field.name };
+                    let name = extra_name(wished, &extras);
+                    if name != wished {
                         job.note(format!("the field '{}' is called '{name}' in the file", shown(&field.name)));
                     }
                     let size = size(&field.values);
@@ -160,8 +169,8 @@ impl<'a> Plan<'a> {
             place_at::<12>(record, 0, bytemuck::cast(steps.map(|step| (step as i32).to_le_bytes())));
         });
         #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one of the types is f64 itself")]
-        for &(place, values) in &self.own {
-            each_type!(values, v => match place {
+        for (place, values) in &self.own {
+            each_type!(&**values, v => match *place {
                 Place::Bits { at, shift, mask } => {
                     each(records, len, point, |record, i| record[at] |= (v[i] as u8 & mask) << shift);
                 }
@@ -271,6 +280,35 @@ impl Range {
             // Not those who rely on more digits; no number is a number here.
             Place::F64(_) => !self.finite || !self.whole || self.within(-WHOLE, WHOLE),
         }
+    }
+}
+
+/// What the intensities are called that were scaled for their place: as they were, for those who want them.
+const EXACT_INTENSITY: &str = "ExactIntensity";
+
+/// The range of intensities that becomes the 16 bits that LAS has for them.
+#[derive(Clone, Copy)]
+struct IntensityScale {
+    low: f64,
+    high: f64,
+}
+
+impl IntensityScale {
+    /// For intensities that do not fit as they are: most formats have 0 to 1, of which nothing would be left.
+    fn of(field: &Field, range: Range) -> Option<Self> {
+        let Range { low, high, .. } = range;
+        let usable = low < high && low.is_finite() && high.is_finite();
+        // Of no numbers at all, the lowest is above the highest.
+        let is_unit = low >= 0.0 && low <= high && high <= 1.0;
+        let scale = if is_unit { Self { low: 0.0, high: 1.0 } } else { Self { low, high } };
+        (field.name.eq_ignore_ascii_case("Intensity") && (usable || is_unit)).then_some(scale)
+    }
+
+    /// The values as steps; no number is no intensity.
+    fn apply(self, values: &FieldValues) -> FieldValues {
+        // Ranges of doubles may be wider than doubles reach.
+        let part = |i| (values.get(i) / 2.0 - self.low / 2.0) / (self.high / 2.0 - self.low / 2.0);
+        FieldValues::U16((0..values.len()).into_par_iter().map(|i| (65_535.0 * part(i)).round() as u16).collect())
     }
 }
 
