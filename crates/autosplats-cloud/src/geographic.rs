@@ -60,6 +60,7 @@ impl PointCloud {
         let positions = (0..self.len()).into_par_iter().map(|i| (world(i) - origin).as_vec3().to_array()).collect();
         let residuals = (0..self.len()).into_par_iter().map(|i| residual(world(i) - origin)).collect();
         (self.origin, self.positions, self.residuals) = (origin, positions, Some(residuals));
+        self.identity = Identity::default();
         for scan in &mut self.scans {
             scan.world_from_sensor.w_axis = (scan.position() * scale).extend(1.0);
         }

@@ -34,7 +34,7 @@ const MAX_CHUNKS: usize = 1 << 10;
 
 /// Points that one byte can stand for. Real data need a byte or more for each; a chunk of 50,000 equal points is about
 /// 70 bytes.
-const MAX_RATIO: u64 = 4096;
+const MAX_RATIO: u64 = 1024;
 
 /// A run of records that is decompressed from its beginning.
 struct Chunk {
