@@ -61,6 +61,7 @@ fn test(root: &Path) -> Result<()> {
         Ok::<(), anyhow::Error>(())
     };
     step("test data", &|| find_data(root))?;
+    step("graphics device", &find_device)?;
     step("stages import in one direction", &|| layers::check(&root.join("crates/autosplats/src")))?;
     step("autosplats-cloud never reaches wgpu", &|| check_dependencies(root))?;
     step("format", &|| {
@@ -92,6 +93,36 @@ fn find_data(root: &Path) -> Result<()> {
     let absent = format!("{} is absent; AUTOSPLATS_DATA can name another folder", folder.display());
     ensure!(std::env::var_os("CI").is_none(), "{absent}");
     println!("{absent}. Tests on real scans are left out.");
+    Ok(())
+}
+
+/// What Vulkan on the processor takes on Debian and its kin.
+const SOFTWARE_VULKAN: [&str; 2] = ["libvulkan1", "mesa-vulkan-drivers"];
+
+/// The GPU's tests run on any device, also on one that is a program on the processor. Where there is none it is installed
+/// if that can be done without asking anybody.
+fn find_device() -> Result<()> {
+    let drivers = || {
+        let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"].map(Path::new);
+        folders.into_iter().filter_map(|folder| folder.read_dir().ok()).flatten().flatten().count()
+    };
+    if !cfg!(target_os = "linux") || drivers() > 0 {
+        println!("a driver is there, or comes with the system");
+        return Ok(());
+    }
+    let install = |arguments: &[&str]| {
+        let mut command = Command::new("apt-get");
+        run(command.args(arguments).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()))
+    };
+    let packages = [&["install", "--yes", "--no-install-recommends"][..], &SOFTWARE_VULKAN].concat();
+    let installed = install(&["update"]).and_then(|()| install(&packages));
+    let absent = format!("there is no Vulkan driver; on Debian: apt-get install {}", SOFTWARE_VULKAN.join(" "));
+    if installed.is_ok() && drivers() > 0 {
+        println!("installed {}", SOFTWARE_VULKAN.join(" "));
+        return Ok(());
+    }
+    ensure!(std::env::var_os("CI").is_none(), "{absent}");
+    println!("{absent}. Tests of the GPU are left out.");
     Ok(())
 }
 

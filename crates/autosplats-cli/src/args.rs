@@ -40,6 +40,8 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Say what is in files: points, bounds, attributes, units, spacing
     Info(InfoArgs),
+    /// Time each stage and pass of a frame
+    Bench(BenchArgs),
     /// Say what this machine can do, and whether the program works on it
     Doctor(DoctorArgs),
     /// Print a script that lets a shell complete this program's options
@@ -158,7 +160,7 @@ pub(crate) struct SurfaceArgs {
     /// How the neighbours are found
     #[arg(long, value_enum, default_value = "screen-grid")]
     pub(crate) engine: Engine,
-    /// What renders; 'auto' takes the best there is
+    /// What renders; the picture is the same
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) backend: Backend,
     /// Expansions of its first search radius after which a point without a neighbour is dropped as an outlier, 0 to 8
@@ -382,6 +384,40 @@ others shown."
     pub(crate) run: RunArgs,
 }
 
+const BENCH_EXAMPLES: &str = "\
+Examples:
+  autosplats bench
+  autosplats bench --scene cathedral:10M --backend cpu,gpu
+  autosplats bench --scene statue:1M -k 20 --size 1280x720 --frames 100 --json";
+
+#[derive(Args, Debug)]
+#[command(after_help = BENCH_EXAMPLES)]
+pub(crate) struct BenchArgs {
+    /// Generated scene to render, with its number of points
+    #[arg(long, value_name = "NAME[:COUNT]", default_value = "statue:1M")]
+    pub(crate) scene: String,
+    /// How neighbours are found
+    #[arg(long, value_enum, default_value = "screen-grid")]
+    pub(crate) engine: Engine,
+    /// What renders; several, with commas, are measured one after the other
+    #[arg(long = "backend", value_enum, value_delimiter = ',', default_value = "auto")]
+    pub(crate) backends: Vec<Backend>,
+    /// Neighbours of each point, 1 to 64
+    #[arg(short, value_name = "COUNT", default_value_t = Reconstruction::default().k, allow_negative_numbers = true)]
+    pub(crate) k: u32,
+    /// Width and height of the picture in pixels
+    #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
+    pub(crate) size: [u32; 2],
+    /// Frames to measure, 1 to 100000, after three that are not
+    #[arg(long, value_name = "COUNT", default_value = "20", value_parser = values::frames)]
+    pub(crate) frames: usize,
+    /// One JSON object on standard output: scene, device, counts, milliseconds per stage and pass
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
 #[derive(Args, Debug)]
 pub(crate) struct DoctorArgs {
     /// One JSON object on standard output
@@ -448,13 +484,33 @@ pub(crate) enum Engine {
     ScreenGrid,
 }
 
+impl From<Engine> for autosplats::SearchEngine {
+    fn from(engine: Engine) -> Self {
+        match engine {
+            Engine::ScreenGrid => Self::ScreenGrid,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum Backend {
+    /// A hardware GPU where there is one, else the CPU
     Auto,
+    /// All cores; needs no driver
     Cpu,
-    /// Not in this version
-    #[value(hide = true)]
+    /// The best device that Vulkan, Metal or DirectX 12 has; also one that is a program on the CPU, which is slower than
+    /// 'cpu'
     Gpu,
+}
+
+impl From<Backend> for autosplats::Backend {
+    fn from(backend: Backend) -> Self {
+        match backend {
+            Backend::Auto => Self::Auto,
+            Backend::Cpu => Self::Cpu,
+            Backend::Gpu => Self::Gpu,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]

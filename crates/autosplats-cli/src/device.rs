@@ -2,6 +2,7 @@
 
 use std::fs::read_to_string;
 
+use autosplats::{AdapterSummary, Renderer};
 use serde::Serialize;
 
 /// What a picture was rendered on.
@@ -11,9 +12,33 @@ pub(crate) struct Device {
     pub(crate) name: String,
     pub(crate) threads: usize,
     pub(crate) simd: Vec<&'static str>,
+    /// The graphics device, if it was one.
+    pub(crate) adapter: Option<AdapterSummary>,
 }
 
 impl Device {
+    /// What `renderer` runs on.
+    pub(crate) fn of(renderer: &Renderer) -> Self {
+        match renderer.adapter() {
+            Some(adapter) => {
+                Self { backend: "gpu", name: adapter.name.clone(), adapter: Some(adapter), ..Self::cpu() }
+            }
+            None => Self::cpu(),
+        }
+    }
+
+    /// One line for people.
+    pub(crate) fn describe(&self) -> String {
+        let Self { backend, name, threads, adapter, .. } = self;
+        match adapter {
+            None => format!("{backend}: {name}, {threads} threads"),
+            Some(AdapterSummary { backend: api, driver, software, .. }) => {
+                let timed = if *software { "; a program on the CPU, each pass waited for" } else { "" };
+                format!("{backend}: {name}, {api}, driver {driver}{timed}")
+            }
+        }
+    }
+
     /// This machine's processor.
     pub(crate) fn cpu() -> Self {
         let name = read_to_string("/proc/cpuinfo").ok().and_then(|info| {
@@ -25,6 +50,7 @@ impl Device {
             name: name.unwrap_or_else(|| std::env::consts::ARCH.into()),
             threads: rayon::current_num_threads(),
             simd: simd(),
+            adapter: None,
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fs::read_to_string;
 use std::io::{IsTerminal as _, stderr, stdout};
 use std::time::Instant;
 
-use autosplats::{Renderer, Settings};
+use autosplats::{AdapterSummary, Backend as Wanted, Frame, Renderer, Settings, adapters};
 use autosplats_cloud::{Scene, available_memory, formats, read, write, written_formats};
 use pulp::{Arch, Simd, WithSimd};
 use serde::Serialize;
@@ -37,8 +37,8 @@ struct Findings {
     /// Whether nothing is broken.
     ok: bool,
     backends: Vec<Backend>,
-    /// Graphics adapters; none, as no backend asks for them.
-    adapters: [&'static str; 0],
+    /// Graphics devices, the one that is used first.
+    adapters: Vec<AdapterSummary>,
     cpu: Cpu,
     memory: Memory,
     self_test: SelfTest,
@@ -50,7 +50,7 @@ struct Findings {
 struct Backend {
     name: &'static str,
     ready: bool,
-    about: &'static str,
+    about: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -76,6 +76,8 @@ struct Memory {
 struct SelfTest {
     generate_ms: Option<f64>,
     render_ms: Option<f64>,
+    /// The same picture on the graphics device, if there is one.
+    gpu_ms: Option<f64>,
     write_ms: Option<f64>,
     read_ms: Option<f64>,
     temporary_folder: String,
@@ -126,16 +128,17 @@ impl Findings {
         let Device { name, threads, simd, .. } = Device::cpu();
         let (simd_used, lanes) = simd_used();
         let available = available_memory();
-        let about = "renders on the processor, with every feature";
+        let adapters = adapters();
+        let about = "renders on the processor, with every feature".into();
         Self {
             version: env!("CARGO_PKG_VERSION"),
             system: format!("{} on {}", std::env::consts::OS, std::env::consts::ARCH),
             ok: self_test.errors.is_empty(),
             backends: vec![
                 Backend { name: "cpu", ready: self_test.render_ms.is_some(), about },
-                Backend { name: "gpu", ready: false, about: "not in this version" },
+                Backend { name: "gpu", ready: self_test.gpu_ms.is_some(), about: about_gpu(&adapters) },
             ],
-            adapters: [],
+            adapters,
             cpu: Cpu { name, threads, simd_found: simd, simd_used, lanes },
             memory: Memory {
                 total: total_memory(),
@@ -164,7 +167,9 @@ impl Findings {
             let state = if *ready { "ready" } else { "not ready" };
             line(*ready, name, format!("{state}: {about}"));
         }
-        line(false, "adapters", "none asked for: this version does not use graphics cards".into());
+        for adapter in &self.adapters {
+            line(!adapter.software, "adapter", about_adapter(adapter));
+        }
         let Cpu { name, threads, simd_found, simd_used, lanes } = &self.cpu;
         line(
             true,
@@ -193,8 +198,14 @@ impl Findings {
             }
             _ => line(false, "memory", "this system does not say; too large a cloud ends without a message".into()),
         }
-        let SelfTest { generate_ms, render_ms, write_ms, read_ms, temporary_folder, errors } = &self.self_test;
-        let took = [("made", generate_ms), ("rendered", render_ms), ("written", write_ms), ("read back", read_ms)];
+        let SelfTest { generate_ms, render_ms, gpu_ms, write_ms, read_ms, temporary_folder, errors } = &self.self_test;
+        let took = [
+            ("made", generate_ms),
+            ("rendered", render_ms),
+            ("rendered on the GPU", gpu_ms),
+            ("written", write_ms),
+            ("read back", read_ms),
+        ];
         let took: Vec<_> =
             took.into_iter().filter_map(|(what, ms)| Some(format!("{what} in {:.0} ms", (*ms)?))).collect();
         line(errors.is_empty(), "self-test", format!("{TEST_POINTS} points {}", took.join(", ")));
@@ -242,16 +253,28 @@ impl SelfTest {
         let cloud = scene.sample(count, &|_| true).map_err(|error| said(&error))?;
         self.generate_ms = since(start);
 
-        let start = Instant::now();
-        let mut renderer = Renderer::new();
-        let frame = renderer
-            .render(&cloud, &scene_camera(&scene), TEST_SIZE, &Settings::default())
-            .map_err(|error| said(&error))?;
-        let covered = frame.layers.weight.iter().filter(|weight| **weight > 0.0).count();
-        if covered * 50 < (TEST_SIZE[0] * TEST_SIZE[1]) as usize {
-            return Err(format!("the picture of the test scene is nearly empty: {covered} pixels"));
+        let (mut cpu, mut pictures) = (Renderer::new(), Vec::new());
+        let mut render = |renderer: &mut Renderer| {
+            let start = Instant::now();
+            let Frame { image, counts, .. } = renderer
+                .render(&cloud, &scene_camera(&scene), TEST_SIZE, &Settings::default())
+                .map_err(|error| said(&error))?;
+            if counts.covered * 50 < image.pixels.len() {
+                return Err(format!("the picture of the test scene is nearly empty: {} pixels", counts.covered));
+            }
+            pictures.push(image.pixels.clone());
+            Ok(since(start))
+        };
+        self.render_ms = render(&mut cpu)?;
+        if let Ok(mut gpu) = Renderer::with_backend(Wanted::Gpu) {
+            let took = render(&mut gpu).map_err(|error| format!("on the GPU: {error}"))?;
+            let unlike = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
+            let unlike = pictures[0].iter().zip(&pictures[1]).filter(unlike).count();
+            if unlike * 1000 > pictures[0].len() {
+                return Err(format!("the GPU's picture differs from the CPU's in {unlike} pixels; use --backend cpu"));
+            }
+            self.gpu_ms = took;
         }
-        self.render_ms = since(start);
 
         let start = Instant::now();
         let folder = tempfile::Builder::new().prefix("autosplats-").tempdir().map_err(|error| {
@@ -268,6 +291,32 @@ impl SelfTest {
         }
         Ok(())
     }
+}
+
+/// What the GPU backend would run on, and what that means.
+fn about_gpu(adapters: &[AdapterSummary]) -> String {
+    match adapters.first() {
+        None => "no Vulkan, Metal or DirectX 12 device; pictures are rendered on the processor".into(),
+        Some(AdapterSummary { name, software: true, .. }) => {
+            format!("{name} is a program on the processor, slower than the CPU backend; only used if asked for")
+        }
+        Some(AdapterSummary { name, .. }) => format!("renders on {name}; used unless --backend says otherwise"),
+    }
+}
+
+/// What a device can do, and what that means.
+fn about_adapter(adapter: &AdapterSummary) -> String {
+    let AdapterSummary { name, backend, kind, driver, int64_atomics, timestamps, points_per_binding, .. } = adapter;
+    let passes = if *int64_atomics { "one pass" } else { "two passes: no 64-bit atomics" };
+    let timed = if *timestamps { "passes are timed" } else { "passes cannot be timed by it" };
+    let millions = points_per_binding / 1_000_000;
+    wrapped(
+        &format!(
+            "{name} ({kind}, {backend}, {driver}): projection in {passes}; {timed}; clouds are cut into runs of \
+             {millions} million points"
+        ),
+        INDENT,
+    )
 }
 
 /// The instructions that the renderer uses here, and how many numbers one of them handles.

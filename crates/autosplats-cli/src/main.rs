@@ -4,6 +4,7 @@
 //! standard output, everything for people to standard error.
 
 mod args;
+mod bench;
 mod convert;
 mod demo;
 mod device;
@@ -57,6 +58,7 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
         Some(Command::Normals(args)) => normals::run(&args),
         Some(Command::Demo(args)) => demo::run(&args),
         Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Doctor(args)) => doctor::run(&args),
         Some(Command::Completions(args)) => pages::completions(&args),
         Some(Command::Man(args)) => pages::manual(&args),

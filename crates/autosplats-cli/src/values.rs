@@ -21,6 +21,14 @@ pub(crate) const COLOR_MODES: [&str; 11] = [
     "depth",
 ];
 
+/// A number of frames.
+pub(crate) fn frames(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(frames) if (1..=100_000).contains(&frames) => Ok(frames),
+        _ => Err("a number of frames is within 1 to 100000".into()),
+    }
+}
+
 /// `1760x900`
 pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.trim().parse().ok()?, h.trim().parse().ok()?]));

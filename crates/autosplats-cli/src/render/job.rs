@@ -3,12 +3,12 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use autosplats::{Background, ColorMap, ColorMode, Reconstruction, SearchEngine, Settings, Shading};
+use autosplats::{Background, ColorMap, ColorMode, Reconstruction, Renderer, Settings, Shading};
 use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
 use super::render_failure;
-use crate::args::{Backend, Engine, LookArgs, Map, RenderArgs, SurfaceArgs};
+use crate::args::{LookArgs, Map, RenderArgs, SurfaceArgs};
 use crate::exit::{Exit, Failure, suggest};
 use crate::input::{Inputs, read_failure};
 use crate::output::{Format, Picture, check_target};
@@ -27,6 +27,8 @@ pub(super) struct Job {
     pub(super) size: [u32; 2],
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
+    /// On the backend that was asked for.
+    pub(super) renderer: Renderer,
     pub(super) json: bool,
     pub(super) quiet: bool,
 }
@@ -35,7 +37,6 @@ impl Job {
     /// Checks the flags, the inputs' existence and the outputs' places.
     pub(super) fn new(args: RenderArgs) -> Result<Self, Failure> {
         let RenderArgs { inputs, input, outputs, size, camera, surface, look, run, json } = args;
-        choose_backend(surface.backend)?;
         start_threads(&run)?;
         let pictures = outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?;
         let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
@@ -56,7 +57,9 @@ impl Job {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)
             .map_err(read_failure)?;
-        Ok(Self { inputs, pictures, save_camera, size, camera, settings, json, quiet: run.quiet })
+        // A device that is not there says so before anything is read.
+        let renderer = Renderer::with_backend(surface.backend.into()).map_err(render_failure)?;
+        Ok(Self { inputs, pictures, save_camera, size, camera, settings, renderer, json, quiet: run.quiet })
     }
 
     /// Whether the picture has nothing behind the surface.
@@ -100,9 +103,7 @@ impl Job {
 fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings {
     let reconstruction = Reconstruction {
         k: surface.k,
-        engine: match surface.engine {
-            Engine::ScreenGrid => SearchEngine::ScreenGrid,
-        },
+        engine: surface.engine.into(),
         outlier_expansions: (!surface.keep_outliers).then_some(surface.e0),
         gap_factor: (!surface.bridge_gaps).then_some(surface.gap_factor),
         splat_scale: surface.splat_scale,
@@ -126,14 +127,4 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         background: look.background.unwrap_or(Shading::default().background),
     };
     Settings { reconstruction, shading, all_layers }
-}
-
-fn choose_backend(backend: Backend) -> Result<(), Failure> {
-    match backend {
-        Backend::Auto | Backend::Cpu => Ok(()),
-        Backend::Gpu => Err(Failure::new(
-            Exit::Device,
-            "no usable device: this version has no GPU backend; leave --backend out, or use --backend cpu",
-        )),
-    }
 }

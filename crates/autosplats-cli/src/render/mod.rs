@@ -6,7 +6,7 @@ mod report;
 
 use std::time::Instant;
 
-use autosplats::{Camera, Counts, Error, Frame, Renderer};
+use autosplats::{Camera, Counts, Error, Frame};
 
 pub(crate) use self::camera::scene_camera;
 use self::job::Job;
@@ -21,7 +21,7 @@ use crate::progress::Bar;
 /// Renders one picture to one file or several.
 pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let mut job = Job::new(args)?;
-    let device = Device::cpu();
+    let device = Device::of(&job.renderer);
 
     let started = Instant::now();
     let mut cloud = job.inputs.read(job.quiet)?;
@@ -33,9 +33,8 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
-    let mut renderer = Renderer::new();
     let bar = Bar::spinner("rendering", job.quiet);
-    let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
+    let frame = job.renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
     drop(bar);
     check_visible(&frame, &job.inputs)?;
     if !job.quiet {
@@ -77,7 +76,7 @@ fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, alpha: b
 
 /// Refuses a picture without a surface.
 fn check_visible(frame: &Frame<'_>, inputs: &Inputs) -> Result<(), Failure> {
-    if frame.layers.weight.iter().any(|weight| *weight > 0.0) {
+    if frame.counts.covered > 0 {
         return Ok(());
     }
     let Counts { points, not_finite, behind, outside, visible, .. } = frame.counts;
@@ -97,7 +96,8 @@ pub(crate) fn render_failure(error: Error) -> Failure {
     match error {
         Error::Setting { name, value, range } => Failure::usage(format!("{} {value}: it must be {range}", flag(name))),
         Error::Camera(_) | Error::MissingAttribute { .. } | Error::ImageSize { .. } => Failure::usage(error),
-        Error::TooManyPoints(_) => Failure::new(Exit::Memory, error),
+        Error::TooManyPoints(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) => Failure::new(Exit::Memory, error),
+        Error::Device(_) | Error::DeviceLost(_) => Failure::new(Exit::Device, error),
         _ => Failure::new(Exit::Input, error),
     }
 }

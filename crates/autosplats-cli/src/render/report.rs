@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use autosplats::{Camera, Counts, Frame, Timings};
+use autosplats::{Camera, Counts, Frame, PassTime, Timings};
 use autosplats_cloud::Axes;
 use serde::Serialize;
 
@@ -21,6 +21,8 @@ pub(super) struct Report<'a> {
     camera: Camera,
     outputs: Vec<Written>,
     timings_ms: PrintedTimings,
+    /// Of a graphics device.
+    passes: Vec<PassTime>,
 }
 
 #[derive(Debug, Serialize)]
@@ -61,6 +63,7 @@ impl<'a> Report<'a> {
             camera,
             outputs: written.into_iter().map(|(path, bytes)| Written { path, bytes }).collect(),
             timings_ms: PrintedTimings { read, stages: frame.timings, write },
+            passes: frame.passes.to_vec(),
         }
     }
 

@@ -5,6 +5,9 @@ use wgpu::BufferUsages;
 use super::Gpu;
 use crate::Error;
 
+/// Parts of a readback begin at multiples of so many bytes.
+const PART: u64 = 16;
+
 impl Gpu {
     /// A storage buffer of `len` values of type `T`, at least one; it can be copied to and from.
     ///
@@ -58,34 +61,61 @@ impl Gpu {
     }
 }
 
-/// A buffer that the host can read, kept from frame to frame.
+/// What the host reads of a frame, through a buffer that is kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Readback {
     buffer: Option<wgpu::Buffer>,
+    /// Bytes of each part.
+    parts: Vec<u64>,
 }
 
 impl Readback {
-    /// A buffer of at least `size` bytes to copy into.
+    /// Has the whole of some buffers copied.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
-    pub(crate) fn room(&mut self, gpu: &Gpu, size: u64) -> Result<&wgpu::Buffer, Error> {
-        if self.buffer.as_ref().is_none_or(|buffer| buffer.size() < size) {
-            self.buffer = None;
-            let usage = BufferUsages::MAP_READ | BufferUsages::COPY_DST;
-            self.buffer = Some(gpu.buffer("autosplats.readback", size.next_multiple_of(16), usage)?);
+    pub(crate) fn copy(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        from: &[&wgpu::Buffer],
+    ) -> Result<(), Error> {
+        self.parts.clear();
+        self.parts.extend(from.iter().map(|buffer| buffer.size()));
+        let size = self.parts.iter().map(|part| part.next_multiple_of(PART)).sum();
+        let most = gpu.device.limits().max_buffer_size;
+        if size > most {
+            return Err(Error::DeviceLimit { what: "reading the picture back", needed: size, allowed: most });
         }
-        self.buffer.as_ref().ok_or(Error::DeviceMemory(None))
+        let buffer = match self.buffer.take().filter(|buffer| buffer.size() >= size) {
+            Some(buffer) => buffer,
+            None => gpu.buffer("readback", size, BufferUsages::MAP_READ | BufferUsages::COPY_DST)?,
+        };
+        let mut at = 0;
+        for part in from {
+            encoder.copy_buffer_to_buffer(part, 0, &buffer, at, part.size());
+            at += part.size().next_multiple_of(PART);
+        }
+        self.buffer = Some(buffer);
+        Ok(())
     }
 
-    /// Hands the first `size` bytes to `take`, once the device has done all that was submitted.
+    /// Hands what was copied to `take`, a part for each buffer, once the device has done all that was submitted.
     ///
     /// # Errors
     /// [`Error::DeviceLost`].
-    pub(crate) fn read<T>(&self, gpu: &Gpu, size: u64, take: impl FnOnce(&[u8]) -> T) -> Result<T, Error> {
-        let lost = || Error::DeviceLost("it does not answer".into());
+    pub(crate) fn read<T>(&self, gpu: &Gpu, take: impl FnOnce(&[&[u8]]) -> T) -> Result<T, Error> {
+        let lost = || Error::DeviceLost("there is nothing to read".into());
         let buffer = self.buffer.as_ref().ok_or_else(lost)?;
-        map(gpu, buffer, size, take)
+        map(gpu, buffer, buffer.size(), |mut bytes| {
+            let mut parts = Vec::with_capacity(self.parts.len());
+            for &len in &self.parts {
+                let (part, rest) = bytes.split_at(len.next_multiple_of(PART) as usize);
+                parts.push(&part[..len as usize]);
+                bytes = rest;
+            }
+            take(&parts)
+        })
     }
 }
 
@@ -105,14 +135,9 @@ pub(super) fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, size: u64, take: impl FnO
 /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
 #[cfg(test)]
 pub(crate) fn read_back<T: bytemuck::Pod>(gpu: &Gpu, buffer: &wgpu::Buffer, len: usize) -> Result<Vec<T>, Error> {
-    let size = (len * size_of::<T>()) as u64;
-    if size == 0 {
-        return Ok(Vec::new());
-    }
     let mut readback = Readback::default();
-    let room = readback.room(gpu, size.next_multiple_of(4))?;
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, room, 0, size.next_multiple_of(4));
+    readback.copy(gpu, &mut encoder, &[buffer])?;
     gpu.queue.submit([encoder.finish()]);
-    readback.read(gpu, size.next_multiple_of(4), |bytes| bytemuck::pod_collect_to_vec(&bytes[..size as usize]))
+    readback.read(gpu, |parts| bytemuck::pod_collect_to_vec(&parts[0][..len * size_of::<T>()]))
 }

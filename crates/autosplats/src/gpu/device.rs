@@ -36,12 +36,11 @@ pub(crate) struct Gpu {
 
 /// All devices that can be rendered on, hardware first.
 pub fn adapters() -> Vec<AdapterSummary> {
+    let summary = |adapter: &wgpu::Adapter| summary(adapter.get_info(), adapter.features(), &adapter.limits());
     usable_adapters().iter().map(summary).collect()
 }
 
-fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
-    let info = adapter.get_info();
-    let features = adapter.features();
+fn summary(info: wgpu::AdapterInfo, features: wgpu::Features, limits: &wgpu::Limits) -> AdapterSummary {
     AdapterSummary {
         software: info.device_type == wgpu::DeviceType::Cpu,
         driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
@@ -50,7 +49,7 @@ fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
         kind: format!("{:?}", info.device_type),
         int64_atomics: features.contains(INT64_ATOMICS),
         timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
-        points_per_binding: adapter.limits().max_storage_buffer_binding_size / 12,
+        points_per_binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / 12,
     }
 }
 
@@ -109,6 +108,11 @@ impl Gpu {
             *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
         });
         Self { device, queue, lost }
+    }
+
+    /// What the device is and can do.
+    pub(crate) fn summary(&self) -> AdapterSummary {
+        summary(self.device.adapter_info(), self.device.features(), &self.device.limits())
     }
 
     /// Whether the device is a program on the CPU.

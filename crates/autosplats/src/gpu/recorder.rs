@@ -69,22 +69,25 @@ impl Clock {
 }
 
 impl Clock {
-    /// Fills in the times of a frame that was submitted, waiting for it.
+    /// Fills in the times of a frame that was submitted, waiting for it, and returns the time from the first pass's start
+    /// to the last one's end.
     ///
     /// # Errors
     /// [`Error::DeviceLost`].
-    pub(crate) fn read(&self, gpu: &Gpu, times: &mut [PassTime]) -> Result<(), Error> {
-        let Self::Timestamps { mapped, .. } = self else { return Ok(()) };
+    pub(crate) fn read(&self, gpu: &Gpu, times: &mut [PassTime]) -> Result<f64, Error> {
         let timed = times.len().min(MOST_PASSES as usize);
+        let Self::Timestamps { mapped, .. } = self else { return Ok(times.iter().map(|time| time.ms).sum()) };
         if timed == 0 {
-            return Ok(());
+            return Ok(0.0);
         }
         let period_ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
         map(gpu, mapped, 16 * timed as u64, |bytes| {
             let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+            let ms = |from: u64, to: u64| to.saturating_sub(from) as f64 * period_ms;
             for (time, ticks) in times.iter_mut().zip(ticks.chunks_exact(2)) {
-                time.ms = ticks[1].saturating_sub(ticks[0]) as f64 * period_ms;
+                time.ms = ms(ticks[0], ticks[1]);
             }
+            ms(ticks[0], ticks[ticks.len() - 1])
         })
     }
 }

@@ -14,6 +14,8 @@ use crate::gpu::Gpu;
 const PIECE: usize = 1 << 18;
 /// Bytes of a staging buffer: two pieces of positions.
 const STAGING: u64 = 8 << 20;
+/// Room is given back when less than one in so many points of it is used.
+const LEAST_USED: usize = 4;
 /// Bytes on their way to the device at a time: staging memory stays within twice that.
 const IN_FLIGHT: u64 = 64 << 20;
 
@@ -61,7 +63,8 @@ pub(crate) struct ChunkUniform {
 /// A run of points in buffers of its own.
 #[derive(Debug)]
 pub(crate) struct Chunk {
-    pub(crate) len: u32,
+    /// Points there is room for.
+    pub(crate) capacity: u32,
     pub(crate) uniform: wgpu::Buffer,
     pub(crate) positions: wgpu::Buffer,
     pub(crate) values: wgpu::Buffer,
@@ -71,6 +74,8 @@ pub(crate) struct Chunk {
 #[derive(Debug, Default)]
 pub(crate) struct DeviceCloud {
     points: usize,
+    /// Points there is room for.
+    capacity: usize,
     /// Words of values per point.
     words: usize,
     chunks: Vec<Chunk>,
@@ -82,29 +87,48 @@ impl DeviceCloud {
         &self.chunks
     }
 
-    /// Makes room for `points` points with `words` words of values each, and says whether buffers had to be made anew.
+    /// Points there is room for.
+    pub(crate) fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// Words of values per point.
+    pub(crate) fn words(&self) -> usize {
+        self.words
+    }
+
+    /// Makes room for `points` points with `words` words of values each, and says whether buffers had to be made anew,
+    /// which a cloud of about the size of the one before does without.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
     pub(crate) fn resize(&mut self, gpu: &Gpu, points: usize, words: usize) -> Result<bool, Error> {
-        if self.points == points && self.words == words {
-            return Ok(false);
+        let fits = words == self.words && points <= self.capacity && points >= self.capacity / LEAST_USED;
+        if !fits {
+            // A cloud that has grown once will grow again.
+            let grown = if self.capacity > 0 && points > self.capacity { points + points / 4 } else { points };
+            *self = Self::default();
+            let limits = gpu.device.limits();
+            let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
+            let longest = most / size_of::<[f32; 3]>();
+            for first in (0..grown).step_by(longest) {
+                let capacity = longest.min(grown - first);
+                let uniform = gpu.uniform::<ChunkUniform>("run of points")?;
+                let positions = gpu.storage::<[f32; 3]>("positions", capacity)?;
+                let values = gpu.storage::<u32>("values of points", capacity * words)?;
+                self.chunks.push(Chunk { capacity: capacity as u32, uniform, positions, values });
+            }
+            (self.capacity, self.words) = (grown, words);
         }
-        let limits = gpu.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
-        let longest = most / size_of::<[f32; 3]>();
-        *self = Self::default();
-        for first in (0..points).step_by(longest) {
-            let len = longest.min(points - first);
-            let uniform = gpu.uniform::<ChunkUniform>("run of points")?;
-            let told = ChunkUniform { first: first as u32, len: len as u32, values: words as u32, padding: 0 };
-            gpu.queue.write_buffer(&uniform, 0, bytemuck::bytes_of(&told));
-            let positions = gpu.storage::<[f32; 3]>("positions", len)?;
-            let values = gpu.storage::<u32>("values of points", len * words)?;
-            self.chunks.push(Chunk { len: len as u32, uniform, positions, values });
+        self.points = points;
+        let mut first = 0;
+        for chunk in &self.chunks {
+            let len = chunk.capacity.min((points - first) as u32);
+            let told = ChunkUniform { first: first as u32, len, values: words as u32, padding: 0 };
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&told));
+            first += len as usize;
         }
-        (self.points, self.words) = (points, words);
-        Ok(true)
+        Ok(!fits)
     }
 }
 
@@ -134,7 +158,7 @@ impl Uploader {
         let mut upload = Upload::new(gpu, &mut self.belt, to.points, report);
         let mut rest = cloud.positions();
         for chunk in &to.chunks {
-            let (positions, after) = rest.split_at(chunk.len as usize);
+            let (positions, after) = rest.split_at(rest.len().min(chunk.capacity as usize));
             rest = after;
             for (piece, positions) in positions.chunks(PIECE).enumerate() {
                 let at = piece * PIECE * size_of::<[f32; 3]>();
@@ -158,7 +182,7 @@ impl Uploader {
         let mut upload = Upload::new(gpu, &mut self.belt, to.points, report);
         let mut first = 0;
         for chunk in to.chunks.iter().filter(|_| to.words > 0) {
-            let len = chunk.len as usize;
+            let len = (to.points - first).min(chunk.capacity as usize);
             for piece in (0..len).step_by(PIECE) {
                 let points = PIECE.min(len - piece);
                 self.packed.resize(points * to.words, 0);

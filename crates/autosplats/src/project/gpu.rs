@@ -47,10 +47,11 @@ pub(crate) enum Counter {
     Outliers,
     RangeLow,
     RangeHigh,
+    Covered,
 }
 
 /// Length of [`ScreenBuffers::counters`].
-pub(crate) const COUNTERS: usize = 16;
+pub(crate) const COUNTERS: usize = Counter::Covered as usize + 1;
 
 /// [`ScreenPoints`](super::ScreenPoints) on the device.
 #[derive(Debug)]
@@ -83,7 +84,7 @@ impl ScreenBuffers {
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], points: usize, values: u32) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], points: usize, values: usize) -> Result<Self, Error> {
         let [width, height] = size.map(|side| side as usize);
         let pixels = width * height;
         let capacity = points.min(pixels);
@@ -98,7 +99,7 @@ impl ScreenBuffers {
             source: gpu.storage::<u32>("sources of screen points", capacity)?,
             pixels: gpu.storage::<u32>("pixels of screen points", capacity)?,
             points: gpu.storage::<ScreenPoint>("screen points", capacity)?,
-            values: gpu.storage::<u32>("values of screen points", capacity * values as usize)?,
+            values: gpu.storage::<u32>("values of screen points", capacity * values)?,
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
             block_sums: gpu.storage::<u32>("sums of blocks", pixels.div_ceil(BLOCK as usize))?,
@@ -166,7 +167,7 @@ impl ProjectPasses {
                 // The last of two passes has nothing left to count.
                 let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters];
                 let bound = if pass.bindings() == 4 { &buffers[..4] } else { &buffers };
-                steps.push(pass.step(gpu, bound, chunk.len.div_ceil(GROUP)));
+                steps.push(pass.step(gpu, bound, chunk.capacity.div_ceil(GROUP)));
             }
         }
         let blocks_16 = width.div_ceil(16) * height.div_ceil(16);

@@ -4,18 +4,19 @@ use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
 
-use super::{Counts, MAX_SIDE, Settings, Timings};
+use super::attributes::Wanted;
+use super::{Counts, Frame, Settings, Timings, check};
 use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::{FitRules, Surfels, fit};
 use crate::project::{Projector, ScreenPoints};
 use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
-use crate::shade::{ColorMode, Image, Scene, class_colors, linear_steps, shade};
-use crate::splat::{Attributes, GBuffer, PointColors, Splatter};
+use crate::shade::{Image, Scene, linear_steps, shade};
+use crate::splat::{Attributes, PointColors, Splatter};
 
-/// Turns clouds into pictures; keeps its buffers, so that a frame after the first allocates next to nothing.
+/// Renders on the CPU, in the current rayon thread pool.
 #[derive(Debug)]
-pub struct Renderer {
+pub(super) struct CpuRenderer {
     projector: Projector,
     neighborhoods: Neighborhoods,
     surfels: Surfels,
@@ -26,28 +27,8 @@ pub struct Renderer {
     linear: [f32; 256],
 }
 
-/// One picture and what is known about it.
-#[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
-    /// The picture.
-    pub image: &'a Image,
-    /// The visible surface it was shaded from.
-    pub layers: &'a GBuffer,
-    /// What became of the points.
-    pub counts: Counts,
-    /// Time per stage.
-    pub timings: Timings,
-}
-
-impl Default for Renderer {
+impl Default for CpuRenderer {
     fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Renderer {
-    /// A renderer that runs on the CPU, in the current rayon thread pool.
-    pub fn new() -> Self {
         Self {
             projector: Projector::default(),
             neighborhoods: Neighborhoods::default(),
@@ -58,13 +39,11 @@ impl Renderer {
             linear: linear_steps(),
         }
     }
+}
 
-    /// Renders `cloud` into a picture of `size` (width, height) pixels.
-    ///
-    /// # Errors
-    /// [`Error::ImageSize`], [`Error::Setting`] and [`Error::Camera`] for what lies outside its range,
-    /// [`Error::TooManyPoints`], [`Error::MissingAttribute`] if the colour mode needs one that the cloud lacks.
-    pub fn render(
+impl CpuRenderer {
+    /// See [`Renderer::render`](super::Renderer::render).
+    pub(super) fn render(
         &mut self,
         cloud: &PointCloud,
         camera: &Camera,
@@ -72,11 +51,13 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
-        let class_colors = match settings.shading.color {
-            ColorMode::Classification => Some(class_colors(&field(cloud, "Classification")?.values)),
-            _ => None,
+        let wanted = Wanted::new(cloud, settings)?;
+        let colors = wanted.colors(cloud);
+        let attributes = Attributes {
+            color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
+            scalar: wanted.scalar(cloud),
+            measures: wanted.measures,
         };
-        let attributes = attributes(cloud, settings, class_colors.as_deref(), &self.linear)?;
         let settings_splat = &settings.reconstruction;
         let Self { projector, neighborhoods, surfels, recovered, splatter, image, .. } = self;
         let mut clock = Clock::start();
@@ -104,7 +85,7 @@ impl Renderer {
             splatter.refine(surfels, &view);
         }
         splatter.attributes(surfels, &view, &attributes);
-        let layers = splatter.trim(&view);
+        let (layers, covered) = splatter.trim(&view);
         clock.lap(|timings| &mut timings.splat);
 
         let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
@@ -125,63 +106,10 @@ impl Renderer {
             outliers: surfels.iter().filter(|surfel| surfel.radius == 0.0).count(),
             clamped: search_counts.clamped,
             bounded: search_counts.bounded,
+            covered,
         };
-        Ok(Frame { image, layers, counts, timings: clock.finish() })
+        Ok(Frame { image, layers, counts, timings: clock.finish(), passes: &[] })
     }
-}
-
-/// Checks what was asked for and makes the camera ready.
-fn check(cloud: &PointCloud, camera: &Camera, [width, height]: [u32; 2], settings: &Settings) -> Result<View, Error> {
-    settings.check()?;
-    let sides = 1..=MAX_SIDE;
-    if !sides.contains(&width) || !sides.contains(&height) {
-        return Err(Error::ImageSize { width, height });
-    }
-    // The last index marks empty pixels.
-    if cloud.len() >= u32::MAX as usize {
-        return Err(Error::TooManyPoints(cloud.len()));
-    }
-    camera.view(cloud.origin(), [width, height])
-}
-
-/// What the splats have to carry for these settings.
-fn attributes<'a>(
-    cloud: &'a PointCloud,
-    settings: &Settings,
-    class_colors: Option<&'a [[u8; 3]]>,
-    linear: &'a [f32; 256],
-) -> Result<Attributes<'a>, Error> {
-    let mode = &settings.shading.color;
-    let srgb = match mode {
-        ColorMode::Classification => class_colors,
-        ColorMode::Rgb => Some(cloud.colors().ok_or_else(|| missing(cloud, "colours"))?),
-        ColorMode::Auto => cloud.colors(),
-        _ if settings.all_layers => cloud.colors(),
-        _ => None,
-    };
-    let scalar = match mode {
-        ColorMode::Field(name) => Some(&field(cloud, name)?.values),
-        _ => None,
-    };
-    let measured = matches!(mode, ColorMode::Curvature | ColorMode::Radius | ColorMode::KRadius);
-    Ok(Attributes {
-        color: srgb.map(|srgb| PointColors { srgb, linear }),
-        scalar,
-        measures: settings.all_layers || measured,
-    })
-}
-
-fn field<'a>(cloud: &'a PointCloud, name: &str) -> Result<&'a autosplats_cloud::Field, Error> {
-    cloud.field(name).ok_or_else(|| missing(cloud, &format!("field {name}")))
-}
-
-fn missing(cloud: &PointCloud, name: &str) -> Error {
-    let mut has: Vec<&str> = cloud.fields().iter().map(|field| field.name.as_str()).collect();
-    if cloud.colors().is_some() {
-        has.insert(0, "colours");
-    }
-    let has = if has.is_empty() { "positions only".into() } else { has.join(", ") };
-    Error::MissingAttribute { name: name.into(), has }
 }
 
 /// From screen points to splats in the depth map.

@@ -1,9 +1,20 @@
 //! A frame, one line per stage.
 
+mod attributes;
 mod cpu;
+mod gpu;
 mod settings;
 
-pub use cpu::{Frame, Renderer};
+use autosplats_cloud::PointCloud;
+
+use self::cpu::CpuRenderer;
+use self::gpu::GpuRenderer;
+use crate::Error;
+use crate::camera::{Camera, View};
+use crate::gpu::{AdapterSummary, Gpu, PassTime};
+use crate::shade::Image;
+use crate::splat::GBuffer;
+
 pub use settings::{Reconstruction, Settings};
 
 /// Longest side of an image in pixels.
@@ -36,17 +47,182 @@ pub struct Counts {
     pub clamped: usize,
     /// Points whose search met the bound on its work.
     pub bounded: usize,
+    /// Pixels that show a surface.
+    pub covered: usize,
 }
 
 /// Milliseconds spent in each stage of one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs, reason = "one field per stage")]
 pub struct Timings {
+    /// Copying the points to the device, where they were not there already; not part of the frame.
+    pub upload: f64,
     pub project: f64,
     pub search: f64,
     pub fit: f64,
     pub splat: f64,
     pub shade: f64,
-    /// From the first stage's start to the last one's end.
+    /// From the first stage's start to the last one's end; reading a picture back from a device is not part of it.
     pub frame: f64,
+}
+
+/// Where frames are made. Pictures are the same within a step of brightness here and there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// A hardware GPU where there is one, else the CPU.
+    #[default]
+    Auto,
+    /// All threads of the current rayon pool; needs no driver.
+    Cpu,
+    /// The best device that wgpu finds, though it may be a program on the CPU.
+    Gpu,
+}
+
+/// Turns clouds into pictures; keeps its buffers, so that a frame after the first allocates next to nothing.
+#[derive(Debug)]
+pub struct Renderer {
+    form: Form,
+}
+
+#[derive(Debug)]
+enum Form {
+    Cpu(Box<CpuRenderer>),
+    Gpu(Box<GpuRenderer>),
+}
+
+/// One picture and what is known about it.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// The picture.
+    pub image: &'a Image,
+    /// The visible surface it was shaded from; a GPU hands it out only if [all layers](Settings::all_layers) are asked for,
+    /// and leaves it empty otherwise.
+    pub layers: &'a GBuffer,
+    /// What became of the points.
+    pub counts: Counts,
+    /// Time per stage.
+    pub timings: Timings,
+    /// Time per pass, in order; empty on the CPU.
+    pub passes: &'a [PassTime],
+}
+
+impl Default for Renderer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Renderer {
+    /// A renderer that runs on the CPU, in the current rayon thread pool.
+    pub fn new() -> Self {
+        Self { form: Form::Cpu(Box::default()) }
+    }
+
+    /// A renderer that runs where `backend` says, on a device of its own.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there is no GPU though one is asked for, or it does not start; [`Error::DeviceMemory`].
+    pub fn with_backend(backend: Backend) -> Result<Self, Error> {
+        let gpu = match backend {
+            Backend::Cpu => return Ok(Self::new()),
+            Backend::Gpu => Gpu::new()?,
+            Backend::Auto => match Gpu::new() {
+                Ok(gpu) if !gpu.is_software() => gpu,
+                _ => return Ok(Self::new()),
+            },
+        };
+        Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(gpu)?)) })
+    }
+
+    /// A renderer on the caller's own device. It uses the features `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and
+    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
+    pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
+        Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
+    }
+
+    /// The device that frames are made on; `None` on the CPU.
+    pub fn adapter(&self) -> Option<AdapterSummary> {
+        match &self.form {
+            Form::Cpu(_) => None,
+            Form::Gpu(renderer) => Some(renderer.adapter()),
+        }
+    }
+
+    /// Renders `cloud` into a picture of `size` (width, height) pixels. A GPU keeps the points: those of a cloud whose
+    /// [identity](PointCloud::identity) it has are not uploaded again.
+    ///
+    /// # Errors
+    /// [`Error::ImageSize`], [`Error::Setting`] and [`Error::Camera`] for what lies outside its range,
+    /// [`Error::TooManyPoints`], [`Error::MissingAttribute`] if the colour mode needs one that the cloud lacks. On a GPU
+    /// also [`Error::DeviceLimit`], [`Error::DeviceMemory`] and [`Error::DeviceLost`]; after the last the renderer is of no
+    /// use any more.
+    pub fn render(
+        &mut self,
+        cloud: &PointCloud,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: &Settings,
+    ) -> Result<Frame<'_>, Error> {
+        match &mut self.form {
+            Form::Cpu(renderer) => renderer.render(cloud, camera, size, settings),
+            Form::Gpu(renderer) => renderer.render(cloud, camera, size, settings),
+        }
+    }
+
+    /// Uploads what `settings` will need of `cloud`, so that the next frame of it starts at once: as soon as the frame
+    /// before is submitted, while the device still renders that. `report` is told the fraction done, and says whether to
+    /// go on. On the CPU there is nothing to do.
+    ///
+    /// # Errors
+    /// [`Error::MissingAttribute`], [`Error::TooManyPoints`], [`Error::DeviceMemory`], [`Error::DeviceLost`];
+    /// [`Error::Cancelled`] if `report` said no.
+    pub fn upload(
+        &mut self,
+        cloud: &PointCloud,
+        settings: &Settings,
+        report: &dyn Fn(f32) -> bool,
+    ) -> Result<(), Error> {
+        match &mut self.form {
+            Form::Cpu(_) => Ok(()),
+            Form::Gpu(renderer) => renderer.upload(cloud, settings, report),
+        }
+    }
+
+    /// Renders into the whole of a caller's texture, made by the device that this renderer runs on, without waiting for it.
+    /// The format is `Rgba8Unorm`, `Bgra8Unorm` or one of their `Srgb` forms, the usage has `COPY_DST`. There is no legend.
+    ///
+    /// # Errors
+    /// Those of [`render`](Self::render), and [`Error::Device`] if the texture cannot be rendered into, or this renderer
+    /// runs on the CPU.
+    pub fn render_to_texture(
+        &mut self,
+        cloud: &PointCloud,
+        camera: &Camera,
+        texture: &wgpu::Texture,
+        settings: &Settings,
+    ) -> Result<(), Error> {
+        match &mut self.form {
+            Form::Cpu(_) => Err(Error::Device("a texture can only be rendered into on a GPU".into())),
+            Form::Gpu(renderer) => renderer.render_to_texture(cloud, camera, texture, settings),
+        }
+    }
+}
+
+/// Checks what was asked for and makes the camera ready.
+fn check(cloud: &PointCloud, camera: &Camera, [width, height]: [u32; 2], settings: &Settings) -> Result<View, Error> {
+    settings.check()?;
+    let sides = 1..=MAX_SIDE;
+    if !sides.contains(&width) || !sides.contains(&height) {
+        return Err(Error::ImageSize { width, height });
+    }
+    check_count(cloud)?;
+    camera.view(cloud.origin(), [width, height])
+}
+
+fn check_count(cloud: &PointCloud) -> Result<(), Error> {
+    // The last index marks empty pixels.
+    if cloud.len() >= u32::MAX as usize { Err(Error::TooManyPoints(cloud.len())) } else { Ok(()) }
 }

@@ -20,3 +20,5 @@ const OUTLIERS = 13u;
 // Ends of the colour map, as bits of f32.
 const RANGE_LOW = 14u;
 const RANGE_HIGH = 15u;
+// Pixels that show a surface.
+const COVERED = 16u;

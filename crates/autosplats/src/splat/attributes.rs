@@ -125,6 +125,11 @@ impl TileSums {
 }
 
 impl TileLayers<'_> {
+    /// Whether there is a surface at pixel `at` of the tile.
+    pub(super) fn covers(&self, at: usize) -> bool {
+        self.weight[at] > 0.0
+    }
+
     /// Leaves nothing at pixel `at` of the tile.
     pub(super) fn clear(&mut self, at: usize) {
         self.weight[at] = 0.0;

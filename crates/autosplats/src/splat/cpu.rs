@@ -92,20 +92,26 @@ impl Splatter {
         layers
     }
 
-    /// Trims the attributes just drawn: silhouettes end where the surface does.
-    pub(crate) fn trim(&mut self, view: &View) -> &GBuffer {
+    /// Trims the attributes just drawn: silhouettes end where the surface does. Returns the number of covered pixels too.
+    pub(crate) fn trim(&mut self, view: &View) -> (&GBuffer, usize) {
         let Self { rims, layers, .. } = self;
-        layers.tiles().into_par_iter().enumerate().for_each(|(index, mut layers)| {
+        let tiles = layers.tiles().into_par_iter().enumerate();
+        let covered = tiles.map(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;
+            let mut covered = 0;
             for y in y0..(y0 + TILE).min(view.height as usize) {
                 for x in x0..(x0 + TILE).min(view.width as usize) {
+                    let at = (y - y0) * TILE + x - x0;
                     if sticks_out(rims, x, y, view) {
-                        layers.clear((y - y0) * TILE + x - x0);
+                        layers.clear(at);
                     }
+                    covered += usize::from(layers.covers(at));
                 }
             }
+            covered
         });
-        layers
+        let covered = covered.sum();
+        (layers, covered)
     }
 }
 

@@ -1,0 +1,173 @@
+//! `autosplats bench`: how long each stage and pass of a frame takes, on each backend asked for.
+
+use std::time::Instant;
+
+use autosplats::{Counts, PassTime, Renderer, SearchEngine, Settings, Timings};
+use autosplats_cloud::PointCloud;
+use serde::Serialize;
+
+use crate::args::BenchArgs;
+use crate::device::Device;
+use crate::exit::{Exit, Failure};
+use crate::input::Inputs;
+use crate::output::print_line;
+use crate::progress::Bar;
+use crate::render::{render_failure, scene_camera};
+use crate::threads::start_threads;
+
+/// Frames before those that count: buffers are made, caches filled, clocks sped up.
+const WARM_UP: usize = 3;
+
+/// Everything that `--json` prints.
+#[derive(Debug, Serialize)]
+struct Bench<'a> {
+    version: &'static str,
+    scene: &'a str,
+    size: [u32; 2],
+    k: u32,
+    engine: &'static str,
+    /// Frames measured; times are medians of them.
+    frames: usize,
+    runs: Vec<Run>,
+}
+
+/// One backend's frames.
+#[derive(Debug, Serialize)]
+struct Run {
+    device: Device,
+    counts: Counts,
+    /// Of the first frame, which makes and fills the buffers.
+    upload_ms: f64,
+    /// From asking for a picture to having it.
+    picture_ms: f64,
+    timings_ms: Timings,
+    passes: Vec<PassTime>,
+}
+
+/// Renders the same frame again and again and prints the medians.
+pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
+    let BenchArgs { scene, engine, backends, k, size, frames, json, run } = args;
+    start_threads(run)?;
+    let mut settings = Settings::default();
+    settings.reconstruction.k = *k;
+    settings.reconstruction.engine = (*engine).into();
+    settings.check().map_err(render_failure)?;
+    let name = scene.strip_prefix("scene:").unwrap_or(scene);
+    let inputs = Inputs::scene(name)?;
+    // Devices are looked for before points are made: what cannot run says so at once.
+    let mut renderers = Vec::new();
+    for &backend in backends {
+        renderers.push(Renderer::with_backend(backend.into()).map_err(render_failure)?);
+    }
+    let cloud = inputs.read(run.quiet)?;
+    let mut bench = Bench {
+        version: env!("CARGO_PKG_VERSION"),
+        scene,
+        size: *size,
+        k: *k,
+        engine: match settings.reconstruction.engine {
+            SearchEngine::ScreenGrid => "screen-grid",
+            _ => "?",
+        },
+        frames: *frames,
+        runs: Vec::new(),
+    };
+    for mut renderer in renderers {
+        bench.runs.push(measure(&mut renderer, &inputs, &cloud, &settings, args)?);
+    }
+    if *json {
+        let json =
+            serde_json::to_string(&bench).map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?;
+        print_line(&json)
+    } else {
+        print_line(&bench.table(&cloud))
+    }
+}
+
+fn measure(
+    renderer: &mut Renderer,
+    inputs: &Inputs,
+    cloud: &PointCloud,
+    settings: &Settings,
+    args: &BenchArgs,
+) -> Result<Run, Failure> {
+    let device = Device::of(renderer);
+    let scene = inputs.only_scene().ok_or_else(|| Failure::usage("a bench needs a scene"))?;
+    let camera = scene_camera(scene);
+    let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), args.run.quiet);
+    let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
+    let (mut counts, mut upload_ms) = (Counts::default(), 0.0);
+    for frame in 0..WARM_UP + args.frames {
+        let started = Instant::now();
+        let rendered = renderer.render(cloud, &camera, args.size, settings).map_err(render_failure)?;
+        let picture_ms = started.elapsed().as_secs_f64() * 1e3;
+        if frame == 0 {
+            (counts, upload_ms) = (rendered.counts, rendered.timings.upload);
+        }
+        if frame >= WARM_UP {
+            samples.push((picture_ms, rendered.timings, rendered.passes.to_vec()));
+        }
+    }
+    drop(bar);
+    let of = |value: &dyn Fn(&Timings) -> f64| median(samples.iter().map(|(_, timings, _)| value(timings)));
+    let passes = samples[0].2.iter().enumerate().map(|(pass, first)| PassTime {
+        pass: first.pass.clone(),
+        ms: median(samples.iter().map(|(.., passes)| passes[pass].ms)),
+    });
+    Ok(Run {
+        counts,
+        upload_ms,
+        picture_ms: median(samples.iter().map(|(picture_ms, ..)| *picture_ms)),
+        timings_ms: Timings {
+            upload: of(&|timings| timings.upload),
+            project: of(&|timings| timings.project),
+            search: of(&|timings| timings.search),
+            fit: of(&|timings| timings.fit),
+            splat: of(&|timings| timings.splat),
+            shade: of(&|timings| timings.shade),
+            frame: of(&|timings| timings.frame),
+        },
+        passes: passes.collect(),
+        device,
+    })
+}
+
+/// The middle one of the values, of which there is at least one.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+impl Bench<'_> {
+    fn table(&self, cloud: &PointCloud) -> String {
+        let Self { scene, size: [width, height], k, engine, frames, runs, .. } = self;
+        let mut lines = vec![format!(
+            "{scene}: {} points, {width}x{height}, k {k}, {engine}; milliseconds, medians of {frames} frames",
+            cloud.len()
+        )];
+        for Run { device, counts, upload_ms, picture_ms, timings_ms, passes } in runs {
+            lines.push(String::new());
+            lines.push(device.describe());
+            let Counts { visible, active, recovered, .. } = counts;
+            lines.push(format!("  {visible} points visible, {active} reconstructed at first, {recovered} after that"));
+            let mut line = |name: &str, ms: f64| lines.push(format!("  {name:<32} {ms:>10.3}"));
+            let Timings { project, search, fit, splat, shade, frame, .. } = timings_ms;
+            for (stage, ms) in
+                [("project", project), ("search", search), ("fit", fit), ("splat", splat), ("shade", shade)]
+            {
+                line(stage, *ms);
+                let prefix = format!("{stage}.");
+                for PassTime { pass, ms } in passes.iter().filter(|time| time.pass.starts_with(&prefix)) {
+                    line(&format!("  {}", &pass[prefix.len()..]), *ms);
+                }
+            }
+            line("frame", *frame);
+            line("picture on the host", *picture_ms);
+            if *upload_ms > 0.0 {
+                line("first upload of the points", *upload_ms);
+            }
+        }
+        lines.join("\n")
+    }
+}

@@ -1,0 +1,76 @@
+//! What splats have to carry for a picture.
+
+use autosplats_cloud::{Field, FieldValues, PointCloud};
+
+use super::Settings;
+use crate::Error;
+use crate::shade::{ColorMode, class_colors};
+
+/// Where the colours of points come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ColorSource {
+    /// The points' own.
+    Points,
+    /// Their classes.
+    Classes,
+}
+
+/// What splats have to carry beside their normals.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Wanted {
+    pub(super) colors: Option<ColorSource>,
+    /// A scalar field, by name.
+    pub(super) scalar: Option<String>,
+    /// Splat radius, k-radius and curvature.
+    pub(super) measures: bool,
+}
+
+impl Wanted {
+    /// What `settings` ask for.
+    ///
+    /// # Errors
+    /// [`Error::MissingAttribute`] if the cloud lacks it.
+    pub(super) fn new(cloud: &PointCloud, settings: &Settings) -> Result<Self, Error> {
+        let mode = &settings.shading.color;
+        let own = cloud.colors().map(|_| ColorSource::Points);
+        let colors = match mode {
+            ColorMode::Classification => field(cloud, "Classification").map(|_| Some(ColorSource::Classes))?,
+            ColorMode::Rgb => Some(own.ok_or_else(|| missing(cloud, "colours"))?),
+            ColorMode::Auto => own,
+            _ if settings.all_layers => own,
+            _ => None,
+        };
+        let scalar = match mode {
+            ColorMode::Field(name) => Some(field(cloud, name)?.name.clone()),
+            _ => None,
+        };
+        let measured = matches!(mode, ColorMode::Curvature | ColorMode::Radius | ColorMode::KRadius);
+        Ok(Self { colors, scalar, measures: settings.all_layers || measured })
+    }
+
+    /// The colours of the points, made where they are not the cloud's own.
+    pub(super) fn colors<'a>(&self, cloud: &'a PointCloud) -> Option<std::borrow::Cow<'a, [[u8; 3]]>> {
+        match self.colors? {
+            ColorSource::Points => cloud.colors().map(Into::into),
+            ColorSource::Classes => cloud.field("Classification").map(|field| class_colors(&field.values).into()),
+        }
+    }
+
+    /// The values of the scalar field.
+    pub(super) fn scalar<'a>(&self, cloud: &'a PointCloud) -> Option<&'a FieldValues> {
+        cloud.field(self.scalar.as_ref()?).map(|field| &field.values)
+    }
+}
+
+fn field<'a>(cloud: &'a PointCloud, name: &str) -> Result<&'a Field, Error> {
+    cloud.field(name).ok_or_else(|| missing(cloud, &format!("field {name}")))
+}
+
+fn missing(cloud: &PointCloud, name: &str) -> Error {
+    let mut has: Vec<&str> = cloud.fields().iter().map(|field| field.name.as_str()).collect();
+    if cloud.colors().is_some() {
+        has.insert(0, "colours");
+    }
+    let has = if has.is_empty() { "positions only".into() } else { has.join(", ") };
+    Error::MissingAttribute { name: name.into(), has }
+}

@@ -1,0 +1,338 @@
+//! The frame on the GPU: the steps of all stages, made when buffers change and replayed for each picture.
+
+use std::time::Instant;
+
+use autosplats_cloud::PointCloud;
+
+use super::attributes::{ColorSource, Wanted};
+use super::{Counts, Frame, Settings, Timings, check, check_count};
+use crate::Error;
+use crate::camera::{Camera, View, guess_axes, up};
+use crate::fit::gpu::{FitPasses, surfel_buffer};
+use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
+use crate::project::gpu::{COUNTERS, Counter, ProjectPasses, ScreenBuffers};
+use crate::project::{DeviceCloud, PointValues, Uploader};
+use crate::search::screen_grid::gpu::{SearchPasses, neighborhood_buffer};
+use crate::search::{SearchEngine, SearchRules};
+use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
+use crate::shade::{Image, Scene, linear_steps};
+use crate::splat::gpu::{Round, SplatBuffers, SplatPasses};
+use crate::splat::{Channels, GBuffer, LayerBuffers};
+
+/// Renders on a device.
+#[derive(Debug)]
+pub(super) struct GpuRenderer {
+    gpu: Gpu,
+    /// How pictures in memory are timed; those in textures are not.
+    clock: Clock,
+    uploader: Uploader,
+    cloud: DeviceCloud,
+    resident: Resident,
+    /// [`FrameUniform`].
+    frame: wgpu::Buffer,
+    passes: Passes,
+    prepared: Option<Prepared>,
+    readback: Readback,
+    image: Image,
+    layers: GBuffer,
+    times: Vec<PassTime>,
+}
+
+/// What of which cloud is on the device.
+#[derive(Debug, Default, PartialEq)]
+struct Resident {
+    cloud: Option<u64>,
+    colors: Option<ColorSource>,
+    scalar: Option<String>,
+}
+
+/// Compiled passes: those of the last k and channels are kept.
+#[derive(Debug)]
+struct Passes {
+    project: ProjectPasses,
+    search: Option<(u32, SearchPasses)>,
+    fit: FitPasses,
+    splat: Option<(Channels, SplatPasses)>,
+    shade: ShadePasses,
+}
+
+/// What a frame's buffers and steps were made for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Shape {
+    size: [u32; 2],
+    k: u32,
+    depth_refinement: bool,
+    channels: Channels,
+    find_range: bool,
+    keep_linear: bool,
+}
+
+/// A frame ready to be replayed.
+#[derive(Debug)]
+struct Prepared {
+    shape: Shape,
+    screen: ScreenBuffers,
+    layers: LayerBuffers,
+    picture: ShadeBuffers,
+    steps: Vec<Step>,
+}
+
+impl GpuRenderer {
+    /// # Errors
+    /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
+    pub(super) fn new(gpu: Gpu) -> Result<Self, Error> {
+        Ok(Self {
+            clock: Clock::new(&gpu),
+            uploader: Uploader::new(&gpu),
+            cloud: DeviceCloud::default(),
+            resident: Resident::default(),
+            frame: gpu.uniform::<FrameUniform>("frame")?,
+            passes: Passes {
+                project: ProjectPasses::new(&gpu, gpu.int64_atomics())?,
+                search: None,
+                fit: FitPasses::new(&gpu)?,
+                splat: None,
+                shade: ShadePasses::new(&gpu)?,
+            },
+            prepared: None,
+            readback: Readback::default(),
+            image: Image::default(),
+            layers: GBuffer::default(),
+            times: Vec::new(),
+            gpu,
+        })
+    }
+
+    pub(super) fn adapter(&self) -> AdapterSummary {
+        self.gpu.summary()
+    }
+
+    /// See [`Renderer::upload`](super::Renderer::upload).
+    pub(super) fn upload(
+        &mut self,
+        cloud: &PointCloud,
+        settings: &Settings,
+        report: &dyn Fn(f32) -> bool,
+    ) -> Result<(), Error> {
+        check_count(cloud)?;
+        let wanted = Wanted::new(cloud, settings)?;
+        self.make_resident(cloud, &wanted, report)
+    }
+
+    /// Uploads what is not there yet.
+    fn make_resident(
+        &mut self,
+        cloud: &PointCloud,
+        wanted: &Wanted,
+        report: &dyn Fn(f32) -> bool,
+    ) -> Result<(), Error> {
+        let wants = Resident { cloud: Some(cloud.identity()), colors: wanted.colors, scalar: wanted.scalar.clone() };
+        if self.resident == wants {
+            return Ok(());
+        }
+        let same_points = self.resident.cloud == wants.cloud;
+        // Nothing is there until everything is.
+        self.resident = Resident::default();
+        let colors = wanted.colors(cloud);
+        let values = PointValues { colors: colors.as_deref(), scalar: wanted.scalar(cloud) };
+        let remade = self.cloud.resize(&self.gpu, cloud.len(), values.words())?;
+        if remade {
+            self.prepared = None;
+        }
+        if remade || !same_points {
+            self.uploader.positions(&self.gpu, cloud, &self.cloud, report)?;
+        }
+        self.uploader.values(&self.gpu, &values, &self.cloud, report)?;
+        self.resident = wants;
+        Ok(())
+    }
+
+    /// See [`Renderer::render`](super::Renderer::render).
+    pub(super) fn render(
+        &mut self,
+        cloud: &PointCloud,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: &Settings,
+    ) -> Result<Frame<'_>, Error> {
+        let view = check(cloud, camera, size, settings)?;
+        let wanted = Wanted::new(cloud, settings)?;
+        let started = Instant::now();
+        self.make_resident(cloud, &wanted, &|_| true)?;
+        let upload = started.elapsed().as_secs_f64() * 1e3;
+        self.prepare(size, &wanted, settings)?;
+        let Self { gpu, clock, prepared, readback, image, layers, times, frame, .. } = self;
+        let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
+        let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
+        prepared.tell(gpu, frame, &view, cloud, settings, &uniform);
+
+        let mut recorder = Recorder::new(gpu, clock);
+        prepared.steps.iter().for_each(|step| recorder.run(step));
+        let mut wants = vec![&prepared.screen.counters, &prepared.picture.image];
+        if settings.all_layers {
+            let LayerBuffers { surface, cover, extras, .. } = &prepared.layers;
+            wants.extend([&prepared.picture.linear, surface, cover, extras]);
+        }
+        readback.copy(gpu, &mut recorder.encoder, &wants)?;
+        *times = recorder.finish();
+        let counters = readback.read(gpu, |parts| {
+            let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
+            let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
+            let linear = if settings.all_layers { parts[2] } else { &[] };
+            finish(&ReadPicture { size, image: parts[1], linear, range }, &scene, &settings.shading, image);
+            *layers = match parts {
+                [_, _, _, surface, cover, extras] => prepared.layers.to_host(surface, cover, extras),
+                _ => GBuffer::default(),
+            };
+            counters
+        })?;
+        let frame_ms = clock.read(gpu, times)?;
+
+        let stage = |name: &str| {
+            times.iter().filter(|time| time.pass.split('.').next() == Some(name)).map(|time| time.ms).sum::<f64>()
+        };
+        let timings = Timings {
+            upload,
+            project: stage("project"),
+            search: stage("search"),
+            fit: stage("fit"),
+            splat: stage("splat"),
+            shade: stage("shade"),
+            frame: frame_ms,
+        };
+        Ok(Frame { image, layers, counts: counts(cloud, &counters), timings, passes: times })
+    }
+
+    /// See [`Renderer::render_to_texture`](super::Renderer::render_to_texture).
+    pub(super) fn render_to_texture(
+        &mut self,
+        cloud: &PointCloud,
+        camera: &Camera,
+        texture: &wgpu::Texture,
+        settings: &Settings,
+    ) -> Result<(), Error> {
+        let size = [texture.width(), texture.height()];
+        check_texture(texture, size)?;
+        let view = check(cloud, camera, size, settings)?;
+        let wanted = Wanted::new(cloud, settings)?;
+        self.make_resident(cloud, &wanted, &|_| true)?;
+        self.prepare(size, &wanted, settings)?;
+        let Self { gpu, prepared, frame, .. } = self;
+        let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
+        let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
+        prepared.tell(gpu, frame, &view, cloud, settings, &uniform.into_format(texture.format()));
+        let mut recorder = Recorder::new(gpu, &Clock::Off);
+        prepared.steps.iter().for_each(|step| recorder.run(step));
+        prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
+        recorder.finish();
+        gpu.check_lost()
+    }
+
+    /// Makes buffers and steps for a frame unless the last frame's will do.
+    fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<(), Error> {
+        let SearchEngine::ScreenGrid = settings.reconstruction.engine;
+        let shape = Shape {
+            size,
+            k: settings.reconstruction.k,
+            depth_refinement: settings.reconstruction.depth_refinement,
+            channels: Channels {
+                color: wanted.colors.is_some(),
+                scalar: wanted.scalar.is_some(),
+                measures: wanted.measures,
+            },
+            find_range: finds_range(&settings.shading),
+            keep_linear: settings.all_layers,
+        };
+        if self.prepared.as_ref().is_some_and(|prepared| prepared.shape == shape) {
+            return Ok(());
+        }
+        // The old buffers go before the new ones come.
+        self.prepared = None;
+        let Self { gpu, cloud, frame, passes, .. } = self;
+        let Passes { project, search, fit, splat, shade } = passes;
+        if search.as_ref().is_none_or(|(k, _)| *k != shape.k) {
+            *search = Some((shape.k, SearchPasses::new(gpu, shape.k)?));
+        }
+        if splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
+            *splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
+        }
+        let (Some((_, search)), Some((_, splat))) = (search, splat) else { return Ok(()) };
+        let screen = ScreenBuffers::new(gpu, size, cloud.capacity(), cloud.words())?;
+        let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
+        let surfels = surfel_buffer(gpu, screen.capacity)?;
+        let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
+        let layers = LayerBuffers::new(gpu, size, shape.channels)?;
+        let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
+        let steps = gpu.checked(|| {
+            let mut steps = project.steps(gpu, frame, cloud, &screen);
+            for round in [Round::Active, Round::Recovered] {
+                if round == Round::Recovered {
+                    steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
+                }
+                steps.extend(search.steps(gpu, frame, &screen, &neighborhoods, round as usize));
+                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round as usize));
+                steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
+            }
+            let refine = shape.depth_refinement;
+            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
+            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, shape.find_range));
+            steps
+        })?;
+        self.prepared = Some(Prepared { shape, screen, layers, picture, steps });
+        Ok(())
+    }
+}
+
+impl Prepared {
+    /// Tells the passes what the next frame is to be.
+    fn tell(
+        &mut self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        view: &View,
+        cloud: &PointCloud,
+        settings: &Settings,
+        shading: &ShadeUniform,
+    ) {
+        let Settings { reconstruction, .. } = settings;
+        let rules = SearchRules {
+            k: reconstruction.k,
+            outlier_expansions: reconstruction.outlier_expansions,
+            gap_factor: reconstruction.gap_factor,
+        };
+        let told = FrameUniform {
+            grid_culling: reconstruction.grid_culling.into(),
+            ellipses: reconstruction.ellipses.into(),
+            keep_outliers: reconstruction.outlier_expansions.is_none().into(),
+            splat_scale: reconstruction.splat_scale,
+            outlier_growth: rules.outlier_radius(1.0),
+            gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
+            ..FrameUniform::new(view, cloud.len(), reconstruction.k)
+        };
+        gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
+        self.picture.write(gpu, shading, &settings.shading);
+    }
+}
+
+/// What became of the points, by the device's counters.
+fn counts(cloud: &PointCloud, counters: &[u32]) -> Counts {
+    let count = |counter: Counter| counters[counter as usize] as usize;
+    let [not_finite, behind, outside] = [Counter::NotFinite, Counter::Behind, Counter::Outside].map(count);
+    Counts {
+        points: cloud.len(),
+        dropped: not_finite + behind + outside,
+        not_finite,
+        behind,
+        outside,
+        visible: count(Counter::Visible),
+        active: count(Counter::Active),
+        passive: count(Counter::Passive),
+        recovered: count(Counter::Recovered),
+        outliers: count(Counter::Outliers),
+        clamped: count(Counter::Clamped),
+        bounded: count(Counter::Bounded),
+        covered: count(Counter::Covered),
+    }
+}
