@@ -14,14 +14,14 @@ use crate::simd::F32s;
 /// Blocks per task.
 const TASK_BLOCKS: usize = 64;
 /// A neighbourhood whose middle eigenvalue is below this part of the largest is a line, not a plane.
-const LINE: f32 = 1e-5;
+pub(super) const LINE: f32 = 1e-5;
 /// Sine of the angle to the eye below which a line has no side towards it.
-const LEAST_ACROSS: f32 = 1e-3;
+pub(super) const LEAST_ACROSS: f32 = 1e-3;
 /// Longest ellipse, semi-major over semi-minor axis.
 // Differs from the paper: it sets no limit, and a nearly straight neighbourhood would draw a needle across the picture.
 pub(super) const LONGEST: f32 = 4.0;
 /// Radius in pixels of a point drawn although it has no neighbour.
-const LONE_RADIUS_PX: f32 = 1.0;
+pub(super) const LONE_RADIUS_PX: f32 = 1.0;
 
 /// Points behind the culling plane of their cell get no splat wider than one whose k-radius were this many first search
 /// radii.

@@ -8,6 +8,7 @@
 
 mod cpu;
 mod eigen;
+pub(crate) mod gpu;
 #[cfg(test)]
 pub(crate) mod tests;
 

@@ -14,6 +14,9 @@ const SHARED: &[(&str, &str)] = &[
     ("screen", include_str!("../shared/screen.wgsl")),
     ("culled", include_str!("../shared/culled.wgsl")),
     ("surfel", include_str!("../shared/surfel.wgsl")),
+    ("eigen", include_str!("../shared/eigen.wgsl")),
+    ("window", include_str!("../shared/window.wgsl")),
+    ("nearest", include_str!("../shared/nearest.wgsl")),
 ];
 
 /// The source of a pass with all it imports.

@@ -42,6 +42,37 @@ pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, V
     (read, counters)
 }
 
+/// A screen as the host has it, brought into the device's form; all active points are queries, those passive recovered
+/// ones.
+pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> ScreenBuffers {
+    let buffers = ScreenBuffers::new(gpu, [view.width, view.height], screen.points.len(), 0).expect("room");
+    let mut counters = [0u32; COUNTERS];
+    for (counter, value) in [
+        (Counter::Visible, screen.points.len()),
+        (Counter::StripPx, screen.cells.strip_px),
+        (Counter::CellPx, screen.density.cell_px),
+        (Counter::CellColumns, screen.density.columns),
+        (Counter::Active, screen.active.len()),
+        (Counter::Passive, screen.passive.len()),
+        (Counter::Recovered, screen.passive.len()),
+    ] {
+        counters[counter as usize] = value as u32;
+    }
+    let depth = |nearest: f32| if nearest.is_finite() { nearest.to_bits() } else { u32::MAX };
+    let cells = screen.density.count.iter().zip(&screen.density.nearest);
+    let density: Vec<[u32; 2]> = cells.map(|(&count, &nearest)| [count, depth(nearest)]).collect();
+    let queries = [&screen.active[..], &screen.passive].concat();
+    let write = |buffer: &wgpu::Buffer, bytes: &[u8]| gpu.queue.write_buffer(buffer, 0, bytes);
+    write(&buffers.counters, bytemuck::cast_slice(&counters));
+    write(&buffers.density, bytemuck::cast_slice(&density));
+    write(&buffers.cell_start, bytemuck::cast_slice(&screen.cells.start));
+    write(&buffers.source, bytemuck::cast_slice(&screen.source));
+    write(&buffers.points, bytemuck::cast_slice(&screen.points));
+    write(&buffers.queries, bytemuck::cast_slice(&queries));
+    write(&buffers.passive, bytemuck::cast_slice(&screen.passive));
+    buffers
+}
+
 fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, culling: bool) -> ScreenPoints {
     let mut uploader = Uploader::new(gpu);
     let mut device_cloud = DeviceCloud::default();

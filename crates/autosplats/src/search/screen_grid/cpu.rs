@@ -19,11 +19,11 @@ use crate::search::{
 const TASK_BLOCKS: usize = 64;
 /// The first window holds spheres of the k-radius expected, that of the block before in first search radii, times this:
 /// most points find their k neighbours in it.
-const FIRST_REACH: f32 = 1.3;
+pub(super) const FIRST_REACH: f32 = 1.3;
 /// Least and most that is expected.
 const REACH: [f32; 2] = [0.8, 4.0];
 /// A radius that has to grow grows at least by this factor.
-const LEAST_GROWTH: f32 = 1.3;
+pub(super) const LEAST_GROWTH: f32 = 1.3;
 
 /// Finds the neighbourhoods of `queries`, indices of screen points, ascending.
 pub(crate) fn search(

@@ -13,6 +13,7 @@
 //! on search work ends a search, what is kept depends on what happened to be read.
 
 mod cpu;
+pub(crate) mod gpu;
 mod window;
 
 pub(crate) use cpu::search;

@@ -6,7 +6,7 @@ use crate::camera::View;
 use crate::project::ScreenCells;
 
 /// Added to projected bounds in pixels, against the rounding of projected coordinates.
-const MARGIN_PX: f32 = 0.02;
+pub(super) const MARGIN_PX: f32 = 0.02;
 
 /// A rectangle of pixels and a range of depths, all sides included.
 #[derive(Clone, Copy, Debug, PartialEq)]

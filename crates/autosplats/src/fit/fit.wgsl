@@ -1,0 +1,176 @@
+// Moments to surfels, by the eigenvectors of the covariance [Paper, §6]. See the CPU form for what differs from the paper.
+//
+// Reads: counters, density, points, source, queries, neighborhoods. Writes: surfels, counters.
+
+#import frame
+#import groups
+#import counters
+#import density
+#import screen
+#import surfel
+#import eigen
+
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(4) var<storage, read> source: array<u32>;
+@group(0) @binding(5) var<storage, read> queries: array<u32>;
+@group(0) @binding(6) var<storage, read> neighborhoods: array<Neighborhood>;
+@group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+override LINE: f32;
+override LEAST_ACROSS: f32;
+override LONGEST: f32;
+override LONE_RADIUS_PX: f32;
+override WIDEST_BEHIND: f32;
+override LOPSIDED: f32;
+override LOPSIDED_COUNT: f32;
+
+const MIN_POSITIVE = 1.1754943508222875e-38;
+
+// What all queries of a workgroup need to know.
+struct Task {
+    first: u32,
+    len: u32,
+    cell_px: u32,
+    cell_columns: u32,
+}
+
+var<workgroup> task: Task;
+var<workgroup> outliers: atomic<u32>;
+
+struct Plane {
+    normal: vec3f,
+    major_axis: vec3f,
+    major_ratio: f32,
+    curvature: f32,
+}
+
+fn product(a: vec3f, b: vec3f) -> f32 {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+fn normalized_or(v: vec3f, otherwise: vec3f) -> vec3f {
+    let scale = 1.0 / sqrt(product(v, v));
+    return select(otherwise, v * scale, is_finite(scale) && scale > 0.0);
+}
+
+// Some unit vector at right angles to the unit vector `v`.
+fn any_orthonormal(v: vec3f) -> vec3f {
+    let side = select(1.0, -1.0, (bitcast<u32>(v.z) >> 31u) == 1u);
+    let a = -1.0 / (side + v.z);
+    return vec3f(v.x * v.y * a, side + v.y * v.y * a, -v.y);
+}
+
+// Eigenvectors of the covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2], in units of the squared
+// k-radius, so that nothing over- or underflows.
+fn axes(sums: Neighborhood) -> Eigen {
+    // The point itself is one of the points fitted; it adds nothing to sums about itself.
+    let share = 1.0 / (sums.count + 1.0);
+    let unit = 1.0 / max(sums.k_radius, MIN_POSITIVE);
+    let mean = sums.offset * unit * share;
+    let of_x = sums.second_x * unit * unit * share - mean.x * mean;
+    let of_yz = sums.second_yz * unit * unit * share - mean.yyz * mean.yzz;
+    return eigen(vec3f(of_x.x, of_yz.x, of_yz.z), vec3f(of_yz.y, of_x.z, of_x.y));
+}
+
+// The unit normal of a neighbourhood that is no plane: as much towards the eye as its line allows.
+fn facing(to_eye: vec3f, line: vec3f, has_line: bool) -> vec3f {
+    let toward = normalized_or(to_eye, vec3f(0.0, 0.0, -1.0));
+    let across = toward - line * product(line, toward);
+    let length_squared = product(across, across);
+    // Of a line towards the eye nothing but rounding is left across it.
+    let is_clear = length_squared > LEAST_ACROSS * LEAST_ACROSS;
+    let of_line = select(any_orthonormal(line), across * (1.0 / sqrt(max(length_squared, MIN_POSITIVE))), is_clear);
+    return select(toward, of_line, has_line);
+}
+
+// The plane through a neighbourhood [Paper, Eq. 1 to 3], seen from the eye. A neighbourhood that is a line or one place has
+// many; the one most square to the line of sight is taken.
+fn plane(sums: Neighborhood, to_eye: vec3f) -> Plane {
+    let found = axes(sums);
+    let middle = found.values.y;
+    let largest = found.values.z;
+    var normal = found.least;
+    var major_axis = found.largest;
+    var major_ratio = largest / middle;
+    if !(middle > LINE * largest) {
+        normal = facing(to_eye, major_axis, largest > 0.0);
+        // Any tangent does for a circle.
+        major_axis = any_orthonormal(normal);
+        major_ratio = 1.0;
+    }
+    let least = max(found.values.x, 0.0);
+    let sum = least + middle + largest;
+    let curvature = select(0.0, least / sum, sum > 0.0);
+    return Plane(select(normal, -normal, product(normal, to_eye) < 0.0), major_axis, major_ratio, curvature);
+}
+
+// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6]; one cut short counts as k neighbours.
+fn splat_radius(k_radius: f32, count: f32) -> f32 {
+    return frame.splat_scale * 2.0 * k_radius / sqrt(max(count, f32(frame.k)));
+}
+
+fn surfel(query: u32, sums: Neighborhood) -> Surfel {
+    let point = points[query];
+    let center = point.position_view;
+    let face = plane(sums, select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u));
+
+    var radius = 0.0;
+    if sums.count > 0.0 {
+        radius = splat_radius(sums.k_radius, sums.count);
+    } else if frame.keep_outliers == 1u {
+        radius = LONE_RADIUS_PX * pixel_size(center.z);
+    }
+    let mean = sums.offset / max(sums.count, 1.0);
+    let apart = LOPSIDED * sums.k_radius;
+    if product(mean, mean) > apart * apart && sums.count >= LOPSIDED_COUNT && frame.keep_outliers == 0u {
+        radius = 0.0;
+    }
+    let cell = density[density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns)];
+    if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
+        let widest = WIDEST_BEHIND * first_radius(cell.x, task.cell_px, center.z);
+        radius = min(radius, splat_radius(widest, f32(frame.k)));
+    }
+    let major_ratio = select(1.0, min(face.major_ratio, LONGEST), frame.ellipses == 1u);
+    return Surfel(
+        center,
+        radius,
+        face.normal,
+        sums.k_radius,
+        face.major_axis,
+        major_ratio,
+        face.curvature,
+        point.pixel,
+        source[query],
+        query,
+    );
+}
+
+@compute @workgroup_size(64)
+fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    if local == 0u {
+        let active_points = atomicLoad(&counters[ACTIVE]);
+        task.first = select(0u, active_points, ROUND == 1u);
+        task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+        task.cell_px = atomicLoad(&counters[CELL_PX]);
+        task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+        atomicStore(&outliers, 0u);
+    }
+    workgroupBarrier();
+    let index = group_index(workgroup) * 64u + local;
+    if index < task.len {
+        let place = task.first + index;
+        let fitted = surfel(queries[place], neighborhoods[place]);
+        surfels[place] = fitted;
+        if fitted.radius == 0.0 {
+            atomicAdd(&outliers, 1u);
+        }
+    }
+    workgroupBarrier();
+    if local == 0u && atomicLoad(&outliers) > 0u {
+        atomicAdd(&counters[OUTLIERS], atomicLoad(&outliers));
+    }
+}

@@ -1,0 +1,1 @@
+//! The fit on the GPU against that on the CPU.

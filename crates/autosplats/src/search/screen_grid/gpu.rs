@@ -1,0 +1,74 @@
+//! The screen-grid search on the GPU: an invocation per point.
+
+use super::cpu::{FIRST_REACH, LEAST_GROWTH};
+use super::window::MARGIN_PX;
+use crate::Error;
+use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::project::gpu::ScreenBuffers;
+use crate::search::MAX_CANDIDATES;
+
+pub(crate) const PASSES: &[PassSource] = &[SEARCH];
+const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_str!("search.wgsl"));
+
+/// Invocations in a workgroup.
+const GROUP: u32 = 64;
+/// Most neighbours that an invocation lists at a time: four registers of four.
+const MOST_QUADS: u32 = 4;
+
+/// Bytes of a neighbourhood on the device.
+type Neighborhood = [f32; 12];
+
+/// Room for the neighbourhoods of `capacity` queries.
+///
+/// # Errors
+/// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+pub(crate) fn neighborhood_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buffer, Error> {
+    gpu.storage::<Neighborhood>("neighbourhoods", capacity as usize)
+}
+
+/// The passes of the search: one per round.
+#[derive(Debug)]
+pub(crate) struct SearchPasses {
+    rounds: [Pass; 2],
+}
+
+impl SearchPasses {
+    /// Compiles them for frames with this k.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu, k: u32) -> Result<Self, Error> {
+        let batches = k.div_ceil(4 * MOST_QUADS);
+        let quads = k.div_ceil(batches).div_ceil(4);
+        let round = |round: u32| {
+            let constants = [
+                ("ROUND", f64::from(round)),
+                ("BATCHES", batches.into()),
+                ("QUADS", quads.into()),
+                ("FIRST_REACH", FIRST_REACH.into()),
+                ("LEAST_GROWTH", LEAST_GROWTH.into()),
+                ("MARGIN_PX", MARGIN_PX.into()),
+                ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
+            ];
+            Pass::new(gpu, &SEARCH, &constants)
+        };
+        Ok(Self { rounds: [round(0)?, round(1)?] })
+    }
+
+    /// Finds the neighbourhoods of the queries of `round`, 0 for active points, 1 for recovered ones.
+    pub(crate) fn steps(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        neighborhoods: &wgpu::Buffer,
+        round: usize,
+    ) -> Vec<Step> {
+        let ScreenBuffers { counters, density, cell_start, points, queries, .. } = screen;
+        let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods];
+        vec![self.rounds[round].step(gpu, &buffers, screen.capacity.div_ceil(GROUP))]
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

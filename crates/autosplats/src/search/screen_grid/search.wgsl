@@ -1,0 +1,249 @@
+// The k nearest screen points of each query, summed up in moments [Paper, §4, §5]; the rules are stated in search/mod.rs.
+//
+// A query reads a window about its first search sphere and lists the k nearest in order. They are exact if the sphere up to
+// the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. k beyond sixteen take
+// several batches of the list, each of those beyond the batch before. Unlike on the CPU no two queries share a window.
+//
+// Reads: counters, density, cell_start, points, queries. Writes: neighborhoods, counters.
+
+#import frame
+#import groups
+#import counters
+#import density
+#import screen
+#import surfel
+#import window
+#import nearest
+
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read> cell_start: array<u32>;
+@group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(5) var<storage, read> queries: array<u32>;
+@group(0) @binding(6) var<storage, read_write> neighborhoods: array<Neighborhood>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+// Lists of k.
+override BATCHES: u32;
+override FIRST_REACH: f32;
+override LEAST_GROWTH: f32;
+override MAX_CANDIDATES: u32;
+
+// Screen points and strips that a query reads at most, all windows together, before it counts as bounded: software devices
+// end an invocation silently after 65535 rounds of its loops.
+const MOST_READS = 32000u;
+const MIN_POSITIVE = 1.1754943508222875e-38;
+
+// What all queries of a workgroup need to know.
+struct Task {
+    first: u32,
+    len: u32,
+    strip_px: u32,
+    cell_px: u32,
+    cell_columns: u32,
+}
+
+var<workgroup> task: Task;
+var<workgroup> clamped: atomic<u32>;
+var<workgroup> bounded: atomic<u32>;
+
+// What a window shows of a point's neighbours.
+struct Seen {
+    // Squared distance to the k-th nearest; MOST if there are fewer.
+    kth_squared: f32,
+    // Distance to the nearest.
+    nearest: f32,
+    // How many lie within the radius that the window is sure to hold, and the squared distance to the last of them.
+    sure: u32,
+    sure_squared: f32,
+    // The first gap: squared distance to the neighbour before it, MOST if there is none; how far the gap has to reach, and
+    // how far it does.
+    gap_squared: f32,
+    gap_reach: f32,
+    gap_end: f32,
+}
+
+struct Found {
+    // Neighbours are the points up to this squared distance.
+    squared: f32,
+    is_clamped: bool,
+    is_bounded: bool,
+}
+
+// Fused, so that both passes over a window get the same bits whatever the compiler makes of sums and products.
+fn squared_length(v: vec3f) -> f32 {
+    return fma(v.z, v.z, fma(v.y, v.y, v.x * v.x));
+}
+
+// Reads a window that holds all points within the square root of `known_squared`.
+fn read_window(center: vec3f, window: Window, initial_radius: f32, known_squared: f32) -> Seen {
+    var seen = Seen(MOST, MOST, 0u, 0.0, MOST, 0.0, 0.0);
+    let strips = window_strips(window, task.strip_px);
+    // Up to here all are listed; the point itself is at 0.
+    var listed_squared = 0.0;
+    var last = 0.0;
+    var rank = 0u;
+    for (var batch = 0u; batch < BATCHES; batch++) {
+        var list = nearest_none();
+        var listed = 0u;
+        for (var strip = strips.x; strip <= strips.y; strip++) {
+            let run = window_run(window, strip);
+            for (var at = run.x; at < run.y; at++) {
+                let squared = squared_length(points[at].position_view - center);
+                let is_listed = squared <= listed_squared;
+                listed += select(0u, 1u, is_listed);
+                nearest_add(&list, select(squared, MOST, is_listed));
+            }
+        }
+        // Points at the same distance may have more ranks than places.
+        if listed > frame.k && seen.kth_squared == MOST {
+            seen.kth_squared = listed_squared;
+        }
+        for (var place = 0u; place < 4u * QUADS; place++) {
+            rank = listed + place;
+            if rank > frame.k {
+                break;
+            }
+            let squared = nearest_take(&list);
+            let distance = sqrt(squared);
+            if last > 0.0 && seen.gap_squared == MOST {
+                let reach = frame.gap_growth * max(last, initial_radius);
+                if distance > reach {
+                    seen.gap_squared = listed_squared;
+                    seen.gap_reach = reach;
+                    seen.gap_end = distance;
+                }
+            }
+            if squared == MOST {
+                return seen;
+            }
+            listed_squared = squared;
+            last = distance;
+            seen.nearest = min(seen.nearest, distance);
+            if squared <= known_squared {
+                seen.sure += 1u;
+                seen.sure_squared = squared;
+            }
+            if rank == frame.k {
+                seen.kth_squared = squared;
+            }
+        }
+        if rank >= frame.k {
+            break;
+        }
+    }
+    return seen;
+}
+
+fn find(center: vec3f, initial_radius: f32) -> Found {
+    let strip_px = f32(task.strip_px);
+    // A radius that rounds to nothing would never grow.
+    var radius = max(FIRST_REACH * initial_radius, MIN_POSITIVE);
+    var window = window_grown(window_of_sphere(center, radius), strip_px);
+    var len = window_len(window, task.strip_px);
+    var reads = len.y;
+    // A point alone in its cell may look into a crowd; a smaller window will do there.
+    for (var halving = 0u; halving < 40u && len.x > MAX_CANDIDATES; halving++) {
+        radius *= 0.5;
+        window = window_grown(window_of_sphere(center, radius), strip_px);
+        len = window_len(window, task.strip_px);
+        reads += len.y;
+    }
+    var seen: Seen;
+    for (var step = 0u; step < 256u; step++) {
+        let is_all = window_contains(window, picture());
+        seen = read_window(center, window, initial_radius, select(min(radius * radius, MOST), MOST, is_all));
+        reads += BATCHES * (len.x + len.y);
+        let kth_radius = sqrt(seen.kth_squared);
+        let is_exact = seen.kth_squared < MOST
+            && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
+        let known = select(select(radius, MOST, is_all), kth_radius, is_exact);
+        if min(seen.nearest, known) > frame.outlier_growth * initial_radius {
+            return Found(0.0, false, false);
+        }
+        let is_gap_sure = is_exact || is_all || seen.gap_squared <= radius * radius;
+        if seen.gap_squared < MOST && is_gap_sure && min(seen.gap_end, known) > seen.gap_reach {
+            return Found(seen.gap_squared, true, false);
+        }
+        if is_exact {
+            return Found(seen.kth_squared, false, false);
+        }
+        if is_all {
+            // The end of the points.
+            return Found(seen.sure_squared, seen.sure > 0u, false);
+        }
+        let growth = max(sqrt(f32(frame.k) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
+        // What was read bounds the k-radius, but across a depth step only loosely.
+        let upper = select(MOST, kth_radius, seen.kth_squared < MOST);
+        radius = min(upper, 2.0 * radius * growth);
+        window = window_grown(window_of_sphere(center, radius), strip_px);
+        len = window_len(window, task.strip_px);
+        reads += len.y;
+        if len.x > MAX_CANDIDATES || reads + (BATCHES + 1u) * (len.x + len.y) > MOST_READS {
+            break;
+        }
+    }
+    return Found(seen.sure_squared, seen.sure > 0u, true);
+}
+
+// Sums the points up to the squared distance, about the point itself.
+fn moments(center: vec3f, squared: f32) -> Neighborhood {
+    let radius = sqrt(squared);
+    let window = window_of_sphere(center, radius);
+    let strips = window_strips(window, task.strip_px);
+    // The point itself adds nothing but to the count.
+    var sums = Neighborhood(vec3f(0.0), -1.0, vec3f(0.0), radius, vec3f(0.0), 0u);
+    for (var strip = strips.x; strip <= strips.y; strip++) {
+        let run = window_run(window, strip);
+        for (var at = run.x; at < run.y; at++) {
+            let away = points[at].position_view - center;
+            if squared_length(away) <= squared {
+                sums.count += 1.0;
+                sums.offset += away;
+                sums.second_x += away.x * away;
+                sums.second_yz += vec3f(away.y * away.y, away.y * away.z, away.z * away.z);
+            }
+        }
+    }
+    return sums;
+}
+
+@compute @workgroup_size(64)
+fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    if local == 0u {
+        let active_points = atomicLoad(&counters[ACTIVE]);
+        task.first = select(0u, active_points, ROUND == 1u);
+        task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+        task.strip_px = atomicLoad(&counters[STRIP_PX]);
+        task.cell_px = atomicLoad(&counters[CELL_PX]);
+        task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+        atomicStore(&clamped, 0u);
+        atomicStore(&bounded, 0u);
+    }
+    workgroupBarrier();
+    let index = group_index(workgroup) * 64u + local;
+    if index < task.len {
+        let query = queries[task.first + index];
+        let point = points[query];
+        let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
+        let initial_radius = first_radius(density[cell].x, task.cell_px, point.position_view.z);
+        let found = find(point.position_view, initial_radius);
+        neighborhoods[task.first + index] = moments(point.position_view, found.squared);
+        if found.is_clamped {
+            atomicAdd(&clamped, 1u);
+        }
+        if found.is_bounded {
+            atomicAdd(&bounded, 1u);
+        }
+    }
+    workgroupBarrier();
+    if local == 0u {
+        if atomicLoad(&clamped) > 0u {
+            atomicAdd(&counters[CLAMPED], atomicLoad(&clamped));
+        }
+        if atomicLoad(&bounded) > 0u {
+            atomicAdd(&counters[BOUNDED], atomicLoad(&bounded));
+        }
+    }
+}
