@@ -1,0 +1,362 @@
+//! Both backends make the same picture of whatever they are given.
+//!
+//! The GPU may be any that is there, also one that is a program on the processor. Where there is none these tests say that
+//! they check nothing, and where `CI` is set they fail.
+
+#[path = "../src/test_clouds.rs"]
+mod test_clouds;
+
+use autosplats::cloud::glam::DVec3;
+use autosplats::cloud::{FieldValues, PointCloud, Scene};
+use autosplats::{
+    Backend, Background, Camera, ColorMode, Counts, Error, GBuffer, Image, Projection, Reconstruction, Renderer,
+    Settings, Shading, wgpu,
+};
+use test_clouds::EYE;
+
+const SIZE: [u32; 2] = [480, 300];
+
+/// Pixels that may differ by more than two steps of brightness: divisions on a device may be off in the last place, which
+/// moves a few points of ten thousand to the next pixel.
+const UNLIKE: f64 = 1e-3;
+
+fn gpu() -> Option<Renderer> {
+    match Renderer::with_backend(Backend::Gpu) {
+        Ok(renderer) => Some(renderer),
+        Err(error) => {
+            assert!(std::env::var_os("CI").is_none(), "{error}");
+            eprintln!("nothing checked: {error}");
+            None
+        }
+    }
+}
+
+/// A generated scene with its camera.
+fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
+    let (scene, _) = Scene::parse(name).expect("a scene");
+    let view = scene.view();
+    let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
+    let camera = Camera { eye: view.eye, look_at: view.look_at, up: view.up, projection };
+    (scene.sample(count, &|_| true).expect("points"), camera)
+}
+
+/// Part of the pixels that differ by more than two steps in any channel.
+fn unlike(a: &Image, b: &Image) -> f64 {
+    assert_eq!([a.width, a.height], [b.width, b.height], "sizes");
+    let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
+    a.pixels.iter().zip(&b.pixels).filter(differs).count() as f64 / a.pixels.len() as f64
+}
+
+/// Renders on both and compares pictures and counts.
+fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 2], settings: &Settings, case: &str) {
+    let mut cpu = Renderer::new();
+    let host = cpu.render(cloud, camera, size, settings).expect("a picture on the CPU");
+    let device = gpu.render(cloud, camera, size, settings).unwrap_or_else(|error| panic!("{case}: {error}"));
+    let unlike = unlike(host.image, device.image);
+    // One pixel of a small picture is more than a thousandth.
+    let allowed = UNLIKE.max(1.0 / host.image.pixels.len() as f64);
+    assert!(unlike <= allowed, "{case}: {unlike} of the pixels differ");
+    let near = |a: usize, b: usize, name: &str| {
+        assert!(a.abs_diff(b) <= 2 + a / 100, "{case}: {name} {a} on the CPU, {b} on the GPU");
+    };
+    let [a, b] = [host.counts, device.counts];
+    assert_eq!([a.points, a.dropped, a.not_finite], [b.points, b.dropped, b.not_finite], "{case}");
+    assert_eq!([a.behind, a.outside], [b.behind, b.outside], "{case}");
+    near(a.visible, b.visible, "visible");
+    near(a.active, b.active, "active");
+    near(a.passive, b.passive, "passive");
+    near(a.recovered, b.recovered, "recovered");
+    near(a.outliers, b.outliers, "outliers");
+    near(a.clamped, b.clamped, "clamped");
+    near(a.covered, b.covered, "covered");
+    if settings.all_layers {
+        compare_layers(host.layers, device.layers, case);
+    }
+}
+
+/// Coverage, depths, normals and what splats carry agree but for a few pixels.
+fn compare_layers(a: &GBuffer, b: &GBuffer, case: &str) {
+    let [width, height] = [a.width as usize, a.height as usize];
+    let near = |a: f32, b: f32| a.to_bits() == b.to_bits() || (a - b).abs() <= 1e-3 * a.abs().max(1e-2);
+    let pixels = (0..width * height).map(|pixel| a.index(pixel % width, pixel / width));
+    let differing = pixels.filter(|&i| {
+        let normals = (0..3).all(|axis| (a.normal[i][axis] - b.normal[i][axis]).abs() < 1e-2);
+        let colors = a.color.is_empty() || (0..3).all(|axis| (a.color[i][axis] - b.color[i][axis]).abs() < 1e-2);
+        let scalars = a.scalar.is_empty() || near(a.scalar[i], b.scalar[i]);
+        let measures = near(a.radius[i], b.radius[i]) && near(a.k_radius[i], b.k_radius[i]);
+        !(near(a.weight[i], b.weight[i]) && near(a.depth[i], b.depth[i]) && normals && colors && scalars && measures)
+    });
+    let differing = differing.count();
+    assert!(differing as f64 <= 2.0 * UNLIKE * (width * height) as f64 + 1.0, "{case}: {differing} pixels of the layers");
+}
+
+#[test]
+fn comparison_sees_another_picture() {
+    let (cloud, camera) = scene("statue", 20_000);
+    let mut renderer = Renderer::new();
+    let mut image = |splat_scale| {
+        let settings =
+            Settings { reconstruction: Reconstruction { splat_scale, ..Reconstruction::default() }, ..Settings::default() };
+        renderer.render(&cloud, &camera, SIZE, &settings).expect("a picture").image.clone()
+    };
+    assert!(unlike(&image(1.0), &image(1.2)) > 2.0 * UNLIKE, "splats a fifth wider make another picture");
+}
+
+#[test]
+fn every_scene() {
+    let Some(mut gpu) = gpu() else { return };
+    for (name, _) in Scene::names() {
+        for count in [3_000, 150_000] {
+            let (cloud, camera) = scene(name, count);
+            compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), &format!("{name}, {count} points"));
+        }
+    }
+}
+
+#[test]
+fn every_test_cloud_with_both_projections() {
+    let Some(mut gpu) = gpu() else { return };
+    let settings = Settings { all_layers: true, ..Settings::default() };
+    for (name, mut positions) in test_clouds::all(4000) {
+        positions.extend([[f32::NAN, 0.0, 0.0], [f32::INFINITY, 1.0, 0.0], [3e38, 3e38, -3e38]]);
+        let cloud = PointCloud::new(DVec3::ZERO, positions);
+        for projection in [Projection::PerspectiveFovDeg(36.0), Projection::OrthographicHeight(2.4)] {
+            let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+            for size in [[1, 1], [7, 300], [150, 110]] {
+                compare(&mut gpu, &cloud, &camera, size, &settings, &format!("{name} {projection:?} {size:?}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn every_setting() {
+    let Some(mut gpu) = gpu() else { return };
+    let (cloud, camera) = scene("cathedral", 60_000);
+    let usual = Reconstruction::default;
+    let cases = [
+        ("k 1", Reconstruction { k: 1, ..usual() }),
+        ("k 16", Reconstruction { k: 16, ..usual() }),
+        ("k 17", Reconstruction { k: 17, ..usual() }),
+        ("k 64", Reconstruction { k: 64, ..usual() }),
+        ("outliers kept", Reconstruction { outlier_expansions: None, ..usual() }),
+        ("three expansions", Reconstruction { outlier_expansions: Some(3), ..usual() }),
+        ("gaps bridged", Reconstruction { gap_factor: None, ..usual() }),
+        ("small splats", Reconstruction { splat_scale: 0.3, ..usual() }),
+        ("huge splats", Reconstruction { splat_scale: 20.0, ..usual() }),
+        ("ellipses", Reconstruction { ellipses: true, ..usual() }),
+        ("no culling", Reconstruction { grid_culling: false, ..usual() }),
+        ("no refinement", Reconstruction { depth_refinement: false, ..usual() }),
+    ];
+    for (name, reconstruction) in cases {
+        let settings = Settings { reconstruction, ..Settings::default() };
+        compare(&mut gpu, &cloud, &camera, SIZE, &settings, name);
+    }
+}
+
+#[test]
+fn every_colour() {
+    let Some(mut gpu) = gpu() else { return };
+    let (cloud, camera) = scene("figure", 40_000);
+    let values = (0..cloud.len()).map(|i| if i % 7 == 0 { f32::NAN } else { (i % 1000) as f32 }).collect();
+    let classes = (0..cloud.len()).map(|i| (i * 8 / cloud.len()) as u8).collect();
+    let colors = (0..cloud.len()).map(|i| [(i % 251) as u8, (i % 13) as u8 * 19, 128]).collect();
+    let cloud = cloud
+        .with_field("Value", FieldValues::F32(values))
+        .and_then(|cloud| cloud.with_field("Classification", FieldValues::U8(classes)))
+        .and_then(|cloud| cloud.with_colors(colors))
+        .expect("a value each");
+    let modes = [
+        ColorMode::Auto,
+        ColorMode::Rgb,
+        ColorMode::Plain,
+        ColorMode::Height,
+        ColorMode::Classification,
+        ColorMode::Field("Value".into()),
+        ColorMode::Normal,
+        ColorMode::Curvature,
+        ColorMode::Radius,
+        ColorMode::KRadius,
+        ColorMode::Depth,
+    ];
+    for color in modes {
+        for all_layers in [false, true] {
+            let shading = Shading { color: color.clone(), legend: true, ..Shading::default() };
+            let settings = Settings { shading, all_layers, ..Settings::default() };
+            compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("{color:?}, all layers {all_layers}"));
+        }
+    }
+    let backgrounds = [Background::Transparent, Background::Color([10, 200, 30]), Shading::default().background];
+    for background in backgrounds {
+        let shading =
+            Shading { background, lighting: false, eye_dome: 0.0, range: Some([0.0, 1.0]), ..Shading::default() };
+        let settings = Settings { shading, ..Settings::default() };
+        compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("{background:?}"));
+    }
+}
+
+#[test]
+fn the_same_frame_twice_is_the_same_to_the_byte() {
+    let Some(mut gpu) = gpu() else { return };
+    let settings = Settings { all_layers: true, ..Settings::default() };
+    let (cloud, camera) = scene("herd", 200_000);
+    let (other, _) = scene("statue", 50_000);
+    let mut picture = |cloud: &PointCloud| {
+        let frame = gpu.render(cloud, &camera, SIZE, &settings).expect("a picture");
+        let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        (frame.image.pixels.clone(), frame.counts, bits(&frame.layers.depth), bits(&frame.layers.weight))
+    };
+    let first = picture(&cloud);
+    let _another = picture(&other);
+    assert!(first == picture(&cloud), "what was rendered in between leaves no trace");
+}
+
+#[test]
+fn nothing_to_see_is_no_trouble() {
+    let Some(mut gpu) = gpu() else { return };
+    let camera = Camera {
+        eye: EYE,
+        look_at: DVec3::ZERO,
+        up: DVec3::NEG_Y,
+        projection: Projection::PerspectiveFovDeg(36.0),
+    };
+    let settings = Settings { all_layers: true, ..Settings::default() };
+    let clouds = [
+        ("no point", Vec::new()),
+        ("one point", vec![[0.0; 3]]),
+        ("no finite point", vec![[f32::NAN; 3]; 5000]),
+        ("all behind", test_clouds::behind(5000)),
+        ("fewer than k", test_clouds::plane(4)),
+    ];
+    for (name, positions) in clouds {
+        let cloud = PointCloud::new(DVec3::ZERO, positions);
+        compare(&mut gpu, &cloud, &camera, [64, 48], &settings, name);
+    }
+    let bad = Settings { reconstruction: Reconstruction { k: 0, ..Reconstruction::default() }, ..Settings::default() };
+    let cloud = PointCloud::new(DVec3::ZERO, test_clouds::plane(100));
+    let refused = |outcome: Result<Counts, Error>| outcome.expect_err("refused").to_string();
+    let mut counts = |size, settings: &Settings| gpu.render(&cloud, &camera, size, settings).map(|frame| frame.counts);
+    assert!(refused(counts([64, 48], &bad)).contains("k is 0"), "settings are checked");
+    assert!(refused(counts([0, 48], &settings)).contains("image size"), "and sizes");
+    let coloured = Settings { shading: Shading { color: ColorMode::Rgb, ..Shading::default() }, ..Settings::default() };
+    assert!(refused(counts([64, 48], &coloured)).contains("no colours"), "and attributes");
+}
+
+/// A device of the caller's own: no optional feature, and bindings of no more than `binding` bytes.
+fn own_device(binding: u64) -> Option<(wgpu::Device, wgpu::Queue)> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).ok()?;
+    let limits = wgpu::Limits { max_storage_buffer_binding_size: binding, ..wgpu::Limits::default() };
+    let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+    Some(pollster::block_on(adapter.request_device(&descriptor)).expect("a device within WebGPU's default limits"))
+}
+
+#[test]
+fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
+    if gpu().is_none() {
+        return;
+    }
+    let (cloud, camera) = scene("statue", 1_000_000);
+    let (device, queue) = own_device(4 << 20).expect("a device");
+    let mut own = Renderer::with_device(device, queue).expect("a renderer");
+    assert!(!own.adapter().expect("a device").int64_atomics, "the device has no 64-bit atomics");
+    assert!(cloud.len() * 12 > 2 * (4 << 20), "the points take three bindings");
+    compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "three bindings");
+    // And a picture that is too large for the device is refused, not garbage.
+    match own.render(&cloud, &camera, [2000, 2000], &Settings::default()) {
+        Err(Error::DeviceLimit { needed, allowed, .. }) => assert!(needed > allowed, "{needed} {allowed}"),
+        other => panic!("{:?}", other.map(|frame| frame.counts)),
+    }
+    compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
+}
+
+#[test]
+fn clouds_of_any_size_follow_each_other() {
+    let Some(mut gpu) = gpu() else { return };
+    let (whole, camera) = scene("statue", 60_000);
+    for points in [60_000, 30_000, 61, 45_000, 59_000, 2_000] {
+        let mut cloud = whole.clone();
+        cloud.retain(|index| index < points);
+        compare(&mut gpu, &cloud, &camera, [200, 160], &Settings::default(), &format!("{points} points"));
+    }
+    let moved = whole.positions().iter().map(|&[x, y, z]| [x + 0.05, y, z]).collect();
+    let moved = PointCloud::new(whole.origin(), moved);
+    compare(&mut gpu, &moved, &camera, [200, 160], &Settings::default(), "as many points elsewhere");
+}
+
+#[test]
+fn a_callers_texture_gets_the_same_picture() {
+    if gpu().is_none() {
+        return;
+    }
+    let (device, queue) = own_device(128 << 20).expect("a device");
+    let mut renderer = Renderer::with_device(device.clone(), queue.clone()).expect("a renderer");
+    let (cloud, camera) = scene("figure", 50_000);
+    let size = [250, 170];
+    let settings = Settings::default();
+    renderer.upload(&cloud, &settings, &|_| true).expect("an upload");
+    let expected = renderer.render(&cloud, &camera, size, &settings).expect("a picture").image.clone();
+    let texture = |format, usage| {
+        device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    };
+    let both = wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+    for (format, swapped) in [(wgpu::TextureFormat::Rgba8Unorm, false), (wgpu::TextureFormat::Bgra8UnormSrgb, true)] {
+        let texture = texture(format, both);
+        renderer.render_to_texture(&cloud, &camera, &texture, &settings).expect("a picture in a texture");
+        let pixels = read_texture(&device, &queue, &texture, size);
+        let expected = expected.pixels.iter().map(|&[r, g, b, a]| if swapped { [b, g, r, a] } else { [r, g, b, a] });
+        assert!(pixels.into_iter().eq(expected), "{format:?}");
+    }
+    let wrong = [texture(wgpu::TextureFormat::R32Float, both), texture(wgpu::TextureFormat::Rgba8Unorm, both - wgpu::TextureUsages::COPY_DST)];
+    for texture in wrong {
+        let refused = renderer.render_to_texture(&cloud, &camera, &texture, &settings);
+        assert!(refused.is_err(), "{:?} {:?}", texture.format(), texture.usage());
+    }
+    assert!(Renderer::new().render_to_texture(&cloud, &camera, &wrong_backend(&texture), &settings).is_err(), "the CPU has none");
+}
+
+fn wrong_backend(
+    texture: &impl Fn(wgpu::TextureFormat, wgpu::TextureUsages) -> wgpu::Texture,
+) -> wgpu::Texture {
+    texture(wgpu::TextureFormat::Rgba8Unorm, wgpu::TextureUsages::COPY_DST)
+}
+
+fn read_texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture, [width, height]: [u32; 2]) -> Vec<[u8; 4]> {
+    let pitch = (4 * width).next_multiple_of(256);
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: u64::from(pitch * height),
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: None };
+    let to = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), to, texture.size());
+    queue.submit([encoder.finish()]);
+    buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device answers");
+    let bytes = buffer.get_mapped_range(..).expect("mapped");
+    let row = |y: u32| &bytes[(y * pitch) as usize..][..4 * width as usize];
+    (0..height).flat_map(|y| row(y).chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect::<Vec<_>>()).collect()
+}
+
+#[test]
+fn an_upload_can_be_stopped() {
+    let Some(mut gpu) = gpu() else { return };
+    // More than goes at once.
+    let cloud = PointCloud::new(DVec3::ZERO, test_clouds::plane(12_000_000));
+    let stopped = gpu.upload(&cloud, &Settings::default(), &|fraction| fraction < 0.1);
+    assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");
+    let (cloud, camera) = scene("figure", 20_000);
+    compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), "after that");
+}
