@@ -14,6 +14,8 @@ const SHARED: &[(&str, &str)] = &[
     ("screen", include_str!("../shared/screen.wgsl")),
     ("culled", include_str!("../shared/culled.wgsl")),
     ("surfel", include_str!("../shared/surfel.wgsl")),
+    ("range_keys", include_str!("../shared/range_keys.wgsl")),
+    ("shading", include_str!("../shared/shading.wgsl")),
 ];
 
 /// The source of a pass with all it imports.
