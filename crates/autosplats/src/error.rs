@@ -61,6 +61,9 @@ pub enum Error {
     /// The GPU stopped working, by its driver's message; a new renderer may find it working again.
     #[error("GPU: the device was lost: {0}; make a new renderer, or use the CPU backend")]
     DeviceLost(String),
+    /// The texture to render into is none that it can: its message says why.
+    #[error("texture to render into: {0}")]
+    Texture(String),
     /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) asked to stop.
     #[error("cancelled")]
     Cancelled,

@@ -17,6 +17,9 @@ const SHARED: &[(&str, &str)] = &[
     ("eigen", include_str!("../shared/eigen.wgsl")),
     ("window", include_str!("../shared/window.wgsl")),
     ("nearest", include_str!("../shared/nearest.wgsl")),
+    ("layers", include_str!("../shared/layers.wgsl")),
+    ("range_keys", include_str!("../shared/range_keys.wgsl")),
+    ("shading", include_str!("../shared/shading.wgsl")),
 ];
 
 /// The source of a pass with all it imports.

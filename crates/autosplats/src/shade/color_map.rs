@@ -3,7 +3,7 @@
 use super::{ColorMap, linear};
 
 /// Steps of a table: finer than 8 bits a channel can show.
-const STEPS: usize = 1024;
+pub(super) const STEPS: usize = 1024;
 /// Ends and middle of [`ColorMap::Reds`], sRGB.
 const REDS: [[f32; 3]; 4] = [[205.0, 208.0, 212.0], [240.0, 190.0, 130.0], [225.0, 80.0, 50.0], [140.0, 0.0, 20.0]];
 
@@ -15,8 +15,7 @@ pub(super) struct Scale {
 
 impl Scale {
     pub(super) fn new(map: ColorMap, range: [f32; 2]) -> Self {
-        let colors = (0..STEPS).map(|step| color(map, step as f64 / (STEPS - 1) as f64).map(linear)).collect();
-        Self { colors, range }
+        Self { colors: table(map), range }
     }
 
     /// Values at the two ends.
@@ -31,6 +30,11 @@ impl Scale {
         let t = if high > low { (value - low) / (high - low) } else { 0.5 };
         self.colors[(t.clamp(0.0, 1.0) * (STEPS - 1) as f32 + 0.5) as usize]
     }
+}
+
+/// Linear colours of a colour map, from its lower end to the upper.
+pub(super) fn table(map: ColorMap) -> Vec<[f32; 3]> {
+    (0..STEPS).map(|step| color(map, step as f64 / (STEPS - 1) as f64).map(linear)).collect()
 }
 
 /// The sRGB colour, 0 to 1, at `t`, 0 to 1.

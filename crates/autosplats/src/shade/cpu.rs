@@ -9,25 +9,25 @@ use crate::camera::View;
 use crate::splat::GBuffer;
 
 /// One clay tone, linear.
-const CLAY: [f32; 3] = [0.53, 0.50, 0.46];
+pub(super) const CLAY: [f32; 3] = [0.53, 0.50, 0.46];
 /// Direction to the key light in view space (x right, y down, z forward): over the left shoulder.
-const KEY: Vec3 = Vec3::new(-0.47, -0.62, -0.63);
-const KEY_LIGHT: f32 = 0.74;
+pub(super) const KEY: Vec3 = Vec3::new(-0.47, -0.62, -0.63);
+pub(super) const KEY_LIGHT: f32 = 0.74;
 /// How far the key light reaches around to surfaces turned away from it.
-const KEY_WRAP: f32 = 0.15;
+pub(super) const KEY_WRAP: f32 = 0.15;
 /// Direction to the fill light.
-const FILL: Vec3 = Vec3::new(0.80, 0.05, -0.60);
-const FILL_LIGHT: f32 = 0.13;
+pub(super) const FILL: Vec3 = Vec3::new(0.80, 0.05, -0.60);
+pub(super) const FILL_LIGHT: f32 = 0.13;
 /// Light of the sky on surfaces that face down and up.
-const SKY: [f32; 2] = [0.05, 0.18];
+pub(super) const SKY: [f32; 2] = [0.05, 0.18];
 /// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
 /// the lights above, so that a surface seen straight on keeps its colour.
-const SCANNED_LIGHT: [f32; 2] = [0.45, 0.75];
+pub(super) const SCANNED_LIGHT: [f32; 2] = [0.45, 0.75];
 /// Neighbours looked at by eye-dome lighting, in pixels.
-const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
+pub(super) const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 /// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
 /// the 255.
-const ENCODE_STEPS: usize = 1 << 13;
+pub(super) const ENCODE_STEPS: usize = 1 << 13;
 /// Pixels looked at to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
 
@@ -41,6 +41,20 @@ pub(crate) struct Scene<'a> {
     pub(crate) origin: DVec3,
 }
 
+impl Scene<'_> {
+    /// What is missing from the values that shading computes with: heights are told from the cloud's origin, because `f32`
+    /// would not tell near ones apart in survey coordinates.
+    pub(super) fn value_offset(&self, mode: &ColorMode) -> f64 {
+        if *mode == ColorMode::Height { self.origin.dot(self.up) } else { 0.0 }
+    }
+
+    /// The range that was asked for, in values that shading computes with.
+    pub(super) fn given_range(&self, shading: &Shading) -> Option<[f32; 2]> {
+        let offset = self.value_offset(&shading.color);
+        shading.range.map(|range| range.map(|end| (f64::from(end) - offset) as f32))
+    }
+}
+
 /// Shades `layers` into `image`; also in linear light if `keep_linear`.
 pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep_linear: bool, image: &mut Image) {
     let [width, height] = [layers.width as usize, layers.height as usize];
@@ -48,8 +62,8 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep
     image.height = layers.height;
     image.pixels.resize(width * height, [0; 4]);
     let shader = Shader::new(layers, scene, shading);
-    let encode = encode_table();
-    let encode = |channel: f32| encode[(channel.clamp(0.0, 1.0) * ENCODE_STEPS as f32 + 0.5) as usize];
+    let table = encode_table();
+    let encode = |channel| encode(&table, channel);
     image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         let background = background(shading.background, (y as f32 + 0.5) / height as f32);
         for (x, out) in row.iter_mut().enumerate() {
@@ -68,23 +82,23 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep
         pixels.map(|at| shader.pixel(at % width, at / width).unwrap_or_default()).collect_into_vec(&mut image.linear);
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
-        legend::draw(image, &title(&shading.color), scale, encode);
+        legend::draw(image, &title(&shading.color), scale, scene.value_offset(&shading.color), encode);
     }
 }
 
-struct Shader<'a> {
+pub(super) struct Shader<'a> {
     layers: &'a GBuffer,
     scene: &'a Scene<'a>,
     shading: &'a Shading,
     /// For colour modes that are a value.
-    scale: Option<Scale>,
+    pub(super) scale: Option<Scale>,
 }
 
 impl<'a> Shader<'a> {
-    fn new(layers: &'a GBuffer, scene: &'a Scene<'a>, shading: &'a Shading) -> Self {
+    pub(super) fn new(layers: &'a GBuffer, scene: &'a Scene<'a>, shading: &'a Shading) -> Self {
         let mut shader = Self { layers, scene, shading, scale: None };
         if let Some(map) = usual_map(&shading.color) {
-            let range = shading.range.unwrap_or_else(|| shader.usual_range());
+            let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
             shader.scale = Some(Scale::new(shading.color_map.unwrap_or(map), range));
         }
         shader
@@ -111,7 +125,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The value that a colour mode shows at a pixel.
+    /// The value that a colour mode shows at a pixel, but for [`Scene::value_offset`].
     fn value(&self, x: usize, y: usize, index: usize) -> f32 {
         let layers = self.layers;
         match self.shading.color {
@@ -119,7 +133,7 @@ impl<'a> Shader<'a> {
                 let view = self.scene.view;
                 let position = view.unproject([x as f32 + 0.5, y as f32 + 0.5], layers.depth[index]);
                 let local = view.view_from_world.transpose() * position + view.eye_local;
-                (local.as_dvec3() + self.scene.origin).dot(self.scene.up) as f32
+                local.as_dvec3().dot(self.scene.up) as f32
             }
             ColorMode::Curvature => layers.curvature[index],
             ColorMode::Radius => layers.radius[index],
@@ -132,7 +146,7 @@ impl<'a> Shader<'a> {
     /// The 1st and 99th percentile of the values in the picture.
     fn usual_range(&self) -> [f32; 2] {
         let [width, height] = [self.layers.width as usize, self.layers.height as usize];
-        let step = (width * height).div_ceil(RANGE_SAMPLES).max(1);
+        let step = sample_step(width * height);
         let samples = (0..width * height).step_by(step).map(|pixel| (pixel % width, pixel / width));
         let covered =
             samples.map(|(x, y)| (x, y, self.layers.index(x, y))).filter(|&(.., i)| self.layers.weight[i] > 0.0);
@@ -184,8 +198,13 @@ impl<'a> Shader<'a> {
     }
 }
 
+/// Every how many of a picture's pixels is looked at to find the usual range.
+pub(super) fn sample_step(pixels: usize) -> usize {
+    pixels.div_ceil(RANGE_SAMPLES).max(1)
+}
+
 /// The colour map that suits a colour mode, if the mode is a value.
-fn usual_map(mode: &ColorMode) -> Option<ColorMap> {
+pub(super) fn usual_map(mode: &ColorMode) -> Option<ColorMap> {
     match mode {
         ColorMode::Height | ColorMode::Depth => Some(ColorMap::Viridis),
         ColorMode::Field(name) if name.eq_ignore_ascii_case("intensity") => Some(ColorMap::Gray),
@@ -196,7 +215,7 @@ fn usual_map(mode: &ColorMode) -> Option<ColorMap> {
 }
 
 /// What a legend calls a colour mode.
-fn title(mode: &ColorMode) -> String {
+pub(super) fn title(mode: &ColorMode) -> String {
     match mode {
         ColorMode::Field(name) => name.clone(),
         ColorMode::KRadius => "k-radius".into(),
@@ -205,7 +224,7 @@ fn title(mode: &ColorMode) -> String {
 }
 
 /// The background at height `t` of the picture, 0 at the top to 1 at the bottom.
-fn background(background: Background, t: f32) -> [u8; 4] {
+pub(super) fn background(background: Background, t: f32) -> [u8; 4] {
     match background {
         Background::Transparent => [0; 4],
         Background::Color([r, g, b]) => [r, g, b, 255],
@@ -219,6 +238,12 @@ fn background(background: Background, t: f32) -> [u8; 4] {
     }
 }
 
-fn encode_table() -> Vec<u8> {
+/// The sRGB channel of a linear one.
+pub(super) fn encode(table: &[u8], channel: f32) -> u8 {
+    table[(channel.clamp(0.0, 1.0) * ENCODE_STEPS as f32 + 0.5) as usize]
+}
+
+/// 8-bit sRGB channels of linear ones from 0 to 1.
+pub(super) fn encode_table() -> Vec<u8> {
     (0..=ENCODE_STEPS).map(|step| (srgb(step as f32 / ENCODE_STEPS as f32) * 255.0).round() as u8).collect()
 }

@@ -12,15 +12,15 @@ const GLYPH: usize = 8;
 const INK: [u8; 4] = [240, 240, 240, 255];
 const SHADE: [u8; 4] = [24, 26, 30, 255];
 
-/// Draws the legend at the right edge; in a picture too small for one, nothing.
-pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, encode: impl Fn(f32) -> u8) {
+/// Draws the legend at the right edge; in a picture too small for one, nothing. `offset` is added to the values of the scale.
+pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
     let [width, height] = [image.width as usize, image.height as usize];
     // One font pixel is this many picture pixels.
     let unit = (height / 400).max(1);
     let line = (GLYPH + 4) * unit;
     let [low, high] = scale.range();
-    let labels: Vec<String> =
-        (0..LABELS).map(|i| number(high + (low - high) * i as f32 / (LABELS - 1) as f32, high - low)).collect();
+    let value = |i: usize| high + (low - high) * i as f32 / (LABELS - 1) as f32;
+    let labels: Vec<String> = (0..LABELS).map(|i| number((f64::from(value(i)) + offset) as f32, high - low)).collect();
     let text_width = labels.iter().map(String::len).chain([title.chars().count()]).max().unwrap_or(0) * GLYPH * unit;
     let bar_width = 14 * unit;
     let panel_width = bar_width + text_width + 5 * line / 2;

@@ -10,6 +10,7 @@
 mod classes;
 mod color_map;
 mod cpu;
+pub(crate) mod gpu;
 mod legend;
 mod settings;
 #[cfg(test)]

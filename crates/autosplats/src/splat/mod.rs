@@ -14,6 +14,7 @@
 mod attributes;
 mod bins;
 mod cpu;
+mod layers;
 mod raster;
 mod setup;
 #[cfg(test)]
@@ -22,6 +23,9 @@ mod trim;
 
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;
+#[cfg(test)]
+pub(crate) use layers::upload_layers;
+pub(crate) use layers::{Channels, LayerBuffers};
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
 pub const TILE: usize = 64;

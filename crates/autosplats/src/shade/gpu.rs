@@ -1,0 +1,150 @@
+//! Shading on the GPU: one pass, and two before it where the range of values is to be found.
+
+mod finish;
+mod texture;
+mod uniform;
+
+pub(crate) use finish::{ReadPicture, finish};
+pub(crate) use texture::check_texture;
+pub(crate) use uniform::{ShadeUniform, finds_range};
+
+use super::color_map::{self, table};
+use super::cpu::{ENCODE_STEPS, background, encode_table, sample_step, usual_map};
+use super::{Background, ColorMap, Shading};
+use crate::Error;
+use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::splat::LayerBuffers;
+
+pub(crate) const PASSES: &[PassSource] = &[RANGE_VALUES, RANGE, SHADE];
+const RANGE_VALUES: PassSource = PassSource::new("shade/range_values", include_str!("range_values.wgsl"));
+const RANGE: PassSource = PassSource::new("shade/range", include_str!("range.wgsl"));
+const SHADE: PassSource = PassSource::new("shade/shade", include_str!("shade.wgsl"));
+
+/// Invocations in a workgroup of `range_values`.
+const GROUP: u32 = 256;
+/// Pixels that a workgroup of `shade` colours.
+const SHADE_GROUP: [u32; 2] = [32, 8];
+/// Keys that `range` reads at a time.
+const KEYS: usize = 4096;
+/// Rows of the image begin at multiples of so many pixels: textures are copied in rows of 256 bytes.
+const ROW_PIXELS: u32 = 64;
+
+/// Pixels from one row of the image to the next.
+pub(crate) const fn pitch(width: u32) -> u32 {
+    width.next_multiple_of(ROW_PIXELS)
+}
+
+/// Words that the table from linear to sRGB takes.
+const fn encode_words() -> usize {
+    (ENCODE_STEPS + 1).div_ceil(4)
+}
+
+/// A picture on the device, and what it takes to shade it.
+#[derive(Debug)]
+pub(crate) struct ShadeBuffers {
+    pub(crate) size: [u32; 2],
+    uniform: wgpu::Buffer,
+    /// Keys of the values among which the range is found.
+    keys: wgpu::Buffer,
+    /// Linear colours, a `vec4f` a step.
+    color_map: wgpu::Buffer,
+    /// The table from linear to sRGB, then the background of each row.
+    tables: wgpu::Buffer,
+    /// RGBA per pixel, 8 bits a channel, rows [`pitch`] apart.
+    pub(crate) image: wgpu::Buffer,
+    /// `vec4f` per pixel, rows from the top without gaps: linear light before any rounding. One element if not wanted.
+    pub(crate) linear: wgpu::Buffer,
+    /// What [`color_map`](Self::color_map) and [`tables`](Self::tables) hold.
+    map_held: Option<ColorMap>,
+    background_held: Option<Background>,
+}
+
+impl ShadeBuffers {
+    /// Room for a picture of `size`; also in linear light if `keep_linear`.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], keep_linear: bool) -> Result<Self, Error> {
+        let [width, height] = size.map(|side| side as usize);
+        let pixels = width * height;
+        let samples = pixels.div_ceil(sample_step(pixels));
+        let tables = gpu.storage::<u32>("tables of shading", encode_words() + height)?;
+        let mut encode = encode_table();
+        encode.resize(4 * encode_words(), 0);
+        gpu.queue.write_buffer(&tables, 0, &encode);
+        Ok(Self {
+            size,
+            uniform: gpu.uniform::<ShadeUniform>("shading")?,
+            keys: gpu.storage::<u32>("keys of values", samples.next_multiple_of(KEYS))?,
+            color_map: gpu.storage::<[f32; 4]>("colour map", color_map::STEPS)?,
+            tables,
+            image: gpu.storage::<u32>("image", pitch(size[0]) as usize * height)?,
+            linear: gpu.storage::<[f32; 4]>("image in linear light", if keep_linear { pixels } else { 1 })?,
+            map_held: None,
+            background_held: None,
+        })
+    }
+
+    /// Tells the passes of the next frame what to do.
+    pub(crate) fn write(&mut self, gpu: &Gpu, uniform: &ShadeUniform, shading: &Shading) {
+        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(uniform));
+        let map = usual_map(&shading.color).map(|usual| shading.color_map.unwrap_or(usual));
+        if let Some(map) = map.filter(|map| self.map_held.replace(*map) != Some(*map)) {
+            let colors: Vec<_> = table(map).iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
+            gpu.queue.write_buffer(&self.color_map, 0, bytemuck::cast_slice(&colors));
+        }
+        if self.background_held.replace(shading.background) != Some(shading.background) {
+            let height = self.size[1];
+            let row = |y| background(shading.background, (y as f32 + 0.5) / height as f32);
+            let rows: Vec<[u8; 4]> = (0..height).map(row).collect();
+            gpu.queue.write_buffer(&self.tables, 4 * encode_words() as u64, bytemuck::cast_slice(&rows));
+        }
+    }
+}
+
+/// The passes of shading.
+#[derive(Debug)]
+pub(crate) struct ShadePasses {
+    range_values: Pass,
+    range: Pass,
+    shade: Pass,
+}
+
+impl ShadePasses {
+    /// Compiles them.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
+        Ok(Self { range_values: pass(&RANGE_VALUES)?, range: pass(&RANGE)?, shade: pass(&SHADE)? })
+    }
+
+    /// Shades `layers` into `buffers`, as [`ShadeBuffers::write`] says; `find_range` if [`finds_range`]. The range goes
+    /// into `counters`.
+    pub(crate) fn steps(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        layers: &LayerBuffers,
+        counters: &wgpu::Buffer,
+        buffers: &ShadeBuffers,
+        find_range: bool,
+    ) -> Vec<Step> {
+        let LayerBuffers { surface, cover, extras, .. } = layers;
+        let ShadeBuffers { uniform, keys, color_map, tables, image, linear, .. } = buffers;
+        let mut steps = Vec::new();
+        if find_range {
+            let groups = (keys.size() / 4) as u32 / GROUP;
+            steps.push(self.range_values.step(gpu, &[frame, uniform, surface, cover, extras, keys], groups));
+            steps.push(self.range.step(gpu, &[frame, keys, counters], 1));
+        }
+        let shade = [frame, uniform, surface, cover, extras, counters, color_map, tables, image, linear];
+        let [columns, rows] = [0, 1].map(|axis| buffers.size[axis].div_ceil(SHADE_GROUP[axis]));
+        steps.push(self.shade.step(gpu, &shade, columns * rows));
+        steps
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

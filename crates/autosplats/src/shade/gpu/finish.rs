@@ -1,0 +1,43 @@
+//! What is left to do on the host for a picture in memory.
+
+use rayon::prelude::*;
+
+use super::super::color_map::Scale;
+use super::super::cpu::{Scene, encode, encode_table, title, usual_map};
+use super::super::{Image, Shading, legend};
+use super::pitch;
+
+/// A picture as it was read back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReadPicture<'a> {
+    pub(crate) size: [u32; 2],
+    /// Bytes of [`ShadeBuffers::image`](super::ShadeBuffers::image).
+    pub(crate) image: &'a [u8],
+    /// Bytes of [`ShadeBuffers::linear`](super::ShadeBuffers::linear); none if it was not wanted.
+    pub(crate) linear: &'a [u8],
+    /// The counters `RangeLow` and `RangeHigh`: looked at if the range was to be found.
+    pub(crate) range: [u32; 2],
+}
+
+/// Brings a picture into the host's form and draws its legend.
+pub(crate) fn finish(read: &ReadPicture<'_>, scene: &Scene<'_>, shading: &Shading, image: &mut Image) {
+    let [width, height] = read.size;
+    image.width = width;
+    image.height = height;
+    image.pixels.resize(width as usize * height as usize, [0; 4]);
+    let rows = read.image.par_chunks(4 * pitch(width) as usize);
+    image.pixels.par_chunks_mut(width as usize).zip(rows).for_each(|(pixels, row)| {
+        bytemuck::cast_slice_mut(pixels).copy_from_slice(&row[..4 * width as usize]);
+    });
+    let linear = read.linear.par_chunks_exact(size_of::<[f32; 4]>());
+    linear
+        .map(|bytes| bytemuck::pod_read_unaligned(&bytes[..size_of::<[f32; 3]>()]))
+        .collect_into_vec(&mut image.linear);
+    if let (true, Some(map)) = (shading.legend, usual_map(&shading.color)) {
+        let range = scene.given_range(shading).unwrap_or_else(|| read.range.map(f32::from_bits));
+        let scale = Scale::new(shading.color_map.unwrap_or(map), range);
+        let table = encode_table();
+        let offset = scene.value_offset(&shading.color);
+        legend::draw(image, &title(&shading.color), &scale, offset, |channel| encode(&table, channel));
+    }
+}

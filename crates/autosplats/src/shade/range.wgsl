@@ -1,0 +1,127 @@
+// Finds the usual range of the listed values, their 1st and 99th percentile, as exactly as sorting would.
+//
+// Reads: keys. Writes: counters. One workgroup.
+// Both are found a byte at a time: how many keys that begin like the one wanted go on with each of the 256 bytes says
+// which comes next.
+
+#import frame
+#import counters
+#import range_keys
+
+// A multiple of 1024 of vectors, filled up with NO_KEY.
+@group(0) @binding(1) var<storage, read> keys: array<vec4u>;
+@group(0) @binding(2) var<storage, read_write> counters: array<u32>;
+
+// Keys by their next byte: those that begin like the lower end, then those that begin like the upper one.
+var<workgroup> bins: array<atomic<u32>, 512>;
+// Keys in all bins up to each, for both ends; in two copies, one written while the other is read.
+var<workgroup> upto: array<vec2u, 512>;
+// What is known of the two keys, and their ranks among those that begin alike.
+var<workgroup> found: vec2u;
+var<workgroup> ranks: vec2u;
+
+// Keys one after the other that are equal as far as looked at.
+struct Run {
+    key: u32,
+    count: u32,
+}
+
+// What the round looks for: where its byte begins, what goes before in the two keys, and whether that is the same.
+struct Round {
+    shift: u32,
+    begins: vec2u,
+    alike: bool,
+}
+
+fn count_run(run: Run, round: Round) {
+    // Twice, because the width of the type is no shift.
+    let begin = (run.key >> round.shift) >> 8u;
+    let bin = (run.key >> round.shift) & 255u;
+    if begin == round.begins.x {
+        atomicAdd(&bins[bin], run.count);
+    }
+    if begin == round.begins.y && !round.alike {
+        atomicAdd(&bins[256u + bin], run.count);
+    }
+}
+
+fn extend(run: Run, key: u32, round: Round) -> Run {
+    if key == NO_KEY {
+        return run;
+    }
+    if run.count > 0u && (key >> round.shift) == (run.key >> round.shift) {
+        return Run(run.key, run.count + 1u);
+    }
+    count_run(run, round);
+    return Run(key, 1u);
+}
+
+fn extend_by_four(run: Run, four: vec4u, round: Round) -> Run {
+    return extend(extend(extend(extend(run, four.x, round), four.y, round), four.z, round), four.w, round);
+}
+
+@compute @workgroup_size(256)
+fn range(@builtin(local_invocation_index) local: u32) {
+    let strides = arrayLength(&keys) / 1024u;
+    var begins = vec2u(0u);
+    for (var byte = 0u; byte < 4u; byte++) {
+        let round = Round(24u - 8u * byte, begins, begins.x == begins.y);
+        atomicStore(&bins[local], 0u);
+        atomicStore(&bins[256u + local], 0u);
+        workgroupBarrier();
+        // First bytes of neighbours are mostly equal: they are counted together, or all would wait for one bin.
+        var run = Run(0u, 0u);
+        for (var stride = 0u; stride < strides; stride++) {
+            // Sixteen keys are on their way at a time.
+            let first = stride * 1024u + local;
+            let a = keys[first];
+            let b = keys[first + 256u];
+            let c = keys[first + 512u];
+            let d = keys[first + 768u];
+            run = extend_by_four(extend_by_four(run, a, round), b, round);
+            run = extend_by_four(extend_by_four(run, c, round), d, round);
+        }
+        count_run(run, round);
+        workgroupBarrier();
+
+        let own = vec2u(atomicLoad(&bins[local]), atomicLoad(&bins[select(256u, 0u, round.alike) + local]));
+        upto[local] = own;
+        workgroupBarrier();
+        var copy = 0u;
+        for (var reach = 1u; reach < 256u; reach *= 2u) {
+            var sum = upto[copy + local];
+            if local >= reach {
+                sum += upto[copy + local - reach];
+            }
+            copy = 256u - copy;
+            upto[copy + local] = sum;
+            workgroupBarrier();
+        }
+        if byte == 0u && local == 0u {
+            // A hundredth of the values is left out at each end.
+            found = vec2u(0u);
+            let total = upto[copy + 255u].x;
+            ranks = vec2u(total / 100u, total - 1u - total / 100u);
+        }
+        workgroupBarrier();
+        let rank = ranks;
+        let end = upto[copy + local];
+        let before = end - own;
+        workgroupBarrier();
+        if rank.x >= before.x && rank.x < end.x {
+            found.x = (begins.x << 8u) | local;
+            ranks.x = rank.x - before.x;
+        }
+        if rank.y >= before.y && rank.y < end.y {
+            found.y = (begins.y << 8u) | local;
+            ranks.y = rank.y - before.y;
+        }
+        workgroupBarrier();
+        begins = found;
+    }
+    if local == 0u {
+        let any = upto[255].x > 0u;
+        counters[RANGE_LOW] = select(bitcast<u32>(0.0), key_bits(begins.x), any);
+        counters[RANGE_HIGH] = select(bitcast<u32>(1.0), key_bits(begins.y), any);
+    }
+}

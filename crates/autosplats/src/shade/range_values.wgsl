@@ -1,0 +1,32 @@
+// Lists the values of every some pixels as keys that order as the values do, for the usual range to be found among them.
+//
+// Reads: surface, cover, extras. Writes: keys.
+
+#import frame
+#import groups
+#import range_keys
+#import layers
+#import shading
+
+@group(0) @binding(2) var<storage, read> surface: array<vec4f>;
+@group(0) @binding(3) var<storage, read> cover: array<Cover>;
+@group(0) @binding(4) var<storage, read> extras: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> keys: array<u32>;
+
+@compute @workgroup_size(256)
+fn range_values(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let sample = group_index(workgroup) * 256u + local;
+    if sample >= arrayLength(&keys) {
+        return;
+    }
+    var key = NO_KEY;
+    if sample < shading.samples {
+        let index = sample * shading.sample_step;
+        let depth = surface[index].w;
+        let value = shown_value(vec2u(index % frame.size.x, index / frame.size.x), index, depth);
+        if is_covered(depth) && is_finite(value) {
+            key = value_key(value);
+        }
+    }
+    keys[sample] = key;
+}
