@@ -90,13 +90,16 @@ pub(super) struct Shader<'a> {
     layers: &'a GBuffer,
     scene: &'a Scene<'a>,
     shading: &'a Shading,
+    /// Whether the layer of colours is shown, which may be there though something else is.
+    colored: bool,
     /// For colour modes that are a value.
     pub(super) scale: Option<Scale>,
 }
 
 impl<'a> Shader<'a> {
     pub(super) fn new(layers: &'a GBuffer, scene: &'a Scene<'a>, shading: &'a Shading) -> Self {
-        let mut shader = Self { layers, scene, shading, scale: None };
+        let colored = shows_colors(&shading.color) && !layers.color.is_empty();
+        let mut shader = Self { layers, scene, shading, colored, scale: None };
         if let Some(map) = usual_map(&shading.color) {
             let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
             shader.scale = Some(Scale::new(shading.color_map.unwrap_or(map), range));
@@ -121,7 +124,8 @@ impl<'a> Shader<'a> {
             None if self.shading.color == ColorMode::Normal => {
                 self.world_normal(index).to_array().map(|component| linear(0.5 + 0.5 * component))
             }
-            None => self.layers.color.get(index).copied().unwrap_or(CLAY),
+            None if self.colored => self.layers.color[index],
+            None => CLAY,
         }
     }
 
@@ -170,7 +174,7 @@ impl<'a> Shader<'a> {
         let fill = normal.dot(FILL).max(0.0);
         let sky = SKY[0] + (SKY[1] - SKY[0]) * (0.5 - 0.5 * normal.y);
         let light = KEY_LIGHT * key + FILL_LIGHT * fill + sky;
-        let [base, share] = if self.layers.color.is_empty() { [0.0, 1.0] } else { SCANNED_LIGHT };
+        let [base, share] = if self.colored { SCANNED_LIGHT } else { [0.0, 1.0] };
         base + share * light
     }
 
@@ -201,6 +205,11 @@ impl<'a> Shader<'a> {
 /// Every how many of a picture's pixels is looked at to find the usual range.
 pub(super) fn sample_step(pixels: usize) -> usize {
     pixels.div_ceil(RANGE_SAMPLES).max(1)
+}
+
+/// Whether a colour mode shows the colours of points, where they have any.
+pub(super) fn shows_colors(mode: &ColorMode) -> bool {
+    matches!(mode, ColorMode::Auto | ColorMode::Rgb | ColorMode::Classification)
 }
 
 /// The colour map that suits a colour mode, if the mode is a value.

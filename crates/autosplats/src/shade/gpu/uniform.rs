@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::super::cpu::{
     CLAY, ENCODE_STEPS, EYE_DOME, FILL, FILL_LIGHT, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SKY, Scene, sample_step,
-    usual_map,
+    shows_colors, usual_map,
 };
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
@@ -35,14 +35,8 @@ impl Shown {
             ColorMode::Curvature => Self::Curvature,
             ColorMode::Field(_) => Self::Scalar,
             ColorMode::Normal => Self::Normal,
-            // Whether points have colours, and of what, was decided before they were splatted.
-            ColorMode::Auto | ColorMode::Rgb | ColorMode::Plain | ColorMode::Classification => {
-                if layers.color {
-                    Self::Color
-                } else {
-                    Self::Clay
-                }
-            }
+            mode if shows_colors(mode) && layers.color => Self::Color,
+            ColorMode::Plain | ColorMode::Auto | ColorMode::Rgb | ColorMode::Classification => Self::Clay,
         }
     }
 }
@@ -88,6 +82,7 @@ impl ShadeUniform {
         let [width, height] = layers.size;
         let pixels = width as usize * height as usize;
         let step = sample_step(pixels);
+        let shown = Shown::new(&shading.color, layers.channels);
         Self {
             key: KEY.to_array(),
             key_light: KEY_LIGHT,
@@ -98,10 +93,10 @@ impl ShadeUniform {
             up: scene.up.as_vec3().to_array(),
             eye_dome: shading.eye_dome,
             sky: SKY,
-            scanned_light: if layers.channels.color { SCANNED_LIGHT } else { [0.0, 1.0] },
+            scanned_light: if shown == Shown::Color { SCANNED_LIGHT } else { [0.0, 1.0] },
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
-            shown: Shown::new(&shading.color, layers.channels) as u32,
+            shown: shown as u32,
             lighting: shading.lighting.into(),
             keep_linear: keep_linear.into(),
             swap_red_blue: 0,
