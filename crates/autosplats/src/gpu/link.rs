@@ -14,6 +14,10 @@ const SHARED: &[(&str, &str)] = &[
     ("screen", include_str!("../shared/screen.wgsl")),
     ("culled", include_str!("../shared/culled.wgsl")),
     ("surfel", include_str!("../shared/surfel.wgsl")),
+    ("hidden", include_str!("../shared/hidden.wgsl")),
+    ("splat", include_str!("../shared/splat.wgsl")),
+    ("patch", include_str!("../shared/patch.wgsl")),
+    ("layers", include_str!("../shared/layers.wgsl")),
 ];
 
 /// The source of a pass with all it imports.

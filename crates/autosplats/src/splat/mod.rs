@@ -14,6 +14,8 @@
 mod attributes;
 mod bins;
 mod cpu;
+pub(crate) mod gpu;
+mod layers;
 mod raster;
 mod setup;
 #[cfg(test)]
@@ -22,6 +24,7 @@ mod trim;
 
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;
+pub(crate) use layers::{Channels, LayerBuffers};
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
 pub const TILE: usize = 64;

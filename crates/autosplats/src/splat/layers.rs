@@ -1,0 +1,100 @@
+//! Layers on the device, and how they become the host's.
+
+use super::{GBuffer, TILE_AREA, tile_columns, tiled_index};
+use crate::Error;
+use crate::gpu::Gpu;
+
+/// What splats carry beside depth and normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Channels {
+    pub(crate) color: bool,
+    pub(crate) scalar: bool,
+    /// Splat radius, k-radius and curvature.
+    pub(crate) measures: bool,
+}
+
+/// [`GBuffer`] on the device, row by row.
+#[derive(Debug)]
+pub(crate) struct LayerBuffers {
+    size: [u32; 2],
+    channels: Channels,
+    /// Normal and depth, four `f32` per pixel.
+    pub(crate) surface: wgpu::Buffer,
+    /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`.
+    pub(crate) cover: wgpu::Buffer,
+    /// A plane per channel, one after the other, four `f32` per pixel: if there are colours, linear RGB; if there are
+    /// measures, splat radius, k-radius and curvature. One element if there are neither.
+    pub(crate) extras: wgpu::Buffer,
+}
+
+/// `Cover` in `shared/layers.wgsl`.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+struct Cover {
+    weight: f32,
+    rim: f32,
+    point: u32,
+    scalar: f32,
+}
+
+impl LayerBuffers {
+    /// Room for a picture of `size`.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], channels: Channels) -> Result<Self, Error> {
+        let pixels = size[0] as usize * size[1] as usize;
+        let planes = usize::from(channels.color) + usize::from(channels.measures);
+        Ok(Self {
+            size,
+            channels,
+            surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
+            cover: gpu.storage::<Cover>("cover of pixels", pixels)?,
+            extras: gpu.storage::<[f32; 4]>("colours and measures", planes * pixels)?,
+        })
+    }
+
+    /// The host's form of the layers: what was read back of `surface`, `cover` and `extras`.
+    pub(crate) fn to_host(&self, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
+        let [width, height] = self.size.map(|side| side as usize);
+        let Channels { color, scalar, measures } = self.channels;
+        let area = tile_columns(width) * tile_columns(height) * TILE_AREA;
+        let wanted = |wanted: bool| if wanted { area } else { 0 };
+        let mut layers = GBuffer {
+            width: self.size[0],
+            height: self.size[1],
+            weight: vec![0.0; area],
+            depth: vec![f32::INFINITY; area],
+            normal: vec![[0.0; 3]; area],
+            point: vec![u32::MAX; area],
+            color: vec![[0.0; 3]; wanted(color)],
+            scalar: vec![f32::NAN; wanted(scalar)],
+            radius: vec![0.0; wanted(measures)],
+            k_radius: vec![0.0; wanted(measures)],
+            curvature: vec![0.0; wanted(measures)],
+        };
+        let surface: &[[f32; 4]] = bytemuck::cast_slice(surface);
+        let cover: &[Cover] = bytemuck::cast_slice(cover);
+        let extras: &[[f32; 4]] = bytemuck::cast_slice(extras);
+        let pixels = width * height;
+        let (colors, extras) = extras.split_at(if color { pixels } else { 0 });
+        for (pixel, (&[x, y, z, depth], cover)) in surface[..pixels].iter().zip(cover).enumerate() {
+            let at = tiled_index(width, pixel % width, pixel / width);
+            layers.weight[at] = cover.weight;
+            layers.depth[at] = depth;
+            layers.normal[at] = [x, y, z];
+            layers.point[at] = cover.point;
+            if color {
+                let [r, g, b, _] = colors[pixel];
+                layers.color[at] = [r, g, b];
+            }
+            if scalar {
+                layers.scalar[at] = cover.scalar;
+            }
+            if measures {
+                [layers.radius[at], layers.k_radius[at], layers.curvature[at], _] = extras[pixel];
+            }
+        }
+        layers
+    }
+}
