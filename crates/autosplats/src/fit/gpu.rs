@@ -7,6 +7,7 @@ use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::ScreenBuffers;
 
+#[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[FIT];
 const FIT: PassSource = PassSource::new("fit/fit", include_str!("fit.wgsl"));
 

@@ -20,6 +20,9 @@ const SHARED: &[(&str, &str)] = &[
     ("layers", include_str!("../shared/layers.wgsl")),
     ("range_keys", include_str!("../shared/range_keys.wgsl")),
     ("shading", include_str!("../shared/shading.wgsl")),
+    ("hidden", include_str!("../shared/hidden.wgsl")),
+    ("splat", include_str!("../shared/splat.wgsl")),
+    ("patch", include_str!("../shared/patch.wgsl")),
 ];
 
 /// The source of a pass with all it imports.

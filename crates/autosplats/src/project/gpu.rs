@@ -6,6 +6,7 @@ use super::device_cloud::DeviceCloud;
 use crate::Error;
 use crate::gpu::{Gpu, INT64_ATOMICS, Pass, PassSource, Step};
 
+#[cfg(test)]
 pub(crate) const PASSES: &[PassSource] =
     &[CLEAR, PROJECT, PROJECT_DEPTH, PROJECT_INDEX, OCCUPANCY, GRID, COUNT, SCAN, COMPACT, GATHER, SPLIT_COUNT, SPLIT];
 const CLEAR: PassSource = PassSource::new("project/clear", include_str!("clear.wgsl"));
@@ -29,7 +30,7 @@ pub(crate) const BLOCK: u32 = 2048;
 
 /// Indices into [`ScreenBuffers::counters`], as `shared/counters.wgsl` has them.
 #[derive(Clone, Copy, Debug)]
-#[allow(missing_docs, reason = "the shader says it")]
+#[allow(dead_code, reason = "those that only the device uses have their place all the same")]
 pub(crate) enum Counter {
     NotFinite,
     Behind,

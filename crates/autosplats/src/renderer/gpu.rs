@@ -10,7 +10,7 @@ use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
-use crate::project::gpu::{COUNTERS, Counter, ProjectPasses, ScreenBuffers};
+use crate::project::gpu::{Counter, ProjectPasses, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
 use crate::search::screen_grid::gpu::{SearchPasses, neighborhood_buffer};
 use crate::search::{SearchEngine, SearchRules};

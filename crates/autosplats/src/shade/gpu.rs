@@ -15,6 +15,7 @@ use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::splat::LayerBuffers;
 
+#[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[RANGE_VALUES, RANGE, SHADE];
 const RANGE_VALUES: PassSource = PassSource::new("shade/range_values", include_str!("range_values.wgsl"));
 const RANGE: PassSource = PassSource::new("shade/range", include_str!("range.wgsl"));

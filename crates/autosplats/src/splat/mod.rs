@@ -14,6 +14,7 @@
 mod attributes;
 mod bins;
 mod cpu;
+pub(crate) mod gpu;
 mod layers;
 mod raster;
 mod setup;

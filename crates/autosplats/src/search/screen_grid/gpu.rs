@@ -7,6 +7,7 @@ use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::ScreenBuffers;
 use crate::search::MAX_CANDIDATES;
 
+#[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH];
 const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_str!("search.wgsl"));
 
