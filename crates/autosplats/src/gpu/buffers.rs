@@ -47,6 +47,19 @@ impl Gpu {
     }
 }
 
+#[cfg(test)]
+impl Gpu {
+    /// A storage buffer with these values: for tests.
+    ///
+    /// # Errors
+    /// Those of [`storage`](Self::storage).
+    pub(crate) fn storage_with<T: bytemuck::Pod>(&self, label: &'static str, values: &[T]) -> Result<wgpu::Buffer, Error> {
+        let buffer = self.storage::<T>(label, values.len())?;
+        self.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(values));
+        Ok(buffer)
+    }
+}
+
 /// What the host reads of a frame, through a buffer that is kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Readback {
