@@ -26,7 +26,7 @@ pub(crate) enum Shown {
 }
 
 impl Shown {
-    fn new(mode: &ColorMode, layers: LayerSet) -> Self {
+    pub(super) fn new(mode: &ColorMode, layers: LayerSet) -> Self {
         match mode {
             ColorMode::Height => Self::Height,
             ColorMode::Depth => Self::Depth,
@@ -63,7 +63,6 @@ pub(crate) struct ShadeUniform {
     pub(crate) scanned_light: [f32; 2],
     pub(crate) range: [f32; 2],
     pub(crate) find_range: u32,
-    pub(crate) shown: u32,
     pub(crate) lighting: u32,
     pub(crate) keep_linear: u32,
     pub(crate) swap_red_blue: u32,
@@ -72,6 +71,7 @@ pub(crate) struct ShadeUniform {
     pub(crate) samples: u32,
     pub(crate) encode_steps: u32,
     pub(crate) backgrounds: u32,
+    pub(crate) padding: u32,
     pub(crate) neighbors: [[i32; 4]; 8],
 }
 
@@ -99,7 +99,6 @@ impl ShadeUniform {
             scanned_light: if layers.set.colors { SCANNED_LIGHT } else { [0.0, 1.0] },
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
-            shown: Shown::new(&shading.color, layers.set) as u32,
             lighting: shading.lighting.into(),
             keep_linear: keep_linear.into(),
             swap_red_blue: 0,
@@ -108,6 +107,7 @@ impl ShadeUniform {
             samples: pixels.div_ceil(step) as u32,
             encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
+            padding: 0,
             neighbors: EYE_DOME.map(|[dx, dy]| {
                 let distance_px = ((dx * dx + dy * dy) as f32).sqrt();
                 [dx as i32, dy as i32, distance_px.to_bits() as i32, 0]
