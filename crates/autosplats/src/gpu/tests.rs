@@ -5,6 +5,8 @@ use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 use super::PassSource;
 use super::device::INT64_ATOMICS;
 
+mod layouts;
+
 fn passes() -> impl Iterator<Item = &'static PassSource> {
     [crate::project::gpu::PASSES, crate::shade::gpu::PASSES].into_iter().flatten()
 }

@@ -6,9 +6,7 @@ mod uniform;
 
 pub(crate) use finish::{ReadPicture, finish};
 pub(crate) use texture::check_texture;
-pub(crate) use uniform::{ShadeUniform, finds_range};
-
-use uniform::Shown;
+pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
 
 use super::color_map::{self, table};
 use super::cpu::{ENCODE_STEPS, background, encode_table, sample_step, usual_map};
