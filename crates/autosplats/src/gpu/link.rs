@@ -16,6 +16,10 @@ const SHARED: &[(&str, &str)] = &[
     ("surfel", include_str!("../shared/surfel.wgsl")),
     ("range_keys", include_str!("../shared/range_keys.wgsl")),
     ("shading", include_str!("../shared/shading.wgsl")),
+    ("hidden", include_str!("../shared/hidden.wgsl")),
+    ("splat", include_str!("../shared/splat.wgsl")),
+    ("patch", include_str!("../shared/patch.wgsl")),
+    ("layers", include_str!("../shared/layers.wgsl")),
 ];
 
 /// The source of a pass with all it imports.

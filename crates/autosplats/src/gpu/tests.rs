@@ -8,7 +8,7 @@ use super::device::INT64_ATOMICS;
 mod layouts;
 
 fn passes() -> impl Iterator<Item = &'static PassSource> {
-    [crate::project::gpu::PASSES, crate::shade::gpu::PASSES].into_iter().flatten()
+    [crate::project::gpu::PASSES, crate::splat::gpu::PASSES, crate::shade::gpu::PASSES].into_iter().flatten()
 }
 
 /// What naga calls the features a pass declares: nothing beyond WebGPU's core but that.

@@ -148,9 +148,9 @@ impl ShadePasses {
         buffers: &ShadeBuffers,
         shading: &Shading,
     ) -> Result<Vec<Step>, Error> {
-        let LayerBuffers { surface, colors, measures, .. } = layers;
+        let LayerBuffers { surface, cover, extras, .. } = layers;
         let ShadeBuffers { uniform, keys, color_map, tables, image, linear, .. } = buffers;
-        let shown = Shown::new(&shading.color, layers.set);
+        let shown = Shown::new(&shading.color, layers.channels);
         let at = shown as usize;
         if self.coloring.len() <= at {
             self.coloring.resize_with(at + 1, || None);
@@ -162,10 +162,10 @@ impl ShadePasses {
         let mut steps = Vec::new();
         if finds_range(shading) {
             let groups = (keys.size() / 4) as u32 / GROUP;
-            steps.push(passes.range_values.step(gpu, &[frame, uniform, surface, colors, measures, keys], groups));
+            steps.push(passes.range_values.step(gpu, &[frame, uniform, surface, cover, extras, keys], groups));
             steps.push(self.range.step(gpu, &[frame, keys, counters], 1));
         }
-        let shade = [frame, uniform, surface, colors, measures, counters, color_map, tables, image, linear];
+        let shade = [frame, uniform, surface, cover, extras, counters, color_map, tables, image, linear];
         let [columns, rows] = [0, 1].map(|axis| buffers.size[axis].div_ceil(SHADE_GROUP[axis]));
         steps.push(passes.shade.step(gpu, &shade, columns * rows));
         Ok(steps)

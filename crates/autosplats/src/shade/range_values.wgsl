@@ -1,15 +1,16 @@
 // Lists the values of every some pixels as keys that order as the values do, for the usual range to be found among them.
 //
-// Reads: surface, colors, measures. Writes: keys.
+// Reads: surface, cover, extras. Writes: keys.
 
 #import frame
 #import groups
 #import range_keys
+#import layers
 #import shading
 
 @group(0) @binding(2) var<storage, read> surface: array<vec4f>;
-@group(0) @binding(3) var<storage, read> colors: array<vec4f>;
-@group(0) @binding(4) var<storage, read> measures: array<vec4f>;
+@group(0) @binding(3) var<storage, read> cover: array<Cover>;
+@group(0) @binding(4) var<storage, read> extras: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> keys: array<u32>;
 
 @compute @workgroup_size(256)

@@ -1,15 +1,16 @@
 // Colours each pixel: base colour, light, eye-dome lighting; the background where no surface is [Paper, §7].
 //
-// Reads: surface, colors, measures, counters, color_map, tables. Writes: image, linear.
+// Reads: surface, cover, extras, counters, color_map, tables. Writes: image, linear.
 
 #import frame
 #import groups
 #import counters
+#import layers
 #import shading
 
 @group(0) @binding(2) var<storage, read> surface: array<vec4f>;
-@group(0) @binding(3) var<storage, read> colors: array<vec4f>;
-@group(0) @binding(4) var<storage, read> measures: array<vec4f>;
+@group(0) @binding(3) var<storage, read> cover: array<Cover>;
+@group(0) @binding(4) var<storage, read> extras: array<vec4f>;
 @group(0) @binding(5) var<storage, read> counters: array<u32>;
 // Linear colours from the lower end of the range to the upper.
 @group(0) @binding(6) var<storage, read> color_map: array<vec4f>;
@@ -49,7 +50,7 @@ fn base_color(pixel: vec2u, index: u32, surface_here: vec4f) -> vec3f {
         return vec3f(from_srgb(normal.x), from_srgb(normal.y), from_srgb(normal.z));
     }
     if SHOWN == SHOW_COLOR {
-        return colors[index].rgb;
+        return extras[index].rgb;
     }
     return shading.clay;
 }

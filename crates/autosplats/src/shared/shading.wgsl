@@ -1,5 +1,5 @@
-// What shading is told beside the frame, and the values that it can show. Imports: frame. The including pass binds
-// `surface`, `colors` and `measures`.
+// What shading is told beside the frame, and the values that it can show. Imports: frame, layers. The including pass
+// binds `surface`, `cover` and `extras`.
 
 struct ShadeUniform {
     // Directions to the lights in view space.
@@ -35,7 +35,8 @@ struct ShadeUniform {
     encode_steps: u32,
     // Where in the tables the backgrounds of rows begin.
     backgrounds: u32,
-    padding: u32,
+    // Where among the extras the measures begin.
+    measures: u32,
     // Neighbours for eye-dome lighting: steps in x and y, and the bits of the distance in pixels.
     neighbors: array<vec4i, 8>,
 }
@@ -75,16 +76,16 @@ fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
             return dot(to_world(position_view) + frame.eye_local, shading.up);
         }
         case SHOW_RADIUS: {
-            return measures[index].x;
+            return extras[shading.measures + index].x;
         }
         case SHOW_K_RADIUS: {
-            return measures[index].y;
+            return extras[shading.measures + index].y;
         }
         case SHOW_CURVATURE: {
-            return measures[index].z;
+            return extras[shading.measures + index].z;
         }
         case SHOW_SCALAR: {
-            return colors[index].w;
+            return cover[index].scalar;
         }
         default: {
             return depth;

@@ -1,82 +1,141 @@
-//! The visible surface on the device.
+//! Layers on the device, and how they become the host's.
 
+use super::{GBuffer, TILE_AREA, tile_columns, tiled_index};
 use crate::Error;
 use crate::gpu::Gpu;
 
-/// Which layers there are beside depth and normal.
+/// What splats carry beside depth and normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct LayerSet {
-    pub(crate) colors: bool,
+pub(crate) struct Channels {
+    pub(crate) color: bool,
     pub(crate) scalar: bool,
     /// Splat radius, k-radius and curvature.
     pub(crate) measures: bool,
 }
 
-/// [`GBuffer`](super::GBuffer) on the device, rows from the top; layers that are not wanted have one element.
+/// [`GBuffer`] on the device, row by row.
 #[derive(Debug)]
 pub(crate) struct LayerBuffers {
     pub(crate) size: [u32; 2],
-    pub(crate) set: LayerSet,
-    /// `vec4f` per pixel: normal in view space, and depth, which is infinite where no surface is and nowhere else.
+    pub(crate) channels: Channels,
+    /// Normal and depth, four `f32` per pixel.
     pub(crate) surface: wgpu::Buffer,
-    /// `vec2u` per pixel: bits of the sum of weights, an `f32`, 0 where no surface is; index of the source point of the
-    /// heaviest splat.
-    pub(crate) weights: wgpu::Buffer,
-    /// `vec4f` per pixel: linear colour, and the scalar, NaN where it is unknown.
-    pub(crate) colors: wgpu::Buffer,
-    /// `vec4f` per pixel: splat radius, k-radius, curvature, 0.
-    pub(crate) measures: wgpu::Buffer,
+    /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`.
+    pub(crate) cover: wgpu::Buffer,
+    /// A plane per channel, one after the other, four `f32` per pixel: if there are colours, linear RGB; if there are
+    /// measures, splat radius, k-radius and curvature. One element if there are neither.
+    pub(crate) extras: wgpu::Buffer,
+}
+
+/// `Cover` in `shared/layers.wgsl`.
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Cover {
+    pub(crate) weight: f32,
+    pub(crate) rim: f32,
+    pub(crate) point: u32,
+    pub(crate) scalar: f32,
 }
 
 impl LayerBuffers {
-    /// Room for a picture of `size` with these layers.
+    /// Room for a picture of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], set: LayerSet) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], channels: Channels) -> Result<Self, Error> {
         let pixels = size[0] as usize * size[1] as usize;
-        let wanted = |wanted: bool| if wanted { pixels } else { 1 };
+        let planes = usize::from(channels.color) + usize::from(channels.measures);
         Ok(Self {
             size,
-            set,
+            channels,
             surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
-            weights: gpu.storage::<[u32; 2]>("weights", pixels)?,
-            colors: gpu.storage::<[f32; 4]>("colours of pixels", wanted(set.colors || set.scalar))?,
-            measures: gpu.storage::<[f32; 4]>("measures", wanted(set.measures))?,
+            cover: gpu.storage::<Cover>("cover of pixels", pixels)?,
+            extras: gpu.storage::<[f32; 4]>("colours and measures", planes * pixels)?,
         })
+    }
+
+    /// The host's form of the layers: what was read back of `surface`, `cover` and `extras`.
+    pub(crate) fn to_host(&self, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
+        let [width, height] = self.size.map(|side| side as usize);
+        let Channels { color, scalar, measures } = self.channels;
+        let area = tile_columns(width) * tile_columns(height) * TILE_AREA;
+        let wanted = |wanted: bool| if wanted { area } else { 0 };
+        let mut layers = GBuffer {
+            width: self.size[0],
+            height: self.size[1],
+            weight: vec![0.0; area],
+            depth: vec![f32::INFINITY; area],
+            normal: vec![[0.0; 3]; area],
+            point: vec![u32::MAX; area],
+            color: vec![[0.0; 3]; wanted(color)],
+            scalar: vec![f32::NAN; wanted(scalar)],
+            radius: vec![0.0; wanted(measures)],
+            k_radius: vec![0.0; wanted(measures)],
+            curvature: vec![0.0; wanted(measures)],
+        };
+        let surface: &[[f32; 4]] = bytemuck::cast_slice(surface);
+        let cover: &[Cover] = bytemuck::cast_slice(cover);
+        let extras: &[[f32; 4]] = bytemuck::cast_slice(extras);
+        let pixels = width * height;
+        let (colors, extras) = extras.split_at(if color { pixels } else { 0 });
+        for (pixel, (&[x, y, z, depth], cover)) in surface[..pixels].iter().zip(cover).enumerate() {
+            let at = tiled_index(width, pixel % width, pixel / width);
+            layers.weight[at] = cover.weight;
+            layers.depth[at] = depth;
+            layers.normal[at] = [x, y, z];
+            layers.point[at] = cover.point;
+            if color {
+                let [r, g, b, _] = colors[pixel];
+                layers.color[at] = [r, g, b];
+            }
+            if scalar {
+                layers.scalar[at] = cover.scalar;
+            }
+            if measures {
+                [layers.radius[at], layers.k_radius[at], layers.curvature[at], _] = extras[pixel];
+            }
+        }
+        layers
     }
 }
 
 /// The host's layers on the device.
 #[cfg(test)]
-pub(crate) fn upload_layers(gpu: &Gpu, layers: &super::GBuffer) -> LayerBuffers {
-    let set = LayerSet {
-        colors: !layers.color.is_empty(),
+pub(crate) fn upload_layers(gpu: &Gpu, layers: &GBuffer) -> LayerBuffers {
+    let channels = Channels {
+        color: !layers.color.is_empty(),
         scalar: !layers.scalar.is_empty(),
         measures: !layers.radius.is_empty(),
     };
     let size = [layers.width, layers.height];
-    let buffers = LayerBuffers::new(gpu, size, set).expect("room");
+    let buffers = LayerBuffers::new(gpu, size, channels).expect("room");
     let [width, height] = size.map(|side| side as usize);
     let pixels = || (0..width * height).map(|pixel| layers.index(pixel % width, pixel / width));
-    let vectors = |buffer: &wgpu::Buffer, vector: &dyn Fn(usize) -> [f32; 4]| {
-        let vectors: Vec<_> = pixels().map(vector).collect();
-        gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&vectors));
+    let surface: Vec<[f32; 4]> = pixels()
+        .map(|at| {
+            let [x, y, z] = layers.normal[at];
+            [x, y, z, layers.depth[at]]
+        })
+        .collect();
+    let cover = |at: usize| Cover {
+        weight: layers.weight[at],
+        rim: 0.0,
+        point: layers.point[at],
+        scalar: layers.scalar.get(at).copied().unwrap_or(f32::NAN),
     };
-    vectors(&buffers.surface, &|at| {
-        let [x, y, z] = layers.normal[at];
-        [x, y, z, layers.depth[at]]
-    });
-    if set.colors || set.scalar {
-        vectors(&buffers.colors, &|at| {
-            let [r, g, b] = layers.color.get(at).copied().unwrap_or_default();
-            [r, g, b, layers.scalar.get(at).copied().unwrap_or(f32::NAN)]
-        });
+    let cover: Vec<_> = pixels().map(cover).collect();
+    let mut extras: Vec<[f32; 4]> = Vec::new();
+    if channels.color {
+        extras.extend(pixels().map(|at| {
+            let [r, g, b] = layers.color[at];
+            [r, g, b, 0.0]
+        }));
     }
-    if set.measures {
-        vectors(&buffers.measures, &|at| [layers.radius[at], layers.k_radius[at], layers.curvature[at], 0.0]);
+    if channels.measures {
+        extras.extend(pixels().map(|at| [layers.radius[at], layers.k_radius[at], layers.curvature[at], 0.0]));
     }
-    let weights: Vec<_> = pixels().map(|at| [layers.weight[at].to_bits(), layers.point[at]]).collect();
-    gpu.queue.write_buffer(&buffers.weights, 0, bytemuck::cast_slice(&weights));
+    gpu.queue.write_buffer(&buffers.surface, 0, bytemuck::cast_slice(&surface));
+    gpu.queue.write_buffer(&buffers.cover, 0, bytemuck::cast_slice(&cover));
+    gpu.queue.write_buffer(&buffers.extras, 0, bytemuck::cast_slice(&extras));
     buffers
 }

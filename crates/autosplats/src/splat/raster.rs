@@ -18,6 +18,9 @@ pub(super) struct Tile {
     pub(super) origin: [usize; 2],
 }
 
+/// How steeply the kernel falls: see [`kernel`].
+pub(super) const KERNEL_SLOPE: f32 = 0.52;
+
 /// Offsets of the pixels of a vector from its first one.
 const STEPS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
@@ -129,7 +132,7 @@ fn add<S: Simd>(simd: S, sums: &mut [f32], vector: usize, value: F32s<S>) {
 /// radii, without the exponential, and 0.003 at the end.
 #[inline(always)]
 fn kernel<S: Simd>(simd: S, squared: F32s<S>) -> F32s<S> {
-    let w = F32s::splat(simd, 1.0) - F32s::splat(simd, 0.52) * squared;
+    let w = F32s::splat(simd, 1.0) - F32s::splat(simd, KERNEL_SLOPE) * squared;
     let w = w * w;
     let w = w * w;
     w * w

@@ -155,7 +155,7 @@ fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> V
 /// Attributes by point.
 pub(super) struct Data {
     pub(super) colors: Vec<[u8; 3]>,
-    scalars: Vec<f32>,
+    pub(super) scalars: Vec<f32>,
     pub(super) linear: [f32; 256],
 }
 

@@ -11,17 +11,17 @@ use super::tiled_index;
 use crate::camera::View;
 
 /// Weight of a splat from which a pixel belongs to its core: the kernel at 0.42 splat radii.
-const CORE_WEIGHT: f32 = 0.68;
+pub(super) const CORE_WEIGHT: f32 = 0.68;
 /// Sum of weights from which a pixel belongs to the surface whatever its heaviest splat: inside a surface the sum is
 /// about 2, at its border 1. Where many points fall into each pixel, the nearest one may lie at the same edge of every
 /// pixel, and no pixel's centre in a core.
-const INNER_WEIGHT: f32 = 1.3;
+pub(super) const INNER_WEIGHT: f32 = 1.3;
 /// How far lines go, in reaches of the splat.
-const FURTHEST: f32 = 5.0;
+pub(super) const FURTHEST: f32 = 5.0;
 /// Strides that a line takes in the reach of a splat wider than so many pixels.
-const STRIDES_PER_REACH: f32 = 6.0;
+pub(super) const STRIDES_PER_REACH: f32 = 6.0;
 /// Added to how far lines go: what is a pixel wide has cores here and there along it.
-const LEAST_REACH_PX: usize = 2;
+pub(super) const LEAST_REACH_PX: usize = 2;
 /// Directions of the eight lines.
 const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
 

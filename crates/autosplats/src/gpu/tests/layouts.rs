@@ -12,6 +12,7 @@ use crate::fit::Surfel;
 use crate::project::gpu::{BLOCK, COUNTERS, Counter};
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::shade::gpu::{ShadeUniform, Shown};
+use crate::splat::Cover;
 
 /// Name, offset and size of a field.
 type Field = (String, usize, usize);
@@ -40,7 +41,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 5] {
+fn mirrored() -> [Mirrored; 6] {
     [
         mirrored!(
             "Frame",
@@ -62,6 +63,7 @@ fn mirrored() -> [Mirrored; 5] {
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
+        mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(
             "Surfel",
@@ -90,7 +92,7 @@ fn mirrored() -> [Mirrored; 5] {
                 samples,
                 encode_steps,
                 backgrounds,
-                padding,
+                measures,
                 neighbors,
             }
         ),

@@ -8,7 +8,7 @@ use super::super::cpu::{
 };
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
-use crate::splat::{LayerBuffers, LayerSet};
+use crate::splat::{Channels, LayerBuffers};
 
 /// What a surface is coloured by, as `shared/shading.wgsl` has it; from [`Height`](Self::Height) on these are values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(crate) enum Shown {
 }
 
 impl Shown {
-    pub(super) fn new(mode: &ColorMode, layers: LayerSet) -> Self {
+    pub(super) fn new(mode: &ColorMode, layers: Channels) -> Self {
         match mode {
             ColorMode::Height => Self::Height,
             ColorMode::Depth => Self::Depth,
@@ -37,7 +37,7 @@ impl Shown {
             ColorMode::Normal => Self::Normal,
             // Whether points have colours, and of what, was decided before they were splatted.
             ColorMode::Auto | ColorMode::Rgb | ColorMode::Plain | ColorMode::Classification => {
-                if layers.colors {
+                if layers.color {
                     Self::Color
                 } else {
                     Self::Clay
@@ -71,7 +71,7 @@ pub(crate) struct ShadeUniform {
     pub(crate) samples: u32,
     pub(crate) encode_steps: u32,
     pub(crate) backgrounds: u32,
-    pub(crate) padding: u32,
+    pub(crate) measures: u32,
     pub(crate) neighbors: [[i32; 4]; 8],
 }
 
@@ -96,7 +96,7 @@ impl ShadeUniform {
             up: scene.up.as_vec3().to_array(),
             eye_dome: shading.eye_dome,
             sky: SKY,
-            scanned_light: if layers.set.colors { SCANNED_LIGHT } else { [0.0, 1.0] },
+            scanned_light: if layers.channels.color { SCANNED_LIGHT } else { [0.0, 1.0] },
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
             lighting: shading.lighting.into(),
@@ -107,7 +107,7 @@ impl ShadeUniform {
             samples: pixels.div_ceil(step) as u32,
             encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
-            padding: 0,
+            measures: if layers.channels.color { pixels as u32 } else { 0 },
             neighbors: EYE_DOME.map(|[dx, dy]| {
                 let distance_px = ((dx * dx + dy * dy) as f32).sqrt();
                 [dx as i32, dy as i32, distance_px.to_bits() as i32, 0]

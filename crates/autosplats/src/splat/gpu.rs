@@ -1,0 +1,221 @@
+//! Splatting on the GPU.
+//!
+//! # How it works
+//! Instead of bins there is a tree over the list of surfels (`shared/splat.wgsl`), and a workgroup for each patch of 8×8 pixels
+//! finds what meets it (`shared/patch.wgsl`). A pixel draws its splats in the order of the list, so that sums come out as
+//! on the CPU, and the same each time.
+
+use super::layers::{Channels, LayerBuffers};
+use super::raster::KERNEL_SLOPE;
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, SUPPORT};
+use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, STRIDES_PER_REACH};
+use crate::Error;
+use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::project::gpu::{BLOCK, Counter, SCAN, ScreenBuffers};
+
+pub(crate) const PASSES: &[PassSource] = &[SET_UP, BOXES, DEPTH, RECOVER_COUNT, RECOVER, REFINE, ATTRIBUTES, TRIM];
+const SET_UP: PassSource = PassSource::new("splat/set_up", include_str!("set_up.wgsl"));
+const BOXES: PassSource = PassSource::new("splat/boxes", include_str!("boxes.wgsl"));
+const DEPTH: PassSource = PassSource::new("splat/depth", include_str!("depth.wgsl"));
+const RECOVER_COUNT: PassSource = PassSource::new("splat/recover_count", include_str!("recover_count.wgsl"));
+const RECOVER: PassSource = PassSource::new("splat/recover", include_str!("recover.wgsl"));
+const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.wgsl"));
+const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
+const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
+
+/// Invocations in a workgroup of passes over surfels.
+const GROUP: u32 = 256;
+/// Side of a patch in pixels, and children of a node of the tree.
+const PATCH: u32 = 8;
+const FAN: u32 = 64;
+/// Bytes of a splat.
+const SPLAT_BYTES: usize = 48;
+
+/// Which surfels a round of the frame adds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Round {
+    Active,
+    Recovered,
+}
+
+/// Splats on the device, and the depth maps.
+#[derive(Debug)]
+pub(crate) struct SplatBuffers {
+    splats: wgpu::Buffer,
+    tree: wgpu::Buffer,
+    /// Depth per pixel, pushed back by ε, row by row; infinite where nothing is. The second one is for refinement.
+    pub(crate) depth: [wgpu::Buffer; 2],
+}
+
+impl SplatBuffers {
+    /// Room for `screen_capacity` splats in a picture of `size`.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn new(gpu: &Gpu, screen_capacity: u32, size: [u32; 2]) -> Result<Self, Error> {
+        let pixels = size[0] as usize * size[1] as usize;
+        let families = screen_capacity.div_ceil(FAN * FAN) as usize;
+        let nodes = 1 + families * (1 + FAN + FAN * FAN) as usize;
+        Ok(Self {
+            splats: gpu.storage::<[u8; SPLAT_BYTES]>("splats", screen_capacity as usize)?,
+            tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
+            depth: [gpu.storage::<f32>("depth map", pixels)?, gpu.storage::<f32>("other depth map", pixels)?],
+        })
+    }
+}
+
+/// The passes of splatting.
+#[derive(Debug)]
+pub(crate) struct SplatPasses {
+    /// For each [`Round`].
+    set_up: [Pass; 2],
+    boxes: [Pass; 2],
+    depth: Pass,
+    recover_count: Pass,
+    scan_recovered: Pass,
+    recover: Pass,
+    refine: Pass,
+    attributes: Pass,
+    trim: Pass,
+    /// Linear value of each step of a colour.
+    linear: wgpu::Buffer,
+}
+
+impl SplatPasses {
+    /// Compiles them for splats that carry `channels`; `linear` has the linear value of each step of a colour.
+    ///
+    /// # Errors
+    /// [`Error::Device`], [`Error::DeviceMemory`].
+    pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
+        let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
+        let dot_radius = ("DOT_RADIUS_PX", f64::from(DOT_RADIUS_PX));
+        let set_up = |recovered: f64| {
+            let constants = [
+                ("RECOVERED_ONLY", recovered),
+                dot_radius,
+                ("SUPPORT", SUPPORT.into()),
+                ("GRAZING", GRAZING.into()),
+                ("EPSILON_RADII", EPSILON_RADII.into()),
+                ("NEAREST", NEAREST.into()),
+            ];
+            Pass::new(gpu, &SET_UP, &constants)
+        };
+        let boxes = |recovered: f64| Pass::new(gpu, &BOXES, &[("RECOVERED_ONLY", recovered)]);
+        let Channels { color, scalar, measures } = channels;
+        let slots = |carried: bool| if carried { f64::from(FAN) } else { 1.0 };
+        let attributes = [
+            dot_radius,
+            ("COLOR", color.into()),
+            ("SCALAR", scalar.into()),
+            ("MEASURES", measures.into()),
+            ("COLOR_SLOTS", slots(color)),
+            ("SCALAR_SLOTS", slots(scalar)),
+            ("MEASURE_SLOTS", slots(measures)),
+            ("KERNEL_SLOPE", KERNEL_SLOPE.into()),
+            ("CORE_WEIGHT", CORE_WEIGHT.into()),
+            ("INNER_WEIGHT", INNER_WEIGHT.into()),
+        ];
+        let trim = [
+            ("FURTHEST", FURTHEST.into()),
+            ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
+            ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
+        ];
+        let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
+        gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
+        Ok(Self {
+            set_up: [set_up(0.0)?, set_up(1.0)?],
+            boxes: [boxes(0.0)?, boxes(1.0)?],
+            depth: Pass::new(gpu, &DEPTH, &[dot_radius])?,
+            recover_count: pass(&RECOVER_COUNT)?,
+            scan_recovered: Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(Counter::Recovered as u32))])?,
+            recover: pass(&RECOVER)?,
+            refine: pass(&REFINE)?,
+            attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
+            trim: Pass::new(gpu, &TRIM, &trim)?,
+            linear: steps,
+        })
+    }
+
+    /// Visibility pass: draws the surfels of a round into the depth map, which the first round clears [Paper, §7].
+    pub(crate) fn steps_visibility(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        surfels: &wgpu::Buffer,
+        splats: &SplatBuffers,
+        round: Round,
+    ) -> Vec<Step> {
+        let SplatBuffers { splats, tree, depth } = splats;
+        let counters = &screen.counters;
+        let set_up = &self.set_up[round as usize];
+        vec![
+            set_up.step(gpu, &[frame, counters, surfels, splats, tree], screen.capacity.div_ceil(GROUP)),
+            self.boxes[round as usize].step(gpu, &[frame, counters, tree], families(screen)),
+            self.depth.step(gpu, &[frame, splats, tree, &depth[0]], patches(screen)),
+        ]
+    }
+
+    /// Appends the passive points that the depth map does not hide to the queries [Paper, §7, Grid Culling].
+    pub(crate) fn steps_recover(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        splats: &SplatBuffers,
+    ) -> Vec<Step> {
+        let ScreenBuffers { counters, points, passive, block_sums, queries, .. } = screen;
+        let depth = &splats.depth[0];
+        // All sums of blocks are scanned, so all are counted.
+        let blocks = (screen.size[0] * screen.size[1]).div_ceil(BLOCK);
+        let recover = [frame, points, passive, counters, depth, block_sums, queries];
+        vec![
+            self.recover_count.step(gpu, &[frame, points, passive, counters, depth, block_sums], blocks),
+            self.scan_recovered.step(gpu, &[frame, block_sums, counters], 1),
+            self.recover.step(gpu, &recover, screen.capacity.div_ceil(BLOCK)),
+        ]
+    }
+
+    /// Draws the attributes of all rounds' surfels and trims them, after two refinements of the depth map if
+    /// `depth_refinement` [Paper, §7].
+    #[allow(clippy::too_many_arguments, reason = "each is a buffer or a set of them")]
+    pub(crate) fn steps_layers(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        surfels: &wgpu::Buffer,
+        splats: &SplatBuffers,
+        layers: &LayerBuffers,
+        depth_refinement: bool,
+    ) -> Vec<Step> {
+        let SplatBuffers { splats, tree, depth: [depth, other] } = splats;
+        let ScreenBuffers { counters, values, .. } = screen;
+        let LayerBuffers { surface, cover, extras, .. } = layers;
+        let mut steps = Vec::new();
+        for [before, after] in [[depth, other], [other, depth]].into_iter().filter(|_| depth_refinement) {
+            let groups = screen.capacity.div_ceil(GROUP);
+            steps.push(self.refine.step(gpu, &[frame, counters, splats, before, tree], groups));
+            steps.push(self.boxes[Round::Active as usize].step(gpu, &[frame, counters, tree], families(screen)));
+            steps.push(self.depth.step(gpu, &[frame, splats, tree, after], patches(screen)));
+        }
+        let attributes = [frame, &self.linear, splats, tree, surfels, values, depth, surface, cover, extras];
+        steps.push(self.attributes.step(gpu, &attributes, patches(screen)));
+        steps.push(self.trim.step(gpu, &[frame, surface, cover, extras], patches(screen)));
+        steps
+    }
+}
+
+/// Workgroups for the upper levels of the tree; one at least, which notes how many splats there are.
+fn families(screen: &ScreenBuffers) -> u32 {
+    screen.capacity.div_ceil(FAN * FAN).max(1)
+}
+
+/// Workgroups for a patch each.
+fn patches(screen: &ScreenBuffers) -> u32 {
+    let [columns, rows] = screen.size.map(|side| side.div_ceil(PATCH));
+    columns * rows
+}
+
+#[cfg(test)]
+mod tests;

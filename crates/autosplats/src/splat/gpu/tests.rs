@@ -1,0 +1,326 @@
+//! Splatting on the GPU against that on the CPU, fed with the same surfels.
+
+use autosplats_cloud::FieldValues;
+
+use super::super::tests::{ALL_DISCS, Data, Discs, surfels, views};
+use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA};
+use super::*;
+use crate::camera::View;
+use crate::fit::Surfel;
+use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::project::ScreenPoint;
+use crate::project::gpu::COUNTERS;
+use crate::test_clouds::Random;
+
+/// One pixel, patches and tiles that are cut off, several tiles.
+const SIZES: [[u32; 2]; 4] = [[1, 1], [71, 50], [64, 65], [133, 9]];
+const ALL: Channels = Channels { color: true, scalar: true, measures: true };
+
+/// What is drawn, and in how many rounds.
+struct Scene<'a> {
+    surfels: &'a [Surfel],
+    /// Those of the first round.
+    active: usize,
+    view: &'a View,
+    refinement: bool,
+    data: &'a Data,
+}
+
+/// Depth maps after visibility and after refinement, row by row, and the layers.
+struct Drawn {
+    depth: [Vec<f32>; 2],
+    layers: GBuffer,
+}
+
+/// The buffers of a frame.
+struct Buffers {
+    frame: wgpu::Buffer,
+    screen: ScreenBuffers,
+    surfels: wgpu::Buffer,
+    splats: SplatBuffers,
+    layers: LayerBuffers,
+}
+
+impl Scene<'_> {
+    fn size(&self) -> [u32; 2] {
+        [self.view.width, self.view.height]
+    }
+
+    fn upload(&self, gpu: &Gpu, channels: Channels) -> Buffers {
+        let size = self.size();
+        let mut screen = ScreenBuffers::new(gpu, size, 0, 0).expect("room");
+        // There may be more surfels than pixels here.
+        screen.capacity = self.surfels.len() as u32;
+        let values = self.surfels.iter().flat_map(|surfel| {
+            let [r, g, b] = self.data.colors[surfel.source as usize];
+            let color = channels.color.then(|| u32::from_le_bytes([r, g, b, 0]));
+            let scalar = channels.scalar.then(|| self.data.scalars[surfel.source as usize].to_bits());
+            [color, scalar].into_iter().flatten()
+        });
+        screen.values = gpu.storage_with("values", &values.collect::<Vec<u32>>()).expect("room");
+        let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
+        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(self.view, 0, 1)));
+        Buffers {
+            frame,
+            surfels: gpu.storage_with("surfels", self.surfels).expect("room"),
+            splats: SplatBuffers::new(gpu, screen.capacity, size).expect("room"),
+            layers: LayerBuffers::new(gpu, size, channels).expect("room"),
+            screen,
+        }
+    }
+
+    fn device(&self, gpu: &Gpu, passes: &SplatPasses, channels: Channels) -> Drawn {
+        let buffers = self.upload(gpu, channels);
+        let Buffers { frame, screen, surfels, splats, layers } = &buffers;
+        let run = |steps: Vec<Step>| {
+            let mut recorder = Recorder::new(gpu, &Clock::Off);
+            steps.iter().for_each(|step| recorder.run(step));
+            recorder.finish();
+        };
+        let pixels = (screen.size[0] * screen.size[1]) as usize;
+        let depth = || read_back::<f32>(gpu, &splats.depth[0], pixels).expect("a depth map");
+        let visibility = |round| run(passes.steps_visibility(gpu, frame, screen, surfels, splats, round));
+        set_counter(gpu, screen, Counter::Active, self.active);
+        visibility(Round::Active);
+        set_counter(gpu, screen, Counter::Recovered, self.surfels.len() - self.active);
+        visibility(Round::Recovered);
+        let before = depth();
+        run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, self.refinement));
+        Drawn { depth: [before, depth()], layers: read_layers(gpu, layers) }
+    }
+
+    fn host(&self, channels: Channels) -> (Splatter, GBuffer) {
+        let Self { surfels, view, data, .. } = *self;
+        let mut splatter = Splatter::default();
+        splatter.begin(view);
+        splatter.add(&surfels[..self.active], 0, view);
+        splatter.add(surfels, self.active, view);
+        if self.refinement {
+            (0..2).for_each(|_| splatter.refine(surfels, view));
+        }
+        let scalars = FieldValues::F32(data.scalars.clone());
+        let color = PointColors { srgb: &data.colors, linear: &data.linear };
+        let attributes = Attributes {
+            color: channels.color.then_some(color),
+            scalar: channels.scalar.then_some(&scalars),
+            measures: channels.measures,
+        };
+        splatter.attributes(surfels, view, &attributes);
+        let layers = splatter.trim(view).clone();
+        (splatter, layers)
+    }
+}
+
+fn set_counter(gpu: &Gpu, screen: &ScreenBuffers, counter: Counter, value: usize) {
+    gpu.queue.write_buffer(&screen.counters, 4 * counter as u64, bytemuck::bytes_of(&(value as u32)));
+}
+
+pub(crate) fn read_layers(gpu: &Gpu, layers: &LayerBuffers) -> GBuffer {
+    let read = |buffer: &wgpu::Buffer| read_back::<u8>(gpu, buffer, buffer.size() as usize).expect("a layer");
+    layers.to_host(&read(&layers.surface), &read(&layers.cover), &read(&layers.extras))
+}
+
+/// Pixels at which the splatter does not hide what is in front of `depth`, or does not what is behind. Rounding of
+/// gradients moves depths by a millionth.
+fn other_depths(splatter: &Splatter, depth: &[f32], view: &View) -> usize {
+    let wrong = |&pixel: &usize| {
+        let at = [pixel % view.width as usize, pixel / view.width as usize];
+        let near = depth[pixel].abs() * 1e-5;
+        let hides = |depth: f32| splatter.hides(at, depth.min(f32::MAX), view);
+        hides(depth[pixel] - near) || (depth[pixel].is_finite() && !hides(depth[pixel] + near))
+    };
+    (0..depth.len()).filter(wrong).count()
+}
+
+/// Pixels at which any layer differs.
+fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
+    let [width, height] = [host.width as usize, host.height as usize];
+    let sizes = |l: &GBuffer| [l.weight.len(), l.color.len(), l.scalar.len(), l.radius.len(), l.curvature.len()];
+    assert_eq!(sizes(device), sizes(host), "sizes of layers");
+    // f32 rounding of gradients, which the kernel's eighth power and sums that cancel make greater: some 1e-5.
+    let near = |a: f32, b: f32, scale: f32| {
+        a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-4 * b.abs() + 1e-4 * scale
+    };
+    let same = |x: usize, y: usize| {
+        let i = host.index(x, y);
+        let scalar_of = |a: &[f32], b: &[f32], scale: f32| a.is_empty() || near(a[i], b[i], scale);
+        let vector_of =
+            |a: &[[f32; 3]], b: &[[f32; 3]]| a.is_empty() || a[i].iter().zip(b[i]).all(|(&a, b)| near(a, b, 1.0));
+        scalar_of(&device.weight, &host.weight, 0.1)
+            && scalar_of(&device.depth, &host.depth, 0.0)
+            && vector_of(&device.normal, &host.normal)
+            && device.point[i] == host.point[i]
+            && vector_of(&device.color, &host.color)
+            && scalar_of(&device.scalar, &host.scalar, 100.0)
+            && scalar_of(&device.radius, &host.radius, 0.0)
+            && scalar_of(&device.k_radius, &host.k_radius, 0.0)
+            && scalar_of(&device.curvature, &host.curvature, 0.0)
+    };
+    (0..width * height).filter(|pixel| !same(pixel % width, pixel / width)).count()
+}
+
+/// Rounding decides what covers a pixel, what is in front or which of two splats is heavier at some pixels of ten thousand.
+fn assert_few(other: usize, pixels: usize, what: &str) {
+    assert!(other <= pixels / 1000, "{what}: {other} of {pixels} pixels differ");
+}
+
+fn assert_same(gpu: &Gpu, passes: &SplatPasses, scene: &Scene<'_>, case: &str) {
+    let drawn = scene.device(gpu, passes, ALL);
+    let pixels = drawn.depth[0].len();
+    let (splatter, layers) = Scene { refinement: false, ..*scene }.host(ALL);
+    assert_few(other_depths(&splatter, &drawn.depth[0], scene.view), pixels, &format!("{case}: depth map"));
+    let (splatter, layers) = if scene.refinement { scene.host(ALL) } else { (splatter, layers) };
+    assert_few(other_depths(&splatter, &drawn.depth[1], scene.view), pixels, &format!("{case}: last depth map"));
+    assert_few(other_layers(&drawn.layers, &layers), pixels, &format!("{case}: layers"));
+}
+
+#[test]
+fn the_device_draws_what_the_host_draws() {
+    let Some(gpu) = test_gpu() else { return };
+    let data = Data::new(2000);
+    let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
+    for size in SIZES {
+        for view in views(size) {
+            for discs in ALL_DISCS {
+                let surfels = surfels(41, 5 + (size[0] * size[1]) as usize / 20, discs, &view);
+                for refinement in [false, true] {
+                    let scene = Scene {
+                        surfels: &surfels,
+                        active: surfels.len() * 2 / 3,
+                        view: &view,
+                        refinement,
+                        data: &data,
+                    };
+                    let case = format!("{discs:?}, {size:?}, perspective {}, {refinement}", view.perspective);
+                    assert_same(&gpu, &passes, &scene, &case);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn many_splats_and_none() {
+    let Some(gpu) = test_gpu() else { return };
+    let data = Data::new(300_000);
+    let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
+    let view = views([150, 90])[0];
+    // More than the root's first 64 children have, so that lists are filled more than once.
+    for (count, discs) in [(0, Discs::Small), (64, Discs::Surface), (270_000, Discs::Small)] {
+        let surfels = surfels(42, count, discs, &view);
+        for active in [0, count / 3, count] {
+            let scene = Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data };
+            assert_same(&gpu, &passes, &scene, &format!("{active} of {count}"));
+        }
+    }
+    // Each over the whole picture.
+    let mut surfels = surfels(43, 3000, Discs::Circles, &view);
+    surfels.iter_mut().for_each(|surfel| surfel.radius *= 100.0);
+    let scene = Scene { surfels: &surfels, active: 3000, view: &view, refinement: true, data: &data };
+    assert_same(&gpu, &passes, &scene, "huge splats");
+}
+
+#[test]
+fn layers_that_are_not_wanted_change_no_other() {
+    let Some(gpu) = test_gpu() else { return };
+    let data = Data::new(1000);
+    let view = views([71, 50])[0];
+    let surfels = surfels(44, 300, Discs::Ellipses, &view);
+    let scene = Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data };
+    for bits in 0..8 {
+        let channels = Channels { color: bits & 1 != 0, scalar: bits & 2 != 0, measures: bits & 4 != 0 };
+        let passes = SplatPasses::new(&gpu, channels, &data.linear).expect("passes");
+        let drawn = scene.device(&gpu, &passes, channels);
+        assert_few(other_layers(&drawn.layers, &scene.host(channels).1), 71 * 50, &format!("{channels:?}"));
+        let again = scene.device(&gpu, &passes, channels);
+        let bits = |layers: &GBuffer| -> Vec<u32> {
+            let vectors = layers.normal.iter().chain(&layers.color).flatten();
+            let scalars = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius];
+            vectors
+                .chain(scalars.into_iter().flatten())
+                .map(|value| value.to_bits())
+                .chain(layers.point.clone())
+                .collect()
+        };
+        assert!(bits(&drawn.layers) == bits(&again.layers), "{channels:?}: another picture the second time");
+    }
+}
+
+#[test]
+fn hidden_points_are_not_recovered() {
+    let Some(gpu) = test_gpu() else { return };
+    let data = Data::new(5000);
+    let passes = SplatPasses::new(&gpu, Channels::default(), &data.linear).expect("passes");
+    let view = views([133, 90])[0];
+    let surfels = surfels(45, 500, Discs::Circles, &view);
+    let scene = Scene { surfels: &surfels, active: 500, view: &view, refinement: false, data: &data };
+    let mut buffers = scene.upload(&gpu, Channels::default());
+    let mut random = Random::new(46);
+    let points: Vec<ScreenPoint> = (0..4500)
+        .map(|_| {
+            let pixel = random.below(133) as u32 | (random.below(90) as u32) << 16;
+            ScreenPoint { position_view: [0.0, 0.0, 1.0 + 5.0 * random.unit()], pixel }
+        })
+        .collect();
+    let passive: Vec<u32> = (0..4500).filter(|index| index % 3 != 0).collect();
+    let screen = &mut buffers.screen;
+    screen.capacity = 5000;
+    screen.points = gpu.storage_with("points", &points).expect("room");
+    screen.passive = gpu.storage_with("passive", &passive).expect("room");
+    screen.queries = gpu.storage::<u32>("queries", 5000).expect("room");
+    set_counter(&gpu, screen, Counter::Active, 500);
+    set_counter(&gpu, screen, Counter::Passive, passive.len());
+    let Buffers { frame, screen, surfels: on_device, splats, .. } = &buffers;
+    let mut recorder = Recorder::new(&gpu, &Clock::Off);
+    let visibility = passes.steps_visibility(&gpu, frame, screen, on_device, splats, Round::Active);
+    let recover = passes.steps_recover(&gpu, frame, screen, splats);
+    visibility.iter().chain(&recover).for_each(|step| recorder.run(step));
+    recorder.finish();
+
+    let (splatter, _) = scene.host(Channels::default());
+    let seen = |&index: &u32| {
+        let point = &points[index as usize];
+        !splatter.hides(point.pixel_xy(), point.position_view[2], &view)
+    };
+    let expected: Vec<u32> = passive.iter().copied().filter(seen).collect();
+    assert!(expected.len() > 500 && expected.len() + 500 < passive.len(), "some of each: {}", expected.len());
+    let counters: Vec<u32> = read_back(&gpu, &screen.counters, COUNTERS).expect("counters");
+    let recovered = counters[Counter::Recovered as usize] as usize;
+    let queries: Vec<u32> = read_back(&gpu, &screen.queries, 500 + recovered).expect("queries");
+    // Depths are drawn by chance: none is decided by rounding.
+    assert_eq!(queries[500..], expected, "recovered points, in order");
+}
+
+#[test]
+fn comparisons_see_each_kind_of_error() {
+    let data = Data::new(1000);
+    let view = views([70, 50])[0];
+    let surfels = surfels(47, 200, Discs::Circles, &view);
+    let scene = Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data };
+    let (_, right) = scene.host(ALL);
+    assert_eq!(other_layers(&right, &right), 0, "nothing is wrong yet");
+    let (splatter, other) = Scene { refinement: false, ..scene }.host(ALL);
+    assert!(other_layers(&other, &right) > 50, "not noticed: no refinement");
+    let flat = vec![3.0; 70 * 50];
+    assert!(other_depths(&splatter, &flat, &view) > 3000, "not noticed: another depth map");
+    assert!(other_depths(&splatter, &[f32::INFINITY; 70 * 50], &view) > 3000, "not noticed: no depth map");
+    let at =
+        (0..TILE_AREA).find(|&at| right.weight[at] > 0.1 && right.scalar[at].is_finite()).expect("a covered pixel");
+    type Spoil = fn(&mut GBuffer, usize);
+    let spoils: [(&str, Spoil); 9] = [
+        ("weight", |l, i| l.weight[i] *= 1.001),
+        ("depth", |l, i| l.depth[i] *= 1.001),
+        ("normal", |l, i| l.normal[i][0] += 0.001),
+        ("colour", |l, i| l.color[i][1] += 0.001),
+        ("scalar", |l, i| l.scalar[i] = f32::NAN),
+        ("radius", |l, i| l.radius[i] *= 1.001),
+        ("k-radius", |l, i| l.k_radius[i] *= 1.001),
+        ("curvature", |l, i| l.curvature[i] *= 1.001),
+        ("point", |l, i| l.point[i] += 1),
+    ];
+    for (name, spoil) in spoils {
+        let mut wrong = right.clone();
+        spoil(&mut wrong, at);
+        assert_eq!(other_layers(&wrong, &right), 1, "not noticed: {name}");
+    }
+}

@@ -1,0 +1,42 @@
+// Appends the passive points that the depth map does not hide to the active ones, ascending [Paper, §7, Grid Culling].
+//
+// Reads: points, passive, counters, depth_map, block_sums. Writes: queries.
+
+#import frame
+#import groups
+#import counters
+#import rank
+#import screen
+#import hidden
+
+@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(2) var<storage, read> passive: array<u32>;
+@group(0) @binding(3) var<storage, read> counters: array<u32>;
+@group(0) @binding(4) var<storage, read> depth_map: array<f32>;
+@group(0) @binding(5) var<storage, read> block_sums: array<u32>;
+@group(0) @binding(6) var<storage, read_write> queries: array<u32>;
+
+@compute @workgroup_size(256)
+fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    rank_clear(local);
+    let block = group_index(workgroup);
+    var is_recovered = 0u;
+    for (var step = 0u; step < 8u; step++) {
+        let flag = step * 256u + local;
+        let index = block * 2048u + flag;
+        if index < counters[PASSIVE] {
+            let point = points[passive[index]];
+            if !is_hidden(point.pixel, point.position_view.z) {
+                rank_set(flag);
+                is_recovered |= 1u << step;
+            }
+        }
+    }
+    rank_finish(local);
+    for (var step = 0u; step < 8u; step++) {
+        let flag = step * 256u + local;
+        if (is_recovered & (1u << step)) != 0u {
+            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * 2048u + flag];
+        }
+    }
+}

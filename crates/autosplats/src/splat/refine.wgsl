@@ -1,0 +1,35 @@
+// Depth refinement: splats whose own point the depth map hides are dead, the others alive [Paper, §7, Depth Refinement].
+//
+// Reads: counters, splats, depth_map. Reads and writes: tree.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import hidden
+#import splat
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> depth_map: array<f32>;
+@group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
+
+@compute @workgroup_size(256)
+fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] {
+        return;
+    }
+    let place = level_start(SPLATS) + index;
+    // Those killed before may live again.
+    let before = tree[place].x;
+    let bounds = vec2u(before & ~DEAD, tree[place].y);
+    if is_empty(bounds) {
+        return;
+    }
+    let splat = &splats[index];
+    let now = select(bounds.x, bounds.x | DEAD, is_hidden((*splat).pixel, (*splat).depth));
+    if now != before {
+        tree[place].x = now;
+    }
+}

@@ -1,0 +1,114 @@
+// Splat set-up: surfels made ready to be drawn over their pixels. The CPU form, `setup.rs`, says how.
+//
+// Reads: counters, surfels. Writes: splats, tree.
+
+#import frame
+#import groups
+#import counters
+#import surfel
+#import splat
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
+@group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
+
+// Whether only the recovered ones are new.
+override RECOVERED_ONLY: bool;
+override DOT_RADIUS_PX: f32;
+override SUPPORT: f32;
+override GRAZING: f32;
+override EPSILON_RADII: f32;
+override NEAREST: f32;
+
+// No pixel.
+const NOWHERE = 1u;
+
+@compute @workgroup_size(256)
+fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let first = select(0u, counters[ACTIVE], RECOVERED_ONLY);
+    let index = first + group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] {
+        return;
+    }
+    let surfel = surfels[index];
+    let c = surfel.center;
+    let n = surfel.normal;
+    let a = surfel.major_axis;
+    let b = vec3f(n.y * a.z - n.z * a.y, n.z * a.x - n.x * a.z, n.x * a.y - n.y * a.x);
+    let perspective = frame.perspective == 1u;
+    let most = select(infinity(), NEAREST * c.z, perspective);
+    let minor = min(SUPPORT * surfel.radius, most);
+    let major = min(SUPPORT * surfel.radius * surfel.major_ratio, most);
+    let place = level_start(SPLATS) + index;
+    if !(minor > 0.0) {
+        tree[place] = vec2u(NOWHERE);
+        return;
+    }
+
+    let focal = frame.focal_px;
+    let a_scale = 1.0 / (focal * major);
+    let b_scale = 1.0 / (focal * minor);
+    // How much the disc faces the line of sight, and what each axis loses along it.
+    var facing = n.z;
+    var least_facing = GRAZING;
+    var along = vec2f(a.z, b.z);
+    var plane = vec2f(-n.x, -n.y);
+    if perspective {
+        facing = n.x * c.x + n.y * c.y + n.z * c.z;
+        least_facing = GRAZING * sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
+        along = vec2f(a.x * c.x + a.y * c.y + a.z * c.z, b.x * c.x + b.y * c.y + b.z * c.z);
+        plane = vec2f(n.x, n.y);
+    }
+    plane = plane / (focal * facing);
+    let shear = along / facing;
+    var u = vec2f((a.x - n.x * shear.x) * a_scale, (a.y - n.y * shear.x) * a_scale);
+    var v = vec2f((b.x - n.x * shear.y) * b_scale, (b.y - n.y * shear.y) * b_scale);
+    if !(abs(facing) > least_facing) {
+        // Drawn as the dot alone.
+        let per_dot = 1.0 / (DOT_RADIUS_PX * select(1.0, c.z, perspective));
+        plane = vec2f(0.0);
+        u = vec2f(per_dot, 0.0);
+        v = vec2f(0.0, per_dot);
+    }
+
+    let axis_a = a * major;
+    let axis_b = b * minor;
+    let center_px = to_pixel(c);
+    let across = vec2f(axis_a.z, axis_b.z);
+    let x = extent(c.x, c.z, vec2f(axis_a.x, axis_b.x), across, center_px.x, frame.size.x);
+    let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y);
+    tree[place] = vec2u(x, y);
+    let epsilon = EPSILON_RADII * min(surfel.radius, most);
+    let depth_reach = sqrt(across.x * across.x + across.y * across.y);
+    splats[index] = Splat(center_px, plane, u, v, c.z, epsilon, depth_reach, surfel.pixel);
+}
+
+// First and last pixel along an axis whose centre the disc or its dot may cover. `axes` are the coordinates of the disc's
+// axes along that axis, `across` their depths.
+fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32) -> u32 {
+    let squared = axes.x * axes.x + axes.y * axes.y;
+    var low: f32;
+    var high: f32;
+    if frame.perspective == 1u {
+        // The lines of sight s = x/z that touch the ellipse c + a·cos + b·sin: (c - s·cz)² = (a - s·az)² + (b - s·bz)².
+        let qa = cz * cz - across.x * across.x - across.y * across.y;
+        let qb = c * cz - axes.x * across.x - axes.y * across.y;
+        let qc = c * c - squared;
+        let root = sqrt(max(qb * qb - qa * qc, 0.0));
+        low = (qb - root) / qa;
+        high = (qb + root) / qa;
+    } else {
+        let reach = sqrt(squared);
+        low = c - reach;
+        high = c + reach;
+    }
+    let middle = 0.5 * f32(size);
+    // Pixel i is covered if its centre i + ½ lies within.
+    let first = max(ceil(min(low * frame.focal_px + middle, center_px - DOT_RADIUS_PX) - 0.5), 0.0);
+    let last = min(floor(max(high * frame.focal_px + middle, center_px + DOT_RADIUS_PX) - 0.5), f32(size) - 1.0);
+    if first <= last {
+        return u32(first) | u32(last) << 16u;
+    }
+    return NOWHERE;
+}
