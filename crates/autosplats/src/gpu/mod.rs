@@ -10,8 +10,6 @@ mod frame;
 mod link;
 mod pass;
 mod recorder;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use buffers::Readback;
 #[cfg(test)]

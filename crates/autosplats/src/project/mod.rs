@@ -16,6 +16,8 @@ pub(crate) mod gpu;
 mod tests;
 
 pub(crate) use cpu::Projector;
+#[cfg(test)]
+pub(crate) use device_cloud::ChunkUniform;
 pub(crate) use device_cloud::{DeviceCloud, PointValues, Uploader};
 
 use bytemuck::{Pod, Zeroable};

@@ -15,7 +15,7 @@ use crate::project::{DeviceCloud, PointValues, Uploader};
 use crate::search::screen_grid::gpu::{SearchPasses, neighborhood_buffer};
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
-use crate::shade::{Image, Scene, linear_steps};
+use crate::shade::{ColorMode, Image, Scene, linear_steps};
 use crate::splat::gpu::{Round, SplatBuffers, SplatPasses};
 use crate::splat::{Channels, GBuffer, LayerBuffers};
 
@@ -57,7 +57,7 @@ struct Passes {
 }
 
 /// What a frame's buffers and steps were made for.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Shape {
     size: [u32; 2],
     k: u32,
@@ -65,6 +65,7 @@ struct Shape {
     channels: Channels,
     find_range: bool,
     keep_linear: bool,
+    color: ColorMode,
 }
 
 /// A frame ready to be replayed.
@@ -244,6 +245,7 @@ impl GpuRenderer {
             },
             find_range: finds_range(&settings.shading),
             keep_linear: settings.all_layers,
+            color: settings.shading.color.clone(),
         };
         if self.prepared.as_ref().is_some_and(|prepared| prepared.shape == shape) {
             return Ok(());
@@ -265,7 +267,7 @@ impl GpuRenderer {
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
         let layers = LayerBuffers::new(gpu, size, shape.channels)?;
         let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
-        let steps = gpu.checked(|| {
+        let mut steps = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
             for round in [Round::Active, Round::Recovered] {
                 if round == Round::Recovered {
@@ -277,9 +279,9 @@ impl GpuRenderer {
             }
             let refine = shape.depth_refinement;
             steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
-            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, shape.find_range));
             steps
         })?;
+        steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
         self.prepared = Some(Prepared { shape, screen, layers, picture, steps });
         Ok(())
     }
@@ -336,3 +338,6 @@ fn counts(cloud: &PointCloud, counters: &[u32]) -> Counts {
         covered: count(Counter::Covered),
     }
 }
+
+#[cfg(test)]
+mod tests;

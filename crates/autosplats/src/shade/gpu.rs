@@ -6,7 +6,7 @@ mod uniform;
 
 pub(crate) use finish::{ReadPicture, finish};
 pub(crate) use texture::check_texture;
-pub(crate) use uniform::{ShadeUniform, finds_range};
+pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
 
 use super::color_map::{self, table};
 use super::cpu::{ENCODE_STEPS, background, encode_table, sample_step, usual_map};
@@ -106,44 +106,70 @@ impl ShadeBuffers {
 /// The passes of shading.
 #[derive(Debug)]
 pub(crate) struct ShadePasses {
-    range_values: Pass,
     range: Pass,
+    /// By [`Shown`].
+    coloring: Vec<Option<ColoringPasses>>,
+}
+
+/// The passes that differ by what a surface is coloured by.
+#[derive(Debug)]
+struct ColoringPasses {
+    range_values: Pass,
     shade: Pass,
 }
 
+impl ColoringPasses {
+    fn new(gpu: &Gpu, shown: Shown) -> Result<Self, Error> {
+        let pass = |source: &PassSource| Pass::new(gpu, source, &[("SHOWN", f64::from(shown as u32))]);
+        Ok(Self { range_values: pass(&RANGE_VALUES)?, shade: pass(&SHADE)? })
+    }
+}
+
 impl ShadePasses {
-    /// Compiles them.
+    /// Compiles what is common to all colour modes.
     ///
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
-        Ok(Self { range_values: pass(&RANGE_VALUES)?, range: pass(&RANGE)?, shade: pass(&SHADE)? })
+        Ok(Self { range: Pass::new(gpu, &RANGE, &[])?, coloring: Vec::new() })
     }
 
-    /// Shades `layers` into `buffers`, as [`ShadeBuffers::write`] says; `find_range` if [`finds_range`]. The range goes
-    /// into `counters`.
+    /// Shades `layers` into `buffers`, as [`ShadeBuffers::write`] says, for this colour mode and with a range given or
+    /// not: with others, steps are others. The range goes into `counters`. The first time that something is shown its
+    /// passes are compiled.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
     pub(crate) fn steps(
-        &self,
+        &mut self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
         layers: &LayerBuffers,
         counters: &wgpu::Buffer,
         buffers: &ShadeBuffers,
-        find_range: bool,
-    ) -> Vec<Step> {
+        shading: &Shading,
+    ) -> Result<Vec<Step>, Error> {
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let ShadeBuffers { uniform, keys, color_map, tables, image, linear, .. } = buffers;
+        let shown = Shown::new(&shading.color, layers.channels);
+        let at = shown as usize;
+        if self.coloring.len() <= at {
+            self.coloring.resize_with(at + 1, || None);
+        }
+        let passes = match &mut self.coloring[at] {
+            Some(passes) => passes,
+            none => none.insert(ColoringPasses::new(gpu, shown)?),
+        };
         let mut steps = Vec::new();
-        if find_range {
+        if finds_range(shading) {
             let groups = (keys.size() / 4) as u32 / GROUP;
-            steps.push(self.range_values.step(gpu, &[frame, uniform, surface, cover, extras, keys], groups));
+            steps.push(passes.range_values.step(gpu, &[frame, uniform, surface, cover, extras, keys], groups));
             steps.push(self.range.step(gpu, &[frame, keys, counters], 1));
         }
         let shade = [frame, uniform, surface, cover, extras, counters, color_map, tables, image, linear];
         let [columns, rows] = [0, 1].map(|axis| buffers.size[axis].div_ceil(SHADE_GROUP[axis]));
-        steps.push(self.shade.step(gpu, &shade, columns * rows));
-        steps
+        steps.push(passes.shade.step(gpu, &shade, columns * rows));
+        Ok(steps)
     }
 }
 

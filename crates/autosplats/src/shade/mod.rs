@@ -6,6 +6,10 @@
 //! viewer's left shoulder, a weak fill light from the right and a sky brighter above than below; since normals face the
 //! eye, both sides of a surface are lit alike. Eye-dome lighting darkens pixels beside nearer ones. Colours are linear
 //! until the last step, which encodes them as sRGB.
+//!
+//! The range of a value, if none is given, reaches from the 1st to the 99th percentile of those in the picture, of 50,000
+//! of them at most; on the device it is found before shading, so that no frame waits for the host. The legend is drawn by
+//! the host in any case, into pictures in memory.
 
 mod classes;
 mod color_map;

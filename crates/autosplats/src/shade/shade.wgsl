@@ -42,14 +42,14 @@ fn from_srgb(value: f32) -> f32 {
 }
 
 fn base_color(pixel: vec2u, index: u32, surface_here: vec4f) -> vec3f {
-    if shading.shown >= SHOW_HEIGHT {
+    if SHOWN >= SHOW_HEIGHT {
         return map_color(shown_value(pixel, index, surface_here.w));
     }
-    if shading.shown == SHOW_NORMAL {
+    if SHOWN == SHOW_NORMAL {
         let normal = 0.5 + 0.5 * to_world(surface_here.xyz);
         return vec3f(from_srgb(normal.x), from_srgb(normal.y), from_srgb(normal.z));
     }
-    if shading.shown == SHOW_COLOR {
+    if SHOWN == SHOW_COLOR {
         return extras[index].rgb;
     }
     return shading.clay;
@@ -63,23 +63,28 @@ fn light(normal: vec3f) -> f32 {
     return shading.scanned_light.x + shading.scanned_light.y * sum;
 }
 
+// How much a neighbour shades a pixel.
+fn shadow_of(side: u32, pixel: vec2u, index: u32, depth: f32) -> f32 {
+    let neighbor = shading.neighbors[side];
+    // Beyond the left and upper edges it wraps around, to beyond the others. What is outside shades as the pixel itself.
+    let at = vec2u(vec2i(pixel) + neighbor.xy);
+    let is_inside = at.x < frame.size.x && at.y < frame.size.y;
+    let nearer = surface[select(index, at.y * frame.size.x + at.x, is_inside)].w;
+    // How steeply the nearer neighbour rises towards the eye; slopes up to 45° are surface, not a step.
+    let slope = max((depth - nearer) / (pixel_size(depth) * bitcast<f32>(neighbor.z)), 1.0);
+    return (slope - 1.0) / (slope + 3.0);
+}
+
 // How much light is left beside nearer surfaces.
-fn eye_dome(pixel: vec2u, depth: f32) -> f32 {
-    let unit = pixel_size(depth);
-    var shadow = 0.0;
-    for (var side = 0u; side < 8u; side++) {
-        let neighbor = shading.neighbors[side];
-        // Beyond the left and upper edges it wraps around, to beyond the others.
-        let at = vec2u(vec2i(pixel) + neighbor.xy);
-        if at.x < frame.size.x && at.y < frame.size.y {
-            // How steeply the nearer neighbour rises towards the eye; slopes up to 45° are surface, not a step.
-            let rise = depth - surface[at.y * frame.size.x + at.x].w;
-            let slope = rise / (unit * bitcast<f32>(neighbor.z));
-            if slope > 1.0 {
-                shadow += (slope - 1.0) / (slope + 3.0);
-            }
-        }
-    }
+fn eye_dome(pixel: vec2u, index: u32, depth: f32) -> f32 {
+    // No loop, so that all are read at once.
+    var shadow = shadow_of(0u, pixel, index, depth) + shadow_of(1u, pixel, index, depth);
+    shadow += shadow_of(2u, pixel, index, depth);
+    shadow += shadow_of(3u, pixel, index, depth);
+    shadow += shadow_of(4u, pixel, index, depth);
+    shadow += shadow_of(5u, pixel, index, depth);
+    shadow += shadow_of(6u, pixel, index, depth);
+    shadow += shadow_of(7u, pixel, index, depth);
     shadow = shading.eye_dome * shadow / 8.0;
     return 1.0 / (1.0 + shadow + 0.5 * shadow * shadow);
 }
@@ -109,7 +114,7 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
             lit = light(surface_here.xyz);
         }
         if shading.eye_dome > 0.0 {
-            lit *= eye_dome(pixel, surface_here.w);
+            lit *= eye_dome(pixel, index, surface_here.w);
         }
         color *= lit;
         word = encode(color.r) | (encode(color.g) << 8u) | (encode(color.b) << 16u) | 0xff000000u;

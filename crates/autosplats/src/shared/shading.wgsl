@@ -22,8 +22,6 @@ struct ShadeUniform {
     // Ends of the colour map, if they are not to be found.
     range: vec2f,
     find_range: u32,
-    // What the surface is coloured by.
-    shown: u32,
     lighting: u32,
     keep_linear: u32,
     // Bytes of the image are blue, green, red.
@@ -37,11 +35,8 @@ struct ShadeUniform {
     encode_steps: u32,
     // Where in the tables the backgrounds of rows begin.
     backgrounds: u32,
-    // Where in the extras the measures begin.
+    // Where among the extras the measures begin.
     measures: u32,
-    padding_x: u32,
-    padding_y: u32,
-    padding_z: u32,
     // Neighbours for eye-dome lighting: steps in x and y, and the bits of the distance in pixels.
     neighbors: array<vec4i, 8>,
 }
@@ -59,6 +54,9 @@ const SHOW_K_RADIUS = 6u;
 const SHOW_CURVATURE = 7u;
 const SHOW_SCALAR = 8u;
 
+// What the surface is coloured by. A constant, because software devices run all branches.
+override SHOWN: u32;
+
 // Whether a surface covers a pixel of this depth.
 fn is_covered(depth: f32) -> bool {
     return is_finite(depth);
@@ -72,7 +70,7 @@ fn to_world(direction: vec3f) -> vec3f {
 
 // The value shown at a pixel. Heights are told from the cloud's origin.
 fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
-    switch shading.shown {
+    switch SHOWN {
         case SHOW_HEIGHT: {
             let position_view = unproject(vec2f(pixel) + 0.5, depth);
             return dot(to_world(position_view) + frame.eye_local, shading.up);

@@ -30,11 +30,11 @@ pub(crate) struct LayerBuffers {
 /// `Cover` in `shared/layers.wgsl`.
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-struct Cover {
-    weight: f32,
-    rim: f32,
-    point: u32,
-    scalar: f32,
+pub(crate) struct Cover {
+    pub(crate) weight: f32,
+    pub(crate) rim: f32,
+    pub(crate) point: u32,
+    pub(crate) scalar: f32,
 }
 
 impl LayerBuffers {
@@ -111,19 +111,20 @@ pub(crate) fn upload_layers(gpu: &Gpu, layers: &GBuffer) -> LayerBuffers {
     let buffers = LayerBuffers::new(gpu, size, channels).expect("room");
     let [width, height] = size.map(|side| side as usize);
     let pixels = || (0..width * height).map(|pixel| layers.index(pixel % width, pixel / width));
-    let surface = pixels().map(|at| {
-        let [x, y, z] = layers.normal[at];
-        [x, y, z, layers.depth[at]]
-    });
-    gpu.queue.write_buffer(&buffers.surface, 0, bytemuck::cast_slice(&surface.collect::<Vec<_>>()));
-    let cover = pixels().map(|at| Cover {
+    let surface: Vec<[f32; 4]> = pixels()
+        .map(|at| {
+            let [x, y, z] = layers.normal[at];
+            [x, y, z, layers.depth[at]]
+        })
+        .collect();
+    let cover = |at: usize| Cover {
         weight: layers.weight[at],
         rim: 0.0,
         point: layers.point[at],
         scalar: layers.scalar.get(at).copied().unwrap_or(f32::NAN),
-    });
-    gpu.queue.write_buffer(&buffers.cover, 0, bytemuck::cast_slice(&cover.collect::<Vec<_>>()));
-    let mut extras = Vec::new();
+    };
+    let cover: Vec<_> = pixels().map(cover).collect();
+    let mut extras: Vec<[f32; 4]> = Vec::new();
     if channels.color {
         extras.extend(pixels().map(|at| {
             let [r, g, b] = layers.color[at];
@@ -133,6 +134,8 @@ pub(crate) fn upload_layers(gpu: &Gpu, layers: &GBuffer) -> LayerBuffers {
     if channels.measures {
         extras.extend(pixels().map(|at| [layers.radius[at], layers.k_radius[at], layers.curvature[at], 0.0]));
     }
+    gpu.queue.write_buffer(&buffers.surface, 0, bytemuck::cast_slice(&surface));
+    gpu.queue.write_buffer(&buffers.cover, 0, bytemuck::cast_slice(&cover));
     gpu.queue.write_buffer(&buffers.extras, 0, bytemuck::cast_slice(&extras));
     buffers
 }

@@ -24,9 +24,9 @@ mod trim;
 
 pub(crate) use attributes::{Attributes, PointColors};
 pub(crate) use cpu::Splatter;
-#[cfg(test)]
-pub(crate) use layers::upload_layers;
 pub(crate) use layers::{Channels, LayerBuffers};
+#[cfg(test)]
+pub(crate) use layers::{Cover, upload_layers};
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
 pub const TILE: usize = 64;

@@ -1,5 +1,7 @@
 //! Shading on the GPU against that on the CPU, from the same layers.
 
+use std::cell::RefCell;
+
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
@@ -16,7 +18,7 @@ use crate::{Renderer, Settings};
 /// A device with what shading takes on it.
 struct Device {
     gpu: Gpu,
-    passes: ShadePasses,
+    passes: RefCell<ShadePasses>,
 }
 
 /// What the device made of layers.
@@ -28,7 +30,7 @@ struct Shaded {
 impl Device {
     fn new() -> Option<Self> {
         let gpu = test_gpu()?;
-        let passes = ShadePasses::new(&gpu).expect("passes");
+        let passes = RefCell::new(ShadePasses::new(&gpu).expect("passes"));
         Some(Self { gpu, passes })
     }
 
@@ -43,6 +45,7 @@ impl Device {
         then: impl FnOnce(&ShadeBuffers, &wgpu::Buffer) -> T,
     ) -> T {
         let Self { gpu, passes } = self;
+        let mut passes = passes.borrow_mut();
         let layers = upload_layers(gpu, layers);
         let mut buffers = ShadeBuffers::new(gpu, layers.size, keep_linear).expect("room");
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -51,7 +54,7 @@ impl Device {
         let uniform = ShadeUniform::new(scene, shading, &layers, keep_linear).into_format(format);
         buffers.write(gpu, &uniform, shading);
         let mut recorder = Recorder::new(gpu, &Clock::Off);
-        let steps = passes.steps(gpu, &frame, &layers, &counters, &buffers, finds_range(shading));
+        let steps = passes.steps(gpu, &frame, &layers, &counters, &buffers, shading).expect("passes");
         steps.iter().for_each(|step| recorder.run(step));
         recorder.finish();
         then(&buffers, &counters)
@@ -105,15 +108,16 @@ fn difference(a: &Image, b: &Image) -> Difference {
     }
 }
 
-fn assert_same(host: &Image, device: &Image, case: &str) {
+fn assert_same(host: &Image, device: &Image, shading: &Shading, case: &str) {
     let found = difference(host, device);
     // Divisions, powers and fused sums may be off by some units in the last place, which moves a channel over the border
-    // between two of 255 steps, and a value over that between two steps of a colour map, which are up to two of 255 apart.
-    assert!(found.worst <= 2, "{case}: {found:?}");
-    // At 1x1 one pixel is all.
-    let few = 2.0 / host.pixels.len() as f64;
-    assert!(found.share <= f64::max(5e-3, few), "{case}: {found:?}");
-    assert!(found.linear <= 0.02, "{case}: {found:?}");
+    // between two of 255 steps, and a value over that between two steps of a colour map: of 1024 steps the steepest, those
+    // of Turbo, are two of 255 apart, or 0.02 in linear light.
+    let (worst, linear) = if usual_map(&shading.color).is_some() { (2, 0.02) } else { (1, 1e-5) };
+    assert!(found.worst <= worst && found.linear <= linear, "{case}: {found:?}");
+    // Some pixels are many where there are few.
+    let few = 3.0 / host.pixels.len() as f64;
+    assert!(found.share <= f64::max(1e-3, few), "{case}: {found:?}");
 }
 
 fn layers_of(size: [u32; 2]) -> GBuffer {
@@ -221,7 +225,7 @@ fn every_setting_makes_the_same_picture() {
                         let keep_linear = seed.is_multiple_of(5);
                         let shaded = device.shade(&layers, &scene, &shading, keep_linear);
                         let host = on_host(&layers, &scene, &shading, keep_linear);
-                        assert_same(&host, &shaded.image, &format!("{size:?} {projection:?} {shading:?}"));
+                        assert_same(&host, &shaded.image, &shading, &format!("{size:?} {projection:?} {shading:?}"));
                     }
                 }
             }
@@ -249,7 +253,7 @@ fn pictures_of_clouds_are_the_same() {
                 let shading = Shading { color, ..Shading::default() };
                 let case = format!("{name} {projection:?} {:?}", shading.color);
                 let host = on_host(&layers, &scene, &shading, true);
-                assert_same(&host, &device.shade(&layers, &scene, &shading, true).image, &case);
+                assert_same(&host, &device.shade(&layers, &scene, &shading, true).image, &shading, &case);
             }
         }
     }
@@ -319,7 +323,7 @@ fn heights_are_told_apart_in_survey_coordinates() {
                 let shading = Shading { legend, ..shading.clone() };
                 let host = on_host(&layers, &scene, &shading, true);
                 let shaded = device.shade(&layers, &scene, &shading, true).image;
-                assert_same(&host, &shaded, &format!("{origin:?} {range:?}, legend {legend}"));
+                assert_same(&host, &shaded, &shading, &format!("{origin:?} {range:?}, legend {legend}"));
             }
             device.shade(&layers, &scene, &shading, true).image
         })
@@ -396,10 +400,12 @@ fn tables_follow_the_settings() {
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&view, 0, 10)));
     let counters = gpu.storage::<u32>("counters", COUNTERS).expect("room");
-    let steps = device.passes.steps(gpu, &frame, &layers, &counters, &buffers, true);
+    let depth = Shading { color: ColorMode::Depth, ..Shading::default() };
+    let mut passes = device.passes.borrow_mut();
+    let steps = passes.steps(gpu, &frame, &layers, &counters, &buffers, &depth).expect("passes");
     // The same buffers and steps, frame after frame.
     for (color_map, background) in MAPS.into_iter().zip(BACKGROUNDS.into_iter().cycle()).cycle().take(8) {
-        let shading = Shading { color: ColorMode::Depth, color_map, background, ..Shading::default() };
+        let shading = Shading { color_map, background, ..depth.clone() };
         buffers.write(gpu, &ShadeUniform::new(&scene, &shading, &layers, false), &shading);
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         steps.iter().for_each(|step| recorder.run(step));
@@ -408,6 +414,7 @@ fn tables_follow_the_settings() {
         let mut image = Image::default();
         let read = ReadPicture { size, image: &bytes, linear: &[], range: [0; 2] };
         finish(&read, &scene, &shading, &mut image);
-        assert_same(&on_host(&host, &scene, &shading, false), &image, &format!("{color_map:?} {background:?}"));
+        let case = format!("{color_map:?} {background:?}");
+        assert_same(&on_host(&host, &scene, &shading, false), &image, &shading, &case);
     }
 }

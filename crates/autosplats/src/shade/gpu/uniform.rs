@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::cpu::{
+use super::super::cpu::{shows_colors, 
     CLAY, ENCODE_STEPS, EYE_DOME, FILL, FILL_LIGHT, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SKY, Scene, sample_step,
-    shows_colors, usual_map,
+    usual_map,
 };
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
@@ -26,7 +26,7 @@ pub(crate) enum Shown {
 }
 
 impl Shown {
-    fn new(mode: &ColorMode, layers: Channels) -> Self {
+    pub(super) fn new(mode: &ColorMode, layers: Channels) -> Self {
         match mode {
             ColorMode::Height => Self::Height,
             ColorMode::Depth => Self::Depth,
@@ -57,7 +57,6 @@ pub(crate) struct ShadeUniform {
     pub(crate) scanned_light: [f32; 2],
     pub(crate) range: [f32; 2],
     pub(crate) find_range: u32,
-    pub(crate) shown: u32,
     pub(crate) lighting: u32,
     pub(crate) keep_linear: u32,
     pub(crate) swap_red_blue: u32,
@@ -67,7 +66,6 @@ pub(crate) struct ShadeUniform {
     pub(crate) encode_steps: u32,
     pub(crate) backgrounds: u32,
     pub(crate) measures: u32,
-    pub(crate) padding: [u32; 3],
     pub(crate) neighbors: [[i32; 4]; 8],
 }
 
@@ -82,7 +80,7 @@ impl ShadeUniform {
         let [width, height] = layers.size;
         let pixels = width as usize * height as usize;
         let step = sample_step(pixels);
-        let shown = Shown::new(&shading.color, layers.channels);
+        let colored = Shown::new(&shading.color, layers.channels) == Shown::Color;
         Self {
             key: KEY.to_array(),
             key_light: KEY_LIGHT,
@@ -93,10 +91,9 @@ impl ShadeUniform {
             up: scene.up.as_vec3().to_array(),
             eye_dome: shading.eye_dome,
             sky: SKY,
-            scanned_light: if shown == Shown::Color { SCANNED_LIGHT } else { [0.0, 1.0] },
+            scanned_light: if colored { SCANNED_LIGHT } else { [0.0, 1.0] },
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
-            shown: shown as u32,
             lighting: shading.lighting.into(),
             keep_linear: keep_linear.into(),
             swap_red_blue: 0,
@@ -106,7 +103,6 @@ impl ShadeUniform {
             encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
             measures: if layers.channels.color { pixels as u32 } else { 0 },
-            padding: [0; 3],
             neighbors: EYE_DOME.map(|[dx, dy]| {
                 let distance_px = ((dx * dx + dy * dy) as f32).sqrt();
                 [dx as i32, dy as i32, distance_px.to_bits() as i32, 0]

@@ -2,8 +2,9 @@
 
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use super::PassSource;
-use super::device::INT64_ATOMICS;
+use crate::gpu::{INT64_ATOMICS, PassSource};
+
+mod layouts;
 
 fn passes() -> impl Iterator<Item = &'static PassSource> {
     let stages = [

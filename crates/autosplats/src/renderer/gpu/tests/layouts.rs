@@ -1,0 +1,204 @@
+//! Structs and constants that Rust and WGSL both have are the same.
+
+use std::mem::offset_of;
+
+use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
+
+use super::super::link::link;
+use super::super::recorder::GROUPS_PER_ROW;
+use super::super::{FrameUniform, PassSource};
+use super::passes;
+use crate::fit::Surfel;
+use crate::project::gpu::{BLOCK, COUNTERS, Counter};
+use crate::project::{ChunkUniform, ScreenPoint};
+use crate::shade::gpu::{ShadeUniform, Shown};
+use crate::splat::Cover;
+
+/// Name, offset and size of a field.
+type Field = (String, usize, usize);
+
+/// The name of a struct in WGSL, its size and its fields.
+struct Mirrored {
+    name: &'static str,
+    size: usize,
+    fields: Vec<Field>,
+}
+
+fn field_size<S, F>(_: impl Fn(&S) -> &F) -> usize {
+    size_of::<F>()
+}
+
+macro_rules! mirrored {
+    ($name:literal, $rust:ident { $($field:ident),* $(,)? }) => {{
+        // Fails to compile if one is missing.
+        let $rust { $($field: _),* } = <$rust as bytemuck::Zeroable>::zeroed();
+        let fields = vec![$((
+            stringify!($field).to_owned(),
+            offset_of!($rust, $field),
+            field_size(|mirror: &$rust| &mirror.$field),
+        )),*];
+        Mirrored { name: $name, size: size_of::<$rust>(), fields }
+    }};
+}
+
+fn mirrored() -> [Mirrored; 6] {
+    [
+        mirrored!(
+            "Frame",
+            FrameUniform {
+                view_from_world,
+                eye_local,
+                focal_px,
+                size,
+                near,
+                perspective,
+                k,
+                grid_culling,
+                ellipses,
+                keep_outliers,
+                splat_scale,
+                outlier_growth,
+                gap_growth,
+                points,
+            }
+        ),
+        mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
+        mirrored!("Cover", Cover { weight, rim, point, scalar }),
+        mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
+        mirrored!(
+            "Surfel",
+            Surfel { center, radius, normal, k_radius, major_axis, major_ratio, curvature, pixel, source, screen }
+        ),
+        mirrored!(
+            "ShadeUniform",
+            ShadeUniform {
+                key,
+                key_light,
+                fill,
+                fill_light,
+                clay,
+                key_wrap,
+                up,
+                eye_dome,
+                sky,
+                scanned_light,
+                range,
+                find_range,
+                lighting,
+                keep_linear,
+                swap_red_blue,
+                pitch,
+                sample_step,
+                samples,
+                encode_steps,
+                backgrounds,
+                measures,
+                neighbors,
+            }
+        ),
+    ]
+}
+
+/// All passes, and what is shared but imported by none of them.
+fn modules() -> Vec<Module> {
+    let shared = ["#import surfel\n", "#import counters\n", "#import rank\n", "#import groups\n"];
+    passes().map(PassSource::module).chain(shared.map(parse)).collect()
+}
+
+fn parse(source: &str) -> Module {
+    naga::front::wgsl::parse_str(&link(source)).expect("WGSL")
+}
+
+/// Size and fields of a struct.
+fn layout(module: &Module, name: &str) -> Option<(usize, Vec<Field>)> {
+    module.types.iter().find_map(|(_, ty)| match &ty.inner {
+        TypeInner::Struct { members, span } if ty.name.as_deref() == Some(name) => {
+            let field = |member: &naga::StructMember| {
+                let size = module.types[member.ty].inner.size(module.to_ctx());
+                (member.name.clone().unwrap_or_default(), member.offset as usize, size as usize)
+            };
+            Some((*span as usize, members.iter().map(field).collect()))
+        }
+        _ => None,
+    })
+}
+
+/// The `u32` constants of a module, by name.
+fn constants(module: &Module) -> Vec<(String, u32)> {
+    let constant = |constant: &naga::Constant| match module.global_expressions[constant.init] {
+        Expression::Literal(Literal::U32(value)) => Some((constant.name.clone()?, value)),
+        _ => None,
+    };
+    module.constants.iter().filter_map(|(_, value)| constant(value)).collect()
+}
+
+fn constant(source: &str, name: &str) -> u32 {
+    let constants = constants(&parse(source));
+    constants.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
+}
+
+/// As WGSL names the variant of an enum: `NotFinite` is `NOT_FINITE`.
+fn screaming(variant: &impl std::fmt::Debug) -> String {
+    let name = format!("{variant:?}");
+    let words = name.char_indices().map(|(at, c)| if at > 0 && c.is_uppercase() { format!("_{c}") } else { c.into() });
+    words.collect::<String>().to_uppercase()
+}
+
+#[test]
+fn structs_lie_alike_in_rust_and_wgsl() {
+    let modules = modules();
+    for Mirrored { name, size, fields } in mirrored() {
+        let found: Vec<_> = modules.iter().filter_map(|module| layout(module, name)).collect();
+        assert!(!found.is_empty(), "no pass has a struct {name}");
+        for (span, members) in found {
+            assert_eq!(members, fields, "{name}: fields in WGSL, and in Rust");
+            assert_eq!(span, size, "{name}: size in WGSL, and in Rust");
+        }
+    }
+}
+
+#[test]
+fn a_shifted_field_is_found() {
+    let module = parse("struct Surfel { center: vec3f, normal: vec3f }");
+    let (_, members) = layout(&module, "Surfel").expect("a struct");
+    let expected = [("center".to_owned(), 0, 12), ("normal".to_owned(), 16, 12)];
+    assert_eq!(members, expected, "vectors of three are aligned to four");
+}
+
+#[test]
+fn constants_are_alike_in_rust_and_wgsl() {
+    use Counter::{
+        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, NotFinite, Outliers, Outside, Passive,
+        RangeHigh, RangeLow, Recovered, StripPx, Visible,
+    };
+    let counters: [Counter; COUNTERS] = [
+        NotFinite,
+        Behind,
+        Outside,
+        Visible,
+        Blocks,
+        StripPx,
+        CellPx,
+        CellColumns,
+        Active,
+        Passive,
+        Recovered,
+        Clamped,
+        Bounded,
+        Outliers,
+        RangeLow,
+        RangeHigh,
+    ];
+    let counters = counters.map(|counter| (screaming(&counter), counter as u32));
+    assert_eq!(constants(&parse("#import counters\n")), counters, "counters in WGSL, and in Rust");
+
+    use Shown::{Clay, Color, Curvature, Depth, Height, KRadius, Normal, Radius, Scalar};
+    let shown = [Clay, Color, Normal, Height, Depth, Radius, KRadius, Curvature, Scalar];
+    let shown = shown.map(|shown| (format!("SHOW_{}", screaming(&shown)), shown as u32));
+    let shading = passes().find(|pass| pass.path == "shade/shade").expect("a pass").module();
+    let in_wgsl: Vec<_> = constants(&shading).into_iter().filter(|(name, _)| name.starts_with("SHOW_")).collect();
+    assert_eq!(in_wgsl, shown, "what is shown in WGSL, and in Rust");
+
+    assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, BLOCK, "flags that a workgroup ranks");
+    assert_eq!(constant("#import groups\n", "GROUPS_PER_ROW"), GROUPS_PER_ROW, "workgroups in a row");
+}
