@@ -20,9 +20,7 @@ impl Device {
     /// What `renderer` runs on.
     pub(crate) fn of(renderer: &Renderer) -> Self {
         match renderer.adapter() {
-            Some(adapter) => {
-                Self { backend: "gpu", name: adapter.name.clone(), adapter: Some(adapter), ..Self::cpu() }
-            }
+            Some(adapter) => Self { backend: "gpu", name: adapter.name.clone(), adapter: Some(adapter), ..Self::cpu() },
             None => Self::cpu(),
         }
     }

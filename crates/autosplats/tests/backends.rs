@@ -87,7 +87,10 @@ fn compare_layers(a: &GBuffer, b: &GBuffer, case: &str) {
         !(near(a.weight[i], b.weight[i]) && near(a.depth[i], b.depth[i]) && normals && colors && scalars && measures)
     });
     let differing = differing.count();
-    assert!(differing as f64 <= 2.0 * UNLIKE * (width * height) as f64 + 1.0, "{case}: {differing} pixels of the layers");
+    assert!(
+        differing as f64 <= 2.0 * UNLIKE * (width * height) as f64 + 1.0,
+        "{case}: {differing} pixels of the layers"
+    );
 }
 
 #[test]
@@ -95,8 +98,10 @@ fn comparison_sees_another_picture() {
     let (cloud, camera) = scene("statue", 20_000);
     let mut renderer = Renderer::new();
     let mut image = |splat_scale| {
-        let settings =
-            Settings { reconstruction: Reconstruction { splat_scale, ..Reconstruction::default() }, ..Settings::default() };
+        let settings = Settings {
+            reconstruction: Reconstruction { splat_scale, ..Reconstruction::default() },
+            ..Settings::default()
+        };
         renderer.render(&cloud, &camera, SIZE, &settings).expect("a picture").image.clone()
     };
     assert!(unlike(&image(1.0), &image(1.2)) > 2.0 * UNLIKE, "splats a fifth wider make another picture");
@@ -214,12 +219,8 @@ fn the_same_frame_twice_is_the_same_to_the_byte() {
 #[test]
 fn nothing_to_see_is_no_trouble() {
     let Some(mut gpu) = gpu() else { return };
-    let camera = Camera {
-        eye: EYE,
-        look_at: DVec3::ZERO,
-        up: DVec3::NEG_Y,
-        projection: Projection::PerspectiveFovDeg(36.0),
-    };
+    let camera =
+        Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::NEG_Y, projection: Projection::PerspectiveFovDeg(36.0) };
     let settings = Settings { all_layers: true, ..Settings::default() };
     let clouds = [
         ("no point", Vec::new()),
@@ -316,21 +317,30 @@ fn a_callers_texture_gets_the_same_picture() {
         let expected = expected.pixels.iter().map(|&[r, g, b, a]| if swapped { [b, g, r, a] } else { [r, g, b, a] });
         assert!(pixels.into_iter().eq(expected), "{format:?}");
     }
-    let wrong = [texture(wgpu::TextureFormat::R32Float, both), texture(wgpu::TextureFormat::Rgba8Unorm, both - wgpu::TextureUsages::COPY_DST)];
+    let wrong = [
+        texture(wgpu::TextureFormat::R32Float, both),
+        texture(wgpu::TextureFormat::Rgba8Unorm, both - wgpu::TextureUsages::COPY_DST),
+    ];
     for texture in wrong {
         let refused = renderer.render_to_texture(&cloud, &camera, &texture, &settings);
         assert!(refused.is_err(), "{:?} {:?}", texture.format(), texture.usage());
     }
-    assert!(Renderer::new().render_to_texture(&cloud, &camera, &wrong_backend(&texture), &settings).is_err(), "the CPU has none");
+    assert!(
+        Renderer::new().render_to_texture(&cloud, &camera, &wrong_backend(&texture), &settings).is_err(),
+        "the CPU has none"
+    );
 }
 
-fn wrong_backend(
-    texture: &impl Fn(wgpu::TextureFormat, wgpu::TextureUsages) -> wgpu::Texture,
-) -> wgpu::Texture {
+fn wrong_backend(texture: &impl Fn(wgpu::TextureFormat, wgpu::TextureUsages) -> wgpu::Texture) -> wgpu::Texture {
     texture(wgpu::TextureFormat::Rgba8Unorm, wgpu::TextureUsages::COPY_DST)
 }
 
-fn read_texture(device: &wgpu::Device, queue: &wgpu::Queue, texture: &wgpu::Texture, [width, height]: [u32; 2]) -> Vec<[u8; 4]> {
+fn read_texture(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    texture: &wgpu::Texture,
+    [width, height]: [u32; 2],
+) -> Vec<[u8; 4]> {
     let pitch = (4 * width).next_multiple_of(256);
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: None,

@@ -96,7 +96,9 @@ pub(crate) fn render_failure(error: Error) -> Failure {
     match error {
         Error::Setting { name, value, range } => Failure::usage(format!("{} {value}: it must be {range}", flag(name))),
         Error::Camera(_) | Error::MissingAttribute { .. } | Error::ImageSize { .. } => Failure::usage(error),
-        Error::TooManyPoints(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) => Failure::new(Exit::Memory, error),
+        Error::TooManyPoints(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) => {
+            Failure::new(Exit::Memory, error)
+        }
         Error::Device(_) | Error::DeviceLost(_) => Failure::new(Exit::Device, error),
         _ => Failure::new(Exit::Input, error),
     }

@@ -53,7 +53,11 @@ impl Gpu {
     ///
     /// # Errors
     /// Those of [`storage`](Self::storage).
-    pub(crate) fn storage_with<T: bytemuck::Pod>(&self, label: &'static str, values: &[T]) -> Result<wgpu::Buffer, Error> {
+    pub(crate) fn storage_with<T: bytemuck::Pod>(
+        &self,
+        label: &'static str,
+        values: &[T],
+    ) -> Result<wgpu::Buffer, Error> {
         let buffer = self.storage::<T>(label, values.len())?;
         self.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(values));
         Ok(buffer)

@@ -29,7 +29,7 @@ const SHARED: &[(&str, &str)] = &[
 ///
 /// # Panics
 /// If a name is unknown; every pass is linked in the tests.
-pub(super) fn link(source: &str) -> String {
+pub(crate) fn link(source: &str) -> String {
     let mut wanted = vec![false; SHARED.len()];
     want(source, &mut wanted);
     for at in (0..SHARED.len()).rev() {

@@ -19,6 +19,10 @@ pub(crate) use device::test_gpu;
 pub use device::{AdapterSummary, adapters};
 pub(crate) use device::{Gpu, INT64_ATOMICS};
 pub(crate) use frame::FrameUniform;
+#[cfg(test)]
+pub(crate) use link::link;
 pub(crate) use pass::{Pass, PassSource, Step};
+#[cfg(test)]
+pub(crate) use recorder::GROUPS_PER_ROW;
 pub use recorder::PassTime;
 pub(crate) use recorder::{Clock, Recorder};

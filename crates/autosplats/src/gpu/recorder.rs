@@ -7,7 +7,7 @@ use super::{Gpu, Step};
 use crate::Error;
 
 /// Workgroups in a row of a dispatch: more than 65535 need a second dimension. `shared/groups.wgsl` undoes this.
-pub(super) const GROUPS_PER_ROW: u32 = 32768;
+pub(crate) const GROUPS_PER_ROW: u32 = 32768;
 
 /// Most passes of a frame that can be timed.
 const MOST_PASSES: u32 = 512;

@@ -7,9 +7,11 @@
 //! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
 //!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ;
 //! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
-//! - *bound*: an engine need not read more than [`MAX_CANDIDATES`] screen points for P. A search that would have to keeps
-//!   the neighbours it is already sure of, is clamped and counted as bounded. So a cloud of nothing but outliers costs a
-//!   bounded time per point. Only here does the answer depend on what the engine happened to read.
+//! - *bound*: a search need not look further than the largest of the radii r̃₀·1.25ⁱ, i any whole number, whose sphere
+//!   projects to a rectangle with at most [`MAX_CANDIDATES`] screen points. If no rule ended the neighbourhood and its k-th
+//!   neighbour lies beyond, P keeps the neighbours within that radius and is counted as bounded. So a cloud of nothing but
+//!   outliers costs a bounded time per point. An engine may go without the rectangle, and so without the bound, where it
+//!   reads less than [`CROWDED`] screen points.
 
 pub(crate) mod moments;
 pub(crate) mod screen_grid;
@@ -29,8 +31,12 @@ pub enum SearchEngine {
 /// Neighbourhoods that share a [`NeighborhoodBlock`].
 pub(crate) const LANES: usize = 16;
 
-/// Screen points an engine reads for one point before it may settle for fewer than k neighbours.
+/// Screen points in the projection of the largest sphere that is searched.
 pub(crate) const MAX_CANDIDATES: usize = 4096;
+/// Screen points in a window from which on its points may meet the bound: densities do not rise eightfold in one step.
+pub(crate) const CROWDED: usize = MAX_CANDIDATES / 8;
+/// Step between the radii among which the bound is found.
+pub(crate) const BOUND_STEP: f32 = 1.25;
 
 /// One value per neighbourhood of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,7 +12,8 @@ use crate::project::ScreenPoints;
 use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::select::{GROUP, kth_smallest, largest_below};
 use crate::search::{
-    EarlyEnd, LANES, Lanes, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts, SearchRules,
+    BOUND_STEP, CROWDED, EarlyEnd, LANES, Lanes, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts,
+    SearchRules,
 };
 
 /// Blocks per task: enough to hide its start, few enough to share out evenly.
@@ -114,6 +115,11 @@ fn search_block<S: Simd>(
     while block.pending.contains(&true) {
         let (window, group) = block.next_window(task);
         let everything = window.is_all();
+        let crowded = window.candidates(&screen.cells) > CROWDED;
+        let bound: [f32; LANES] = std::array::from_fn(|lane| match crowded & group[lane] {
+            true => block.bound_radius(lane, task),
+            false => f32::INFINITY,
+        });
         let candidates = gather(screen, &window, &mut scratch.candidates);
         let padded = candidates.next_multiple_of(GROUP);
         squared_distances(simd, &block.position, &scratch.candidates[..padded], &mut scratch.squared);
@@ -126,6 +132,7 @@ fn search_block<S: Simd>(
             for lane in 0..LANES {
                 // Points so far away that their squared distance overflows are nobody's neighbours.
                 exact[lane] = group[lane] & (inside[lane] | everything) & block.threshold.0[lane].is_finite();
+                exact[lane] &= block.threshold.0[lane].sqrt() <= bound[lane];
             }
             done = unruled(simd, &scratch.squared, &block, rules, &exact);
         }
@@ -141,9 +148,11 @@ fn search_block<S: Simd>(
             } else {
                 block.radius.0[lane]
             };
+            let known = known.min(bound[lane]);
             let upper = if enough { kth_radius } else { f32::INFINITY };
             sort_lane(&scratch.squared, lane, known, &mut scratch.sorted);
-            let verdict = judge(task, &block, lane, &scratch.sorted, known, exact[lane], upper);
+            let verdict =
+                judge(task, &block, lane, &scratch.sorted, Known { radius: known, exact: exact[lane], upper, crowded });
             if let Verdict::Grow(radius) = verdict {
                 block.radius.0[lane] = radius;
                 continue;
@@ -190,26 +199,43 @@ enum Verdict {
     Grow(f32),
 }
 
-/// Applies the rules to a point one by one, whose squared distances up to `known` are given ascending, and whose k-th
-/// neighbour is no further than `upper`.
-fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: f32, exact: bool, upper: f32) -> Verdict {
+/// What reading a window told of a point.
+#[derive(Clone, Copy)]
+struct Known {
+    /// All neighbours up to this distance are known.
+    radius: f32,
+    /// The k-th neighbour is among them.
+    exact: bool,
+    /// The k-th neighbour is no further than this.
+    upper: f32,
+    /// The bound on search work may be near.
+    crowded: bool,
+}
+
+/// Applies the rules to a point one by one, whose squared distances up to the known radius are given ascending.
+fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known) -> Verdict {
     let Task { screen, view, rules } = *task;
-    match rules.early_end(squared, block.initial_radius.0[lane], known) {
+    let Known { radius, exact, upper, crowded } = known;
+    match rules.early_end(squared, block.initial_radius.0[lane], radius) {
         Some(EarlyEnd::Outlier) => return Verdict::Outlier,
         Some(EarlyEnd::Gap(neighbors)) => return Verdict::Clamped(neighbors),
         None if exact => return Verdict::Exact,
         None => {}
     }
+    if radius == f32::INFINITY {
+        return if squared.is_empty() { Verdict::Outlier } else { Verdict::Clamped(squared.len()) };
+    }
     let growth = (rules.k as f32 / squared.len().max(1) as f32).sqrt().max(LEAST_GROWTH);
     // What was read bounds the k-radius, but across a depth step only loosely.
-    let next = upper.min(2.0 * known * growth);
-    let too_much = || Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) > MAX_CANDIDATES;
-    match squared.len() {
-        0 if known == f32::INFINITY => Verdict::Outlier,
-        neighbors if known == f32::INFINITY => Verdict::Clamped(neighbors),
-        neighbors if too_much() => Verdict::Bounded(neighbors),
-        _ => Verdict::Grow(next),
+    let next = upper.min(2.0 * radius * growth);
+    if !crowded && Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) <= CROWDED {
+        return Verdict::Grow(next);
     }
+    let bound = block.bound_radius(lane, task);
+    if bound > radius {
+        return Verdict::Grow(next.min(bound));
+    }
+    Verdict::Bounded(squared.partition_point(|&d| d <= bound * bound))
 }
 
 /// Those lanes of `exact` whose neighbourhoods no rule can end early; the others need to be looked at one by one.
@@ -290,6 +316,26 @@ impl Block {
         let (count, sum) = ratios.fold((0.0, 0.0), |(count, sum), ratio| (count + 1.0, sum + ratio));
         let [least, most] = REACH;
         (sum / f32::max(count, 1.0)).clamp(least, most)
+    }
+
+    /// How far the search of a point goes at most.
+    #[cold]
+    fn bound_radius(&self, lane: usize, task: &Task) -> f32 {
+        let Task { screen, view, .. } = *task;
+        if screen.points.len() <= MAX_CANDIDATES {
+            return f32::INFINITY;
+        }
+        let center = self.center(lane);
+        let fits = |radius| Window::of_sphere(center, radius, view).candidates(&screen.cells) <= MAX_CANDIDATES;
+        let mut radius = self.initial_radius.0[lane].max(f32::MIN_POSITIVE);
+        while !fits(radius) && radius > f32::MIN_POSITIVE {
+            radius /= BOUND_STEP;
+        }
+        // At the latest the whole picture does not.
+        while fits(radius * BOUND_STEP) {
+            radius *= BOUND_STEP;
+        }
+        radius
     }
 
     #[inline(always)]

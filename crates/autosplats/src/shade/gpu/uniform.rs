@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::cpu::{shows_colors, 
+use super::super::cpu::{
     CLAY, ENCODE_STEPS, EYE_DOME, FILL, FILL_LIGHT, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SKY, Scene, sample_step,
-    usual_map,
+    shows_colors, usual_map,
 };
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};

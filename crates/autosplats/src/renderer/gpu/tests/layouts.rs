@@ -4,11 +4,9 @@ use std::mem::offset_of;
 
 use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 
-use super::super::link::link;
-use super::super::recorder::GROUPS_PER_ROW;
-use super::super::{FrameUniform, PassSource};
 use super::passes;
 use crate::fit::Surfel;
+use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
 use crate::project::gpu::{BLOCK, COUNTERS, Counter};
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::shade::gpu::{ShadeUniform, Shown};
@@ -168,7 +166,7 @@ fn a_shifted_field_is_found() {
 #[test]
 fn constants_are_alike_in_rust_and_wgsl() {
     use Counter::{
-        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, NotFinite, Outliers, Outside, Passive,
+        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, Covered, NotFinite, Outliers, Outside, Passive,
         RangeHigh, RangeLow, Recovered, StripPx, Visible,
     };
     let counters: [Counter; COUNTERS] = [
@@ -188,6 +186,7 @@ fn constants_are_alike_in_rust_and_wgsl() {
         Outliers,
         RangeLow,
         RangeHigh,
+        Covered,
     ];
     let counters = counters.map(|counter| (screaming(&counter), counter as u32));
     assert_eq!(constants(&parse("#import counters\n")), counters, "counters in WGSL, and in Rust");
