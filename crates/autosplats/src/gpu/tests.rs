@@ -6,7 +6,9 @@ use super::PassSource;
 use super::device::INT64_ATOMICS;
 
 fn passes() -> impl Iterator<Item = &'static PassSource> {
-    [crate::project::gpu::PASSES, crate::search::screen_grid::gpu::PASSES, crate::fit::gpu::PASSES].into_iter().flatten()
+    [crate::project::gpu::PASSES, crate::search::screen_grid::gpu::PASSES, crate::fit::gpu::PASSES]
+        .into_iter()
+        .flatten()
 }
 
 /// What naga calls the features a pass declares: nothing beyond WebGPU's core but that.
