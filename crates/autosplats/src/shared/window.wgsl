@@ -64,13 +64,13 @@ fn window_run(window: Window, strip: u32) -> vec2u {
     return vec2u(cell_start[row + u32(window.low.x)], cell_start[row + u32(window.high.x) + 1u]);
 }
 
-// Number of screen points in the window, and of its strips.
-fn window_len(window: Window, strip_px: u32) -> vec2u {
+// Number of screen points in the window.
+fn window_len(window: Window, strip_px: u32) -> u32 {
     let strips = window_strips(window, strip_px);
     var len = 0u;
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);
         len += run.y - run.x;
     }
-    return vec2u(len, strips.y - strips.x + 1u);
+    return len;
 }

@@ -1,1 +1,181 @@
 //! The fit on the GPU against that on the CPU.
+
+use autosplats_cloud::PointCloud;
+use autosplats_cloud::glam::{DMat3, DVec3};
+
+use super::*;
+use crate::camera::{Camera, Projection, View};
+use crate::fit::tests::eigenvalues;
+use crate::fit::{FitRules, Surfels, fit};
+use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::project::gpu::tests::upload_screen;
+use crate::project::gpu::{COUNTERS, Counter};
+use crate::project::{Projector, ScreenPoints};
+use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
+use crate::search::{Neighborhoods, SearchRules, screen_grid};
+use crate::test_clouds::{self, EYE};
+
+const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, ellipses: true, keep_outliers: false };
+
+/// Screen points and their neighbourhoods, of the active and of the passive ones.
+struct Case {
+    screen: ScreenPoints,
+    view: View,
+    neighborhoods: [Neighborhoods; 2],
+}
+
+impl Case {
+    fn new(positions: &[[f32; 3]], projection: Projection, gap_factor: Option<f32>) -> Self {
+        let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+        let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
+        let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
+        let screen = Projector::default().project(&cloud, &view, RULES.k, true).clone();
+        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor };
+        let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
+            let mut neighborhoods = Neighborhoods::default();
+            screen_grid::search(&screen, queries, &view, &rules, &mut neighborhoods);
+            neighborhoods
+        });
+        Self { screen, view, neighborhoods }
+    }
+
+    fn moments(&self) -> Vec<Moments> {
+        let [active, passive] = &self.neighborhoods;
+        let mut all = host_moments(active, self.screen.active.len());
+        all.extend(host_moments(passive, self.screen.passive.len()));
+        all
+    }
+
+    fn on_host(&self, rules: &FitRules) -> Surfels {
+        let mut surfels = Surfels::new();
+        for (queries, neighborhoods) in [&self.screen.active, &self.screen.passive].into_iter().zip(&self.neighborhoods)
+        {
+            fit(&self.screen, queries, neighborhoods, &self.view, rules, &mut surfels);
+        }
+        surfels
+    }
+
+    /// Surfels of both rounds, and how many are counted as outliers.
+    fn on_device(&self, gpu: &Gpu, passes: &FitPasses, rules: &FitRules) -> (Surfels, usize) {
+        let buffers = upload_screen(gpu, &self.screen, &self.view);
+        let moments: Vec<_> = self.moments().iter().map(Moments::to_device).collect();
+        let neighborhoods = gpu.storage_with("neighbourhoods", &moments).expect("room");
+        let surfels = surfel_buffer(gpu, buffers.capacity).expect("room");
+        let told = FrameUniform {
+            splat_scale: rules.splat_scale,
+            ellipses: rules.ellipses.into(),
+            keep_outliers: rules.keep_outliers.into(),
+            ..FrameUniform::new(&self.view, 0, rules.k)
+        };
+        let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
+        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
+        let mut recorder = Recorder::new(gpu, &Clock::Off);
+        for round in [0, 1] {
+            let steps = passes.steps(gpu, &frame, &buffers, &neighborhoods, &surfels, round);
+            steps.iter().for_each(|step| recorder.run(step));
+        }
+        recorder.finish();
+        let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
+        let surfels = read_back(gpu, &surfels, moments.len()).expect("surfels");
+        (surfels, counters[Counter::Outliers as usize] as usize)
+    }
+}
+
+/// Covariance in units of the squared k-radius.
+fn covariance(moments: &Moments) -> DMat3 {
+    let share = 1.0 / (f64::from(moments.count) + 1.0);
+    let unit = 1.0 / f64::from(moments.k_radius).max(1e-38);
+    let mean = DVec3::from(moments.offset.map(f64::from)) * (unit * share);
+    let [xx, xy, xz, yy, yz, zz] = moments.second.map(|term| f64::from(term) * unit * unit * share);
+    let second = DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
+    second - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z)
+}
+
+fn compare(device: &Surfel, host: &Surfel, moments: &Moments) -> Result<(), String> {
+    let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(format!("{what}: {device:?}, host: {host:?}")) };
+    let of_point = |surfel: &Surfel| (surfel.center, surfel.k_radius, surfel.pixel, surfel.source, surfel.screen);
+    ensure(of_point(device) == of_point(host), "what is only copied")?;
+    // A quotient and a root.
+    ensure((device.radius - host.radius).abs() <= 1e-6 * host.radius, "radius")?;
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let [normal, major] = [device.normal, device.major_axis].map(vector);
+    ensure((normal.length() - 1.0).abs() < 1e-5 && (major.length() - 1.0).abs() < 1e-5, "lengths of axes")?;
+    ensure(normal.dot(major).abs() < 1e-5, "the major axis is not in the disc's plane")?;
+    // Eigenvectors of nearly equal eigenvalues are anybody's guess, but the variance along them is not. f32 rounding of
+    // moments, whose mean is subtracted, and of some hundred operations.
+    const TOLERANCE: f64 = 4e-6;
+    let covariance = covariance(moments);
+    let variance = |direction: DVec3| direction.dot(covariance * direction);
+    let like_host = |a: [f32; 3], b: [f32; 3]| (variance(vector(a)) - variance(vector(b))).abs() < TOLERANCE;
+    ensure(like_host(device.normal, host.normal), "variance along the normal")?;
+    let [least, middle, largest] = eigenvalues(covariance);
+    let is_plane = middle > 1.5e-5 * largest;
+    ensure(!is_plane || like_host(device.major_axis, host.major_axis), "variance along the major axis")?;
+    let is_line = middle < 0.5e-5 * largest;
+    let angle = (normal - vector(host.normal)).length();
+    // The rounding above, divided by the distance to the next eigenvalue.
+    ensure(!(is_line || middle - least > 2e-3 * largest) || angle < 4e-3, "normal")?;
+    let near = |a: f32, b: f32, tolerance: f64| f64::from((a - b).abs()) <= tolerance;
+    ensure(near(device.curvature, host.curvature, TOLERANCE / largest.max(TOLERANCE)), "curvature")?;
+    let tolerance = if is_plane { 4.0 * TOLERANCE / middle } else { f64::from(LONGEST) };
+    ensure(near(device.major_ratio, host.major_ratio, tolerance), "ratio of axes")
+}
+
+#[test]
+fn the_device_fits_what_the_host_fits() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = FitPasses::new(&gpu).expect("passes");
+    let (mut compared, mut outliers, mut different, mut other_bits) = (0, 0, 0, 0);
+    for (name, positions) in test_clouds::all(4000) {
+        for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
+            for gap_factor in [Some(4.0), None] {
+                let case = Case::new(&positions, projection, gap_factor);
+                let moments = case.moments();
+                for (ellipses, keep_outliers, splat_scale) in [(true, false, 1.0), (false, true, 0.7)] {
+                    let rules = FitRules { ellipses, keep_outliers, splat_scale, ..RULES };
+                    let host = case.on_host(&rules);
+                    let (device, counted) = case.on_device(&gpu, &passes, &rules);
+                    assert_eq!(device.len(), host.len(), "{name}: every query gives a surfel");
+                    for ((device, host), moments) in device.iter().zip(&host).zip(&moments) {
+                        let outcome = compare(device, host, moments);
+                        different += usize::from(outcome.is_err());
+                        outcome.unwrap_or_else(|error| eprintln!("{name}, {projection:?}, {rules:?}: {error}"));
+                        other_bits += usize::from(device != host);
+                    }
+                    let expected = device.iter().filter(|surfel| surfel.radius == 0.0).count();
+                    assert_eq!(counted, expected, "{name}: outliers of both rounds are counted");
+                    compared += host.len();
+                    outliers += counted;
+                }
+            }
+        }
+    }
+    eprintln!("{different} of {compared} differ, {other_bits} in bits");
+    assert!(compared > 50_000 && outliers > 100, "there is something to compare: {compared}, {outliers} outliers");
+    // Rounding decides what is lopsided, or a line, in few neighbourhoods.
+    assert!(different * 10_000 <= compared, "{different} of {compared} differ");
+}
+
+#[test]
+fn comparison_sees_each_kind_of_error() {
+    let case = Case::new(&test_clouds::edge(4000), Projection::PerspectiveFovDeg(30.0), Some(4.0));
+    let moments = case.moments();
+    let surfels = case.on_host(&RULES);
+    let right = surfels[5];
+    let wrong = [
+        Surfel { normal: right.normal.map(|c| -c), ..right },
+        Surfel { normal: right.major_axis, major_axis: right.normal, ..right },
+        Surfel { major_axis: surfels[6].major_axis, ..right },
+        Surfel { normal: right.normal.map(|c| 1.001 * c), ..right },
+        Surfel { radius: 1.001 * right.radius, ..right },
+        Surfel { k_radius: 1.001 * right.k_radius, ..right },
+        Surfel { curvature: right.curvature + 1e-3, ..right },
+        Surfel { major_ratio: 1.01 * right.major_ratio, ..right },
+        Surfel { pixel: 0, ..right },
+        Surfel { screen: right.screen + 1, ..right },
+    ];
+    assert_eq!(compare(&right, &right, &moments[5]), Ok(()), "nothing is wrong yet");
+    for surfel in wrong {
+        assert!(compare(&surfel, &right, &moments[5]).is_err(), "not noticed: {surfel:?}");
+    }
+}

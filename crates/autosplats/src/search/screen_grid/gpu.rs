@@ -13,9 +13,6 @@ const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_
 
 /// Invocations in a workgroup.
 const GROUP: u32 = 64;
-/// Most neighbours that an invocation lists at a time: four registers of four.
-const MOST_QUADS: u32 = 4;
-
 /// Bytes of a neighbourhood on the device.
 type Neighborhood = [f32; 12];
 
@@ -39,13 +36,11 @@ impl SearchPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, k: u32) -> Result<Self, Error> {
-        let batches = k.div_ceil(4 * MOST_QUADS);
-        let quads = k.div_ceil(batches).div_ceil(4);
         let round = |round: u32| {
             let constants = [
                 ("ROUND", f64::from(round)),
-                ("BATCHES", batches.into()),
-                ("QUADS", quads.into()),
+                ("K", k.into()),
+                ("QUADS", k.div_ceil(4).into()),
                 ("FIRST_REACH", FIRST_REACH.into()),
                 ("LEAST_GROWTH", LEAST_GROWTH.into()),
                 ("MARGIN_PX", MARGIN_PX.into()),

@@ -1,8 +1,8 @@
 // The k nearest screen points of each query, summed up in moments [Paper, §4, §5]; the rules are stated in search/mod.rs.
 //
 // A query reads a window about its first search sphere and lists the k nearest in order. They are exact if the sphere up to
-// the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. k beyond sixteen take
-// several batches of the list, each of those beyond the batch before. Unlike on the CPU no two queries share a window.
+// the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. Unlike on the CPU no two
+// queries share a window, and it has no depths.
 //
 // Reads: counters, density, cell_start, points, queries. Writes: neighborhoods, counters.
 
@@ -24,15 +24,13 @@
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
-// Lists of k.
-override BATCHES: u32;
 override FIRST_REACH: f32;
 override LEAST_GROWTH: f32;
 override MAX_CANDIDATES: u32;
 
-// Screen points and strips that a query reads at most, all windows together, before it counts as bounded: software devices
-// end an invocation silently after 65535 rounds of its loops.
-const MOST_READS = 32000u;
+// Screen points that a query lists at most, all windows together, before it counts as bounded: software devices end an
+// invocation silently after 65535 rounds of its loops.
+const MOST_READS = 24000u;
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
 // What all queries of a workgroup need to know.
@@ -50,8 +48,6 @@ var<workgroup> bounded: atomic<u32>;
 
 // What a window shows of a point's neighbours.
 struct Seen {
-    // Squared distance to the k-th nearest; MOST if there are fewer.
-    kth_squared: f32,
     // Distance to the nearest.
     nearest: f32,
     // How many lie within the radius that the window is sure to hold, and the squared distance to the last of them.
@@ -76,90 +72,83 @@ fn squared_length(v: vec3f) -> f32 {
     return fma(v.z, v.z, fma(v.y, v.y, v.x * v.x));
 }
 
-// Reads a window that holds all points within the square root of `known_squared`.
-fn read_window(center: vec3f, window: Window, initial_radius: f32, known_squared: f32) -> Seen {
-    var seen = Seen(MOST, MOST, 0u, 0.0, MOST, 0.0, 0.0);
+// The k nearest of a window.
+fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
+    var list = nearest_none();
     let strips = window_strips(window, task.strip_px);
-    // Up to here all are listed; the point itself is at 0.
-    var listed_squared = 0.0;
+    for (var strip = strips.x; strip <= strips.y; strip++) {
+        let run = window_run(window, strip);
+        for (var at = run.x; at < run.y; at++) {
+            let squared = squared_length(points[at].position_view - center);
+            nearest_add(&list, select(squared, MOST, at == query));
+        }
+    }
+    return list;
+}
+
+// Goes through the k nearest in order. All points within the square root of `sure_squared` are known.
+fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Seen {
+    var list = nearest;
+    var seen = Seen(MOST, 0u, 0.0, MOST, 0.0, 0.0);
+    var last_squared = 0.0;
     var last = 0.0;
-    var rank = 0u;
-    for (var batch = 0u; batch < BATCHES; batch++) {
-        var list = nearest_none();
-        var listed = 0u;
-        for (var strip = strips.x; strip <= strips.y; strip++) {
-            let run = window_run(window, strip);
-            for (var at = run.x; at < run.y; at++) {
-                let squared = squared_length(points[at].position_view - center);
-                let is_listed = squared <= listed_squared;
-                listed += select(0u, 1u, is_listed);
-                nearest_add(&list, select(squared, MOST, is_listed));
-            }
+    for (var place = 0u; place < 4u * QUADS; place++) {
+        let squared = nearest_take(&list);
+        // Points in the same place tell nothing of distances.
+        if !(squared > 0.0) {
+            continue;
         }
-        // Points at the same distance may have more ranks than places.
-        if listed > frame.k && seen.kth_squared == MOST {
-            seen.kth_squared = listed_squared;
+        let distance = sqrt(squared);
+        let reach = frame.gap_growth * max(last, initial_radius);
+        if last > 0.0 && seen.gap_squared == MOST && distance > reach {
+            seen.gap_squared = last_squared;
+            seen.gap_reach = reach;
+            seen.gap_end = distance;
         }
-        for (var place = 0u; place < 4u * QUADS; place++) {
-            rank = listed + place;
-            if rank > frame.k {
-                break;
-            }
-            let squared = nearest_take(&list);
-            let distance = sqrt(squared);
-            if last > 0.0 && seen.gap_squared == MOST {
-                let reach = frame.gap_growth * max(last, initial_radius);
-                if distance > reach {
-                    seen.gap_squared = listed_squared;
-                    seen.gap_reach = reach;
-                    seen.gap_end = distance;
-                }
-            }
-            if squared == MOST {
-                return seen;
-            }
-            listed_squared = squared;
-            last = distance;
-            seen.nearest = min(seen.nearest, distance);
-            if squared <= known_squared {
-                seen.sure += 1u;
-                seen.sure_squared = squared;
-            }
-            if rank == frame.k {
-                seen.kth_squared = squared;
-            }
-        }
-        if rank >= frame.k {
+        if squared == MOST {
             break;
         }
+        seen.nearest = min(seen.nearest, distance);
+        if squared <= sure_squared {
+            seen.sure += 1u;
+            seen.sure_squared = squared;
+        }
+        last_squared = squared;
+        last = distance;
     }
     return seen;
 }
 
-fn find(center: vec3f, initial_radius: f32) -> Found {
+fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     let strip_px = f32(task.strip_px);
+    let outlier_radius = frame.outlier_growth * initial_radius;
     // A radius that rounds to nothing would never grow.
     var radius = max(FIRST_REACH * initial_radius, MIN_POSITIVE);
     var window = window_grown(window_of_sphere(center, radius), strip_px);
     var len = window_len(window, task.strip_px);
-    var reads = len.y;
     // A point alone in its cell may look into a crowd; a smaller window will do there.
-    for (var halving = 0u; halving < 40u && len.x > MAX_CANDIDATES; halving++) {
+    for (var halving = 0u; halving < 40u && len > MAX_CANDIDATES; halving++) {
         radius *= 0.5;
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px);
-        reads += len.y;
     }
+    var reads = 0u;
     var seen: Seen;
     for (var step = 0u; step < 256u; step++) {
+        reads += len;
+        var nearest = read_window(query, center, window);
+        let kth_squared = nearest_last(&nearest);
+        let kth_radius = sqrt(kth_squared);
         let is_all = window_contains(window, picture());
-        seen = read_window(center, window, initial_radius, select(min(radius * radius, MOST), MOST, is_all));
-        reads += BATCHES * (len.x + len.y);
-        let kth_radius = sqrt(seen.kth_squared);
-        let is_exact = seen.kth_squared < MOST
-            && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
+        let is_exact = kth_squared < MOST && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
+        // No gap begins before the first search radius.
+        if is_exact && kth_radius <= min(frame.gap_growth * initial_radius, outlier_radius) {
+            return Found(kth_squared, false, false);
+        }
+
+        seen = look_through(nearest, initial_radius, select(min(radius * radius, MOST), MOST, is_all));
         let known = select(select(radius, MOST, is_all), kth_radius, is_exact);
-        if min(seen.nearest, known) > frame.outlier_growth * initial_radius {
+        if min(seen.nearest, known) > outlier_radius {
             return Found(0.0, false, false);
         }
         let is_gap_sure = is_exact || is_all || seen.gap_squared <= radius * radius;
@@ -167,20 +156,20 @@ fn find(center: vec3f, initial_radius: f32) -> Found {
             return Found(seen.gap_squared, true, false);
         }
         if is_exact {
-            return Found(seen.kth_squared, false, false);
+            return Found(kth_squared, false, false);
         }
         if is_all {
             // The end of the points.
             return Found(seen.sure_squared, seen.sure > 0u, false);
         }
-        let growth = max(sqrt(f32(frame.k) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
+
+        let growth = max(sqrt(f32(K) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
         // What was read bounds the k-radius, but across a depth step only loosely.
-        let upper = select(MOST, kth_radius, seen.kth_squared < MOST);
+        let upper = select(MOST, kth_radius, kth_squared < MOST);
         radius = min(upper, 2.0 * radius * growth);
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px);
-        reads += len.y;
-        if len.x > MAX_CANDIDATES || reads + (BATCHES + 1u) * (len.x + len.y) > MOST_READS {
+        if len > MAX_CANDIDATES || reads + len > MOST_READS {
             break;
         }
     }
@@ -228,7 +217,7 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         let point = points[query];
         let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
         let initial_radius = first_radius(density[cell].x, task.cell_px, point.position_view.z);
-        let found = find(point.position_view, initial_radius);
+        let found = find(query, point.position_view, initial_radius);
         neighborhoods[task.first + index] = moments(point.position_view, found.squared);
         if found.is_clamped {
             atomicAdd(&clamped, 1u);

@@ -26,16 +26,22 @@ pub(crate) fn frame_buffer(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu:
     frame
 }
 
-/// One neighbourhood: count, k-radius, offset, second moments as the host orders them.
+/// One neighbourhood, in no one's layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Found {
-    count: f32,
-    k_radius: f32,
-    offset: [f32; 3],
-    second: [f32; 6],
+pub(crate) struct Moments {
+    pub(crate) count: f32,
+    pub(crate) k_radius: f32,
+    pub(crate) offset: [f32; 3],
+    /// xx, xy, xz, yy, yz, zz.
+    pub(crate) second: [f32; 6],
 }
 
-impl Found {
+/// The first `len` neighbourhoods that the host found.
+pub(crate) fn host_moments(neighborhoods: &Neighborhoods, len: usize) -> Vec<Moments> {
+    (0..len).map(|index| Moments::of_host(neighborhoods, index)).collect()
+}
+
+impl Moments {
     fn of_host(neighborhoods: &Neighborhoods, index: usize) -> Self {
         let NeighborhoodBlock { count, k_radius, offset, second } = &neighborhoods.blocks[index / LANES];
         let lane = |lanes: &Lanes| lanes.0[index % LANES];
@@ -49,6 +55,11 @@ impl Found {
 
     fn of_device([x, y, z, count, xx, xy, xz, k_radius, yy, yz, zz, _]: Neighborhood) -> Self {
         Self { count, k_radius, offset: [x, y, z], second: [xx, xy, xz, yy, yz, zz] }
+    }
+
+    pub(crate) fn to_device(&self) -> [f32; 12] {
+        let Self { count, k_radius, offset: [x, y, z], second: [xx, xy, xz, yy, yz, zz] } = *self;
+        [x, y, z, count, xx, xy, xz, k_radius, yy, yz, zz, 0.0]
     }
 
     /// Compares with what the host found.
@@ -84,7 +95,7 @@ fn on_device(
     screen: &ScreenPoints,
     view: &View,
     rules: &SearchRules,
-) -> (Vec<Found>, [usize; 2]) {
+) -> (Vec<Moments>, [usize; 2]) {
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let frame = frame_buffer(gpu, view, rules);
@@ -96,16 +107,16 @@ fn on_device(
     let found: Vec<Neighborhood> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
     let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
     let counted = [Counter::Clamped, Counter::Bounded].map(|counter| counters[counter as usize] as usize);
-    (found.into_iter().map(Found::of_device).collect(), counted)
+    (found.into_iter().map(Moments::of_device).collect(), counted)
 }
 
-fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -> (Vec<Found>, [usize; 2]) {
+fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -> (Vec<Moments>, [usize; 2]) {
     let mut all = Vec::new();
     let mut counted = [0; 2];
     for queries in [&screen.active, &screen.passive] {
         let mut neighborhoods = Neighborhoods::default();
         screen_grid::search(screen, queries, view, rules, &mut neighborhoods);
-        all.extend((0..queries.len()).map(|index| Found::of_host(&neighborhoods, index)));
+        all.extend(host_moments(&neighborhoods, queries.len()));
         counted[0] += neighborhoods.counts.clamped;
         counted[1] += neighborhoods.counts.bounded;
     }
@@ -146,4 +157,67 @@ fn the_device_finds_what_the_host_finds() {
     // A threshold of a rule or a tie is left to rounding on few points only.
     assert!(compared > 100_000, "there is something to compare: {compared}");
     assert!(different * 10_000 <= compared, "{different} of {compared} differ");
+}
+
+#[test]
+fn comparison_sees_each_kind_of_error() {
+    let (screen, view) = screen(&test_clouds::edge(4000), &cameras()[0], [121, 90], 10);
+    let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0) };
+    let right = on_host(&screen, &view, &rules).0[5];
+    let [mut offset, mut second] = [right; 2];
+    offset.offset[1] += 1e-4 * right.k_radius;
+    second.second[3] *= 1.001;
+    let wrong = [
+        offset,
+        second,
+        Moments { count: right.count - 1.0, ..right },
+        Moments { k_radius: 1.00001 * right.k_radius, ..right },
+    ];
+    assert_eq!(right.compare(&right), Ok(()), "nothing is wrong yet");
+    for moments in wrong {
+        assert!(moments.compare(&right).is_err(), "not noticed: {moments:?}");
+    }
+}
+
+/// A search that meets its bound keeps fewer neighbours, but all there are up to its k-radius.
+#[test]
+fn bounded_searches_stay_exact_as_far_as_they_go() {
+    let Some(gpu) = test_gpu() else { return };
+    for (k, count) in [(10, 60_000), (64, 30_000)] {
+        let (screen, view) = screen(&test_clouds::outliers(count), &cameras()[1], [400, 400], k);
+        let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
+        let passes = SearchPasses::new(&gpu, k).expect("passes");
+        let (found, [clamped, bounded]) = on_device(&gpu, &passes, &screen, &view, &rules);
+        let queries = [&screen.active[..], &screen.passive].concat();
+        let fewer = found.iter().filter(|found| found.count < k as f32).count();
+        assert!(bounded > 0 && clamped <= bounded, "k = {k}: {clamped} clamped, {bounded} bounded");
+        assert_eq!(fewer, bounded, "k = {k}: fewer than k neighbours are counted as bounded");
+        for (found, &query) in found.iter().zip(&queries).step_by(101) {
+            let at = |q: usize| screen.points[q].position_view;
+            let squared = |q: usize| (0..3).map(|axis| (at(q)[axis] - at(query as usize)[axis]).powi(2)).sum::<f32>();
+            let within = (0..screen.points.len()).filter(|&q| squared(q).sqrt() <= found.k_radius).count() - 1;
+            assert_eq!(found.count as usize, within, "k = {k}, point {query}: all neighbours up to the last");
+        }
+    }
+}
+
+/// Points whose squared distances overflow are nobody's neighbours, even where every point is asked for.
+#[test]
+fn huge_coordinates_reach_no_sum() {
+    let Some(gpu) = test_gpu() else { return };
+    for k in [1, 10, 64] {
+        let passes = SearchPasses::new(&gpu, k).expect("passes");
+        for (near, huge) in [(1, 0), (1, 40), (5, 1), (200, 40)] {
+            let mut positions = test_clouds::sphere(near);
+            let forward = (EYE / EYE.z).as_vec3();
+            positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
+            let (screen, view) = screen(&positions, &cameras()[1], [90, 70], k);
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
+            let (host, counted) = on_host(&screen, &view, &rules);
+            assert_eq!(on_device(&gpu, &passes, &screen, &view, &rules).1, counted, "{near} + {huge}, k = {k}");
+            for (device, host) in on_device(&gpu, &passes, &screen, &view, &rules).0.iter().zip(&host) {
+                assert_eq!(device.compare(host), Ok(()), "{near} + {huge} points, k = {k}");
+            }
+        }
+    }
 }
