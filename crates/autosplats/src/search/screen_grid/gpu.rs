@@ -5,7 +5,7 @@ use super::window::MARGIN_PX;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::ScreenBuffers;
-use crate::search::MAX_CANDIDATES;
+use crate::search::{BOUND_STEP, CROWDED, MAX_CANDIDATES};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH];
@@ -45,6 +45,8 @@ impl SearchPasses {
                 ("LEAST_GROWTH", LEAST_GROWTH.into()),
                 ("MARGIN_PX", MARGIN_PX.into()),
                 ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
+                ("CROWDED", CROWDED as f64),
+                ("BOUND_STEP", BOUND_STEP.into()),
             ];
             Pass::new(gpu, &SEARCH, &constants)
         };

@@ -27,6 +27,8 @@ override ROUND: u32;
 override FIRST_REACH: f32;
 override LEAST_GROWTH: f32;
 override MAX_CANDIDATES: u32;
+override CROWDED: u32;
+override BOUND_STEP: f32;
 
 // Screen points that a query lists at most, all windows together, before it counts as bounded: software devices end an
 // invocation silently after 65535 rounds of its loops.
@@ -37,6 +39,7 @@ const MIN_POSITIVE = 1.1754943508222875e-38;
 struct Task {
     first: u32,
     len: u32,
+    visible: u32,
     strip_px: u32,
     cell_px: u32,
     cell_columns: u32,
@@ -140,25 +143,33 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
         let is_all = window_contains(window, picture());
-        let is_exact = kth_squared < MOST && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
+        let is_crowded = len > CROWDED;
+        var bound = MOST;
+        if is_crowded {
+            bound = bound_radius(center, initial_radius);
+        }
+        let is_exact = kth_squared < MOST && kth_radius <= bound
+            && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
         // No gap begins before the first search radius.
         if is_exact && kth_radius <= min(frame.gap_growth * initial_radius, outlier_radius) {
             return Found(kth_squared, false, false);
         }
 
-        seen = look_through(nearest, initial_radius, select(min(radius * radius, MOST), MOST, is_all));
-        let known = select(select(radius, MOST, is_all), kth_radius, is_exact);
+        // Up to here all neighbours are known.
+        let sure = min(select(radius, MOST, is_all), bound);
+        seen = look_through(nearest, initial_radius, min(sure * sure, MOST));
+        let known = select(sure, kth_radius, is_exact);
         if min(seen.nearest, known) > outlier_radius {
             return Found(0.0, false, false);
         }
-        let is_gap_sure = is_exact || is_all || seen.gap_squared <= radius * radius;
+        let is_gap_sure = is_exact || seen.gap_squared <= sure * sure;
         if seen.gap_squared < MOST && is_gap_sure && min(seen.gap_end, known) > seen.gap_reach {
             return Found(seen.gap_squared, true, false);
         }
         if is_exact {
             return Found(kth_squared, false, false);
         }
-        if is_all {
+        if sure == MOST {
             // The end of the points.
             return Found(seen.sure_squared, seen.sure > 0u, false);
         }
@@ -166,14 +177,40 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let growth = max(sqrt(f32(K) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
         // What was read bounds the k-radius, but across a depth step only loosely.
         let upper = select(MOST, kth_radius, kth_squared < MOST);
-        radius = min(upper, 2.0 * radius * growth);
+        radius = min(upper, 2.0 * sure * growth);
+        if is_crowded || window_len(window_of_sphere(center, radius), task.strip_px) > CROWDED {
+            if !is_crowded {
+                bound = bound_radius(center, initial_radius);
+            }
+            if !(bound > sure) {
+                seen = look_through(nearest, initial_radius, bound * bound);
+                break;
+            }
+            radius = min(radius, bound);
+        }
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px);
-        if len > MAX_CANDIDATES || reads + len > MOST_READS {
+        if reads + len > MOST_READS {
             break;
         }
     }
     return Found(seen.sure_squared, seen.sure > 0u, true);
+}
+
+// How far the search of a point goes at most: search/mod.rs states it.
+fn bound_radius(center: vec3f, initial_radius: f32) -> f32 {
+    if task.visible <= MAX_CANDIDATES {
+        return MOST;
+    }
+    var radius = max(initial_radius, MIN_POSITIVE);
+    while window_len(window_of_sphere(center, radius), task.strip_px) > MAX_CANDIDATES && radius > MIN_POSITIVE {
+        radius /= BOUND_STEP;
+    }
+    // At the latest the whole picture holds too many.
+    while window_len(window_of_sphere(center, radius * BOUND_STEP), task.strip_px) <= MAX_CANDIDATES {
+        radius *= BOUND_STEP;
+    }
+    return radius;
 }
 
 // Sums the points up to the squared distance, about the point itself.
@@ -204,6 +241,7 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         let active_points = atomicLoad(&counters[ACTIVE]);
         task.first = select(0u, active_points, ROUND == 1u);
         task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+        task.visible = atomicLoad(&counters[VISIBLE]);
         task.strip_px = atomicLoad(&counters[STRIP_PX]);
         task.cell_px = atomicLoad(&counters[CELL_PX]);
         task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
