@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use autosplats::{Background, ColorMap, ColorMode, Reconstruction, Renderer, Settings, Shading};
+use autosplats::{Backend, Background, ColorMap, ColorMode, Reconstruction, Settings, Shading};
 use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
@@ -27,8 +27,7 @@ pub(super) struct Job {
     pub(super) size: [u32; 2],
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
-    /// On the backend that was asked for.
-    pub(super) renderer: Renderer,
+    pub(super) backend: Backend,
     pub(super) json: bool,
     pub(super) quiet: bool,
 }
@@ -57,9 +56,8 @@ impl Job {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)
             .map_err(read_failure)?;
-        // A device that is not there says so before anything is read.
-        let renderer = Renderer::with_backend(surface.backend.into()).map_err(render_failure)?;
-        Ok(Self { inputs, pictures, save_camera, size, camera, settings, renderer, json, quiet: run.quiet })
+        let backend = surface.backend.into();
+        Ok(Self { inputs, pictures, save_camera, size, camera, settings, backend, json, quiet: run.quiet })
     }
 
     /// Whether the picture has nothing behind the surface.

@@ -6,7 +6,7 @@ mod report;
 
 use std::time::Instant;
 
-use autosplats::{Camera, Counts, Error, Frame};
+use autosplats::{Camera, Counts, Error, Frame, Renderer};
 
 pub(crate) use self::camera::scene_camera;
 use self::job::Job;
@@ -21,7 +21,9 @@ use crate::progress::Bar;
 /// Renders one picture to one file or several.
 pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let mut job = Job::new(args)?;
-    let device = Device::of(&job.renderer);
+    // A device that is not there says so before anything is read.
+    let mut renderer = Renderer::with_backend(job.backend).map_err(render_failure)?;
+    let device = Device::of(&renderer);
 
     let started = Instant::now();
     let mut cloud = job.inputs.read(job.quiet)?;
@@ -34,7 +36,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let cloud = cloud.with_axes(axes);
 
     let bar = Bar::spinner("rendering", job.quiet);
-    let frame = job.renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
+    let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
     drop(bar);
     check_visible(&frame, &job.inputs)?;
     if !job.quiet {
