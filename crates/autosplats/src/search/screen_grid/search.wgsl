@@ -2,7 +2,7 @@
 //
 // A query reads a window about its first search sphere and lists the k nearest in order. They are exact if the sphere up to
 // the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. Unlike on the CPU no two
-// queries share a window, and it has no depths.
+// queries share a window, and a window has no depths: nothing is gained by leaving out what has been read.
 //
 // Reads: counters, density, cell_start, points, queries. Writes: neighborhoods, counters.
 
@@ -30,7 +30,7 @@ override MAX_CANDIDATES: u32;
 
 // Screen points that a query lists at most, all windows together, before it counts as bounded: software devices end an
 // invocation silently after 65535 rounds of its loops.
-const MOST_READS = 24000u;
+const MOST_READS = 40000u;
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
 // What all queries of a workgroup need to know.
@@ -78,9 +78,13 @@ fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
     let strips = window_strips(window, task.strip_px);
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);
-        for (var at = run.x; at < run.y; at++) {
+        // Two at a time: the loads of both are on their way together.
+        for (var at = run.x; at < run.y; at += 2u) {
+            let next = min(at + 1u, run.y - 1u);
             let squared = squared_length(points[at].position_view - center);
+            let next_squared = squared_length(points[next].position_view - center);
             nearest_add(&list, select(squared, MOST, at == query));
+            nearest_add(&list, select(next_squared, MOST, next == query || next == at));
         }
     }
     return list;
@@ -123,19 +127,24 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
     // A radius that rounds to nothing would never grow.
-    var radius = max(FIRST_REACH * initial_radius, MIN_POSITIVE);
-    var window = window_grown(window_of_sphere(center, radius), strip_px);
-    var len = window_len(window, task.strip_px);
-    // A point alone in its cell may look into a crowd; a smaller window will do there.
-    for (var halving = 0u; halving < 40u && len > MAX_CANDIDATES; halving++) {
-        radius *= 0.5;
-        window = window_grown(window_of_sphere(center, radius), strip_px);
-        len = window_len(window, task.strip_px);
-    }
+    var radius = clamp(FIRST_REACH * initial_radius, MIN_POSITIVE, MOST);
+    // All points this near have been seen.
+    var known_radius = 0.0;
     var reads = 0u;
     var seen: Seen;
     for (var step = 0u; step < 256u; step++) {
+        var window = window_grown(window_of_sphere(center, radius), strip_px);
+        var len = window_len(window, task.strip_px, MAX_CANDIDATES);
+        // In a crowd, or next to one, a smaller window may do.
+        for (var halving = 0u; halving < 16u && len > MAX_CANDIDATES && 0.5 * radius > known_radius; halving++) {
+            radius *= 0.5;
+            window = window_grown(window_of_sphere(center, radius), strip_px);
+            len = window_len(window, task.strip_px, MAX_CANDIDATES);
+        }
         reads += len;
+        if len > MAX_CANDIDATES || reads > MOST_READS {
+            break;
+        }
         var nearest = read_window(query, center, window);
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
@@ -163,15 +172,11 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
             return Found(seen.sure_squared, seen.sure > 0u, false);
         }
 
+        known_radius = radius;
         let growth = max(sqrt(f32(K) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
         // What was read bounds the k-radius, but across a depth step only loosely.
         let upper = select(MOST, kth_radius, kth_squared < MOST);
         radius = min(upper, 2.0 * radius * growth);
-        window = window_grown(window_of_sphere(center, radius), strip_px);
-        len = window_len(window, task.strip_px);
-        if len > MAX_CANDIDATES || reads + len > MOST_READS {
-            break;
-        }
     }
     return Found(seen.sure_squared, seen.sure > 0u, true);
 }
