@@ -130,11 +130,12 @@ fn the_device_finds_what_the_host_finds() {
     for k in KS {
         let passes = SearchPasses::new(&gpu, k).expect("passes");
         for camera in cameras() {
-            for (name, positions) in test_clouds::all(4000) {
-                let (screen, view) = screen(&positions, &camera, [121, 90], k);
+            let sized = |size| test_clouds::all(4000).into_iter().map(move |(name, cloud)| (name, cloud, size));
+            for (name, positions, size) in [[121, 90], [300, 2], [1, 1]].into_iter().flat_map(sized) {
+                let (screen, view) = screen(&positions, &camera, size, k);
                 for (e0, lambda) in [(Some(3), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)] {
                     let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
-                    let case = format!("{name}, {:?}, {rules:?}", camera.projection);
+                    let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
                     let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules);
                     assert_eq!(device.len(), host.len(), "{case}: every point is a query");
