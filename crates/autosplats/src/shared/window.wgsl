@@ -64,8 +64,13 @@ fn window_run(window: Window, strip: u32) -> vec2u {
     return vec2u(cell_start[row + u32(window.low.x)], cell_start[row + u32(window.high.x) + 1u]);
 }
 
-// Number of screen points in the window.
-fn window_len(window: Window, strip_px: u32) -> u32 {
+// Number of screen points in the window, or of its pixels where these are few.
+fn window_len(window: Window, strip_px: u32, few: u32) -> u32 {
+    let sides = window.high - window.low + 1.0;
+    let area = u32(sides.x * sides.y);
+    if area <= few {
+        return area;
+    }
     let strips = window_strips(window, strip_px);
     var len = 0u;
     for (var strip = strips.x; strip <= strips.y; strip++) {

@@ -13,7 +13,7 @@ const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_
 
 /// Invocations in a workgroup.
 const GROUP: u32 = 64;
-/// Bytes of a neighbourhood on the device.
+/// `Neighborhood` of `shared/surfel.wgsl`.
 type Neighborhood = [f32; 12];
 
 /// Room for the neighbourhoods of `capacity` queries.
@@ -31,7 +31,7 @@ pub(crate) struct SearchPasses {
 }
 
 impl SearchPasses {
-    /// Compiles them for frames with this k.
+    /// Compiles them for frames with this k, which is the length of the list that each invocation keeps in registers.
     ///
     /// # Errors
     /// [`Error::Device`].
