@@ -4,21 +4,16 @@
 // beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixel. A pixel draws its splats
 // in the order of their list.
 //
-// How it works: the workgroup descends the tree, testing the children of up to eight nodes at a time, an invocation per
-// child. Hits become bits in workgroup memory and from there a list in order. Once 64 splats are listed, or none are left
-// to find, they are drawn: each invocation loads one splat; the splats that meet each column and each row of the patch
-// become bits, and a pixel's splats are those of its column and its row.
+// How it works: the workgroup descends the tree, testing the children of some nodes at a time, an invocation per child. Hits
+// become bits in workgroup memory and from there a list in order. Splats that are found are drawn, 64 at a time: each
+// invocation loads one; the splats that meet each column and each row of the patch become bits, and a pixel's splats are
+// those of its column and its row.
 
-// Side of a patch in pixels; a patch has as many pixels as a node children, and a workgroup invocations.
+// Side of a patch in pixels, and its pixels: a workgroup's invocations, and splats drawn at a time.
 const PATCH = 8u;
-// Nodes whose children are tested at a time.
-const MOST_PARENTS = 8u;
-// Lists of runs of runs and of runs, then a ring of splats: 63 may be left when those of eight runs are added.
-const LIST = 512u;
-const RING = 1024u;
-// What to do next, if not to find nodes of a level.
-const DRAW = 3u;
-const FINISH = 4u;
+const GROUP = 64u;
+// Words of bits for the children that are tested at a time.
+const HIT_WORDS = 16u;
 
 // A splat's geometry.
 struct Brush {
@@ -43,127 +38,160 @@ struct Fragment {
 
 override DOT_RADIUS_PX: f32;
 
-var<workgroup> todo: u32;
-// Two words for each parent; twice, so that one can be cleared while the other is in use.
-var<workgroup> hits: array<atomic<u32>, 32>;
-var<workgroup> listed: array<u32, 2u * LIST + RING>;
-var<workgroup> brushes: array<Brush, FAN>;
+var<workgroup> found_nodes: u32;
+// Which children are hit; twice, so that one half can be cleared while the other is in use.
+var<workgroup> hits: array<atomic<u32>, 2u * HIT_WORDS>;
+// Which half is in use.
+var<private> hits_half: u32;
+var<workgroup> listed: array<u32, 1280>;
+var<workgroup> brushes: array<Brush, GROUP>;
 // The patch's columns in the low, its rows in the high 8 bits that each splat meets.
-var<workgroup> met: array<u32, FAN>;
+var<workgroup> met: array<u32, GROUP>;
 // The same the other way around: the splats that meet each column, then each row, sixteen to a word.
-var<workgroup> meeting: array<u32, FAN>;
+var<workgroup> meeting: array<u32, GROUP>;
 
 // Number of workgroups that have a patch.
 fn patches() -> vec2u {
     return (frame.size + PATCH - 1u) / PATCH;
 }
 
-// Draws all living splats from `first` on into the patch whose first pixel is `corner`.
+// Draws all living splats from `first` on into the patch whose first pixel is `corner`. Loops break at their end: each is
+// passed once for most patches, and a software device pays for a pass that only ends a loop.
 fn draw_patch(corner: vec2u, local: u32, first: u32) {
-    let last = corner + PATCH - 1u;
     let end = tree[0].y;
-    // Next and end of the nodes that wait in each list, and of those above the tree.
-    var above = vec2u(first / (FAN * FAN * FAN), (end + FAN * FAN * FAN - 1u) / (FAN * FAN * FAN));
-    var runs_of_runs = vec2u(0u);
-    var runs = vec2u(0u);
-    var waiting = vec2u(0u);
-    var half = 0u;
-    if local < 32u {
+    if local < 2u * HIT_WORDS {
         atomicStore(&hits[local], 0u);
     }
+    // Nodes above the tree.
+    let size = 1u << (FAN_BITS * (TOP + 1u));
+    let roots = (end + size - 1u) / size;
+    var root = first / size;
     loop {
-        if local == 0u {
-            var next = FINISH;
-            if waiting.y - waiting.x >= FAN {
-                next = DRAW;
-            } else if runs.x < runs.y {
-                next = SPLATS;
-            } else if runs_of_runs.x < runs_of_runs.y {
-                next = RUNS;
-            } else if above.x < above.y {
-                next = RUNS_OF_RUNS;
-            } else if waiting.x < waiting.y {
-                next = DRAW;
-            }
-            todo = next;
-        }
-        let level = workgroupUniformLoad(&todo);
-        if level == FINISH {
-            break;
-        }
-        if level == DRAW {
-            let count = min(waiting.y - waiting.x, FAN);
-            prepare(corner, local, count, waiting.x);
-            draw_prepared(local);
-            waiting.x += count;
-            continue;
-        }
-
-        // Find: which children of the next parents meet the patch.
-        var parents = above;
-        var at = 0u;
-        var nodes = (end + FAN * FAN - 1u) / (FAN * FAN);
-        if level == RUNS {
-            parents = runs_of_runs;
-            nodes = (end + FAN - 1u) / FAN;
-        } else if level == SPLATS {
-            parents = runs;
-            at = LIST;
-            nodes = end;
-        }
-        let count = min(parents.y - parents.x, MOST_PARENTS);
-        let start = level_start(level);
-        if local < 16u {
-            atomicStore(&hits[16u - half + local], 0u);
-        }
-        for (var i = 0u; i < count; i++) {
-            let parent = select(listed[at + parents.x + i], parents.x + i, level == RUNS_OF_RUNS);
-            let child = parent * FAN + local;
-            if child < nodes && !(level == SPLATS && child < first) {
-                let bounds = tree[start + child];
-                if all(firsts(bounds) <= last) && all(lasts(bounds) >= corner) {
-                    atomicOr(&hits[half + 2u * i + local / 32u], 1u << (local % 32u));
+        let tops = find(TOP, root, roots, corner, local, first, end);
+        var top = 0u;
+        loop {
+            let runs = find(RUNS, top, tops, corner, local, first, end);
+            var run = 0u;
+            loop {
+                let leaves = find(LEAVES, run, runs, corner, local, first, end);
+                var leaf = 0u;
+                loop {
+                    let found = find(SPLATS, leaf, leaves, corner, local, first, end);
+                    var at = 0u;
+                    loop {
+                        prepare(corner, local, at, found);
+                        draw_prepared(local);
+                        // The next ones replace these.
+                        workgroupBarrier();
+                        at += GROUP;
+                        if at >= found {
+                            break;
+                        }
+                    }
+                    leaf += most_parents(SPLATS);
+                    if leaf >= leaves {
+                        break;
+                    }
+                }
+                run += most_parents(LEAVES);
+                if run >= runs {
+                    break;
                 }
             }
-        }
-        workgroupBarrier();
-        var hit = 0u;
-        for (var i = 0u; i < count; i++) {
-            let low = atomicLoad(&hits[half + 2u * i]);
-            let high = atomicLoad(&hits[half + 2u * i + 1u]);
-            let own = select(low, high, local >= 32u);
-            let bit = 1u << (local % 32u);
-            if (own & bit) != 0u {
-                let rank = hit + countOneBits(own & (bit - 1u)) + select(0u, countOneBits(low), local >= 32u);
-                let parent = select(listed[at + parents.x + i], parents.x + i, level == RUNS_OF_RUNS);
-                let to = select(
-                    select(rank, LIST + rank, level == RUNS),
-                    2u * LIST + (waiting.y + rank) % RING,
-                    level == SPLATS,
-                );
-                listed[to] = parent * FAN + local;
+            top += most_parents(RUNS);
+            if top >= tops {
+                break;
             }
-            hit += countOneBits(low) + countOneBits(high);
         }
-        half = 16u - half;
-        if level == RUNS_OF_RUNS {
-            above.x += count;
-            runs_of_runs = vec2u(0u, hit);
-        } else if level == RUNS {
-            runs_of_runs.x += count;
-            runs = vec2u(0u, hit);
-        } else {
-            runs.x += count;
-            waiting.y += hit;
+        root += most_parents(TOP);
+        if root >= roots {
+            break;
         }
     }
 }
 
-// Loads `count` splats from place `at` of the ring on.
-fn prepare(corner: vec2u, local: u32, count: u32, at: u32) {
+// Nodes whose children at a level are tested at a time.
+fn most_parents(level: u32) -> u32 {
+    return select(16u, 32u, level == SPLATS);
+}
+
+// Where the list of a level begins.
+fn list_start(level: u32) -> u32 {
+    return select(256u + 256u * level, 0u, level == SPLATS);
+}
+
+// Lists the children at `level` that meet the patch, of the nodes in the list above from place `at` to `listed_end`, of as
+// many as are tested at a time. Returns how many.
+fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, first: u32, end: u32) -> u32 {
+    let last = corner + PATCH - 1u;
+    let start = level_start(level);
+    // Splats in a node.
+    let size = 1u << (FAN_BITS * level);
+    let nodes = (end + size - 1u) / size;
+    let parents = min(max(listed_end, at) - at, most_parents(level));
+    // A word is two parents' children, a row of the workgroup four's.
+    let rows = (parents + 3u) / 4u;
+    let above = list_start(level + 1u) + at;
+    let half = hits_half;
+    hits_half = HIT_WORDS - half;
+    if local < HIT_WORDS {
+        atomicStore(&hits[HIT_WORDS - half + local], 0u);
+    }
+    var row = 0u;
+    loop {
+        let place = 4u * row + local / FAN;
+        if place < parents {
+            let child = parent_at(level, at, above, place) * FAN + local % FAN;
+            if child < nodes && child >= first / size {
+                let bounds = tree[start + child];
+                if all(firsts(bounds) <= last) && all(lasts(bounds) >= corner) {
+                    atomicOr(&hits[half + 2u * row + local / 32u], 1u << (local % 32u));
+                }
+            }
+        }
+        row += 1u;
+        if row >= rows {
+            break;
+        }
+    }
+    workgroupBarrier();
+    var hit = 0u;
+    row = 0u;
+    loop {
+        let low = atomicLoad(&hits[half + 2u * row]);
+        let high = atomicLoad(&hits[half + 2u * row + 1u]);
+        let own = select(low, high, local >= 32u);
+        let bit = 1u << (local % 32u);
+        if (own & bit) != 0u {
+            let rank = hit + countOneBits(own & (bit - 1u)) + select(0u, countOneBits(low), local >= 32u);
+            let parent = parent_at(level, at, above, 4u * row + local / FAN);
+            listed[list_start(level) + rank] = parent * FAN + local % FAN;
+        }
+        hit += countOneBits(low) + countOneBits(high);
+        row += 1u;
+        if row >= rows {
+            break;
+        }
+    }
+    if local == 0u {
+        found_nodes = hit;
+    }
+    return workgroupUniformLoad(&found_nodes);
+}
+
+// The node at a place after `at` in the list above a level, which begins at `above`; those above the top are all.
+fn parent_at(level: u32, at: u32, above: u32, place: u32) -> u32 {
+    if level == TOP {
+        return at + place;
+    }
+    return listed[above + place];
+}
+
+// Loads up to 64 of the splats listed, from place `at` on.
+fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
     var meets = 0u;
-    if local < count {
-        let index = listed[2u * LIST + (at + local) % RING];
+    if at + local < found {
+        let index = listed[at + local];
         let splat = splats[index];
         brushes[local] = Brush(
             splat.center_px,
@@ -188,8 +216,13 @@ fn prepare(corner: vec2u, local: u32, count: u32, at: u32) {
     let line = local % 16u;
     let part = local / 16u;
     var word = 0u;
-    for (var i = 0u; i < 16u; i++) {
+    var i = 0u;
+    loop {
         word |= ((met[16u * part + i] >> line) & 1u) << i;
+        i += 1u;
+        if i >= 16u {
+            break;
+        }
     }
     meeting[4u * line + part] = word;
     workgroupBarrier();

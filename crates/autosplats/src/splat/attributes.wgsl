@@ -34,9 +34,9 @@ override KERNEL_SLOPE: f32;
 override CORE_WEIGHT: f32;
 override INNER_WEIGHT: f32;
 
-var<workgroup> normals: array<vec3f, FAN>;
-var<workgroup> sources: array<u32, FAN>;
-var<workgroup> reaches: array<f32, FAN>;
+var<workgroup> normals: array<vec3f, GROUP>;
+var<workgroup> sources: array<u32, GROUP>;
+var<workgroup> reaches: array<f32, GROUP>;
 var<workgroup> colors: array<vec3f, COLOR_SLOTS>;
 // x the value, y its weight: 0 if it is unknown.
 var<workgroup> scalars: array<vec2f, SCALAR_SLOTS>;
