@@ -1,16 +1,19 @@
-// Draws splats into a patch of pixels, one workgroup and one pixel per invocation. Imports: frame, splat.
+// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of four pixels, as the components of
+// vectors, so that what it reads of a splat serves four. Imports: frame, splat.
 //
 // The including pass binds `tree` and `splats`, and has two functions: `load(slot, index)` reads what it needs of a splat
-// beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixel. A pixel draws its splats
-// in the order of their list.
+// beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixels. A pixel draws its
+// splats in the order of their list.
 //
 // How it works: the workgroup descends the tree, testing the children of some nodes at a time, an invocation per child. Hits
 // become bits in workgroup memory and from there a list in order. Splats that are found are drawn, 64 at a time: each
-// invocation loads one; the splats that meet each column and each row of the patch become bits, and a pixel's splats are
-// those of its column and its row.
+// invocation loads one; the splats that meet each column and each four rows of the patch become bits, and an invocation's
+// splats are those of its column and its rows.
 
-// Side of a patch in pixels, and its pixels: a workgroup's invocations, and splats drawn at a time.
-const PATCH = 8u;
+// Side of a patch in pixels, and pixels of an invocation.
+const PATCH = 16u;
+const OWN = 4u;
+// Invocations in a workgroup, and splats drawn at a time.
 const GROUP = 64u;
 // Words of bits for the children that are tested at a time.
 const HIT_WORDS = 16u;
@@ -29,11 +32,12 @@ struct Brush {
     high: f32,
 }
 
-struct Fragment {
+// A splat at four pixels.
+struct Fragments {
     // Squared distance from the centre, in supports; the splat covers up to 1.
-    squared: f32,
+    squared: vec4f,
     // Depth along the viewing axis.
-    depth: f32,
+    depth: vec4f,
 }
 
 override DOT_RADIUS_PX: f32;
@@ -45,10 +49,15 @@ var<workgroup> hits: array<atomic<u32>, 2u * HIT_WORDS>;
 var<private> hits_half: u32;
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
-// The patch's columns in the low, its rows in the high 8 bits that each splat meets.
+// The patch's columns in the low 16 bits, above them its fours of rows that each splat meets.
 var<workgroup> met: array<u32, GROUP>;
-// The same the other way around: the splats that meet each column, then each row, sixteen to a word.
-var<workgroup> meeting: array<u32, GROUP>;
+// The same the other way around: the splats that meet each column, then each four rows, sixteen to a word.
+var<workgroup> meeting: array<u32, 80>;
+
+// The invocation's pixels, as offsets in the patch: column and first row.
+fn own_offset(local: u32) -> vec2u {
+    return vec2u(local % PATCH, OWN * (local / PATCH));
+}
 
 // Number of workgroups that have a patch.
 fn patches() -> vec2u {
@@ -206,49 +215,61 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
         let bounds = tree[level_start(SPLATS) + index];
         let low = max(firsts(bounds), corner) - corner;
         let high = min(lasts(bounds) - corner, vec2u(PATCH - 1u));
-        let bits = (vec2u(2u) << high) - (vec2u(1u) << low);
-        meets = bits.x | bits.y << PATCH;
+        let fours = vec2u(low.y, high.y) / OWN;
+        meets = ((2u << high.x) - (1u << low.x)) | ((2u << fours.y) - (1u << fours.x)) << PATCH;
         load(local, index);
     }
     met[local] = meets;
     workgroupBarrier();
-    // An invocation per column or row and sixteen splats.
-    let line = local % 16u;
-    let part = local / 16u;
-    var word = 0u;
+    // An invocation per column and sixteen splats; those of the first columns take fours of rows too.
+    let line = local % PATCH;
+    let part = local / PATCH;
+    var column = 0u;
+    var row = 0u;
     var i = 0u;
     loop {
-        word |= ((met[16u * part + i] >> line) & 1u) << i;
+        let bits = met[16u * part + i] >> line;
+        column |= (bits & 1u) << i;
+        row |= ((bits >> PATCH) & 1u) << i;
         i += 1u;
         if i >= 16u {
             break;
         }
     }
-    meeting[4u * line + part] = word;
+    meeting[4u * line + part] = column;
+    if line < PATCH / OWN {
+        meeting[4u * (PATCH + line) + part] = row;
+    }
     workgroupBarrier();
 }
 
-// Draws the splats that may cover the invocation's pixel, in order.
+// Draws the splats that may cover the invocation's pixels, in order.
 fn draw_prepared(local: u32) {
     let column = 4u * (local % PATCH);
     let row = 4u * (PATCH + local / PATCH);
-    for (var half = 0u; half < 2u; half++) {
-        let low = meeting[column + 2u * half] & meeting[row + 2u * half];
-        let high = meeting[column + 2u * half + 1u] & meeting[row + 2u * half + 1u];
-        var rest = low | high << 16u;
-        while rest != 0u {
-            draw(32u * half + firstTrailingBit(rest));
-            rest &= rest - 1u;
+    var low = (meeting[column] & meeting[row]) | (meeting[column + 1u] & meeting[row + 1u]) << 16u;
+    var high = (meeting[column + 2u] & meeting[row + 2u]) | (meeting[column + 3u] & meeting[row + 3u]) << 16u;
+    loop {
+        if (low | high) != 0u {
+            let rest = select(high, low, low != 0u);
+            draw(select(32u, 0u, low != 0u) + firstTrailingBit(rest));
+            high = select(high & (high - 1u), high, low != 0u);
+            low &= low - 1u;
+        }
+        if (low | high) == 0u {
+            break;
         }
     }
 }
 
-// A splat at the centre of a pixel.
-fn fragment(slot: u32, pixel_center: vec2f) -> Fragment {
-    let d = pixel_center - brushes[slot].center_px;
-    let plane = (brushes[slot].start + brushes[slot].plane.y * d.y) + brushes[slot].plane.x * d.x;
-    var u = brushes[slot].u.y * d.y + brushes[slot].u.x * d.x;
-    var v = brushes[slot].v.y * d.y + brushes[slot].v.x * d.x;
+// A splat at the centres of four pixels in a column.
+fn fragments(slot: u32, x: f32, y: vec4f) -> Fragments {
+    let brush = &brushes[slot];
+    let dx = x - (*brush).center_px.x;
+    let dy = y - (*brush).center_px.y;
+    let plane = ((*brush).start + (*brush).plane.y * dy) + (*brush).plane.x * dx;
+    var u = (*brush).u.y * dy + (*brush).u.x * dx;
+    var v = (*brush).v.y * dy + (*brush).v.x * dx;
     var depth = plane;
     if frame.perspective == 1u {
         depth = 1.0 / plane;
@@ -256,7 +277,8 @@ fn fragment(slot: u32, pixel_center: vec2f) -> Fragment {
         v *= depth;
     }
     let disc = u * u + v * v;
-    let dot = (d.x * d.x + d.y * d.y) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
+    let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
     // The dot reaches beyond the disc, where its plane is of no use; the disc may not be a number there.
-    return Fragment(select(dot, disc, disc < dot), min(max(depth, brushes[slot].low), brushes[slot].high));
+    let low = vec4f((*brush).low);
+    return Fragments(select(dot, disc, disc < dot), min(max(depth, low), vec4f((*brush).high)));
 }

@@ -1,7 +1,7 @@
 //! Splatting on the GPU.
 //!
 //! # How it works
-//! Instead of bins there is a tree over the list of surfels (`shared/splat.wgsl`), and a workgroup for each patch of 8×8 pixels
+//! Instead of bins there is a tree over the list of surfels (`shared/splat.wgsl`), and a workgroup for each patch of 16×16 pixels
 //! finds what meets it (`shared/patch.wgsl`). A pixel draws its splats in the order of the list, so that sums come out as
 //! on the CPU, and the same each time.
 
@@ -26,7 +26,7 @@ const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl")
 /// Invocations in a workgroup of passes over surfels.
 const GROUP: u32 = 256;
 /// Side of a patch in pixels, and splats drawn into it at a time.
-const PATCH: u32 = 8;
+const PATCH: u32 = 16;
 const BATCH: u32 = 64;
 /// Splats below each top node of the tree, and nodes: `shared/splat.wgsl`.
 const TOP_SPLATS: u32 = 4096;

@@ -15,11 +15,11 @@ override FURTHEST: f32;
 override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(16, 16)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
-    let columns = (frame.size.x + 7u) / 8u;
+    let columns = (frame.size.x + 15u) / 16u;
     let group = group_index(workgroup);
-    let pixel = 8u * vec2u(group % columns, group / columns) + local.xy;
+    let pixel = 16u * vec2u(group % columns, group / columns) + local.xy;
     if any(pixel >= frame.size) {
         return;
     }
