@@ -50,7 +50,7 @@ var<private> hits_half: u32;
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
 // The patch's columns in the low 16 bits, above them its fours of rows that each splat meets.
-var<workgroup> met: array<u32, GROUP>;
+var<workgroup> met: array<vec4u, GROUP / 4u>;
 // The same the other way around: the splats that meet each column, then each four rows, sixteen to a word.
 var<workgroup> meeting: array<u32, 80>;
 
@@ -219,7 +219,7 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
         meets = ((2u << high.x) - (1u << low.x)) | ((2u << fours.y) - (1u << fours.x)) << PATCH;
         load(local, index);
     }
-    met[local] = meets;
+    met[local / 4u][local % 4u] = meets;
     workgroupBarrier();
     // An invocation per column and sixteen splats; those of the first columns take fours of rows too.
     let line = local % PATCH;
@@ -228,11 +228,11 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
     var row = 0u;
     var i = 0u;
     loop {
-        let bits = met[16u * part + i] >> line;
-        column |= (bits & 1u) << i;
-        row |= ((bits >> PATCH) & 1u) << i;
+        let bits = met[4u * part + i] >> vec4u(line);
+        column |= dot(bits & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
+        row |= dot((bits >> vec4u(PATCH)) & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
         i += 1u;
-        if i >= 16u {
+        if i >= 4u {
             break;
         }
     }
