@@ -43,10 +43,11 @@ struct Fragments {
 override DOT_RADIUS_PX: f32;
 
 var<workgroup> found_nodes: u32;
-// Which children are hit; twice, so that one half can be cleared while the other is in use.
+// Flags of the children that are hit; twice, so that one half can be cleared while the other is in use.
 var<workgroup> hits: array<atomic<u32>, 2u * HIT_WORDS>;
-// Which half is in use.
+// Where the half in use begins.
 var<private> hits_half: u32;
+// Nodes found at each level: see `list_start`.
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
 // The patch's columns in the low 16 bits, above them its fours of rows that each splat meets.
@@ -71,6 +72,7 @@ fn draw_patch(corner: vec2u, local: u32, first: u32) {
     if local < 2u * HIT_WORDS {
         atomicStore(&hits[local], 0u);
     }
+    workgroupBarrier();
     // Nodes above the tree.
     let size = 1u << (FAN_BITS * (TOP + 1u));
     let roots = (end + size - 1u) / size;
