@@ -1,24 +1,22 @@
-// Draws splats into a patch of pixels, one workgroup and one pixel per invocation. Imports: frame, splat.
+// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of four pixels, as the components of
+// vectors, so that what it reads of a splat serves four. Imports: frame, splat.
 //
 // The including pass binds `tree` and `splats`, and has two functions: `load(slot, index)` reads what it needs of a splat
-// beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixel. A pixel draws its splats
-// in the order of their list.
+// beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixels. A pixel draws its
+// splats in the order of their list.
 //
-// How it works: the workgroup descends the tree, testing the children of up to eight nodes at a time, an invocation per
-// child. Hits become bits in workgroup memory and from there a list in order. Once 64 splats are listed, or none are left
-// to find, they are drawn: each invocation loads one splat; the splats that meet each column and each row of the patch
-// become bits, and a pixel's splats are those of its column and its row.
+// How it works: the workgroup descends the tree, testing the children of some nodes at a time, an invocation per child. Hits
+// become bits in workgroup memory and from there a list in order. Splats that are found are drawn, 64 at a time: each
+// invocation loads one; the splats that meet each column and each four rows of the patch become bits, and an invocation's
+// splats are those of its column and its rows.
 
-// Side of a patch in pixels; a patch has as many pixels as a node children, and a workgroup invocations.
-const PATCH = 8u;
-// Nodes whose children are tested at a time.
-const MOST_PARENTS = 8u;
-// Lists of runs of runs and of runs, then a ring of splats: 63 may be left when those of eight runs are added.
-const LIST = 512u;
-const RING = 1024u;
-// What to do next, if not to find nodes of a level.
-const DRAW = 3u;
-const FINISH = 4u;
+// Side of a patch in pixels, and pixels of an invocation.
+const PATCH = 16u;
+const OWN = 4u;
+// Invocations in a workgroup, and splats drawn at a time.
+const GROUP = 64u;
+// Words of bits for the children that are tested at a time.
+const HIT_WORDS = 16u;
 
 // A splat's geometry.
 struct Brush {
@@ -34,136 +32,177 @@ struct Brush {
     high: f32,
 }
 
-struct Fragment {
+// A splat at four pixels.
+struct Fragments {
     // Squared distance from the centre, in supports; the splat covers up to 1.
-    squared: f32,
+    squared: vec4f,
     // Depth along the viewing axis.
-    depth: f32,
+    depth: vec4f,
 }
 
 override DOT_RADIUS_PX: f32;
 
-var<workgroup> todo: u32;
-// Two words for each parent; twice, so that one can be cleared while the other is in use.
-var<workgroup> hits: array<atomic<u32>, 32>;
-var<workgroup> listed: array<u32, 2u * LIST + RING>;
-var<workgroup> brushes: array<Brush, FAN>;
-// The patch's columns in the low, its rows in the high 8 bits that each splat meets.
-var<workgroup> met: array<u32, FAN>;
-// The same the other way around: the splats that meet each column, then each row, sixteen to a word.
-var<workgroup> meeting: array<u32, FAN>;
+var<workgroup> found_nodes: u32;
+// Flags of the children that are hit; twice, so that one half can be cleared while the other is in use.
+var<workgroup> hits: array<atomic<u32>, 2u * HIT_WORDS>;
+// Where the half in use begins.
+var<private> hits_half: u32;
+// Nodes found at each level: see `list_start`.
+var<workgroup> listed: array<u32, 1280>;
+var<workgroup> brushes: array<Brush, GROUP>;
+// The patch's columns in the low 16 bits, above them its fours of rows that each splat meets.
+var<workgroup> met: array<vec4u, GROUP / 4u>;
+// The same the other way around: the splats that meet each column, then each four rows, sixteen to a word.
+var<workgroup> meeting: array<u32, 80>;
+
+// The invocation's pixels, as offsets in the patch: column and first row.
+fn own_offset(local: u32) -> vec2u {
+    return vec2u(local % PATCH, OWN * (local / PATCH));
+}
 
 // Number of workgroups that have a patch.
 fn patches() -> vec2u {
     return (frame.size + PATCH - 1u) / PATCH;
 }
 
-// Draws all living splats from `first` on into the patch whose first pixel is `corner`.
+// Draws all living splats from `first` on into the patch whose first pixel is `corner`. Loops break at their end: each is
+// passed once for most patches, and a software device pays for a pass that only ends a loop.
 fn draw_patch(corner: vec2u, local: u32, first: u32) {
-    let last = corner + PATCH - 1u;
     let end = tree[0].y;
-    // Next and end of the nodes that wait in each list, and of those above the tree.
-    var above = vec2u(first / (FAN * FAN * FAN), (end + FAN * FAN * FAN - 1u) / (FAN * FAN * FAN));
-    var runs_of_runs = vec2u(0u);
-    var runs = vec2u(0u);
-    var waiting = vec2u(0u);
-    var half = 0u;
-    if local < 32u {
+    if local < 2u * HIT_WORDS {
         atomicStore(&hits[local], 0u);
     }
+    workgroupBarrier();
+    // Nodes above the tree.
+    let size = 1u << (FAN_BITS * (TOP + 1u));
+    let roots = (end + size - 1u) / size;
+    var root = first / size;
     loop {
-        if local == 0u {
-            var next = FINISH;
-            if waiting.y - waiting.x >= FAN {
-                next = DRAW;
-            } else if runs.x < runs.y {
-                next = SPLATS;
-            } else if runs_of_runs.x < runs_of_runs.y {
-                next = RUNS;
-            } else if above.x < above.y {
-                next = RUNS_OF_RUNS;
-            } else if waiting.x < waiting.y {
-                next = DRAW;
-            }
-            todo = next;
-        }
-        let level = workgroupUniformLoad(&todo);
-        if level == FINISH {
-            break;
-        }
-        if level == DRAW {
-            let count = min(waiting.y - waiting.x, FAN);
-            prepare(corner, local, count, waiting.x);
-            draw_prepared(local);
-            waiting.x += count;
-            continue;
-        }
-
-        // Find: which children of the next parents meet the patch.
-        var parents = above;
-        var at = 0u;
-        var nodes = (end + FAN * FAN - 1u) / (FAN * FAN);
-        if level == RUNS {
-            parents = runs_of_runs;
-            nodes = (end + FAN - 1u) / FAN;
-        } else if level == SPLATS {
-            parents = runs;
-            at = LIST;
-            nodes = end;
-        }
-        let count = min(parents.y - parents.x, MOST_PARENTS);
-        let start = level_start(level);
-        if local < 16u {
-            atomicStore(&hits[16u - half + local], 0u);
-        }
-        for (var i = 0u; i < count; i++) {
-            let parent = select(listed[at + parents.x + i], parents.x + i, level == RUNS_OF_RUNS);
-            let child = parent * FAN + local;
-            if child < nodes && !(level == SPLATS && child < first) {
-                let bounds = tree[start + child];
-                if all(firsts(bounds) <= last) && all(lasts(bounds) >= corner) {
-                    atomicOr(&hits[half + 2u * i + local / 32u], 1u << (local % 32u));
+        let tops = find(TOP, root, roots, corner, local, first, end);
+        var top = 0u;
+        loop {
+            let runs = find(RUNS, top, tops, corner, local, first, end);
+            var run = 0u;
+            loop {
+                let leaves = find(LEAVES, run, runs, corner, local, first, end);
+                var leaf = 0u;
+                loop {
+                    let found = find(SPLATS, leaf, leaves, corner, local, first, end);
+                    var at = 0u;
+                    loop {
+                        prepare(corner, local, at, found);
+                        draw_prepared(local);
+                        // The next ones replace these.
+                        workgroupBarrier();
+                        at += GROUP;
+                        if at >= found {
+                            break;
+                        }
+                    }
+                    leaf += most_parents(SPLATS);
+                    if leaf >= leaves {
+                        break;
+                    }
+                }
+                run += most_parents(LEAVES);
+                if run >= runs {
+                    break;
                 }
             }
-        }
-        workgroupBarrier();
-        var hit = 0u;
-        for (var i = 0u; i < count; i++) {
-            let low = atomicLoad(&hits[half + 2u * i]);
-            let high = atomicLoad(&hits[half + 2u * i + 1u]);
-            let own = select(low, high, local >= 32u);
-            let bit = 1u << (local % 32u);
-            if (own & bit) != 0u {
-                let rank = hit + countOneBits(own & (bit - 1u)) + select(0u, countOneBits(low), local >= 32u);
-                let parent = select(listed[at + parents.x + i], parents.x + i, level == RUNS_OF_RUNS);
-                let to = select(
-                    select(rank, LIST + rank, level == RUNS),
-                    2u * LIST + (waiting.y + rank) % RING,
-                    level == SPLATS,
-                );
-                listed[to] = parent * FAN + local;
+            top += most_parents(RUNS);
+            if top >= tops {
+                break;
             }
-            hit += countOneBits(low) + countOneBits(high);
         }
-        half = 16u - half;
-        if level == RUNS_OF_RUNS {
-            above.x += count;
-            runs_of_runs = vec2u(0u, hit);
-        } else if level == RUNS {
-            runs_of_runs.x += count;
-            runs = vec2u(0u, hit);
-        } else {
-            runs.x += count;
-            waiting.y += hit;
+        root += most_parents(TOP);
+        if root >= roots {
+            break;
         }
     }
 }
 
-// Loads `count` splats from place `at` of the ring on.
-fn prepare(corner: vec2u, local: u32, count: u32, at: u32) {
+// Nodes whose children at a level are tested at a time.
+fn most_parents(level: u32) -> u32 {
+    return select(16u, 32u, level == SPLATS);
+}
+
+// Where the list of a level begins.
+fn list_start(level: u32) -> u32 {
+    return select(256u + 256u * level, 0u, level == SPLATS);
+}
+
+// Lists the children at `level` that meet the patch, of the nodes in the list above from place `at` to `listed_end`, of as
+// many as are tested at a time. Returns how many.
+fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, first: u32, end: u32) -> u32 {
+    let last = corner + PATCH - 1u;
+    let start = level_start(level);
+    // Splats in a node.
+    let size = 1u << (FAN_BITS * level);
+    let nodes = (end + size - 1u) / size;
+    let parents = min(max(listed_end, at) - at, most_parents(level));
+    // A word is two parents' children, a row of the workgroup four's.
+    let rows = (parents + 3u) / 4u;
+    let above = list_start(level + 1u) + at;
+    let half = hits_half;
+    hits_half = HIT_WORDS - half;
+    if local < HIT_WORDS {
+        atomicStore(&hits[HIT_WORDS - half + local], 0u);
+    }
+    var row = 0u;
+    loop {
+        let place = 4u * row + local / FAN;
+        if place < parents {
+            let child = parent_at(level, at, above, place) * FAN + local % FAN;
+            if child < nodes && child >= first / size {
+                let bounds = tree[start + child];
+                if all(firsts(bounds) <= last) && all(lasts(bounds) >= corner) {
+                    atomicOr(&hits[half + 2u * row + local / 32u], 1u << (local % 32u));
+                }
+            }
+        }
+        row += 1u;
+        if row >= rows {
+            break;
+        }
+    }
+    workgroupBarrier();
+    var hit = 0u;
+    row = 0u;
+    loop {
+        let low = atomicLoad(&hits[half + 2u * row]);
+        let high = atomicLoad(&hits[half + 2u * row + 1u]);
+        let own = select(low, high, local >= 32u);
+        let bit = 1u << (local % 32u);
+        if (own & bit) != 0u {
+            let rank = hit + countOneBits(own & (bit - 1u)) + select(0u, countOneBits(low), local >= 32u);
+            let parent = parent_at(level, at, above, 4u * row + local / FAN);
+            listed[list_start(level) + rank] = parent * FAN + local % FAN;
+        }
+        hit += countOneBits(low) + countOneBits(high);
+        row += 1u;
+        if row >= rows {
+            break;
+        }
+    }
+    if local == 0u {
+        found_nodes = hit;
+    }
+    return workgroupUniformLoad(&found_nodes);
+}
+
+// The node at a place after `at` in the list above a level, which begins at `above`; those above the top are all.
+fn parent_at(level: u32, at: u32, above: u32, place: u32) -> u32 {
+    if level == TOP {
+        return at + place;
+    }
+    return listed[above + place];
+}
+
+// Loads up to 64 of the splats listed, from place `at` on.
+fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
     var meets = 0u;
-    if local < count {
-        let index = listed[2u * LIST + (at + local) % RING];
+    if at + local < found {
+        let index = listed[at + local];
         let splat = splats[index];
         brushes[local] = Brush(
             splat.center_px,
@@ -178,44 +217,61 @@ fn prepare(corner: vec2u, local: u32, count: u32, at: u32) {
         let bounds = tree[level_start(SPLATS) + index];
         let low = max(firsts(bounds), corner) - corner;
         let high = min(lasts(bounds) - corner, vec2u(PATCH - 1u));
-        let bits = (vec2u(2u) << high) - (vec2u(1u) << low);
-        meets = bits.x | bits.y << PATCH;
+        let fours = vec2u(low.y, high.y) / OWN;
+        meets = ((2u << high.x) - (1u << low.x)) | ((2u << fours.y) - (1u << fours.x)) << PATCH;
         load(local, index);
     }
-    met[local] = meets;
+    met[local / 4u][local % 4u] = meets;
     workgroupBarrier();
-    // An invocation per column or row and sixteen splats.
-    let line = local % 16u;
-    let part = local / 16u;
-    var word = 0u;
-    for (var i = 0u; i < 16u; i++) {
-        word |= ((met[16u * part + i] >> line) & 1u) << i;
+    // An invocation per column and sixteen splats; those of the first columns take fours of rows too.
+    let line = local % PATCH;
+    let part = local / PATCH;
+    var column = 0u;
+    var row = 0u;
+    var i = 0u;
+    loop {
+        let bits = met[4u * part + i] >> vec4u(line);
+        column |= dot(bits & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
+        row |= dot((bits >> vec4u(PATCH)) & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
+        i += 1u;
+        if i >= 4u {
+            break;
+        }
     }
-    meeting[4u * line + part] = word;
+    meeting[4u * line + part] = column;
+    if line < PATCH / OWN {
+        meeting[4u * (PATCH + line) + part] = row;
+    }
     workgroupBarrier();
 }
 
-// Draws the splats that may cover the invocation's pixel, in order.
+// Draws the splats that may cover the invocation's pixels, in order.
 fn draw_prepared(local: u32) {
     let column = 4u * (local % PATCH);
     let row = 4u * (PATCH + local / PATCH);
-    for (var half = 0u; half < 2u; half++) {
-        let low = meeting[column + 2u * half] & meeting[row + 2u * half];
-        let high = meeting[column + 2u * half + 1u] & meeting[row + 2u * half + 1u];
-        var rest = low | high << 16u;
-        while rest != 0u {
-            draw(32u * half + firstTrailingBit(rest));
-            rest &= rest - 1u;
+    var low = (meeting[column] & meeting[row]) | (meeting[column + 1u] & meeting[row + 1u]) << 16u;
+    var high = (meeting[column + 2u] & meeting[row + 2u]) | (meeting[column + 3u] & meeting[row + 3u]) << 16u;
+    loop {
+        if (low | high) != 0u {
+            let rest = select(high, low, low != 0u);
+            draw(select(32u, 0u, low != 0u) + firstTrailingBit(rest));
+            high = select(high & (high - 1u), high, low != 0u);
+            low &= low - 1u;
+        }
+        if (low | high) == 0u {
+            break;
         }
     }
 }
 
-// A splat at the centre of a pixel.
-fn fragment(slot: u32, pixel_center: vec2f) -> Fragment {
-    let d = pixel_center - brushes[slot].center_px;
-    let plane = (brushes[slot].start + brushes[slot].plane.y * d.y) + brushes[slot].plane.x * d.x;
-    var u = brushes[slot].u.y * d.y + brushes[slot].u.x * d.x;
-    var v = brushes[slot].v.y * d.y + brushes[slot].v.x * d.x;
+// A splat at the centres of four pixels in a column.
+fn fragments(slot: u32, x: f32, y: vec4f) -> Fragments {
+    let brush = &brushes[slot];
+    let dx = x - (*brush).center_px.x;
+    let dy = y - (*brush).center_px.y;
+    let plane = ((*brush).start + (*brush).plane.y * dy) + (*brush).plane.x * dx;
+    var u = (*brush).u.y * dy + (*brush).u.x * dx;
+    var v = (*brush).v.y * dy + (*brush).v.x * dx;
     var depth = plane;
     if frame.perspective == 1u {
         depth = 1.0 / plane;
@@ -223,7 +279,8 @@ fn fragment(slot: u32, pixel_center: vec2f) -> Fragment {
         v *= depth;
     }
     let disc = u * u + v * v;
-    let dot = (d.x * d.x + d.y * d.y) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
+    let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
     // The dot reaches beyond the disc, where its plane is of no use; the disc may not be a number there.
-    return Fragment(select(dot, disc, disc < dot), min(max(depth, brushes[slot].low), brushes[slot].high));
+    let low = vec4f((*brush).low);
+    return Fragments(select(dot, disc, disc < dot), min(max(depth, low), vec4f((*brush).high)));
 }

@@ -1,7 +1,7 @@
 // Splats, and the tree by which the pixels find them. Imports: frame. The including pass binds `tree`.
 //
-// Surfels are in screen-cell order, so that any 64 in a row are a small patch of the screen. The tree has the bounds of
-// each splat; of each run of 64 splats; and of each 64 runs. No sorting, no bins, no capacity.
+// Surfels are in screen-cell order, so that any few in a row are a small patch of the screen. The tree has the bounds of
+// each splat, and of each 16, 256 and 4096 in a row. No sorting, no bins, no capacity.
 
 // A surfel ready to be drawn: the CPU form's, but for its bounds, which are in the tree.
 struct Splat {
@@ -23,20 +23,23 @@ struct Splat {
 }
 
 // Children of a node.
-const FAN = 64u;
-// Nodes below and including one whose children are runs: 1 + 64 + 64².
-const FAMILY = 4161u;
+const FAN = 16u;
+const FAN_BITS = 4u;
+// Nodes of a tree of 4096 splats.
+const FAMILY = 4369u;
 // Levels.
 const SPLATS = 0u;
-const RUNS = 1u;
-const RUNS_OF_RUNS = 2u;
+const LEAVES = 1u;
+const RUNS = 2u;
+const TOP = 3u;
 // Set in the first column of bounds that are not drawn now: none is so far right.
 const DEAD = 0x8000u;
 
-// Where in `tree` a level begins. The first element are the first and the end of the splats to be drawn.
+// Where in `tree` a level begins, the top one first. Before it are the first and the end of the splats to be drawn.
 fn level_start(level: u32) -> u32 {
-    let families = (arrayLength(&tree) - 1u) / FAMILY;
-    return select(select(1u + families, 1u + families * (FAN + 1u), level == SPLATS), 1u, level == RUNS_OF_RUNS);
+    let tops = (arrayLength(&tree) - 1u) / FAMILY;
+    let nodes_before = select(select(select(0u, 1u, level == RUNS), 17u, level == LEAVES), 273u, level == SPLATS);
+    return 1u + nodes_before * tops;
 }
 
 // Columns and rows of bounds, first in the low, last in the high 16 bits, both included.

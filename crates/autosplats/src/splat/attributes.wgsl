@@ -34,27 +34,30 @@ override KERNEL_SLOPE: f32;
 override CORE_WEIGHT: f32;
 override INNER_WEIGHT: f32;
 
-var<workgroup> normals: array<vec3f, FAN>;
-var<workgroup> sources: array<u32, FAN>;
-var<workgroup> reaches: array<f32, FAN>;
+var<workgroup> normals: array<vec3f, GROUP>;
+var<workgroup> sources: array<u32, GROUP>;
+var<workgroup> reaches: array<f32, GROUP>;
 var<workgroup> colors: array<vec3f, COLOR_SLOTS>;
 // x the value, y its weight: 0 if it is unknown.
 var<workgroup> scalars: array<vec2f, SCALAR_SLOTS>;
 // Splat radius, k-radius and curvature.
 var<workgroup> measures: array<vec3f, MEASURE_SLOTS>;
 
-var<private> own_center: vec2f;
-var<private> limit: f32;
-var<private> weight_sum: f32;
-var<private> depth_sum: f32;
-var<private> normal_sum: vec3f;
-var<private> color_sum: vec3f;
-var<private> scalar_sum: vec2f;
-var<private> measure_sum: vec3f;
+// Centres of the invocation's four pixels, which are the components of vectors, and the depth map there.
+var<private> own_x: f32;
+var<private> own_y: vec4f;
+var<private> limit: vec4f;
+var<private> weight_sum: vec4f;
+var<private> depth_sum: vec4f;
+var<private> normal_sum: mat3x4f;
+var<private> color_sum: mat3x4f;
+// Sum of the values, and of the weights of those known.
+var<private> scalar_sum: mat2x4f;
+var<private> measure_sum: mat3x4f;
 // Weight of the heaviest splat, its point and its reach.
-var<private> heaviest: f32;
-var<private> point: u32;
-var<private> reach: f32;
+var<private> heaviest: vec4f;
+var<private> point: vec4u;
+var<private> reach: vec4f;
 
 fn load(slot: u32, index: u32) {
     let surfel = surfels[index];
@@ -86,31 +89,33 @@ fn to_linear(srgb: u32) -> f32 {
 }
 
 fn draw(slot: u32) {
-    let hit = fragment(slot, own_center);
-    if hit.squared <= 1.0 && hit.depth <= limit {
-        // Much like exp(-2·d²) with d in splat radii, without the exponential, and 0.003 at the end.
-        var weight = 1.0 - KERNEL_SLOPE * hit.squared;
-        weight *= weight;
-        weight *= weight;
-        weight *= weight;
-        weight_sum += weight;
-        depth_sum += weight * hit.depth;
-        normal_sum += weight * normals[slot];
-        if COLOR {
-            color_sum += weight * colors[slot];
-        }
-        if SCALAR {
-            scalar_sum += weight * scalars[slot];
-        }
-        if MEASURES {
-            measure_sum += weight * measures[slot];
-        }
-        if heaviest < weight {
-            heaviest = weight;
-            point = sources[slot];
-            reach = reaches[slot];
-        }
+    let hit = fragments(slot, own_x, own_y);
+    // Much like exp(-2·d²) with d in splat radii, without the exponential, and 0.003 at the end.
+    var kernel = 1.0 - KERNEL_SLOPE * hit.squared;
+    kernel *= kernel;
+    kernel *= kernel;
+    kernel *= kernel;
+    let weight = select(vec4f(0.0), kernel, (hit.squared <= vec4f(1.0)) & (hit.depth <= limit));
+    weight_sum += weight;
+    depth_sum += weight * hit.depth;
+    let n = normals[slot];
+    normal_sum += mat3x4f(weight * n.x, weight * n.y, weight * n.z);
+    if COLOR {
+        let c = colors[slot];
+        color_sum += mat3x4f(weight * c.x, weight * c.y, weight * c.z);
     }
+    if SCALAR {
+        let s = scalars[slot];
+        scalar_sum += mat2x4f(weight * s.x, weight * s.y);
+    }
+    if MEASURES {
+        let m = measures[slot];
+        measure_sum += mat3x4f(weight * m.x, weight * m.y, weight * m.z);
+    }
+    let heavier = heaviest < weight;
+    heaviest = select(heaviest, weight, heavier);
+    point = select(point, vec4u(sources[slot]), heavier);
+    reach = select(reach, vec4f(reaches[slot]), heavier);
 }
 
 @compute @workgroup_size(64)
@@ -120,59 +125,65 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         return;
     }
     let corner = PATCH * vec2u(index % patches().x, index / patches().x);
-    let pixel = corner + vec2u(local % PATCH, local / PATCH);
-    let at = pixel.y * frame.size.x + pixel.x;
-    let inside = all(pixel < frame.size);
-    own_center = vec2f(pixel) + 0.5;
-    point = NO_POINT;
-    // Beyond the picture nothing is in front.
-    limit = -1.0;
-    if inside {
-        limit = depth_map[at];
-    }
+    let pixel = corner + own_offset(local);
+    own_x = f32(pixel.x) + 0.5;
+    own_y = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
+    limit = vec4f(limit_at(pixel, 0u), limit_at(pixel, 1u), limit_at(pixel, 2u), limit_at(pixel, 3u));
+    point = vec4u(NO_POINT);
     draw_patch(corner, local, 0u);
-    if inside {
-        normalize_sums(at);
-    }
+    normalize_sums(pixel, 0u);
+    normalize_sums(pixel, 1u);
+    normalize_sums(pixel, 2u);
+    normalize_sums(pixel, 3u);
 }
 
-// Divides the sums by the weights into the layers.
-fn normalize_sums(at: u32) {
-    var rim = EMPTY_RIM;
-    if heaviest >= CORE_WEIGHT || weight_sum >= INNER_WEIGHT {
-        rim = CORE_RIM;
-    } else if heaviest > 0.0 {
-        rim = reach;
+// Index of a pixel below another; that of the last one if it is beyond the picture.
+fn pixel_index(pixel: vec2u, below: u32) -> u32 {
+    let inside = min(pixel + vec2u(0u, below), frame.size - 1u);
+    return inside.y * frame.size.x + inside.x;
+}
+
+fn limit_at(pixel: vec2u, below: u32) -> f32 {
+    return depth_map[pixel_index(pixel, below)];
+}
+
+// Divides the sums of one of the four pixels by the weights into the layers.
+fn normalize_sums(first: vec2u, i: u32) {
+    if any(first + vec2u(0u, i) >= frame.size) {
+        return;
     }
-    let covered = weight_sum > 0.0;
-    let n = normal_sum;
+    let at = pixel_index(first, i);
+    let weight = weight_sum[i];
+    var rim = EMPTY_RIM;
+    if heaviest[i] >= CORE_WEIGHT || weight >= INNER_WEIGHT {
+        rim = CORE_RIM;
+    } else if heaviest[i] > 0.0 {
+        rim = reach[i];
+    }
+    let covered = weight > 0.0;
+    let n = vec3f(normal_sum[0][i], normal_sum[1][i], normal_sum[2][i]);
     let length = sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
     var normal = vec3f(0.0);
     if length > 0.0 {
         normal = n * (1.0 / length);
     }
     // Opposite normals may cancel; then the surface is taken to face the eye.
-    if covered && !(length > 1e-6 * weight_sum) {
+    if covered && !(length > 1e-6 * weight) {
         normal = vec3f(0.0, 0.0, -1.0);
     }
-    var mean_depth = infinity();
-    var color = vec3f(0.0);
-    var mean_measures = vec3f(0.0);
-    if covered {
-        mean_depth = depth_sum / weight_sum;
-        color = color_sum / weight_sum;
-        mean_measures = measure_sum / weight_sum;
-    }
+    let divisor = select(1.0, weight, covered);
+    surface[at] = vec4f(normal, select(infinity(), depth_sum[i] / divisor, covered));
     var scalar = not_a_number();
-    if scalar_sum.y > 0.0 {
-        scalar = scalar_sum.x / scalar_sum.y;
+    if scalar_sum[1][i] > 0.0 {
+        scalar = scalar_sum[0][i] / scalar_sum[1][i];
     }
-    surface[at] = vec4f(normal, mean_depth);
-    cover[at] = Cover(weight_sum, rim, point, scalar);
+    cover[at] = Cover(weight, rim, point[i], scalar);
+    // Sums are zero where nothing is.
     if COLOR {
-        extras[at] = vec4f(color, 0.0);
+        extras[at] = vec4f(color_sum[0][i], color_sum[1][i], color_sum[2][i], 0.0) / divisor;
     }
     if MEASURES {
-        extras[at + u32(COLOR) * frame.size.x * frame.size.y] = vec4f(mean_measures, 0.0);
+        let mean = vec4f(measure_sum[0][i], measure_sum[1][i], measure_sum[2][i], 0.0) / divisor;
+        extras[at + u32(COLOR) * frame.size.x * frame.size.y] = mean;
     }
 }

@@ -1,4 +1,4 @@
-// The upper levels of the tree: bounds of runs of splats, and of runs of runs. A workgroup per run of runs.
+// The upper levels of the tree: a workgroup for each 4096 splats, an invocation for each 16.
 //
 // Reads: counters. Reads and writes: tree.
 
@@ -13,50 +13,62 @@
 // Whether only the recovered ones are new.
 override RECOVERED_ONLY: bool;
 
-var<workgroup> low_x: atomic<u32>;
-var<workgroup> low_y: atomic<u32>;
-var<workgroup> high_x: atomic<u32>;
-var<workgroup> high_y: atomic<u32>;
+// Of the sixteen runs and, last, the top: least column and row, greatest column and row.
+var<workgroup> sides: array<atomic<u32>, 68>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(256)
 fn boxes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let node = group_index(workgroup);
+    let top = group_index(workgroup);
     let first = select(0u, counters[ACTIVE], RECOVERED_ONLY);
     let end = counters[ACTIVE] + counters[RECOVERED];
-    if node == 0u && local == 0u {
+    if top == 0u && local == 0u {
         tree[0] = vec2u(first, end);
     }
-    if local == 0u {
-        atomicStore(&low_x, 0xffffu);
-        atomicStore(&low_y, 0xffffu);
-        atomicStore(&high_x, 0u);
-        atomicStore(&high_y, 0u);
+    if local < 68u {
+        atomicStore(&sides[local], select(0u, 0xffffu, local % 4u < 2u));
     }
     workgroupBarrier();
-    let run = node * FAN + local;
-    let start = level_start(SPLATS);
+    let leaf = top * FAN * FAN + local;
+    let start = level_start(SPLATS) + leaf * FAN;
+    let children = min(max(end, leaf * FAN) - leaf * FAN, FAN);
     var low = vec2u(0xffffu);
     var high = vec2u(0u);
-    for (var index = run * FAN; index < min((run + 1u) * FAN, end); index++) {
-        let bounds = tree[start + index];
+    for (var child = 0u; child < children; child++) {
+        let bounds = tree[start + child];
         if !is_empty(bounds) {
             low = min(low, firsts(bounds));
             high = max(high, lasts(bounds));
         }
     }
-    if run * FAN < end && (run + 1u) * FAN > first {
-        tree[level_start(RUNS) + run] = low | high << vec2u(16u);
+    if children > 0u {
+        tree[level_start(LEAVES) + leaf] = low | high << vec2u(16u);
     }
     if low.x <= high.x {
-        atomicMin(&low_x, low.x);
-        atomicMin(&low_y, low.y);
-        atomicMax(&high_x, high.x);
-        atomicMax(&high_y, high.y);
+        widen(local / FAN, low, high);
     }
     workgroupBarrier();
-    if local == 0u && node * FAN * FAN < end && (node + 1u) * FAN * FAN > first {
-        let lows = vec2u(atomicLoad(&low_x), atomicLoad(&low_y));
-        let highs = vec2u(atomicLoad(&high_x), atomicLoad(&high_y));
-        tree[level_start(RUNS_OF_RUNS) + node] = lows | highs << vec2u(16u);
+    if local < FAN {
+        low = vec2u(atomicLoad(&sides[4u * local]), atomicLoad(&sides[4u * local + 1u]));
+        high = vec2u(atomicLoad(&sides[4u * local + 2u]), atomicLoad(&sides[4u * local + 3u]));
+        let run = top * FAN + local;
+        if run * FAN * FAN < end {
+            tree[level_start(RUNS) + run] = low | high << vec2u(16u);
+        }
+        if low.x <= high.x {
+            widen(FAN, low, high);
+        }
     }
+    workgroupBarrier();
+    if local == 0u && top * FAN * FAN * FAN < end {
+        low = vec2u(atomicLoad(&sides[64]), atomicLoad(&sides[65]));
+        high = vec2u(atomicLoad(&sides[66]), atomicLoad(&sides[67]));
+        tree[level_start(TOP) + top] = low | high << vec2u(16u);
+    }
+}
+
+fn widen(node: u32, low: vec2u, high: vec2u) {
+    atomicMin(&sides[4u * node], low.x);
+    atomicMin(&sides[4u * node + 1u], low.y);
+    atomicMax(&sides[4u * node + 2u], high.x);
+    atomicMax(&sides[4u * node + 3u], high.y);
 }

@@ -11,16 +11,17 @@
 @group(0) @binding(2) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(3) var<storage, read_write> depth_map: array<f32>;
 
-var<private> own_center: vec2f;
-var<private> nearest: f32;
+// Centres of the invocation's pixels.
+var<private> own_x: f32;
+var<private> own_y: vec4f;
+var<private> nearest: vec4f;
 
 fn load(slot: u32, index: u32) {}
 
 fn draw(slot: u32) {
-    let hit = fragment(slot, own_center);
-    if hit.squared <= 1.0 {
-        nearest = min(nearest, hit.depth + brushes[slot].epsilon);
-    }
+    let hit = fragments(slot, own_x, own_y);
+    let pushed = min(nearest, hit.depth + brushes[slot].epsilon);
+    nearest = select(nearest, pushed, hit.squared <= vec4f(1.0));
 }
 
 @compute @workgroup_size(64)
@@ -30,17 +31,26 @@ fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         return;
     }
     let corner = PATCH * vec2u(index % patches().x, index / patches().x);
-    let pixel = corner + vec2u(local % PATCH, local / PATCH);
+    let pixel = corner + own_offset(local);
     let first = tree[0].x;
-    let at = pixel.y * frame.size.x + pixel.x;
-    let inside = all(pixel < frame.size);
-    own_center = vec2f(pixel) + 0.5;
-    nearest = infinity();
-    if inside && first > 0u {
-        nearest = depth_map[at];
-    }
+    own_x = f32(pixel.x) + 0.5;
+    own_y = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
+    nearest = vec4f(infinity());
     draw_patch(corner, local, first);
-    if inside {
-        depth_map[at] = nearest;
+    write(pixel, nearest.x, first);
+    write(pixel + vec2u(0u, 1u), nearest.y, first);
+    write(pixel + vec2u(0u, 2u), nearest.z, first);
+    write(pixel + vec2u(0u, 3u), nearest.w, first);
+}
+
+fn write(pixel: vec2u, drawn: f32, first: u32) {
+    if all(pixel < frame.size) {
+        let at = pixel.y * frame.size.x + pixel.x;
+        // Without the first splats, it is added to what these drew.
+        if first > 0u {
+            depth_map[at] = min(depth_map[at], drawn);
+        } else {
+            depth_map[at] = drawn;
+        }
     }
 }

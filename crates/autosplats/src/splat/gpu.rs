@@ -1,7 +1,7 @@
 //! Splatting on the GPU.
 //!
 //! # How it works
-//! Instead of bins there is a tree over the list of surfels (`shared/splat.wgsl`), and a workgroup for each patch of 8×8 pixels
+//! Instead of bins there is a tree over the list of surfels (`shared/splat.wgsl`), and a workgroup for each patch of 16×16 pixels
 //! finds what meets it (`shared/patch.wgsl`). A pixel draws its splats in the order of the list, so that sums come out as
 //! on the CPU, and the same each time.
 
@@ -26,9 +26,12 @@ const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl")
 
 /// Invocations in a workgroup of passes over surfels.
 const GROUP: u32 = 256;
-/// Side of a patch in pixels, and children of a node of the tree.
-const PATCH: u32 = 8;
-const FAN: u32 = 64;
+/// Side of a patch in pixels, and splats drawn into it at a time.
+const PATCH: u32 = 16;
+const BATCH: u32 = 64;
+/// Splats below each top node of the tree, and nodes: `shared/splat.wgsl`.
+const TOP_SPLATS: u32 = 4096;
+const TOP_NODES: u32 = 1 + 16 + 256 + 4096;
 /// Bytes of a splat.
 const SPLAT_BYTES: usize = 48;
 
@@ -55,8 +58,7 @@ impl SplatBuffers {
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, screen_capacity: u32, size: [u32; 2]) -> Result<Self, Error> {
         let pixels = size[0] as usize * size[1] as usize;
-        let families = screen_capacity.div_ceil(FAN * FAN) as usize;
-        let nodes = 1 + families * (1 + FAN + FAN * FAN) as usize;
+        let nodes = 1 + screen_capacity.div_ceil(TOP_SPLATS) as usize * TOP_NODES as usize;
         Ok(Self {
             splats: gpu.storage::<[u8; SPLAT_BYTES]>("splats", screen_capacity as usize)?,
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
@@ -103,7 +105,7 @@ impl SplatPasses {
         };
         let boxes = |recovered: f64| Pass::new(gpu, &BOXES, &[("RECOVERED_ONLY", recovered)]);
         let Channels { color, scalar, measures } = channels;
-        let slots = |carried: bool| if carried { f64::from(FAN) } else { 1.0 };
+        let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
             dot_radius,
             ("COLOR", color.into()),
@@ -152,7 +154,7 @@ impl SplatPasses {
         let set_up = &self.set_up[round as usize];
         vec![
             set_up.step(gpu, &[frame, counters, surfels, splats, tree], screen.capacity.div_ceil(GROUP)),
-            self.boxes[round as usize].step(gpu, &[frame, counters, tree], families(screen)),
+            self.boxes[round as usize].step(gpu, &[frame, counters, tree], tops(screen)),
             self.depth.step(gpu, &[frame, splats, tree, &depth[0]], patches(screen)),
         ]
     }
@@ -197,7 +199,7 @@ impl SplatPasses {
         for [before, after] in [[depth, other], [other, depth]].into_iter().filter(|_| depth_refinement) {
             let groups = screen.capacity.div_ceil(GROUP);
             steps.push(self.refine.step(gpu, &[frame, counters, splats, before, tree], groups));
-            steps.push(self.boxes[Round::Active as usize].step(gpu, &[frame, counters, tree], families(screen)));
+            steps.push(self.boxes[Round::Active as usize].step(gpu, &[frame, counters, tree], tops(screen)));
             steps.push(self.depth.step(gpu, &[frame, splats, tree, after], patches(screen)));
         }
         let attributes = [frame, &self.linear, splats, tree, surfels, values, depth, surface, cover, extras];
@@ -208,8 +210,8 @@ impl SplatPasses {
 }
 
 /// Workgroups for the upper levels of the tree; one at least, which notes how many splats there are.
-fn families(screen: &ScreenBuffers) -> u32 {
-    screen.capacity.div_ceil(FAN * FAN).max(1)
+fn tops(screen: &ScreenBuffers) -> u32 {
+    screen.capacity.div_ceil(TOP_SPLATS).max(1)
 }
 
 /// Workgroups for a patch each.

@@ -37,6 +37,10 @@ pub(crate) struct Cover {
     pub(crate) scalar: f32,
 }
 
+/// Bytes of a [`Cover`], of which the shader must think the same.
+#[cfg(test)]
+pub(super) const COVER_BYTES: usize = size_of::<Cover>();
+
 impl LayerBuffers {
     /// Room for a picture of `size`.
     ///

@@ -17,10 +17,10 @@ override FURTHEST: f32;
 override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 
-// Pixels of the patch that show a surface.
+// Pixels of the workgroup that show a surface.
 var<workgroup> covered: atomic<u32>;
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(16, 16)
 fn trim(
     @builtin(workgroup_id) workgroup: vec3u,
     @builtin(local_invocation_id) local: vec3u,
@@ -30,9 +30,9 @@ fn trim(
         atomicStore(&covered, 0u);
     }
     workgroupBarrier();
-    let columns = (frame.size.x + 7u) / 8u;
+    let columns = (frame.size.x + 15u) / 16u;
     let group = group_index(workgroup);
-    let pixel = 8u * vec2u(group % columns, group / columns) + local.xy;
+    let pixel = 16u * vec2u(group % columns, group / columns) + local.xy;
     if all(pixel < frame.size) {
         let at = pixel.y * frame.size.x + pixel.x;
         if sticks_out(vec2i(pixel), cover[at].rim) {

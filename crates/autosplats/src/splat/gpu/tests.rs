@@ -2,6 +2,7 @@
 
 use autosplats_cloud::FieldValues;
 
+use super::super::layers::COVER_BYTES;
 use super::super::tests::{ALL_DISCS, Data, Discs, surfels, views};
 use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA};
 use super::*;
@@ -214,10 +215,13 @@ fn many_splats_and_none() {
         }
     }
     // Each over the whole picture.
-    let mut surfels = surfels(43, 3000, Discs::Circles, &view);
-    surfels.iter_mut().for_each(|surfel| surfel.radius *= 100.0);
-    let scene = Scene { surfels: &surfels, active: 3000, view: &view, refinement: true, data: &data };
-    assert_same(&gpu, &passes, &scene, "huge splats");
+    for (size, count) in [([150, 90], 3000), ([20, 9], 100_000)] {
+        let view = views(size)[0];
+        let mut surfels = surfels(43, count, Discs::Circles, &view);
+        surfels.iter_mut().for_each(|surfel| surfel.radius *= 100.0);
+        let scene = Scene { surfels: &surfels, active: count, view: &view, refinement: true, data: &data };
+        assert_same(&gpu, &passes, &scene, &format!("{count} huge splats"));
+    }
 }
 
 #[test]
@@ -243,6 +247,22 @@ fn layers_that_are_not_wanted_change_no_other() {
                 .collect()
         };
         assert!(bits(&drawn.layers) == bits(&again.layers), "{channels:?}: another picture the second time");
+    }
+}
+
+#[test]
+fn structs_have_the_sizes_that_the_host_thinks() {
+    let sizes: Vec<(String, u32)> = ATTRIBUTES
+        .module()
+        .types
+        .iter()
+        .filter_map(|(_, ty)| match ty.inner {
+            wgpu::naga::TypeInner::Struct { span, .. } => Some((ty.name.clone()?, span)),
+            _ => None,
+        })
+        .collect();
+    for (name, size) in [("Splat", SPLAT_BYTES), ("Surfel", size_of::<Surfel>()), ("Cover", COVER_BYTES)] {
+        assert!(sizes.contains(&(name.into(), size as u32)), "{name} is not {size} bytes: {sizes:?}");
     }
 }
 
