@@ -31,6 +31,7 @@ use crate::args::{Command, CommandLine};
 use crate::exit::{Exit, Failure, suggest};
 
 fn main() -> ExitCode {
+    hush_drivers();
     interrupt::install();
     let outcome = match CommandLine::try_parse() {
         Ok(command_line) => run(command_line),
@@ -48,6 +49,18 @@ fn main() -> ExitCode {
             eprintln!("error: {}", message.lines().map(str::trim).collect::<Vec<_>>().join(" "));
             ExitCode::from(exit as u8)
         }
+    }
+}
+
+/// Looking for graphics devices, Mesa asks Wayland which one the screen hangs on, and where there is no session it says so
+/// on standard error, which is ours. A choice the user made stays.
+#[allow(unsafe_code, reason = "the environment can be changed in no other way")]
+fn hush_drivers() {
+    const CHOICE: &str = "NODEVICE_SELECT";
+    if cfg!(target_os = "linux") && std::env::var_os("XDG_RUNTIME_DIR").is_none() && std::env::var_os(CHOICE).is_none()
+    {
+        // SAFETY: this is the first thing the program does; there is no other thread yet.
+        unsafe { std::env::set_var(CHOICE, "1") };
     }
 }
 

@@ -110,10 +110,19 @@ fn outputs_that_cannot_be_written() {
     folder.fail(&["render", "sphere.ply", "-o", "/proc/out.png"], 4, &["/proc/out.png"]);
 }
 
+#[cfg(target_os = "linux")]
 #[test]
 fn a_gpu_that_is_not_there() {
     let folder = Folder::with_sphere();
-    folder.fail(&[&render("sphere.ply")[..], &["--backend", "gpu"]].concat(), 5, &["--backend cpu"]);
+    for arguments in [&render("sphere.ply")[..], &["bench"]] {
+        let mut command = folder.command(&[arguments, &["--backend", "gpu"]].concat());
+        // Vulkan's loader looks here and nowhere else.
+        let output =
+            command.env("VK_DRIVER_FILES", "absent").env("VK_ICD_FILENAMES", "absent").output().expect("it starts");
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(5), "{error}");
+        assert!(error.contains("CPU backend") && error.lines().count() == 1, "{error}");
+    }
 }
 
 #[cfg(target_os = "linux")]

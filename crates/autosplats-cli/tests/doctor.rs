@@ -9,25 +9,17 @@ use serde_json::Value;
 fn a_healthy_machine_is_told_so() {
     let folder = Folder::new();
     let text = folder.succeed(&["doctor"]).stdout;
-    for said in [
-        "cpu",
-        "gpu",
-        "not in this version",
-        "adapters",
-        "thread",
-        "simd",
-        "memory",
-        "points can be rendered",
-        "read back",
-        "PLY",
-    ] {
+    for said in ["cpu", "gpu", "gpu", "thread", "simd", "memory", "points can be rendered", "read back", "PLY"] {
         assert!(text.contains(said), "'{said}' is not in\n{text}");
     }
     let outcome = folder.succeed(&["doctor", "--json"]);
     let found: Value = serde_json::from_str(&outcome.stdout).expect("it is JSON");
     assert_eq!(found["ok"], true, "{found}");
-    assert_eq!([&found["backends"][0]["ready"], &found["backends"][1]["ready"]], [true, false], "the CPU renders");
-    assert_eq!(found["adapters"], Value::Array(Vec::new()), "nobody asked for graphics cards");
+    let devices = found["adapters"].as_array().expect("devices are listed");
+    let ready = [&found["backends"][0]["ready"], &found["backends"][1]["ready"]];
+    assert_eq!(ready, [&Value::from(true), &Value::from(!devices.is_empty())], "what renders here: {found}");
+    assert!(!devices.is_empty() || std::env::var_os("CI").is_none(), "there is no graphics device");
+    assert_eq!(found["self_test"]["gpu_ms"].is_number(), !devices.is_empty(), "a device is tried: {found}");
     for step in ["generate_ms", "render_ms", "write_ms", "read_ms"] {
         assert!(found["self_test"][step].as_f64().is_some_and(|ms| ms > 0.0), "{step}: {found}");
     }

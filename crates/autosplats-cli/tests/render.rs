@@ -206,7 +206,7 @@ fn the_report_is_complete() {
         assert!(report["timings_ms"][stage].as_f64().is_some_and(|time| time >= 0.0), "{stage} is timed");
     }
     assert_eq!(report["device"]["threads"], 2, "as many threads as asked for");
-    assert_eq!(report["device"]["backend"], "cpu", "the backend is named");
+    assert!(["cpu", "gpu"].iter().any(|name| report["device"]["backend"] == *name), "the backend is named");
     assert_eq!(report["size"], serde_json::json!(SIZE), "the size is told");
     assert_eq!(report["camera"]["eye"], serde_json::json!([0.0, -4.0, 0.0]), "the camera is told");
     let outputs = report["outputs"].as_array().expect("the outputs are listed");
@@ -269,4 +269,39 @@ fn several_inputs_are_shown_together_where_poses_put_them() {
     for (x, covered) in [(80 - 27, 1.0), (80, 0.0), (80 + 27, 1.0)] {
         assert_eq!(float(&layer.channel_data, "A", [x, 60]), covered, "column {x}");
     }
+}
+
+#[test]
+fn both_backends_make_the_same_files() {
+    let folder = Folder::with_sphere();
+    render(&folder, &["-o", "cpu.png", "-o", "cpu.exr", "--backend", "cpu"]);
+    let arguments = ["render", "sphere.ply", "-o", "gpu.png", "-o", "gpu.exr", "--backend", "gpu", "--json"];
+    let output = folder.command(&arguments).output().expect("the command starts");
+    if output.status.code() == Some(5) {
+        assert!(std::env::var_os("CI").is_none(), "there is no graphics device");
+        eprintln!("nothing checked: there is no graphics device");
+        return;
+    }
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{error}");
+    let report: Value = serde_json::from_slice(&output.stdout).expect("the report is JSON");
+    assert_eq!(report["device"]["backend"], "gpu", "the backend is named");
+    assert!(report["device"]["adapter"]["driver"].is_string(), "and the driver: {report}");
+    let passes = report["passes"].as_array().expect("passes are listed");
+    assert!(passes.len() > 20 && passes.iter().all(|pass| pass["ms"].is_number()), "each is timed: {passes:?}");
+}
+
+#[test]
+fn a_bench_tells_every_stage() {
+    let folder = Folder::new();
+    let bench = ["bench", "--scene", "figure:5K", "--size", "160x120", "--frames", "3", "--backend", "cpu"];
+    let text = folder.succeed(&bench).stdout;
+    for said in ["figure:5K", "project", "search", "fit", "splat", "shade", "frame", "3 frames"] {
+        assert!(text.contains(said), "'{said}' is not in\n{text}");
+    }
+    let json = folder.succeed(&[&bench[..], &["--json"]].concat()).stdout;
+    let report: Value = serde_json::from_str(&json).expect("it is JSON");
+    assert!(report["runs"][0]["timings_ms"]["frame"].as_f64().is_some_and(|ms| ms > 0.0), "{report}");
+    folder.fail(&["bench", "--scene", "cave"], 2, &["cathedral"]);
+    folder.fail(&["bench", "--frames", "0"], 2, &["1 to 100000"]);
 }
