@@ -5,14 +5,14 @@ use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, LONGEST, LOPSIDED, LOPSIDED
 use super::eigen::SWEEPS;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::ScreenBuffers;
+use crate::project::gpu::{ScreenBuffers, Work};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[FIT];
 const FIT: PassSource = PassSource::new("fit/fit", include_str!("fit.wgsl"));
 
-/// Invocations in a workgroup.
-const GROUP: u32 = 64;
+/// Workgroups of 64 invocations for each round.
+const ROUND_WORK: [Work; 2] = [Work::Active64, Work::Recovered64];
 
 /// Room for the surfels of `capacity` queries.
 ///
@@ -63,7 +63,7 @@ impl FitPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, points, source, queries, .. } = screen;
         let buffers = [frame, counters, density, points, source, queries, neighborhoods, surfels];
-        vec![self.rounds[round].step(gpu, &buffers, screen.capacity.div_ceil(GROUP))]
+        vec![self.rounds[round].step(gpu, &buffers, screen.groups(ROUND_WORK[round]))]
     }
 }
 

@@ -21,7 +21,7 @@ pub(crate) use device::{Gpu, INT64_ATOMICS};
 pub(crate) use frame::FrameUniform;
 #[cfg(test)]
 pub(crate) use link::link;
-pub(crate) use pass::{Pass, PassSource, Step};
+pub(crate) use pass::{Groups, Pass, PassSource, Step};
 #[cfg(test)]
 pub(crate) use recorder::GROUPS_PER_ROW;
 pub use recorder::PassTime;

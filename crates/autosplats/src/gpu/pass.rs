@@ -95,7 +95,7 @@ impl Pass {
     }
 
     /// The pass bound to buffers, in the order of their binding numbers, to run in `groups` workgroups.
-    pub(crate) fn step(&self, gpu: &Gpu, buffers: &[&wgpu::Buffer], groups: u32) -> Step {
+    pub(crate) fn step(&self, gpu: &Gpu, buffers: &[&wgpu::Buffer], groups: impl Into<Groups>) -> Step {
         let entries: Vec<_> = (0..)
             .zip(buffers)
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
@@ -105,7 +105,22 @@ impl Pass {
             layout: &self.layout,
             entries: &entries,
         });
-        Step { label: self.label.clone(), pipeline: self.pipeline.clone(), bindings, groups }
+        Step { label: self.label.clone(), pipeline: self.pipeline.clone(), bindings, groups: groups.into() }
+    }
+}
+
+/// How many workgroups a step has.
+#[derive(Clone, Debug)]
+pub(crate) enum Groups {
+    /// So many.
+    Number(u32),
+    /// As many as the device wrote into a buffer, in rows as a dispatch has them, at this byte.
+    Counted(wgpu::Buffer, u64),
+}
+
+impl From<u32> for Groups {
+    fn from(number: u32) -> Self {
+        Self::Number(number)
     }
 }
 
@@ -115,7 +130,7 @@ pub(crate) struct Step {
     pub(super) label: String,
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bindings: wgpu::BindGroup,
-    pub(super) groups: u32,
+    pub(super) groups: Groups,
 }
 
 /// The layout that a module declares, whether or not it uses all of it.

@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
+use super::Gpu;
 use super::buffers::map;
-use super::{Gpu, Step};
+use super::pass::{Groups, Step};
 use crate::Error;
 
 /// Workgroups in a row of a dispatch: more than 65535 need a second dimension. `shared/groups.wgsl` undoes this.
@@ -99,8 +100,7 @@ impl<'a> Recorder<'a> {
 
     /// Runs a step.
     pub(crate) fn run(&mut self, step: &Step) {
-        let groups = step.groups;
-        if groups == 0 {
+        if matches!(step.groups, Groups::Number(0)) {
             return;
         }
         let at = 2 * self.times.len() as u32;
@@ -116,7 +116,12 @@ impl<'a> Recorder<'a> {
         let mut compute = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
         compute.set_pipeline(&step.pipeline);
         compute.set_bind_group(0, &step.bindings, &[]);
-        compute.dispatch_workgroups(groups.min(GROUPS_PER_ROW), groups.div_ceil(GROUPS_PER_ROW), 1);
+        match &step.groups {
+            Groups::Number(groups) => {
+                compute.dispatch_workgroups(*groups.min(&GROUPS_PER_ROW), groups.div_ceil(GROUPS_PER_ROW), 1);
+            }
+            Groups::Counted(arguments, at) => compute.dispatch_workgroups_indirect(arguments, *at),
+        }
         drop(compute);
         if matches!(self.clock, Clock::Off) {
             return;

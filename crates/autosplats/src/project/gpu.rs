@@ -4,11 +4,24 @@ use super::ScreenPoint;
 use super::cpu::STRIP_SPACINGS;
 use super::device_cloud::DeviceCloud;
 use crate::Error;
-use crate::gpu::{Gpu, INT64_ATOMICS, Pass, PassSource, Step};
+use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
 
 #[cfg(test)]
-pub(crate) const PASSES: &[PassSource] =
-    &[CLEAR, PROJECT, PROJECT_DEPTH, PROJECT_INDEX, OCCUPANCY, GRID, COUNT, SCAN, COMPACT, GATHER, SPLIT_COUNT, SPLIT];
+pub(crate) const PASSES: &[PassSource] = &[
+    CLEAR,
+    PROJECT,
+    PROJECT_DEPTH,
+    PROJECT_INDEX,
+    OCCUPANCY,
+    GRID,
+    COUNT,
+    SCAN,
+    COMPACT,
+    GATHER,
+    SPLIT_COUNT,
+    SPLIT,
+    WORK,
+];
 const CLEAR: PassSource = PassSource::new("project/clear", include_str!("clear.wgsl"));
 const PROJECT: PassSource =
     PassSource { needs: INT64_ATOMICS, ..PassSource::new("project/project", include_str!("project.wgsl")) };
@@ -17,11 +30,32 @@ const PROJECT_INDEX: PassSource = PassSource::new("project/project_index", inclu
 const OCCUPANCY: PassSource = PassSource::new("project/occupancy", include_str!("occupancy.wgsl"));
 const GRID: PassSource = PassSource::new("project/grid", include_str!("grid.wgsl"));
 const COUNT: PassSource = PassSource::new("project/count", include_str!("count.wgsl"));
-pub(crate) const SCAN: PassSource = PassSource::new("project/scan", include_str!("scan.wgsl"));
+const SCAN: PassSource = PassSource::new("project/scan", include_str!("scan.wgsl"));
 const COMPACT: PassSource = PassSource::new("project/compact", include_str!("compact.wgsl"));
 const GATHER: PassSource = PassSource::new("project/gather", include_str!("gather.wgsl"));
 const SPLIT_COUNT: PassSource = PassSource::new("project/split_count", include_str!("split_count.wgsl"));
 const SPLIT: PassSource = PassSource::new("project/split", include_str!("split.wgsl"));
+
+const WORK: PassSource = PassSource::new("project/work", include_str!("work.wgsl"));
+
+/// Numbers of workgroups that depend on counts, as `work.wgsl` has them: by what there is one invocation each for, and
+/// the invocations of a workgroup; or blocks of [`BLOCK`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Work {
+    Visible256,
+    VisibleBlocks,
+    PassiveBlocks,
+    Active64,
+    Active256,
+    Recovered64,
+    Recovered256,
+    Queries256,
+}
+
+/// Bytes of the arguments of a dispatch.
+const WORK_BYTES: u64 = 12;
+/// How many of them there are.
+const WORKS: u64 = Work::Queries256 as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
@@ -78,6 +112,8 @@ pub(crate) struct ScreenBuffers {
     pub(crate) queries: wgpu::Buffer,
     pub(crate) passive: wgpu::Buffer,
     pub(crate) block_sums: wgpu::Buffer,
+    /// Workgroups of each [`Work`], three `u32`.
+    arguments: wgpu::Buffer,
 }
 
 impl ScreenBuffers {
@@ -104,8 +140,44 @@ impl ScreenBuffers {
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
             block_sums: gpu.storage::<u32>("sums of blocks", pixels.div_ceil(BLOCK as usize))?,
+            arguments: gpu.buffer(
+                "arguments",
+                WORKS * WORK_BYTES,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
+            )?,
         })
     }
+
+    /// As many workgroups as [`WorkPass`] found last.
+    pub(crate) fn groups(&self, work: Work) -> Groups {
+        Groups::Counted(self.arguments.clone(), work as u64 * WORK_BYTES)
+    }
+}
+
+/// Finds how many workgroups there are of each [`Work`].
+#[derive(Debug)]
+pub(crate) struct WorkPass(Pass);
+
+impl WorkPass {
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        Pass::new(gpu, &WORK, &[]).map(Self)
+    }
+
+    /// To be run after counters have changed.
+    pub(crate) fn step(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers) -> Step {
+        self.0.step(gpu, &[frame, &screen.counters, &screen.arguments], 1)
+    }
+}
+
+/// The scan of the sums of blocks: of all blocks, or of those of `scanned` things.
+///
+/// # Errors
+/// [`Error::Device`].
+pub(crate) fn scan_pass(gpu: &Gpu, total: Counter, scanned: Option<Counter>) -> Result<Pass, Error> {
+    let scanned = scanned.unwrap_or(total);
+    Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32)), ("SCANNED", f64::from(scanned as u32))])
 }
 
 /// The passes of projection.
@@ -122,6 +194,7 @@ pub(crate) struct ProjectPasses {
     split_count: Pass,
     scan_active: Pass,
     split: Pass,
+    work: WorkPass,
 }
 
 impl ProjectPasses {
@@ -131,19 +204,19 @@ impl ProjectPasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
         let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
-        let scan = |total: Counter| Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32))]);
         Ok(Self {
             clear: pass(&CLEAR)?,
             nearest: if int64 { vec![pass(&PROJECT)?] } else { vec![pass(&PROJECT_DEPTH)?, pass(&PROJECT_INDEX)?] },
             occupancy: pass(&OCCUPANCY)?,
             grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
             count: pass(&COUNT)?,
-            scan_visible: scan(Counter::Visible)?,
+            scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,
             gather: pass(&GATHER)?,
             split_count: pass(&SPLIT_COUNT)?,
-            scan_active: scan(Counter::Active)?,
+            scan_active: scan_pass(gpu, Counter::Active, Some(Counter::Visible))?,
             split: pass(&SPLIT)?,
+            work: WorkPass::new(gpu)?,
         })
     }
 
@@ -160,8 +233,6 @@ impl ProjectPasses {
         let [width, height] = screen.size;
         let area = width * height;
         let pixel_blocks = area.div_ceil(BLOCK);
-        let point_groups = screen.capacity.div_ceil(GROUP);
-        let point_blocks = screen.capacity.div_ceil(BLOCK);
         let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], area.div_ceil(GROUP))];
         for pass in &self.nearest {
             for chunk in cloud.chunks() {
@@ -178,15 +249,21 @@ impl ProjectPasses {
         steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));
         let compact = [frame, keys, counters, block_sums, source, pixels, cell_start];
         steps.push(self.compact.step(gpu, &compact, pixel_blocks));
+        steps.push(self.work.step(gpu, frame, screen));
         for chunk in cloud.chunks() {
             let gather =
                 [frame, &chunk.uniform, &chunk.positions, &chunk.values, counters, source, pixels, points, values];
-            steps.push(self.gather.step(gpu, &gather, point_groups));
+            steps.push(self.gather.step(gpu, &gather, screen.groups(Work::Visible256)));
         }
-        steps.push(self.split_count.step(gpu, &[frame, points, density, counters, block_sums], pixel_blocks));
+        steps.push(self.split_count.step(
+            gpu,
+            &[frame, points, density, counters, block_sums],
+            screen.groups(Work::VisibleBlocks),
+        ));
         steps.push(self.scan_active.step(gpu, &[frame, block_sums, counters], 1));
         let split = [frame, points, density, counters, block_sums, &screen.queries, &screen.passive];
-        steps.push(self.split.step(gpu, &split, point_blocks));
+        steps.push(self.split.step(gpu, &split, screen.groups(Work::VisibleBlocks)));
+        steps.push(self.work.step(gpu, frame, screen));
         steps
     }
 }

@@ -10,12 +10,14 @@
 
 // Which counter becomes the total.
 override TOTAL: u32;
+// Which counter says of how many things blocks of 2048 have sums; the total itself if all blocks have one.
+override SCANNED: u32;
 
 var<workgroup> before: array<u32, 257>;
 
 @compute @workgroup_size(256)
 fn scan(@builtin(local_invocation_index) local: u32) {
-    let blocks = arrayLength(&block_sums);
+    let blocks = select((counters[SCANNED] + 2047u) / 2048u, arrayLength(&block_sums), SCANNED == TOTAL);
     let each = (blocks + 255u) / 256u;
     let first = min(local * each, blocks);
     let end = min(first + each, blocks);

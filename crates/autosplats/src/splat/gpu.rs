@@ -11,7 +11,7 @@ use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, SUPPORT};
 use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, STRIDES_PER_REACH};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{BLOCK, Counter, SCAN, ScreenBuffers};
+use crate::project::gpu::{Counter, ScreenBuffers, Work, WorkPass, scan_pass};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SET_UP, BOXES, DEPTH, RECOVER_COUNT, RECOVER, REFINE, ATTRIBUTES, TRIM];
@@ -24,8 +24,6 @@ const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.
 const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
-/// Invocations in a workgroup of passes over surfels.
-const GROUP: u32 = 256;
 /// Side of a patch in pixels, and splats drawn into it at a time.
 const PATCH: u32 = 16;
 const BATCH: u32 = 64;
@@ -40,6 +38,16 @@ const SPLAT_BYTES: usize = 48;
 pub(crate) enum Round {
     Active,
     Recovered,
+}
+
+impl Round {
+    /// Workgroups of 256 invocations.
+    fn work(self) -> Work {
+        match self {
+            Self::Active => Work::Active256,
+            Self::Recovered => Work::Recovered256,
+        }
+    }
 }
 
 /// Splats on the device, and the depth maps.
@@ -77,6 +85,7 @@ pub(crate) struct SplatPasses {
     recover_count: Pass,
     scan_recovered: Pass,
     recover: Pass,
+    work: WorkPass,
     refine: Pass,
     attributes: Pass,
     trim: Pass,
@@ -130,8 +139,9 @@ impl SplatPasses {
             boxes: [boxes(0.0)?, boxes(1.0)?],
             depth: Pass::new(gpu, &DEPTH, &[dot_radius])?,
             recover_count: pass(&RECOVER_COUNT)?,
-            scan_recovered: Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(Counter::Recovered as u32))])?,
+            scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
             recover: pass(&RECOVER)?,
+            work: WorkPass::new(gpu)?,
             refine: pass(&REFINE)?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             trim: Pass::new(gpu, &TRIM, &trim)?,
@@ -153,7 +163,7 @@ impl SplatPasses {
         let counters = &screen.counters;
         let set_up = &self.set_up[round as usize];
         vec![
-            set_up.step(gpu, &[frame, counters, surfels, splats, tree], screen.capacity.div_ceil(GROUP)),
+            set_up.step(gpu, &[frame, counters, surfels, splats, tree], screen.groups(round.work())),
             self.boxes[round as usize].step(gpu, &[frame, counters, tree], tops(screen)),
             self.depth.step(gpu, &[frame, splats, tree, &depth[0]], patches(screen)),
         ]
@@ -169,13 +179,13 @@ impl SplatPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, points, passive, block_sums, queries, .. } = screen;
         let depth = &splats.depth[0];
-        // All sums of blocks are scanned, so all are counted.
-        let blocks = (screen.size[0] * screen.size[1]).div_ceil(BLOCK);
+        let blocks = || screen.groups(Work::PassiveBlocks);
         let recover = [frame, points, passive, counters, depth, block_sums, queries];
         vec![
-            self.recover_count.step(gpu, &[frame, points, passive, counters, depth, block_sums], blocks),
+            self.recover_count.step(gpu, &[frame, points, passive, counters, depth, block_sums], blocks()),
             self.scan_recovered.step(gpu, &[frame, block_sums, counters], 1),
-            self.recover.step(gpu, &recover, screen.capacity.div_ceil(BLOCK)),
+            self.recover.step(gpu, &recover, blocks()),
+            self.work.step(gpu, frame, screen),
         ]
     }
 
@@ -197,7 +207,7 @@ impl SplatPasses {
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
         for [before, after] in [[depth, other], [other, depth]].into_iter().filter(|_| depth_refinement) {
-            let groups = screen.capacity.div_ceil(GROUP);
+            let groups = screen.groups(Work::Queries256);
             steps.push(self.refine.step(gpu, &[frame, counters, splats, before, tree], groups));
             steps.push(self.boxes[Round::Active as usize].step(gpu, &[frame, counters, tree], tops(screen)));
             steps.push(self.depth.step(gpu, &[frame, splats, tree, after], patches(screen)));

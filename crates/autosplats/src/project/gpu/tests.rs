@@ -70,7 +70,16 @@ pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> Sc
     write(&buffers.points, bytemuck::cast_slice(&screen.points));
     write(&buffers.queries, bytemuck::cast_slice(&queries));
     write(&buffers.passive, bytemuck::cast_slice(&screen.passive));
+    find_work(gpu, &buffers);
     buffers
+}
+
+/// Finds how many workgroups there are of each kind of work, after the host has written the counters.
+pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
+    let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
+    let mut recorder = Recorder::new(gpu, &Clock::Off);
+    recorder.run(&WorkPass::new(gpu).expect("a pass").step(gpu, &frame, screen));
+    recorder.finish();
 }
 
 fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, culling: bool) -> ScreenPoints {

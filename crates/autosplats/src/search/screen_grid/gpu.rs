@@ -4,15 +4,15 @@ use super::cpu::{FIRST_REACH, LEAST_GROWTH};
 use super::window::MARGIN_PX;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::ScreenBuffers;
+use crate::project::gpu::{ScreenBuffers, Work};
 use crate::search::{BOUND_STEP, CROWDED, MAX_CANDIDATES};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH];
 const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_str!("search.wgsl"));
 
-/// Invocations in a workgroup.
-const GROUP: u32 = 64;
+/// Workgroups of 64 invocations for each round.
+const ROUND_WORK: [Work; 2] = [Work::Active64, Work::Recovered64];
 /// `Neighborhood` of `shared/surfel.wgsl`.
 type Neighborhood = [f32; 12];
 
@@ -64,7 +64,7 @@ impl SearchPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, cell_start, points, queries, .. } = screen;
         let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods];
-        vec![self.rounds[round].step(gpu, &buffers, screen.capacity.div_ceil(GROUP))]
+        vec![self.rounds[round].step(gpu, &buffers, screen.groups(ROUND_WORK[round]))]
     }
 }
 

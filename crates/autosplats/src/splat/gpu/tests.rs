@@ -11,6 +11,7 @@ use crate::fit::Surfel;
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::ScreenPoint;
 use crate::project::gpu::COUNTERS;
+use crate::project::gpu::tests::find_work;
 use crate::test_clouds::Random;
 
 /// One pixel, patches and tiles that are cut off, several tiles.
@@ -114,6 +115,7 @@ impl Scene<'_> {
 
 fn set_counter(gpu: &Gpu, screen: &ScreenBuffers, counter: Counter, value: usize) {
     gpu.queue.write_buffer(&screen.counters, 4 * counter as u64, bytemuck::bytes_of(&(value as u32)));
+    find_work(gpu, screen);
 }
 
 pub(crate) fn read_layers(gpu: &Gpu, layers: &LayerBuffers) -> GBuffer {

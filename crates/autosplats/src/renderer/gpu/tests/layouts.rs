@@ -7,7 +7,7 @@ use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 use super::passes;
 use crate::fit::Surfel;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
-use crate::project::gpu::{BLOCK, COUNTERS, Counter};
+use crate::project::gpu::{BLOCK, COUNTERS, Counter, Work};
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::shade::gpu::{ShadeUniform, Shown};
 use crate::splat::Cover;
@@ -197,6 +197,13 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let shading = passes().find(|pass| pass.path == "shade/shade").expect("a pass").module();
     let in_wgsl: Vec<_> = constants(&shading).into_iter().filter(|(name, _)| name.starts_with("SHOW_")).collect();
     assert_eq!(in_wgsl, shown, "what is shown in WGSL, and in Rust");
+
+    use Work::{Active64, Active256, PassiveBlocks, Queries256, Recovered64, Recovered256, Visible256, VisibleBlocks};
+    let works = [Visible256, VisibleBlocks, PassiveBlocks, Active64, Active256, Recovered64, Recovered256, Queries256];
+    let works = works.map(|work| (screaming(&work), work as u32));
+    let pass = passes().find(|pass| pass.path == "project/work").expect("a pass").module();
+    let in_wgsl: Vec<_> = constants(&pass).into_iter().filter(|entry| works.contains(entry)).collect();
+    assert_eq!(in_wgsl, works, "work in WGSL, and in Rust");
 
     assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, BLOCK, "flags that a workgroup ranks");
     assert_eq!(constant("#import groups\n", "GROUPS_PER_ROW"), GROUPS_PER_ROW, "workgroups in a row");
