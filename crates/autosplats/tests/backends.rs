@@ -68,6 +68,7 @@ fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 
     near(a.recovered, b.recovered, "recovered");
     near(a.outliers, b.outliers, "outliers");
     near(a.clamped, b.clamped, "clamped");
+    near(a.bounded, b.bounded, "bounded");
     near(a.covered, b.covered, "covered");
     if settings.all_layers {
         compare_layers(host.layers, device.layers, case);
@@ -83,7 +84,11 @@ fn compare_layers(a: &GBuffer, b: &GBuffer, case: &str) {
         let normals = (0..3).all(|axis| (a.normal[i][axis] - b.normal[i][axis]).abs() < 1e-2);
         let colors = a.color.is_empty() || (0..3).all(|axis| (a.color[i][axis] - b.color[i][axis]).abs() < 1e-2);
         let scalars = a.scalar.is_empty() || near(a.scalar[i], b.scalar[i]);
-        let measures = near(a.radius[i], b.radius[i]) && near(a.k_radius[i], b.k_radius[i]);
+        // Curvature is a difference of sums, in units of its own size.
+        let measures = near(a.radius[i], b.radius[i])
+            && near(a.k_radius[i], b.k_radius[i])
+            && (a.curvature[i] - b.curvature[i]).abs() < 1e-3
+            && a.point[i] == b.point[i];
         !(near(a.weight[i], b.weight[i]) && near(a.depth[i], b.depth[i]) && normals && colors && scalars && measures)
     });
     let differing = differing.count();
@@ -370,4 +375,52 @@ fn an_upload_can_be_stopped() {
     assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");
     let (cloud, camera) = scene("figure", 20_000);
     compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), "after that");
+}
+
+#[test]
+fn a_device_that_is_lost_says_so() {
+    if gpu().is_none() {
+        return;
+    }
+    let (cloud, camera) = scene("figure", 20_000);
+    let (device, queue) = own_device(128 << 20).expect("a device");
+    let mut lost = Renderer::with_device(device.clone(), queue).expect("a renderer");
+    lost.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture");
+    device.destroy();
+    for other in [false, true] {
+        let cloud = if other { scene("statue", 20_000).0 } else { cloud.clone() };
+        match lost.render(&cloud, &camera, SIZE, &Settings::default()) {
+            Err(Error::DeviceLost(_) | Error::Device(_)) => {}
+            outcome => panic!("{:?}", outcome.map(|frame| frame.counts)),
+        }
+    }
+    let mut new = Renderer::with_backend(Backend::Gpu).expect("another device");
+    compare(&mut new, &cloud, &camera, SIZE, &Settings::default(), "on a new renderer");
+}
+
+#[test]
+fn a_picture_of_8192_pixels_a_side() {
+    let Some(mut gpu) = gpu() else { return };
+    let (cloud, camera) = scene("figure", 20_000);
+    let most = gpu.adapter().expect("a device").points_per_binding * 12;
+    let enough = most >= 8192 * 8192 * 16;
+    match gpu.render(&cloud, &camera, [8192, 8192], &Settings::default()) {
+        Ok(frame) => assert!(frame.counts.covered > 1_000_000, "{:?}", frame.counts),
+        Err(Error::DeviceLimit { .. } | Error::DeviceMemory(_)) => assert!(!enough, "{most} bytes are enough"),
+        Err(error) => panic!("{error}"),
+    }
+    compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), "after that");
+}
+
+#[test]
+fn colours_come_and_go_without_the_points() {
+    let Some(mut gpu) = gpu() else { return };
+    let (cloud, camera) = scene("statue", 30_000);
+    let colors = (0..cloud.len()).map(|i| [(i % 255) as u8, 10, 200]).collect();
+    let cloud = cloud.with_colors(colors).expect("a colour each");
+    for color in [ColorMode::Auto, ColorMode::Height, ColorMode::Rgb, ColorMode::Plain, ColorMode::Auto] {
+        let settings =
+            Settings { shading: Shading { color: color.clone(), ..Shading::default() }, ..Settings::default() };
+        compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("{color:?}"));
+    }
 }

@@ -7,6 +7,8 @@ use crate::Error;
 
 /// Parts of a readback begin at multiples of so many bytes.
 const PART: u64 = 16;
+/// A readback's buffer is given back when it is so many times too large.
+const MOST_WASTE: u64 = 4;
 
 impl Gpu {
     /// A storage buffer of `len` values of type `T`, at least one; it can be copied to and from.
@@ -90,7 +92,8 @@ impl Readback {
         if size > most {
             return Err(Error::DeviceLimit { what: "reading the picture back", needed: size, allowed: most });
         }
-        let buffer = match self.buffer.take().filter(|buffer| buffer.size() >= size) {
+        let fits = |buffer: &wgpu::Buffer| (size..=MOST_WASTE * size).contains(&buffer.size());
+        let buffer = match self.buffer.take().filter(fits) {
             Some(buffer) => buffer,
             None => gpu.buffer("readback", size, BufferUsages::MAP_READ | BufferUsages::COPY_DST)?,
         };
@@ -110,7 +113,8 @@ impl Readback {
     pub(crate) fn read<T>(&self, gpu: &Gpu, take: impl FnOnce(&[&[u8]]) -> T) -> Result<T, Error> {
         let lost = || Error::DeviceLost("there is nothing to read".into());
         let buffer = self.buffer.as_ref().ok_or_else(lost)?;
-        map(gpu, buffer, buffer.size(), |mut bytes| {
+        let size = self.parts.iter().map(|part| part.next_multiple_of(PART)).sum();
+        map(gpu, buffer, size, |mut bytes| {
             let mut parts = Vec::with_capacity(self.parts.len());
             for &len in &self.parts {
                 let (part, rest) = bytes.split_at(len.next_multiple_of(PART) as usize);

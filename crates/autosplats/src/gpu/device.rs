@@ -97,17 +97,18 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| Error::Device(format!("{} does not start: {error}", adapter.get_info().name)))?;
-        Ok(Self::from_parts(device, queue))
-    }
-
-    /// The caller's own device.
-    pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let lost = Arc::new(Mutex::new(None));
-        let reason = Arc::clone(&lost);
-        device.set_device_lost_callback(move |_, message| {
+        let gpu = Self::from_parts(device, queue);
+        let reason = Arc::clone(&gpu.lost);
+        gpu.device.set_device_lost_callback(move |_, message| {
             *reason.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
         });
-        Self { device, queue, lost }
+        Ok(gpu)
+    }
+
+    /// The caller's own device, which has one place for a callback, the caller's: its loss is noticed when it does not
+    /// answer.
+    pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self { device, queue, lost: Arc::default() }
     }
 
     /// What the device is and can do.

@@ -45,7 +45,7 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
             let key = keys[place.pixel.y * frame.size.x + place.pixel.x];
             if key.x != EMPTY_KEY {
                 source[index] = key.x;
-                pixels[index] = place.pixel.y << 16u | place.pixel.x;
+                pixels[index] = (place.pixel.y << 16u) | place.pixel.x;
             }
             if at == area - 1u {
                 // The end of the last cell.

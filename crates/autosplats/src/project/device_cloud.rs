@@ -1,23 +1,18 @@
 //! A cloud on the device: split where one binding cannot hold it, and uploaded piece by piece.
 
-use std::num::NonZeroU64;
-
 use autosplats_cloud::{FieldValues, PointCloud};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
-use wgpu::util::StagingBelt;
 
 use crate::Error;
 use crate::gpu::Gpu;
 
 /// Points uploaded at a time.
 const PIECE: usize = 1 << 18;
-/// Bytes of a staging buffer: two pieces of positions.
-const STAGING: u64 = 8 << 20;
+/// Staging buffers, of a piece of positions each: one is filled while others are on their way.
+const RING: usize = 8;
 /// Room is given back when less than one in so many points of it is used.
 const LEAST_USED: usize = 4;
-/// Bytes on their way to the device at a time: staging memory stays within twice that.
-const IN_FLIGHT: u64 = 64 << 20;
 
 /// Values that splats carry, per point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -97,17 +92,21 @@ impl DeviceCloud {
         self.words
     }
 
-    /// Makes room for `points` points with `words` words of values each, and says whether buffers had to be made anew,
-    /// which a cloud of about the size of the one before does without.
+    /// Whether so many points would go where the points before are: a cloud of about their number does.
+    pub(crate) fn fits(&self, points: usize) -> bool {
+        points <= self.capacity && points >= self.capacity / LEAST_USED
+    }
+
+    /// Makes room for `points` points; their positions and values are lost unless they [fit](Self::fits).
     ///
     /// # Errors
-    /// [`Error::DeviceMemory`] if the device has no room.
-    pub(crate) fn resize(&mut self, gpu: &Gpu, points: usize, words: usize) -> Result<bool, Error> {
-        let fits = words == self.words && points <= self.capacity && points >= self.capacity / LEAST_USED;
-        if !fits {
+    /// [`Error::DeviceMemory`] if the device has no room; then it holds nothing.
+    pub(crate) fn resize(&mut self, gpu: &Gpu, points: usize) -> Result<(), Error> {
+        if !self.fits(points) {
             // A cloud that has grown once will grow again.
             let grown = if self.capacity > 0 && points > self.capacity { points + points / 4 } else { points };
             *self = Self::default();
+            let mut chunks = Vec::new();
             let limits = gpu.device.limits();
             let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) as usize;
             let longest = most / size_of::<[f32; 3]>();
@@ -115,39 +114,69 @@ impl DeviceCloud {
                 let capacity = longest.min(grown - first);
                 let uniform = gpu.uniform::<ChunkUniform>("run of points")?;
                 let positions = gpu.storage::<[f32; 3]>("positions", capacity)?;
-                let values = gpu.storage::<u32>("values of points", capacity * words)?;
-                self.chunks.push(Chunk { capacity: capacity as u32, uniform, positions, values });
+                let values = gpu.storage::<u32>("values of points", 0)?;
+                chunks.push(Chunk { capacity: capacity as u32, uniform, positions, values });
             }
-            (self.capacity, self.words) = (grown, words);
+            (self.capacity, self.chunks) = (grown, chunks);
         }
         self.points = points;
+        self.tell(gpu);
+        Ok(())
+    }
+
+    /// Makes room for `words` words of values per point; values are lost if it was another number.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`] if the device has no room.
+    pub(crate) fn resize_values(&mut self, gpu: &Gpu, words: usize) -> Result<(), Error> {
+        if words != self.words {
+            self.words = words;
+            for chunk in &mut self.chunks {
+                chunk.values = gpu.storage::<u32>("values of points", chunk.capacity as usize * words)?;
+            }
+            self.tell(gpu);
+        }
+        Ok(())
+    }
+
+    /// Tells the passes what each run holds.
+    fn tell(&self, gpu: &Gpu) {
         let mut first = 0;
         for chunk in &self.chunks {
-            let len = chunk.capacity.min((points - first) as u32);
-            let told = ChunkUniform { first: first as u32, len, values: words as u32, padding: 0 };
+            let len = chunk.capacity.min((self.points - first) as u32);
+            let told = ChunkUniform { first: first as u32, len, values: self.words as u32, padding: 0 };
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&told));
             first += len as usize;
         }
-        Ok(!fits)
     }
 }
 
-/// Copies clouds to the device, through staging buffers that are used again and again.
+/// Copies clouds to the device, through a ring of staging buffers: what is on its way takes no more memory than that.
 #[derive(Debug)]
 pub(crate) struct Uploader {
-    belt: StagingBelt,
+    ring: Vec<Staging>,
+    next: usize,
     packed: Vec<u32>,
 }
 
+/// A staging buffer.
+#[derive(Debug)]
+struct Staging {
+    buffer: wgpu::Buffer,
+    /// When it was last copied from; a new one is mapped.
+    submitted: Option<wgpu::SubmissionIndex>,
+}
+
 impl Uploader {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
-        Self { belt: StagingBelt::new(gpu.device.clone(), STAGING), packed: Vec::new() }
+    pub(crate) fn new() -> Self {
+        Self { ring: Vec::new(), next: 0, packed: Vec::new() }
     }
 
     /// Uploads positions.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], and [`Error::Cancelled`] if `report`, told the fraction done, says no.
+    /// [`Error::DeviceLost`], [`Error::DeviceMemory`], and [`Error::Cancelled`] if `report`, told the fraction done, says
+    /// no.
     pub(crate) fn positions(
         &mut self,
         gpu: &Gpu,
@@ -155,17 +184,19 @@ impl Uploader {
         to: &DeviceCloud,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let mut upload = Upload::new(gpu, &mut self.belt, to.points, report);
         let mut rest = cloud.positions();
+        let mut done = 0;
         for chunk in &to.chunks {
             let (positions, after) = rest.split_at(rest.len().min(chunk.capacity as usize));
             rest = after;
             for (piece, positions) in positions.chunks(PIECE).enumerate() {
                 let at = piece * PIECE * size_of::<[f32; 3]>();
-                upload.write(&chunk.positions, at, bytemuck::cast_slice(positions), positions.len())?;
+                self.write(gpu, &chunk.positions, at, bytemuck::cast_slice(positions))?;
+                done += positions.len();
+                go_on(report, done, to.points)?;
             }
         }
-        upload.finish()
+        gpu.check_lost()
     }
 
     /// Uploads values.
@@ -179,75 +210,53 @@ impl Uploader {
         to: &DeviceCloud,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let mut upload = Upload::new(gpu, &mut self.belt, to.points, report);
         let mut first = 0;
         for chunk in to.chunks.iter().filter(|_| to.words > 0) {
             let len = (to.points - first).min(chunk.capacity as usize);
             for piece in (0..len).step_by(PIECE) {
                 let points = PIECE.min(len - piece);
-                self.packed.resize(points * to.words, 0);
-                values.pack(first + piece, &mut self.packed);
-                upload.write(&chunk.values, piece * to.words * 4, bytemuck::cast_slice(&self.packed), points)?;
+                let mut packed = std::mem::take(&mut self.packed);
+                packed.resize(points * to.words, 0);
+                values.pack(first + piece, &mut packed);
+                self.write(gpu, &chunk.values, piece * to.words * 4, bytemuck::cast_slice(&packed))?;
+                self.packed = packed;
+                go_on(report, first + piece + points, to.points)?;
             }
             first += len;
         }
-        upload.finish()
-    }
-}
-
-/// One upload in progress.
-struct Upload<'a> {
-    gpu: &'a Gpu,
-    belt: &'a mut StagingBelt,
-    encoder: wgpu::CommandEncoder,
-    /// Bytes written since the last submission.
-    written: u64,
-    before: Option<wgpu::SubmissionIndex>,
-    points: usize,
-    done: usize,
-    report: &'a dyn Fn(f32) -> bool,
-}
-
-impl<'a> Upload<'a> {
-    fn new(gpu: &'a Gpu, belt: &'a mut StagingBelt, points: usize, report: &'a dyn Fn(f32) -> bool) -> Self {
-        let encoder = encoder(gpu);
-        Self { gpu, belt, encoder, written: 0, before: None, points, done: 0, report }
+        gpu.check_lost()
     }
 
-    fn write(&mut self, to: &wgpu::Buffer, at: usize, bytes: &[u8], points: usize) -> Result<(), Error> {
-        let Some(size) = NonZeroU64::new(bytes.len() as u64) else { return Ok(()) };
-        self.belt.write_buffer(&mut self.encoder, to, at as u64, size).copy_from_slice(bytes);
-        self.written += size.get();
-        self.done += points;
-        if self.written >= IN_FLIGHT {
-            let submitted = self.submit();
-            // The submission before this one is probably done; waiting for it bounds what is in flight.
-            if let Some(before) = self.before.replace(submitted) {
-                let poll = wgpu::PollType::Wait { submission_index: Some(before), timeout: None };
-                self.gpu.device.poll(poll).map_err(|error| Error::DeviceLost(error.to_string()))?;
-            }
-            if !(self.report)(self.done as f32 / self.points as f32) {
-                return Err(Error::Cancelled);
-            }
+    /// Copies bytes, a piece's at most, through the next staging buffer of the ring.
+    fn write(&mut self, gpu: &Gpu, to: &wgpu::Buffer, at: usize, bytes: &[u8]) -> Result<(), Error> {
+        let lost = || gpu.check_lost().err().unwrap_or_else(|| Error::DeviceLost("it takes no points".into()));
+        if self.ring.len() < RING {
+            let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
+            let size = (PIECE * size_of::<[f32; 3]>()) as u64;
+            self.ring.push(Staging { buffer: gpu.buffer("staging", size, usage)?, submitted: None });
+            self.next = self.ring.len() - 1;
         }
+        let Staging { buffer, submitted } = &mut self.ring[self.next];
+        self.next = (self.next + 1) % RING;
+        let size = bytes.len() as u64;
+        // The device is long done with it, but where it is slower than the host.
+        buffer.map_async(wgpu::MapMode::Write, 0..size, |_| {});
+        let poll = match submitted.take() {
+            Some(submitted) => wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None },
+            None => wgpu::PollType::Poll,
+        };
+        gpu.device.poll(poll).map_err(|_| lost())?;
+        buffer.get_mapped_range_mut(0..size).map_err(|_| lost())?.copy_from_slice(bytes);
+        buffer.unmap();
+        let mut encoder =
+            gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("autosplats.upload") });
+        encoder.copy_buffer_to_buffer(buffer, 0, to, at as u64, size);
+        *submitted = Some(gpu.queue.submit([encoder.finish()]));
         Ok(())
     }
-
-    fn submit(&mut self) -> wgpu::SubmissionIndex {
-        self.written = 0;
-        self.belt.finish();
-        let commands = std::mem::replace(&mut self.encoder, encoder(self.gpu)).finish();
-        let submitted = self.gpu.queue.submit([commands]);
-        self.belt.recall();
-        submitted
-    }
-
-    fn finish(mut self) -> Result<(), Error> {
-        self.submit();
-        self.gpu.check_lost()
-    }
 }
 
-fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
-    gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("autosplats.upload") })
+/// Asks whether to go on.
+fn go_on(report: &dyn Fn(f32) -> bool, done: usize, points: usize) -> Result<(), Error> {
+    if report(done as f32 / points as f32) { Ok(()) } else { Err(Error::Cancelled) }
 }

@@ -38,12 +38,11 @@ pub(super) struct GpuRenderer {
     times: Vec<PassTime>,
 }
 
-/// What of which cloud is on the device.
-#[derive(Debug, Default, PartialEq)]
+/// What of which cloud is on the device, by its identity.
+#[derive(Debug, Default)]
 struct Resident {
-    cloud: Option<u64>,
-    colors: Option<ColorSource>,
-    scalar: Option<String>,
+    points: Option<u64>,
+    values: Option<(u64, Option<ColorSource>, Option<String>)>,
 }
 
 /// Compiled passes: those of the last k and channels are kept.
@@ -84,7 +83,7 @@ impl GpuRenderer {
     pub(super) fn new(gpu: Gpu) -> Result<Self, Error> {
         Ok(Self {
             clock: Clock::new(&gpu),
-            uploader: Uploader::new(&gpu),
+            uploader: Uploader::new(),
             cloud: DeviceCloud::default(),
             resident: Resident::default(),
             frame: gpu.uniform::<FrameUniform>("frame")?,
@@ -117,34 +116,41 @@ impl GpuRenderer {
     ) -> Result<(), Error> {
         check_count(cloud)?;
         let wanted = Wanted::new(cloud, settings)?;
-        self.make_resident(cloud, &wanted, report)
+        self.gpu.clone().checked(|| self.make_resident(cloud, &wanted, report))?
     }
 
-    /// Uploads what is not there yet.
+    /// Uploads what is not there yet. `report` is told how much of it is done.
     fn make_resident(
         &mut self,
         cloud: &PointCloud,
         wanted: &Wanted,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
-        let wants = Resident { cloud: Some(cloud.identity()), colors: wanted.colors, scalar: wanted.scalar.clone() };
-        if self.resident == wants {
+        self.gpu.check_lost()?;
+        let points = Some(cloud.identity());
+        let values = Some((cloud.identity(), wanted.colors, wanted.scalar.clone()));
+        let [new_points, new_values] = [self.resident.points != points, self.resident.values != values];
+        if !new_points && !new_values {
             return Ok(());
         }
-        let same_points = self.resident.cloud == wants.cloud;
-        // Nothing is there until everything is.
-        self.resident = Resident::default();
         let colors = wanted.colors(cloud);
-        let values = PointValues { colors: colors.as_deref(), scalar: wanted.scalar(cloud) };
-        let remade = self.cloud.resize(&self.gpu, cloud.len(), values.words())?;
-        if remade {
+        let carried = PointValues { colors: colors.as_deref(), scalar: wanted.scalar(cloud) };
+        if !self.cloud.fits(cloud.len()) || self.cloud.words() != carried.words() {
+            // Steps hold on to the buffers that they are bound to: these go before the new ones come.
             self.prepared = None;
         }
-        if remade || !same_points {
-            self.uploader.positions(&self.gpu, cloud, &self.cloud, report)?;
+        // What fails is not there.
+        self.resident.values = None;
+        let part = if carried.words() == 0 { 1.0 } else { 0.5 };
+        if new_points {
+            self.resident.points = None;
+            self.cloud.resize(&self.gpu, cloud.len())?;
+            self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
+            self.resident.points = points;
         }
-        self.uploader.values(&self.gpu, &values, &self.cloud, report)?;
-        self.resident = wants;
+        self.cloud.resize_values(&self.gpu, carried.words())?;
+        self.uploader.values(&self.gpu, &carried, &self.cloud, &|done| report(1.0 - part + part * done))?;
+        self.resident.values = values;
         Ok(())
     }
 
@@ -157,6 +163,18 @@ impl GpuRenderer {
         settings: &Settings,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
+        // What a device that fails refuses arrives as an error, whatever it is asked for.
+        self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings))?
+    }
+
+    /// Renders what was checked.
+    fn frame(
+        &mut self,
+        cloud: &PointCloud,
+        view: &View,
+        size: [u32; 2],
+        settings: &Settings,
+    ) -> Result<Frame<'_>, Error> {
         let wanted = Wanted::new(cloud, settings)?;
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| true)?;
@@ -164,10 +182,11 @@ impl GpuRenderer {
         self.prepare(size, &wanted, settings)?;
         let Self { gpu, clock, prepared, readback, image, layers, times, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, &view, cloud, settings, &uniform);
+        prepared.tell(gpu, frame, view, cloud, settings, &uniform);
 
+        let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         let mut wants = vec![&prepared.screen.counters, &prepared.picture.image];
@@ -188,7 +207,10 @@ impl GpuRenderer {
             };
             counters
         })?;
-        let frame_ms = clock.read(gpu, times)?;
+        let frame_ms = match clock {
+            Clock::Off => waited.elapsed().as_secs_f64() * 1e3,
+            _ => clock.read(gpu, times)?,
+        };
 
         let stage = |name: &str| {
             times.iter().filter(|time| time.pass.split('.').next() == Some(name)).map(|time| time.ms).sum::<f64>()
@@ -216,14 +238,25 @@ impl GpuRenderer {
         let size = [texture.width(), texture.height()];
         check_texture(texture, size)?;
         let view = check(cloud, camera, size, settings)?;
+        self.gpu.clone().checked(|| self.frame_in_texture(cloud, &view, texture, settings))?
+    }
+
+    /// Renders what was checked into a texture.
+    fn frame_in_texture(
+        &mut self,
+        cloud: &PointCloud,
+        view: &View,
+        texture: &wgpu::Texture,
+        settings: &Settings,
+    ) -> Result<(), Error> {
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
-        self.prepare(size, &wanted, settings)?;
+        self.prepare([texture.width(), texture.height()], &wanted, settings)?;
         let Self { gpu, prepared, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, &view, cloud, settings, &uniform.into_format(texture.format()));
+        prepared.tell(gpu, frame, view, cloud, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
@@ -267,7 +300,7 @@ impl GpuRenderer {
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
         let layers = LayerBuffers::new(gpu, size, shape.channels)?;
         let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
-        let mut steps = gpu.checked(|| {
+        let steps = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
             for round in [Round::Active, Round::Recovered] {
                 if round == Round::Recovered {
@@ -279,9 +312,9 @@ impl GpuRenderer {
             }
             let refine = shape.depth_refinement;
             steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
-            steps
-        })?;
-        steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
+            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
+            Ok::<_, Error>(steps)
+        })??;
         self.prepared = Some(Prepared { shape, screen, layers, picture, steps });
         Ok(())
     }

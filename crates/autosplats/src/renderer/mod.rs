@@ -123,19 +123,20 @@ impl Renderer {
     /// # Errors
     /// [`Error::Device`] if there is no GPU though one is asked for, or it does not start; [`Error::DeviceMemory`].
     pub fn with_backend(backend: Backend) -> Result<Self, Error> {
-        let gpu = match backend {
-            Backend::Cpu => return Ok(Self::new()),
-            Backend::Gpu => Gpu::new()?,
+        let on = |gpu: Gpu| Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(gpu)?)) });
+        match backend {
+            Backend::Cpu => Ok(Self::new()),
+            Backend::Gpu => Gpu::new().and_then(on),
             Backend::Auto => match Gpu::new() {
-                Ok(gpu) if !gpu.is_software() => gpu,
-                _ => return Ok(Self::new()),
+                // A driver that does not do what it should leaves the CPU.
+                Ok(gpu) if !gpu.is_software() => on(gpu).or_else(|_: Error| Ok(Self::new())),
+                _ => Ok(Self::new()),
             },
-        };
-        Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(gpu)?)) })
+        }
     }
 
     /// A renderer on the caller's own device. It uses the features `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and
-    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none.
+    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none. Without the last, passes are not timed.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
@@ -195,8 +196,8 @@ impl Renderer {
     /// The format is `Rgba8Unorm`, `Bgra8Unorm` or one of their `Srgb` forms, the usage has `COPY_DST`. There is no legend.
     ///
     /// # Errors
-    /// Those of [`render`](Self::render), and [`Error::Device`] if the texture cannot be rendered into, or this renderer
-    /// runs on the CPU.
+    /// Those of [`render`](Self::render), and [`Error::Texture`] if the texture cannot be rendered into, [`Error::Device`] if
+    /// this renderer runs on the CPU.
     pub fn render_to_texture(
         &mut self,
         cloud: &PointCloud,

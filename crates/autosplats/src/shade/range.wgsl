@@ -17,8 +17,9 @@ var<workgroup> bins: array<atomic<u32>, 512>;
 // Keys in all bins up to each, for both ends; in two copies, one written while the other is read.
 var<workgroup> upto: array<vec2u, 512>;
 // What is known of the two keys, and their ranks among those that begin alike.
-var<workgroup> found: vec2u;
-var<workgroup> ranks: vec2u;
+// Scalars: invocations that write components of one vector may overwrite each other's.
+var<workgroup> found: array<u32, 2>;
+var<workgroup> ranks: array<u32, 2>;
 
 // Keys one after the other that are equal as far as looked at.
 struct Run {
@@ -99,25 +100,25 @@ fn range(@builtin(local_invocation_index) local: u32) {
         }
         if byte == 0u && local == 0u {
             // A hundredth of the values is left out at each end.
-            found = vec2u(0u);
+            found = array(0u, 0u);
             let total = upto[copy + 255u].x;
-            ranks = vec2u(total / 100u, total - 1u - total / 100u);
+            ranks = array(total / 100u, total - 1u - total / 100u);
         }
         workgroupBarrier();
-        let rank = ranks;
+        let rank = vec2u(ranks[0], ranks[1]);
         let end = upto[copy + local];
         let before = end - own;
         workgroupBarrier();
         if rank.x >= before.x && rank.x < end.x {
-            found.x = (begins.x << 8u) | local;
-            ranks.x = rank.x - before.x;
+            found[0] = (begins.x << 8u) | local;
+            ranks[0] = rank.x - before.x;
         }
         if rank.y >= before.y && rank.y < end.y {
-            found.y = (begins.y << 8u) | local;
-            ranks.y = rank.y - before.y;
+            found[1] = (begins.y << 8u) | local;
+            ranks[1] = rank.y - before.y;
         }
         workgroupBarrier();
-        begins = found;
+        begins = vec2u(found[0], found[1]);
     }
     if local == 0u {
         let any = upto[255].x > 0u;

@@ -51,7 +51,8 @@ var<private> hits_half: u32;
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
 // The patch's columns in the low 16 bits, above them its fours of rows that each splat meets.
-var<workgroup> met: array<vec4u, GROUP / 4u>;
+// Scalars: invocations that write components of one vector may overwrite each other's.
+var<workgroup> met: array<u32, GROUP>;
 // The same the other way around: the splats that meet each column, then each four rows, sixteen to a word.
 var<workgroup> meeting: array<u32, 80>;
 
@@ -218,10 +219,10 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
         let low = max(firsts(bounds), corner) - corner;
         let high = min(lasts(bounds) - corner, vec2u(PATCH - 1u));
         let fours = vec2u(low.y, high.y) / OWN;
-        meets = ((2u << high.x) - (1u << low.x)) | ((2u << fours.y) - (1u << fours.x)) << PATCH;
+        meets = ((2u << high.x) - (1u << low.x)) | (((2u << fours.y) - (1u << fours.x)) << PATCH);
         load(local, index);
     }
-    met[local / 4u][local % 4u] = meets;
+    met[local] = meets;
     workgroupBarrier();
     // An invocation per column and sixteen splats; those of the first columns take fours of rows too.
     let line = local % PATCH;
@@ -230,7 +231,8 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
     var row = 0u;
     var i = 0u;
     loop {
-        let bits = met[4u * part + i] >> vec4u(line);
+        let first = 16u * part + 4u * i;
+        let bits = vec4u(met[first], met[first + 1u], met[first + 2u], met[first + 3u]) >> vec4u(line);
         column |= dot(bits & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
         row |= dot((bits >> vec4u(PATCH)) & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
         i += 1u;
@@ -249,8 +251,8 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
 fn draw_prepared(local: u32) {
     let column = 4u * (local % PATCH);
     let row = 4u * (PATCH + local / PATCH);
-    var low = (meeting[column] & meeting[row]) | (meeting[column + 1u] & meeting[row + 1u]) << 16u;
-    var high = (meeting[column + 2u] & meeting[row + 2u]) | (meeting[column + 3u] & meeting[row + 3u]) << 16u;
+    var low = (meeting[column] & meeting[row]) | ((meeting[column + 1u] & meeting[row + 1u]) << 16u);
+    var high = (meeting[column + 2u] & meeting[row + 2u]) | ((meeting[column + 3u] & meeting[row + 3u]) << 16u);
     loop {
         if (low | high) != 0u {
             let rest = select(high, low, low != 0u);

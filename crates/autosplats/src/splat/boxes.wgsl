@@ -41,7 +41,7 @@ fn boxes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         }
     }
     if children > 0u {
-        tree[level_start(LEAVES) + leaf] = low | high << vec2u(16u);
+        tree[level_start(LEAVES) + leaf] = low | (high << vec2u(16u));
     }
     if low.x <= high.x {
         widen(local / FAN, low, high);
@@ -52,7 +52,7 @@ fn boxes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         high = vec2u(atomicLoad(&sides[4u * local + 2u]), atomicLoad(&sides[4u * local + 3u]));
         let run = top * FAN + local;
         if run * FAN * FAN < end {
-            tree[level_start(RUNS) + run] = low | high << vec2u(16u);
+            tree[level_start(RUNS) + run] = low | (high << vec2u(16u));
         }
         if low.x <= high.x {
             widen(FAN, low, high);
@@ -62,7 +62,7 @@ fn boxes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if local == 0u && top * FAN * FAN * FAN < end {
         low = vec2u(atomicLoad(&sides[64]), atomicLoad(&sides[65]));
         high = vec2u(atomicLoad(&sides[66]), atomicLoad(&sides[67]));
-        tree[level_start(TOP) + top] = low | high << vec2u(16u);
+        tree[level_start(TOP) + top] = low | (high << vec2u(16u));
     }
 }
 

@@ -21,8 +21,8 @@ override GRAZING: f32;
 override EPSILON_RADII: f32;
 override NEAREST: f32;
 
-// No pixel.
-const NOWHERE = 1u;
+// No pixel: the first is beyond all, the last before all but the first.
+const NOWHERE = 0x7fffu;
 
 @compute @workgroup_size(256)
 fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -108,7 +108,7 @@ fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32
     let first = max(ceil(min(low * frame.focal_px + middle, center_px - DOT_RADIUS_PX) - 0.5), 0.0);
     let last = min(floor(max(high * frame.focal_px + middle, center_px + DOT_RADIUS_PX) - 0.5), f32(size) - 1.0);
     if first <= last {
-        return u32(first) | u32(last) << 16u;
+        return u32(first) | (u32(last) << 16u);
     }
     return NOWHERE;
 }

@@ -83,9 +83,9 @@ pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
 }
 
 fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, culling: bool) -> ScreenPoints {
-    let mut uploader = Uploader::new(gpu);
+    let mut uploader = Uploader::new();
     let mut device_cloud = DeviceCloud::default();
-    device_cloud.resize(gpu, cloud.len(), 0).expect("room");
+    device_cloud.resize(gpu, cloud.len()).expect("room");
     uploader.positions(gpu, cloud, &device_cloud, &|_| true).expect("an upload");
     uploader.values(gpu, &PointValues::default(), &device_cloud, &|_| true).expect("an upload");
     let screen = ScreenBuffers::new(gpu, [view.width, view.height], cloud.len(), 0).expect("room");

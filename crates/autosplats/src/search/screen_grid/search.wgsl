@@ -141,6 +141,8 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     }
     var reads = 0u;
     var seen: Seen;
+    // How far the search goes at most, once that is found.
+    var farthest = 0.0;
     for (var step = 0u; step < 256u; step++) {
         reads += len;
         var nearest = read_window(query, center, window);
@@ -148,10 +150,10 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let kth_radius = sqrt(kth_squared);
         let is_all = window_contains(window, picture());
         let is_crowded = len > CROWDED;
-        var bound = MOST;
-        if is_crowded {
-            bound = bound_radius(center, initial_radius);
+        if is_crowded && farthest == 0.0 {
+            farthest = bound_radius(center, initial_radius);
         }
+        let bound = select(MOST, farthest, is_crowded);
         let is_exact = kth_squared < MOST && kth_radius <= bound
             && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
         // No gap begins before the first search radius.
@@ -183,14 +185,14 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let upper = select(MOST, kth_radius, kth_squared < MOST);
         radius = min(upper, 2.0 * sure * growth);
         if is_crowded || window_len(window_of_sphere(center, radius), task.strip_px, CROWDED) > CROWDED {
-            if !is_crowded {
-                bound = bound_radius(center, initial_radius);
+            if farthest == 0.0 {
+                farthest = bound_radius(center, initial_radius);
             }
-            if !(bound > sure) {
-                seen = look_through(nearest, initial_radius, bound * bound);
+            if !(farthest > sure) {
+                seen = look_through(nearest, initial_radius, farthest * farthest);
                 break;
             }
-            radius = min(radius, bound);
+            radius = min(radius, farthest);
         }
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px, CROWDED);
