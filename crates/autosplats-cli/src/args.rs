@@ -388,7 +388,8 @@ const BENCH_EXAMPLES: &str = "\
 Examples:
   autosplats bench
   autosplats bench --scene cathedral:10M --backend cpu,gpu
-  autosplats bench --scene statue:1M -k 20 --size 1280x720 --frames 100 --json";
+  autosplats bench --scene statue:1M -k 20 --size 1280x720 --frames 100 --json
+  autosplats bench --scene cathedral:10M --backend gpu --stream";
 
 #[derive(Args, Debug)]
 #[command(after_help = BENCH_EXAMPLES)]
@@ -411,6 +412,9 @@ pub(crate) struct BenchArgs {
     /// Frames to measure, 1 to 100000, after three that are not
     #[arg(long, value_name = "COUNT", default_value = "20", value_parser = values::frames)]
     pub(crate) frames: usize,
+    /// Take the points for new ones in each frame, as a live scanner's are: a GPU has to upload them again
+    #[arg(long)]
+    pub(crate) stream: bool,
     /// One JSON object on standard output: scene, device, counts, milliseconds per stage and pass
     #[arg(long)]
     pub(crate) json: bool,

@@ -28,6 +28,8 @@ struct Bench<'a> {
     engine: &'static str,
     /// Frames measured; times are medians of them.
     frames: usize,
+    /// Whether the points were new in each frame.
+    stream: bool,
     runs: Vec<Run>,
 }
 
@@ -36,8 +38,8 @@ struct Bench<'a> {
 struct Run {
     device: Device,
     counts: Counts,
-    /// Of the first frame, which makes and fills the buffers.
-    upload_ms: f64,
+    /// Of the first frame, which makes and fills the buffers; those of the others are in the timings.
+    first_upload_ms: f64,
     /// From asking for a picture to having it.
     picture_ms: f64,
     timings_ms: Timings,
@@ -46,7 +48,7 @@ struct Run {
 
 /// Renders the same frame again and again and prints the medians.
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let BenchArgs { scene, engine, backends, k, size, frames, json, run } = args;
+    let BenchArgs { scene, engine, backends, k, size, frames, stream, json, run } = args;
     start_threads(run)?;
     let mut settings = Settings::default();
     settings.reconstruction.k = *k;
@@ -70,6 +72,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
             _ => "?",
         },
         frames: *frames,
+        stream: *stream,
         runs: Vec::new(),
     };
     for mut renderer in renderers {
@@ -96,13 +99,16 @@ fn measure(
     let camera = scene_camera(scene);
     let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), args.run.quiet);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
-    let (mut counts, mut upload_ms) = (Counts::default(), 0.0);
+    let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
+    // Whether points are new is told by their identity: two clouds that take turns always are.
+    let other = args.stream.then(|| copy(cloud)).transpose()?;
     for frame in 0..WARM_UP + args.frames {
+        let cloud = other.as_ref().filter(|_| frame % 2 == 1).unwrap_or(cloud);
         let started = Instant::now();
         let rendered = renderer.render(cloud, &camera, args.size, settings).map_err(render_failure)?;
         let picture_ms = started.elapsed().as_secs_f64() * 1e3;
         if frame == 0 {
-            (counts, upload_ms) = (rendered.counts, rendered.timings.upload);
+            (counts, first_upload_ms) = (rendered.counts, rendered.timings.upload);
         }
         if frame >= WARM_UP {
             samples.push((picture_ms, rendered.timings, rendered.passes.to_vec()));
@@ -116,7 +122,7 @@ fn measure(
     });
     Ok(Run {
         counts,
-        upload_ms,
+        first_upload_ms,
         picture_ms: median(samples.iter().map(|(picture_ms, ..)| *picture_ms)),
         timings_ms: Timings {
             upload: of(&|timings| timings.upload),
@@ -130,6 +136,13 @@ fn measure(
         passes: passes.collect(),
         device,
     })
+}
+
+/// Another cloud with the same points.
+fn copy(cloud: &PointCloud) -> Result<PointCloud, Failure> {
+    let copy = PointCloud::new(cloud.origin(), cloud.positions().to_vec());
+    let Some(colors) = cloud.colors() else { return Ok(copy) };
+    copy.with_colors(colors.to_vec()).map_err(|error| Failure::new(Exit::Input, error))
 }
 
 /// The middle one of the values, of which there is at least one.
@@ -146,7 +159,7 @@ impl Bench<'_> {
             "{scene}: {} points, {width}x{height}, k {k}, {engine}; milliseconds, medians of {frames} frames",
             cloud.len()
         )];
-        for Run { device, counts, upload_ms, picture_ms, timings_ms, passes } in runs {
+        for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes } in runs {
             lines.push(String::new());
             lines.push(device.describe());
             let Counts { visible, active, recovered, .. } = counts;
@@ -164,8 +177,11 @@ impl Bench<'_> {
             }
             line("frame", *frame);
             line("picture on the host", *picture_ms);
-            if *upload_ms > 0.0 {
-                line("first upload of the points", *upload_ms);
+            if timings_ms.upload > 0.01 {
+                line("upload of new points", timings_ms.upload);
+            }
+            if *first_upload_ms > 0.0 {
+                line("first upload of the points", *first_upload_ms);
             }
         }
         lines.join("\n")

@@ -266,7 +266,8 @@ impl SelfTest {
             Ok(since(start))
         };
         self.render_ms = render(&mut cpu)?;
-        if let Ok(mut gpu) = Renderer::with_backend(Wanted::Gpu) {
+        if !adapters().is_empty() {
+            let mut gpu = Renderer::with_backend(Wanted::Gpu).map_err(|error| said(&error))?;
             let took = render(&mut gpu).map_err(|error| format!("on the GPU: {error}"))?;
             let unlike = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
             let unlike = pictures[0].iter().zip(&pictures[1]).filter(unlike).count();
@@ -306,9 +307,14 @@ fn about_gpu(adapters: &[AdapterSummary]) -> String {
 
 /// What a device can do, and what that means.
 fn about_adapter(adapter: &AdapterSummary) -> String {
-    let AdapterSummary { name, backend, kind, driver, int64_atomics, timestamps, points_per_binding, .. } = adapter;
+    let AdapterSummary { name, backend, kind, driver, software, int64_atomics, timestamps, points_per_binding } =
+        adapter;
     let passes = if *int64_atomics { "one pass" } else { "two passes: no 64-bit atomics" };
-    let timed = if *timestamps { "passes are timed" } else { "passes cannot be timed by it" };
+    let timed = match (*software, *timestamps) {
+        (true, _) => "passes are timed one by one",
+        (_, true) => "passes are timed",
+        _ => "passes are not timed",
+    };
     let millions = points_per_binding / 1_000_000;
     wrapped(
         &format!(

@@ -101,7 +101,7 @@ pub(crate) fn render_failure(error: Error) -> Failure {
         Error::TooManyPoints(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) => {
             Failure::new(Exit::Memory, error)
         }
-        Error::Device(_) | Error::DeviceLost(_) => Failure::new(Exit::Device, error),
+        Error::Device(_) | Error::DeviceLost(_) | Error::Texture(_) => Failure::new(Exit::Device, error),
         _ => Failure::new(Exit::Input, error),
     }
 }

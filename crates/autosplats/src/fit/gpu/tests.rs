@@ -58,7 +58,7 @@ impl Case {
     /// Surfels of both rounds, and how many are counted as outliers.
     fn on_device(&self, gpu: &Gpu, passes: &FitPasses, rules: &FitRules) -> (Surfels, usize) {
         let buffers = upload_screen(gpu, &self.screen, &self.view);
-        let moments: Vec<_> = self.moments().iter().map(Moments::to_device).collect();
+        let moments: Vec<_> = self.moments().iter().map(|moments| moments.to_device()).collect();
         let neighborhoods = gpu.storage_with("neighbourhoods", &moments).expect("room");
         let surfels = surfel_buffer(gpu, buffers.capacity).expect("room");
         let told = FrameUniform {

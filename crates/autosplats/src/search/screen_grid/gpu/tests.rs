@@ -57,8 +57,8 @@ impl Moments {
         Self { count, k_radius, offset: [x, y, z], second: [xx, xy, xz, yy, yz, zz] }
     }
 
-    pub(crate) fn to_device(&self) -> [f32; 12] {
-        let Self { count, k_radius, offset: [x, y, z], second: [xx, xy, xz, yy, yz, zz] } = *self;
+    pub(crate) fn to_device(self) -> [f32; 12] {
+        let Self { count, k_radius, offset: [x, y, z], second: [xx, xy, xz, yy, yz, zz] } = self;
         [x, y, z, count, xx, xy, xz, k_radius, yy, yz, zz, 0.0]
     }
 
