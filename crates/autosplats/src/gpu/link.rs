@@ -20,8 +20,10 @@ const SHARED: &[(&str, &str)] = &[
     ("layers", include_str!("../shared/layers.wgsl")),
     ("range_keys", include_str!("../shared/range_keys.wgsl")),
     ("shading", include_str!("../shared/shading.wgsl")),
+    ("depth_map", include_str!("../shared/depth_map.wgsl")),
     ("hidden", include_str!("../shared/hidden.wgsl")),
     ("splat", include_str!("../shared/splat.wgsl")),
+    ("fragment", include_str!("../shared/fragment.wgsl")),
     ("patch", include_str!("../shared/patch.wgsl")),
 ];
 

@@ -50,12 +50,13 @@ pub(crate) enum Work {
     Recovered64,
     Recovered256,
     Queries256,
+    LargeSplats,
 }
 
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 /// How many of them there are.
-const WORKS: u64 = Work::Queries256 as u64 + 1;
+const WORKS: u64 = Work::LargeSplats as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
@@ -83,10 +84,11 @@ pub(crate) enum Counter {
     RangeLow,
     RangeHigh,
     Covered,
+    Large,
 }
 
 /// Length of [`ScreenBuffers::counters`].
-pub(crate) const COUNTERS: usize = Counter::Covered as usize + 1;
+pub(crate) const COUNTERS: usize = Counter::Large as usize + 1;
 
 /// [`ScreenPoints`](super::ScreenPoints) on the device.
 #[derive(Debug)]

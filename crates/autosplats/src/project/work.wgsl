@@ -18,6 +18,7 @@ const ACTIVE256 = 4u;
 const RECOVERED64 = 5u;
 const RECOVERED256 = 6u;
 const QUERIES256 = 7u;
+const LARGE_SPLATS = 8u;
 
 fn put(kind: u32, items: u32, per_group: u32) {
     let groups = (items + per_group - 1u) / per_group;
@@ -35,5 +36,6 @@ fn work() {
     put(ACTIVE256, counters[ACTIVE], 256u);
     put(RECOVERED64, counters[RECOVERED], 64u);
     put(RECOVERED256, counters[RECOVERED], 256u);
+    put(LARGE_SPLATS, counters[LARGE], 1u);
     put(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
 }

@@ -22,3 +22,5 @@ const RANGE_LOW = 14u;
 const RANGE_HIGH = 15u;
 // Pixels that show a surface.
 const COVERED = 16u;
+// Splats too large for one invocation.
+const LARGE = 17u;

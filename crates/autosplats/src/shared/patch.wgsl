@@ -66,10 +66,10 @@ fn patches() -> vec2u {
     return (frame.size + PATCH - 1u) / PATCH;
 }
 
-// Draws all living splats from `first` on into the patch whose first pixel is `corner`. Loops break at their end: each is
+// Draws all living splats into the patch whose first pixel is `corner`. Loops break at their end: each is
 // passed once for most patches, and a software device pays for a pass that only ends a loop.
-fn draw_patch(corner: vec2u, local: u32, first: u32) {
-    let end = tree[0].y;
+fn draw_patch(corner: vec2u, local: u32) {
+    let end = tree[0].x;
     if local < 2u * HIT_WORDS {
         atomicStore(&hits[local], 0u);
     }
@@ -77,18 +77,18 @@ fn draw_patch(corner: vec2u, local: u32, first: u32) {
     // Nodes above the tree.
     let size = 1u << (FAN_BITS * (TOP + 1u));
     let roots = (end + size - 1u) / size;
-    var root = first / size;
+    var root = 0u;
     loop {
-        let tops = find(TOP, root, roots, corner, local, first, end);
+        let tops = find(TOP, root, roots, corner, local, end);
         var top = 0u;
         loop {
-            let runs = find(RUNS, top, tops, corner, local, first, end);
+            let runs = find(RUNS, top, tops, corner, local, end);
             var run = 0u;
             loop {
-                let leaves = find(LEAVES, run, runs, corner, local, first, end);
+                let leaves = find(LEAVES, run, runs, corner, local, end);
                 var leaf = 0u;
                 loop {
-                    let found = find(SPLATS, leaf, leaves, corner, local, first, end);
+                    let found = find(SPLATS, leaf, leaves, corner, local, end);
                     var at = 0u;
                     loop {
                         prepare(corner, local, at, found);
@@ -134,7 +134,7 @@ fn list_start(level: u32) -> u32 {
 
 // Lists the children at `level` that meet the patch, of the nodes in the list above from place `at` to `listed_end`, of as
 // many as are tested at a time. Returns how many.
-fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, first: u32, end: u32) -> u32 {
+fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, end: u32) -> u32 {
     let last = corner + PATCH - 1u;
     let start = level_start(level);
     // Splats in a node.
@@ -154,7 +154,7 @@ fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, first: 
         let place = 4u * row + local / FAN;
         if place < parents {
             let child = parent_at(level, at, above, place) * FAN + local % FAN;
-            if child < nodes && child >= first / size {
+            if child < nodes {
                 let bounds = tree[start + child];
                 if all(firsts(bounds) <= last) && all(lasts(bounds) >= corner) {
                     atomicOr(&hits[half + 2u * row + local / 32u], 1u << (local % 32u));

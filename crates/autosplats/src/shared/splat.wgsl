@@ -35,7 +35,7 @@ const TOP = 3u;
 // Set in the first column of bounds that are not drawn now: none is so far right.
 const DEAD = 0x8000u;
 
-// Where in `tree` a level begins, the top one first. Before it are the first and the end of the splats to be drawn.
+// Where in `tree` a level begins, the top one first. Before it is the number of splats.
 fn level_start(level: u32) -> u32 {
     let tops = (arrayLength(&tree) - 1u) / FAMILY;
     let nodes_before = select(select(select(0u, 1u, level == RUNS), 17u, level == LEAVES), 273u, level == SPLATS);
@@ -54,4 +54,10 @@ fn lasts(bounds: vec2u) -> vec2u {
 // Whether it is empty, or dead.
 fn is_empty(bounds: vec2u) -> bool {
     return any(firsts(bounds) > lasts(bounds));
+}
+
+// Pixels of bounds that are not empty.
+fn bounds_area(bounds: vec2u) -> u32 {
+    let sides = lasts(bounds) - firsts(bounds) + 1u;
+    return sides.x * sides.y;
 }

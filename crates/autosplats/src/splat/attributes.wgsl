@@ -9,6 +9,7 @@
 #import splat
 #import patch
 #import layers
+#import depth_map
 
 // Linear value of each step of a colour.
 @group(0) @binding(1) var<uniform> linear: array<vec4f, 64>;
@@ -16,7 +17,7 @@
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(5) var<storage, read> values: array<u32>;
-@group(0) @binding(6) var<storage, read> depth_map: array<f32>;
+@group(0) @binding(6) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(7) var<storage, read_write> surface: array<vec4f>;
 @group(0) @binding(8) var<storage, read_write> cover: array<Cover>;
 @group(0) @binding(9) var<storage, read_write> extras: array<vec4f>;
@@ -130,7 +131,7 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     own_y = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
     limit = vec4f(limit_at(pixel, 0u), limit_at(pixel, 1u), limit_at(pixel, 2u), limit_at(pixel, 3u));
     point = vec4u(NO_POINT);
-    draw_patch(corner, local, 0u);
+    draw_patch(corner, local);
     normalize_sums(pixel, 0u);
     normalize_sums(pixel, 1u);
     normalize_sums(pixel, 2u);
@@ -144,7 +145,7 @@ fn pixel_index(pixel: vec2u, below: u32) -> u32 {
 }
 
 fn limit_at(pixel: vec2u, below: u32) -> f32 {
-    return depth_map[pixel_index(pixel, below)];
+    return key_depth(depth_map[pixel_index(pixel, below)]);
 }
 
 // Divides the sums of one of the four pixels by the weights into the layers.

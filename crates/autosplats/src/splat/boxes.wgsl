@@ -10,19 +10,15 @@
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> tree: array<vec2u>;
 
-// Whether only the recovered ones are new.
-override RECOVERED_ONLY: bool;
-
 // Of the sixteen runs and, last, the top: least column and row, greatest column and row.
 var<workgroup> sides: array<atomic<u32>, 68>;
 
 @compute @workgroup_size(256)
 fn boxes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let top = group_index(workgroup);
-    let first = select(0u, counters[ACTIVE], RECOVERED_ONLY);
     let end = counters[ACTIVE] + counters[RECOVERED];
     if top == 0u && local == 0u {
-        tree[0] = vec2u(first, end);
+        tree[0] = vec2u(end);
     }
     if local < 68u {
         atomicStore(&sides[local], select(0u, 0xffffu, local % 4u < 2u));

@@ -1,56 +1,43 @@
-// Visibility pass: the nearest depth, pushed back by ε, of the splats that cover each pixel [Paper, §7].
+// Visibility pass: the nearest depth, pushed back by ε, of the splats that cover each pixel [Paper, §7]. An invocation
+// draws a splat; a minimum does not depend on the order. `depth_large` draws those that are too large for that.
 //
-// Reads: splats, tree. Reads and writes: depth_map. With recovered splats alone it adds to the map that is there.
+// Reads: counters, splats, tree. Reads and writes: depth_map.
 
 #import frame
 #import groups
+#import counters
 #import splat
-#import patch
+#import depth_map
+#import fragment
 
-@group(0) @binding(1) var<storage, read> splats: array<Splat>;
-@group(0) @binding(2) var<storage, read> tree: array<vec2u>;
-@group(0) @binding(3) var<storage, read_write> depth_map: array<f32>;
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> tree: array<vec2u>;
+@group(0) @binding(4) var<storage, read_write> depth_map: array<atomic<u32>>;
 
-// Centres of the invocation's pixels.
-var<private> own_x: f32;
-var<private> own_y: vec4f;
-var<private> nearest: vec4f;
+// Whether only the recovered ones are drawn.
+override RECOVERED_ONLY: bool;
+override MOST_PX: u32;
 
-fn load(slot: u32, index: u32) {}
-
-fn draw(slot: u32) {
-    let hit = fragments(slot, own_x, own_y);
-    let pushed = min(nearest, hit.depth + brushes[slot].epsilon);
-    nearest = select(nearest, pushed, hit.squared <= vec4f(1.0));
-}
-
-@compute @workgroup_size(64)
+@compute @workgroup_size(256)
 fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup);
-    if index >= patches().x * patches().y {
+    let index = select(0u, counters[ACTIVE], RECOVERED_ONLY) + group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] {
         return;
     }
-    let corner = PATCH * vec2u(index % patches().x, index / patches().x);
-    let pixel = corner + own_offset(local);
-    let first = tree[0].x;
-    own_x = f32(pixel.x) + 0.5;
-    own_y = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
-    nearest = vec4f(infinity());
-    draw_patch(corner, local, first);
-    write(pixel, nearest.x, first);
-    write(pixel + vec2u(0u, 1u), nearest.y, first);
-    write(pixel + vec2u(0u, 2u), nearest.z, first);
-    write(pixel + vec2u(0u, 3u), nearest.w, first);
-}
-
-fn write(pixel: vec2u, drawn: f32, first: u32) {
-    if all(pixel < frame.size) {
-        let at = pixel.y * frame.size.x + pixel.x;
-        // Without the first splats, it is added to what these drew.
-        if first > 0u {
-            depth_map[at] = min(depth_map[at], drawn);
-        } else {
-            depth_map[at] = drawn;
-        }
+    let bounds = tree[level_start(SPLATS) + index];
+    if is_empty(bounds) {
+        return;
+    }
+    let area = bounds_area(bounds);
+    if area > MOST_PX {
+        return;
+    }
+    let splat = splats[index];
+    var pixel = firsts(bounds);
+    for (var drawn = 0u; drawn < area; drawn++) {
+        draw_depth(splat, pixel);
+        let ends = pixel.x == lasts(bounds).x;
+        pixel = select(pixel + vec2u(1u, 0u), vec2u(firsts(bounds).x, pixel.y + 1u), ends);
     }
 }

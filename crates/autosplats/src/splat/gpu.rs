@@ -1,9 +1,10 @@
 //! Splatting on the GPU.
 //!
 //! # How it works
-//! Instead of bins there is a tree over the list of surfels (`shared/splat.wgsl`), and a workgroup for each patch of 16×16 pixels
-//! finds what meets it (`shared/patch.wgsl`). A pixel draws its splats in the order of the list, so that sums come out as
-//! on the CPU, and the same each time.
+//! The depth map takes minima, which no order changes: an invocation draws a splat, a workgroup one that is large, by atomic
+//! minima of integers that order as depths do. Attributes are sums, which are to come out as on the CPU and the same each
+//! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×16 pixels finds them, by a
+//! tree over the list instead of bins (`shared/splat.wgsl`, `shared/patch.wgsl`).
 
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
@@ -14,9 +15,12 @@ use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Counter, ScreenBuffers, Work, WorkPass, scan_pass};
 
 #[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[SET_UP, BOXES, DEPTH, RECOVER_COUNT, RECOVER, REFINE, ATTRIBUTES, TRIM];
+pub(crate) const PASSES: &[PassSource] =
+    &[SET_UP, BOXES, CLEAR_DEPTH, DEPTH, DEPTH_LARGE, RECOVER_COUNT, RECOVER, REFINE, ATTRIBUTES, TRIM];
 const SET_UP: PassSource = PassSource::new("splat/set_up", include_str!("set_up.wgsl"));
 const BOXES: PassSource = PassSource::new("splat/boxes", include_str!("boxes.wgsl"));
+const CLEAR_DEPTH: PassSource = PassSource::new("splat/clear_depth", include_str!("clear_depth.wgsl"));
+const DEPTH_LARGE: PassSource = PassSource::new("splat/depth_large", include_str!("depth_large.wgsl"));
 const DEPTH: PassSource = PassSource::new("splat/depth", include_str!("depth.wgsl"));
 const RECOVER_COUNT: PassSource = PassSource::new("splat/recover_count", include_str!("recover_count.wgsl"));
 const RECOVER: PassSource = PassSource::new("splat/recover", include_str!("recover.wgsl"));
@@ -24,6 +28,8 @@ const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.
 const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
+/// Pixels of the bounds of a splat that one invocation draws into the depth map.
+const MOST_PX: u32 = 256;
 /// Side of a patch in pixels, and splats drawn into it at a time.
 const PATCH: u32 = 16;
 const BATCH: u32 = 64;
@@ -55,7 +61,9 @@ impl Round {
 pub(crate) struct SplatBuffers {
     splats: wgpu::Buffer,
     tree: wgpu::Buffer,
-    /// Depth per pixel, pushed back by ε, row by row; infinite where nothing is. The second one is for refinement.
+    /// Indices of splats that one invocation cannot draw.
+    large: wgpu::Buffer,
+    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is. The second one is for refinement.
     pub(crate) depth: [wgpu::Buffer; 2],
 }
 
@@ -69,8 +77,9 @@ impl SplatBuffers {
         let nodes = 1 + screen_capacity.div_ceil(TOP_SPLATS) as usize * TOP_NODES as usize;
         Ok(Self {
             splats: gpu.storage::<[u8; SPLAT_BYTES]>("splats", screen_capacity as usize)?,
+            large: gpu.storage::<u32>("large splats", screen_capacity as usize)?,
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
-            depth: [gpu.storage::<f32>("depth map", pixels)?, gpu.storage::<f32>("other depth map", pixels)?],
+            depth: [gpu.storage::<u32>("depth map", pixels)?, gpu.storage::<u32>("other depth map", pixels)?],
         })
     }
 }
@@ -80,8 +89,10 @@ impl SplatBuffers {
 pub(crate) struct SplatPasses {
     /// For each [`Round`].
     set_up: [Pass; 2],
-    boxes: [Pass; 2],
-    depth: Pass,
+    boxes: Pass,
+    clear_depth: Pass,
+    depth: [Pass; 2],
+    depth_large: Pass,
     recover_count: Pass,
     scan_recovered: Pass,
     recover: Pass,
@@ -104,6 +115,7 @@ impl SplatPasses {
         let set_up = |recovered: f64| {
             let constants = [
                 ("RECOVERED_ONLY", recovered),
+                ("MOST_PX", MOST_PX.into()),
                 dot_radius,
                 ("SUPPORT", SUPPORT.into()),
                 ("GRAZING", GRAZING.into()),
@@ -112,7 +124,9 @@ impl SplatPasses {
             ];
             Pass::new(gpu, &SET_UP, &constants)
         };
-        let boxes = |recovered: f64| Pass::new(gpu, &BOXES, &[("RECOVERED_ONLY", recovered)]);
+        let depth = |recovered: f64| {
+            Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), dot_radius, ("MOST_PX", MOST_PX.into())])
+        };
         let Channels { color, scalar, measures } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
@@ -136,8 +150,10 @@ impl SplatPasses {
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {
             set_up: [set_up(0.0)?, set_up(1.0)?],
-            boxes: [boxes(0.0)?, boxes(1.0)?],
-            depth: Pass::new(gpu, &DEPTH, &[dot_radius])?,
+            boxes: pass(&BOXES)?,
+            clear_depth: pass(&CLEAR_DEPTH)?,
+            depth: [depth(0.0)?, depth(1.0)?],
+            depth_large: Pass::new(gpu, &DEPTH_LARGE, &[dot_radius])?,
             recover_count: pass(&RECOVER_COUNT)?,
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
             recover: pass(&RECOVER)?,
@@ -159,13 +175,36 @@ impl SplatPasses {
         splats: &SplatBuffers,
         round: Round,
     ) -> Vec<Step> {
-        let SplatBuffers { splats, tree, depth } = splats;
+        let SplatBuffers { splats: list, tree, large, depth } = splats;
         let counters = &screen.counters;
-        let set_up = &self.set_up[round as usize];
-        vec![
-            set_up.step(gpu, &[frame, counters, surfels, splats, tree], screen.groups(round.work())),
-            self.boxes[round as usize].step(gpu, &[frame, counters, tree], tops(screen)),
-            self.depth.step(gpu, &[frame, splats, tree, &depth[0]], patches(screen)),
+        let set_up = [frame, counters, surfels, list, tree, large];
+        let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work()))];
+        steps.push(self.work.step(gpu, frame, screen));
+        if round == Round::Active {
+            steps.push(self.clear_depth.step(gpu, &[frame, &depth[0]], pixel_groups(screen)));
+        }
+        steps.extend(self.steps_depth(gpu, frame, screen, splats, 0, round));
+        steps
+    }
+
+    /// Draws the living splats of a round into a depth map; large ones of all rounds, which changes nothing.
+    fn steps_depth(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        splats: &SplatBuffers,
+        map: usize,
+        round: Round,
+    ) -> [Step; 2] {
+        let SplatBuffers { splats, tree, large, depth } = splats;
+        let counters = &screen.counters;
+        let work = if round == Round::Active { Work::Queries256 } else { Work::Recovered256 };
+        let small = [frame, counters, splats, tree, &depth[map]];
+        let rest = [frame, counters, splats, tree, large, &depth[map]];
+        [
+            self.depth[round as usize].step(gpu, &small, screen.groups(work)),
+            self.depth_large.step(gpu, &rest, screen.groups(Work::LargeSplats)),
         ]
     }
 
@@ -202,17 +241,18 @@ impl SplatPasses {
         layers: &LayerBuffers,
         depth_refinement: bool,
     ) -> Vec<Step> {
-        let SplatBuffers { splats, tree, depth: [depth, other] } = splats;
+        let SplatBuffers { splats: list, tree, depth, .. } = splats;
         let ScreenBuffers { counters, values, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
-        for [before, after] in [[depth, other], [other, depth]].into_iter().filter(|_| depth_refinement) {
+        for [before, after] in [[0, 1], [1, 0]].into_iter().filter(|_| depth_refinement) {
             let groups = screen.groups(Work::Queries256);
-            steps.push(self.refine.step(gpu, &[frame, counters, splats, before, tree], groups));
-            steps.push(self.boxes[Round::Active as usize].step(gpu, &[frame, counters, tree], tops(screen)));
-            steps.push(self.depth.step(gpu, &[frame, splats, tree, after], patches(screen)));
+            steps.push(self.refine.step(gpu, &[frame, counters, list, &depth[before], tree], groups));
+            steps.push(self.clear_depth.step(gpu, &[frame, &depth[after]], pixel_groups(screen)));
+            steps.extend(self.steps_depth(gpu, frame, screen, splats, after, Round::Active));
         }
-        let attributes = [frame, &self.linear, splats, tree, surfels, values, depth, surface, cover, extras];
+        steps.push(self.boxes.step(gpu, &[frame, counters, tree], tops(screen)));
+        let attributes = [frame, &self.linear, list, tree, surfels, values, &depth[0], surface, cover, extras];
         steps.push(self.attributes.step(gpu, &attributes, patches(screen)));
         steps.push(self.trim.step(gpu, &[frame, surface, cover, extras, counters], patches(screen)));
         steps
@@ -222,6 +262,11 @@ impl SplatPasses {
 /// Workgroups for the upper levels of the tree; one at least, which notes how many splats there are.
 fn tops(screen: &ScreenBuffers) -> u32 {
     screen.capacity.div_ceil(TOP_SPLATS).max(1)
+}
+
+/// Workgroups with an invocation per pixel.
+fn pixel_groups(screen: &ScreenBuffers) -> u32 {
+    (screen.size[0] * screen.size[1]).div_ceil(256)
 }
 
 /// Workgroups for a patch each.

@@ -7,12 +7,13 @@
 #import counters
 #import rank
 #import screen
+#import depth_map
 #import hidden
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> passive: array<u32>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
-@group(0) @binding(4) var<storage, read> depth_map: array<f32>;
+@group(0) @binding(4) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(5) var<storage, read> block_sums: array<u32>;
 @group(0) @binding(6) var<storage, read_write> queries: array<u32>;
 

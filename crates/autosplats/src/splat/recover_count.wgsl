@@ -6,12 +6,13 @@
 #import groups
 #import counters
 #import screen
+#import depth_map
 #import hidden
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var<storage, read> passive: array<u32>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
-@group(0) @binding(4) var<storage, read> depth_map: array<f32>;
+@group(0) @binding(4) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(5) var<storage, read_write> block_sums: array<u32>;
 
 var<workgroup> recovered_points: atomic<u32>;

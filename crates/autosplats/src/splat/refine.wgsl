@@ -6,12 +6,13 @@
 #import groups
 #import counters
 #import screen
+#import depth_map
 #import hidden
 #import splat
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
-@group(0) @binding(3) var<storage, read> depth_map: array<f32>;
+@group(0) @binding(3) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
 
 @compute @workgroup_size(256)

@@ -1,6 +1,6 @@
 // Splat set-up: surfels made ready to be drawn over their pixels. The CPU form, `setup.rs`, says how.
 //
-// Reads: counters, surfels. Writes: splats, tree.
+// Reads: surfels. Reads and writes: counters. Writes: splats, tree, large.
 
 #import frame
 #import groups
@@ -8,13 +8,17 @@
 #import surfel
 #import splat
 
-@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
+// Splats too large for one invocation, in any order.
+@group(0) @binding(5) var<storage, read_write> large: array<u32>;
 
 // Whether only the recovered ones are new.
 override RECOVERED_ONLY: bool;
+// Pixels of the bounds of a splat that one invocation draws.
+override MOST_PX: u32;
 override DOT_RADIUS_PX: f32;
 override SUPPORT: f32;
 override GRAZING: f32;
@@ -26,9 +30,10 @@ const NOWHERE = 0x7fffu;
 
 @compute @workgroup_size(256)
 fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let first = select(0u, counters[ACTIVE], RECOVERED_ONLY);
+    let active_points = atomicLoad(&counters[ACTIVE]);
+    let first = select(0u, active_points, RECOVERED_ONLY);
     let index = first + group_index(workgroup) * 256u + local;
-    if index >= counters[ACTIVE] + counters[RECOVERED] {
+    if index >= active_points + atomicLoad(&counters[RECOVERED]) {
         return;
     }
     let surfel = surfels[index];
@@ -78,7 +83,11 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let across = vec2f(axis_a.z, axis_b.z);
     let x = extent(c.x, c.z, vec2f(axis_a.x, axis_b.x), across, center_px.x, frame.size.x);
     let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y);
-    tree[place] = vec2u(x, y);
+    let bounds = vec2u(x, y);
+    tree[place] = bounds;
+    if !is_empty(bounds) && bounds_area(bounds) > MOST_PX {
+        large[atomicAdd(&counters[LARGE], 1u)] = index;
+    }
     let epsilon = EPSILON_RADII * min(surfel.radius, most);
     let depth_reach = sqrt(across.x * across.x + across.y * across.y);
     splats[index] = Splat(center_px, plane, u, v, c.z, epsilon, depth_reach, surfel.pixel);

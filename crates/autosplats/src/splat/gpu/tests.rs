@@ -80,7 +80,7 @@ impl Scene<'_> {
             recorder.finish();
         };
         let pixels = (screen.size[0] * screen.size[1]) as usize;
-        let depth = || read_back::<f32>(gpu, &splats.depth[0], pixels).expect("a depth map");
+        let depth = || read_depth(gpu, splats, pixels);
         let visibility = |round| run(passes.steps_visibility(gpu, frame, screen, surfels, splats, round));
         set_counter(gpu, screen, Counter::Active, self.active);
         visibility(Round::Active);
@@ -111,6 +111,13 @@ impl Scene<'_> {
         let layers = splatter.trim(view).0.clone();
         (splatter, layers)
     }
+}
+
+/// The depth map, as depths.
+fn read_depth(gpu: &Gpu, splats: &SplatBuffers, pixels: usize) -> Vec<f32> {
+    let keys: Vec<u32> = read_back(gpu, &splats.depth[0], pixels).expect("a depth map");
+    let mask = |key: u32| if key >= 0x8000_0000 { 0x8000_0000 } else { u32::MAX };
+    keys.into_iter().map(|key| f32::from_bits(key ^ mask(key))).collect()
 }
 
 fn set_counter(gpu: &Gpu, screen: &ScreenBuffers, counter: Counter, value: usize) {

@@ -166,8 +166,8 @@ fn a_shifted_field_is_found() {
 #[test]
 fn constants_are_alike_in_rust_and_wgsl() {
     use Counter::{
-        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, Covered, NotFinite, Outliers, Outside, Passive,
-        RangeHigh, RangeLow, Recovered, StripPx, Visible,
+        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, Covered, Large, NotFinite, Outliers, Outside,
+        Passive, RangeHigh, RangeLow, Recovered, StripPx, Visible,
     };
     let counters: [Counter; COUNTERS] = [
         NotFinite,
@@ -187,6 +187,7 @@ fn constants_are_alike_in_rust_and_wgsl() {
         RangeLow,
         RangeHigh,
         Covered,
+        Large,
     ];
     let counters = counters.map(|counter| (screaming(&counter), counter as u32));
     assert_eq!(constants(&parse("#import counters\n")), counters, "counters in WGSL, and in Rust");
@@ -198,8 +199,21 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let in_wgsl: Vec<_> = constants(&shading).into_iter().filter(|(name, _)| name.starts_with("SHOW_")).collect();
     assert_eq!(in_wgsl, shown, "what is shown in WGSL, and in Rust");
 
-    use Work::{Active64, Active256, PassiveBlocks, Queries256, Recovered64, Recovered256, Visible256, VisibleBlocks};
-    let works = [Visible256, VisibleBlocks, PassiveBlocks, Active64, Active256, Recovered64, Recovered256, Queries256];
+    use Work::{
+        Active64, Active256, LargeSplats, PassiveBlocks, Queries256, Recovered64, Recovered256, Visible256,
+        VisibleBlocks,
+    };
+    let works = [
+        Visible256,
+        VisibleBlocks,
+        PassiveBlocks,
+        Active64,
+        Active256,
+        Recovered64,
+        Recovered256,
+        Queries256,
+        LargeSplats,
+    ];
     let works = works.map(|work| (screaming(&work), work as u32));
     let pass = passes().find(|pass| pass.path == "project/work").expect("a pass").module();
     let in_wgsl: Vec<_> = constants(&pass).into_iter().filter(|entry| works.contains(entry)).collect();

@@ -1,0 +1,17 @@
+// Clears the depth map: nothing is drawn yet.
+//
+// Writes: depth_map.
+
+#import frame
+#import groups
+#import depth_map
+
+@group(0) @binding(1) var<storage, read_write> depth_map: array<u32>;
+
+@compute @workgroup_size(256)
+fn clear_depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let at = group_index(workgroup) * 256u + local;
+    if at < arrayLength(&depth_map) {
+        depth_map[at] = depth_key(infinity());
+    }
+}
