@@ -154,7 +154,8 @@ fn cargo(root: &Path, arguments: &[&str]) -> Result<()> {
 
 fn cargo_command(root: &Path) -> Command {
     let mut command = Command::new("cargo");
-    command.current_dir(root);
+    // Else Mesa says for each device it looks for that there is no Wayland, where there is none.
+    command.current_dir(root).env("NODEVICE_SELECT", "1");
     command
 }
 
