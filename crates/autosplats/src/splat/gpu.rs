@@ -29,7 +29,7 @@ const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!(
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
 /// Pixels of the bounds of a splat that one invocation draws into the depth map.
-const MOST_PX: u32 = 256;
+const MOST_PX: u32 = 1024;
 /// Side of a patch in pixels, and splats drawn into it at a time.
 const PATCH: u32 = 16;
 const BATCH: u32 = 64;
