@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use autosplats::{Background, ColorMode, NormalSettings, Reconstruction, Shading};
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{DepthCamera, written_formats};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
+use crate::choices::{AxesChoice, Backend, Engine, Map, OrientChoice, Side};
 use crate::exit::EXIT_CODES;
 use crate::values::{self, Ortho};
 
@@ -331,19 +332,6 @@ pub(crate) struct NormalsArgs {
     pub(crate) run: RunArgs,
 }
 
-/// Which way normals point.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum OrientChoice {
-    /// To the sensor where the file tells its place, else upward for land, else outward
-    Auto,
-    /// To the sensor
-    Sensor,
-    /// Upward, along z
-    Up,
-    /// Away from the middle
-    Outward,
-}
-
 #[derive(Args, Debug)]
 pub(crate) struct DemoArgs {
     /// Folder for the pictures; made if it is not there
@@ -456,72 +444,4 @@ pub(crate) struct ManArgs {
     /// Replace existing pages
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
-}
-
-/// Where to look from.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Side {
-    Iso,
-    Front,
-    Back,
-    Left,
-    Right,
-    Top,
-    Bottom,
-}
-
-/// Which way is up.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum AxesChoice {
-    Auto,
-    /// Surveys, robots
-    ZUp,
-    /// Models
-    YUp,
-    /// X right, y down, z forward, seen from the origin: depth cameras
-    Camera,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Engine {
-    /// Buckets of screen points, exact
-    ScreenGrid,
-}
-
-impl From<Engine> for autosplats::SearchEngine {
-    fn from(engine: Engine) -> Self {
-        match engine {
-            Engine::ScreenGrid => Self::ScreenGrid,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Backend {
-    /// A hardware GPU where there is one, else the CPU
-    Auto,
-    /// All cores; needs no driver
-    Cpu,
-    /// The best device that Vulkan, Metal or DirectX 12 has; also one that is a program on the CPU, which is slower than
-    /// 'cpu'
-    Gpu,
-}
-
-impl From<Backend> for autosplats::Backend {
-    fn from(backend: Backend) -> Self {
-        match backend {
-            Backend::Auto => Self::Auto,
-            Backend::Cpu => Self::Cpu,
-            Backend::Gpu => Self::Gpu,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum Map {
-    Viridis,
-    Inferno,
-    Turbo,
-    Gray,
-    Reds,
 }

@@ -117,7 +117,7 @@ fn measure(
     drop(bar);
     let of = |value: &dyn Fn(&Timings) -> f64| median(samples.iter().map(|(_, timings, _)| value(timings)));
     let passes = samples[0].2.iter().enumerate().map(|(pass, first)| PassTime {
-        pass: first.pass.clone(),
+        pass: first.pass,
         ms: median(samples.iter().map(|(.., passes)| passes[pass].ms)),
     });
     Ok(Run {
@@ -170,7 +170,7 @@ impl Bench<'_> {
                 [("project", project), ("search", search), ("fit", fit), ("splat", splat), ("shade", shade)]
             {
                 line(stage, *ms);
-                let prefix = format!("{stage}.");
+                let prefix = format!("{stage}/");
                 for PassTime { pass, ms } in passes.iter().filter(|time| time.pass.starts_with(&prefix)) {
                     line(&format!("  {}", &pass[prefix.len()..]), *ms);
                 }

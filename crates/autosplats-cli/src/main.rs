@@ -5,6 +5,7 @@
 
 mod args;
 mod bench;
+mod choices;
 mod convert;
 mod demo;
 mod device;

@@ -6,7 +6,8 @@ use autosplats::cloud::glam::DVec3;
 use autosplats::{Error, NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
 use autosplats_cloud::{Axes, FieldValues, PointCloud, Unit, check_memory};
 
-use crate::args::{NormalsArgs, OrientChoice};
+use crate::args::NormalsArgs;
+use crate::choices::OrientChoice;
 use crate::exit::{Exit, Failure};
 use crate::input::{Inputs, read_failure};
 use crate::output::{check_cloud_target, write_cloud};

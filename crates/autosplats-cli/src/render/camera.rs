@@ -10,7 +10,8 @@ use autosplats_cloud::{Axes, PointCloud, Scene, View};
 use serde_json::error::Category;
 
 use super::render_failure;
-use crate::args::{AxesChoice, CameraArgs, Side};
+use crate::args::CameraArgs;
+use crate::choices::{AxesChoice, Side};
 use crate::exit::{Exit, Failure};
 use crate::output::write_file;
 use crate::values::Ortho;

@@ -8,7 +8,8 @@ use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
 use super::render_failure;
-use crate::args::{LookArgs, Map, RenderArgs, SurfaceArgs};
+use crate::args::{LookArgs, RenderArgs, SurfaceArgs};
+use crate::choices::Map;
 use crate::exit::{Exit, Failure, suggest};
 use crate::input::{Inputs, read_failure};
 use crate::output::{Format, Picture, check_target};

@@ -5,14 +5,11 @@ use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, LONGEST, LOPSIDED, LOPSIDED
 use super::eigen::SWEEPS;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{ScreenBuffers, Work};
+use crate::project::gpu::{Round, ScreenBuffers};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[FIT];
 const FIT: PassSource = PassSource::new("fit/fit", include_str!("fit.wgsl"));
-
-/// Workgroups of 64 invocations for each round.
-const ROUND_WORK: [Work; 2] = [Work::Active64, Work::Recovered64];
 
 /// Room for the surfels of `capacity` queries.
 ///
@@ -34,9 +31,9 @@ impl FitPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        let round = |round: u32| {
+        let round = |round: Round| {
             let constants = [
-                ("ROUND", f64::from(round)),
+                ("ROUND", f64::from(round as u32)),
                 ("SWEEPS", SWEEPS as f64),
                 ("LINE", LINE.into()),
                 ("LEAST_ACROSS", LEAST_ACROSS.into()),
@@ -48,10 +45,10 @@ impl FitPasses {
             ];
             Pass::new(gpu, &FIT, &constants)
         };
-        Ok(Self { rounds: [round(0)?, round(1)?] })
+        Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
     }
 
-    /// Fits surfels to the neighbourhoods of the queries of `round`, 0 for active points, 1 for recovered ones.
+    /// Fits surfels to the neighbourhoods of the queries of `round`.
     pub(crate) fn steps(
         &self,
         gpu: &Gpu,
@@ -59,11 +56,11 @@ impl FitPasses {
         screen: &ScreenBuffers,
         neighborhoods: &wgpu::Buffer,
         surfels: &wgpu::Buffer,
-        round: usize,
+        round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, points, source, queries, .. } = screen;
         let buffers = [frame, counters, density, points, source, queries, neighborhoods, surfels];
-        vec![self.rounds[round].step(gpu, &buffers, screen.groups(ROUND_WORK[round]))]
+        vec![self.rounds[round as usize].step(gpu, &buffers, screen.groups(round.work_64()))]
     }
 }
 

@@ -24,13 +24,12 @@ pub(crate) struct FrameUniform {
     pub(crate) outlier_growth: f32,
     /// √λ; infinite if any gap is bridged.
     pub(crate) gap_growth: f32,
-    /// Points in the cloud.
-    pub(crate) points: u32,
+    pub(crate) padding: u32,
 }
 
 impl FrameUniform {
     /// The camera; settings are the simplest there are.
-    pub(crate) fn new(view: &View, points: usize, k: u32) -> Self {
+    pub(crate) fn new(view: &View, k: u32) -> Self {
         let column = |axis: glam::Vec3| [axis.x, axis.y, axis.z, 0.0];
         let axes = view.view_from_world;
         Self {
@@ -47,7 +46,7 @@ impl FrameUniform {
             splat_scale: 1.0,
             outlier_growth: f32::INFINITY,
             gap_growth: f32::INFINITY,
-            points: points as u32,
+            padding: 0,
         }
     }
 }

@@ -41,6 +41,7 @@ impl PassSource {
 /// A compute pipeline with the layout of what it is bound to.
 #[derive(Debug)]
 pub(crate) struct Pass {
+    path: &'static str,
     label: String,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
@@ -85,7 +86,7 @@ impl Pass {
                 },
                 cache: None,
             });
-            Self { label: label.clone(), pipeline, layout, bindings: entries.len() }
+            Self { path: source.path, label: label.clone(), pipeline, layout, bindings: entries.len() }
         })
     }
 
@@ -105,7 +106,13 @@ impl Pass {
             layout: &self.layout,
             entries: &entries,
         });
-        Step { label: self.label.clone(), pipeline: self.pipeline.clone(), bindings, groups: groups.into() }
+        Step {
+            path: self.path,
+            label: self.label.clone(),
+            pipeline: self.pipeline.clone(),
+            bindings,
+            groups: groups.into(),
+        }
     }
 }
 
@@ -127,6 +134,7 @@ impl From<u32> for Groups {
 /// A pass ready to run.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
+    pub(super) path: &'static str,
     pub(super) label: String,
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bindings: wgpu::BindGroup,

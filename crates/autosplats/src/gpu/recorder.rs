@@ -16,8 +16,8 @@ const MOST_PASSES: u32 = 512;
 /// The time that one pass took.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassTime {
-    /// Stage and pass: `project.compact`.
-    pub pass: String,
+    /// Stage and pass: `project/compact`.
+    pub pass: &'static str,
     /// Milliseconds.
     pub ms: f64,
 }
@@ -129,9 +129,8 @@ impl<'a> Recorder<'a> {
         if matches!(self.clock, Clock::Off) {
             return;
         }
-        let name = step.label.strip_prefix("autosplats.").unwrap_or(&step.label);
         let ms = if matches!(self.clock, Clock::Wall) { self.submit() } else { 0.0 };
-        self.times.push(PassTime { pass: name.into(), ms });
+        self.times.push(PassTime { pass: step.path, ms });
     }
 
     /// Submits what was recorded and waits for it; the milliseconds that took.

@@ -130,10 +130,12 @@ impl DeviceCloud {
     /// [`Error::DeviceMemory`] if the device has no room.
     pub(crate) fn resize_values(&mut self, gpu: &Gpu, words: usize) -> Result<(), Error> {
         if words != self.words {
-            self.words = words;
+            // None, should one of the buffers fail.
+            self.words = 0;
             for chunk in &mut self.chunks {
                 chunk.values = gpu.storage::<u32>("values of points", chunk.capacity as usize * words)?;
             }
+            self.words = words;
             self.tell(gpu);
         }
         Ok(())
@@ -163,7 +165,7 @@ pub(crate) struct Uploader {
 #[derive(Debug)]
 struct Staging {
     buffer: wgpu::Buffer,
-    /// When it was last copied from; a new one is mapped.
+    /// When it was last copied from.
     submitted: Option<wgpu::SubmissionIndex>,
 }
 

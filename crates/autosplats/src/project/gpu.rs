@@ -35,7 +35,6 @@ const COMPACT: PassSource = PassSource::new("project/compact", include_str!("com
 const GATHER: PassSource = PassSource::new("project/gather", include_str!("gather.wgsl"));
 const SPLIT_COUNT: PassSource = PassSource::new("project/split_count", include_str!("split_count.wgsl"));
 const SPLIT: PassSource = PassSource::new("project/split", include_str!("split.wgsl"));
-
 const WORK: PassSource = PassSource::new("project/work", include_str!("work.wgsl"));
 
 /// Numbers of workgroups that depend on counts, as `work.wgsl` has them: by what there is one invocation each for, and
@@ -51,6 +50,27 @@ pub(crate) enum Work {
     Recovered256,
     Queries256,
     LargeSplats,
+}
+
+/// Which queries the search, the fit and the splatting take up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Round {
+    /// The active points.
+    Active,
+    /// The passive points that turned out not to be hidden.
+    Recovered,
+}
+
+impl Round {
+    /// In workgroups of 64 invocations.
+    pub(crate) fn work_64(self) -> Work {
+        [Work::Active64, Work::Recovered64][self as usize]
+    }
+
+    /// In workgroups of 256 invocations.
+    pub(crate) fn work_256(self) -> Work {
+        [Work::Active256, Work::Recovered256][self as usize]
+    }
 }
 
 /// Bytes of the arguments of a dispatch.

@@ -10,13 +10,13 @@ use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
-use crate::project::gpu::{Counter, ProjectPasses, ScreenBuffers};
+use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
 use crate::search::screen_grid::gpu::{SearchPasses, neighborhood_buffer};
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
 use crate::shade::{ColorMode, Image, Scene, linear_steps};
-use crate::splat::gpu::{Round, SplatBuffers, SplatPasses};
+use crate::splat::gpu::{SplatBuffers, SplatPasses};
 use crate::splat::{Channels, GBuffer, LayerBuffers};
 
 /// Renders on a device.
@@ -184,7 +184,7 @@ impl GpuRenderer {
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, view, cloud, settings, &uniform);
+        prepared.tell(gpu, frame, view, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -213,7 +213,7 @@ impl GpuRenderer {
         };
 
         let stage = |name: &str| {
-            times.iter().filter(|time| time.pass.split('.').next() == Some(name)).map(|time| time.ms).sum::<f64>()
+            times.iter().filter(|time| time.pass.split('/').next() == Some(name)).map(|time| time.ms).sum::<f64>()
         };
         let timings = Timings {
             upload,
@@ -256,7 +256,7 @@ impl GpuRenderer {
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, view, cloud, settings, &uniform.into_format(texture.format()));
+        prepared.tell(gpu, frame, view, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
@@ -306,8 +306,8 @@ impl GpuRenderer {
                 if round == Round::Recovered {
                     steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
                 }
-                steps.extend(search.steps(gpu, frame, &screen, &neighborhoods, round as usize));
-                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round as usize));
+                steps.extend(search.steps(gpu, frame, &screen, &neighborhoods, round));
+                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
                 steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
             }
             let refine = shape.depth_refinement;
@@ -322,15 +322,7 @@ impl GpuRenderer {
 
 impl Prepared {
     /// Tells the passes what the next frame is to be.
-    fn tell(
-        &mut self,
-        gpu: &Gpu,
-        frame: &wgpu::Buffer,
-        view: &View,
-        cloud: &PointCloud,
-        settings: &Settings,
-        shading: &ShadeUniform,
-    ) {
+    fn tell(&mut self, gpu: &Gpu, frame: &wgpu::Buffer, view: &View, settings: &Settings, shading: &ShadeUniform) {
         let Settings { reconstruction, .. } = settings;
         let rules = SearchRules {
             k: reconstruction.k,
@@ -344,7 +336,7 @@ impl Prepared {
             splat_scale: reconstruction.splat_scale,
             outlier_growth: rules.outlier_radius(1.0),
             gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
-            ..FrameUniform::new(view, cloud.len(), reconstruction.k)
+            ..FrameUniform::new(view, reconstruction.k)
         };
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
         self.picture.write(gpu, shading, &settings.shading);

@@ -136,7 +136,8 @@ impl Renderer {
     }
 
     /// A renderer on the caller's own device. It uses the features `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and
-    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none. Without the last, passes are not timed.
+    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none. Without the last, passes are not timed, and the
+    /// time of a frame includes reading it back.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].

@@ -20,8 +20,7 @@ struct Frame {
     outlier_growth: f32,
     // √λ.
     gap_growth: f32,
-    // Points in the cloud.
-    points: u32,
+    padding: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

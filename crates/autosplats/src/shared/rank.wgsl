@@ -4,8 +4,8 @@
 const RANK_WORDS = 64u;
 
 var<workgroup> rank_bits: array<atomic<u32>, RANK_WORDS>;
-// Flags set before each word, and at the end all.
-var<workgroup> rank_before: array<u32, RANK_WORDS + 1u>;
+// Flags set before each word.
+var<workgroup> rank_before: array<u32, RANK_WORDS>;
 
 // Call from all, before any flag is set; a barrier follows.
 fn rank_clear(local: u32) {
@@ -22,7 +22,7 @@ fn rank_set(flag: u32) {
 // Call from all, after all flags are set; barriers surround it.
 fn rank_finish(local: u32) {
     workgroupBarrier();
-    if local <= RANK_WORDS {
+    if local < RANK_WORDS {
         var sum = 0u;
         for (var word = 0u; word < local; word++) {
             sum += countOneBits(atomicLoad(&rank_bits[word]));
@@ -35,8 +35,4 @@ fn rank_finish(local: u32) {
 fn rank_of(flag: u32) -> u32 {
     let below = atomicLoad(&rank_bits[flag / 32u]) & ((1u << (flag % 32u)) - 1u);
     return rank_before[flag / 32u] + countOneBits(below);
-}
-
-fn rank_total() -> u32 {
-    return rank_before[RANK_WORDS];
 }

@@ -12,7 +12,7 @@ use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, SUPPORT};
 use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, STRIDES_PER_REACH};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{Counter, ScreenBuffers, Work, WorkPass, scan_pass};
+use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] =
@@ -39,23 +39,6 @@ const TOP_NODES: u32 = 1 + 16 + 256 + 4096;
 /// Bytes of a splat.
 const SPLAT_BYTES: usize = 48;
 
-/// Which surfels a round of the frame adds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Round {
-    Active,
-    Recovered,
-}
-
-impl Round {
-    /// Workgroups of 256 invocations.
-    fn work(self) -> Work {
-        match self {
-            Self::Active => Work::Active256,
-            Self::Recovered => Work::Recovered256,
-        }
-    }
-}
-
 /// Splats on the device, and the depth maps.
 #[derive(Debug)]
 pub(crate) struct SplatBuffers {
@@ -63,7 +46,8 @@ pub(crate) struct SplatBuffers {
     tree: wgpu::Buffer,
     /// Indices of splats that one invocation cannot draw.
     large: wgpu::Buffer,
-    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is. The second one is for refinement.
+    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is. The
+    /// second one is for refinement.
     pub(crate) depth: [wgpu::Buffer; 2],
 }
 
@@ -178,7 +162,7 @@ impl SplatPasses {
         let SplatBuffers { splats: list, tree, large, depth } = splats;
         let counters = &screen.counters;
         let set_up = [frame, counters, surfels, list, tree, large];
-        let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work()))];
+        let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work_256()))];
         steps.push(self.work.step(gpu, frame, screen));
         if round == Round::Active {
             steps.push(self.clear_depth.step(gpu, &[frame, &depth[0]], pixel_groups(screen)));

@@ -65,12 +65,12 @@ impl Case {
             splat_scale: rules.splat_scale,
             ellipses: rules.ellipses.into(),
             keep_outliers: rules.keep_outliers.into(),
-            ..FrameUniform::new(&self.view, 0, rules.k)
+            ..FrameUniform::new(&self.view, rules.k)
         };
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
-        for round in [0, 1] {
+        for round in [Round::Active, Round::Recovered] {
             let steps = passes.steps(gpu, &frame, &buffers, &neighborhoods, &surfels, round);
             steps.iter().for_each(|step| recorder.run(step));
         }

@@ -90,7 +90,7 @@ fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, c
     uploader.values(gpu, &PointValues::default(), &device_cloud, &|_| true).expect("an upload");
     let screen = ScreenBuffers::new(gpu, [view.width, view.height], cloud.len(), 0).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    let told = FrameUniform { grid_culling: culling.into(), ..FrameUniform::new(view, cloud.len(), K) };
+    let told = FrameUniform { grid_culling: culling.into(), ..FrameUniform::new(view, K) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     passes.steps(gpu, &frame, &device_cloud, &screen).iter().for_each(|step| recorder.run(step));

@@ -4,15 +4,13 @@ use super::cpu::{FIRST_REACH, LEAST_GROWTH};
 use super::window::MARGIN_PX;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
-use crate::project::gpu::{ScreenBuffers, Work};
+use crate::project::gpu::{Round, ScreenBuffers};
 use crate::search::{BOUND_STEP, CROWDED, MAX_CANDIDATES};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH];
 const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_str!("search.wgsl"));
 
-/// Workgroups of 64 invocations for each round.
-const ROUND_WORK: [Work; 2] = [Work::Active64, Work::Recovered64];
 /// `Neighborhood` of `shared/surfel.wgsl`.
 type Neighborhood = [f32; 12];
 
@@ -36,9 +34,9 @@ impl SearchPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, k: u32) -> Result<Self, Error> {
-        let round = |round: u32| {
+        let round = |round: Round| {
             let constants = [
-                ("ROUND", f64::from(round)),
+                ("ROUND", f64::from(round as u32)),
                 ("K", k.into()),
                 ("QUADS", k.div_ceil(4).into()),
                 ("FIRST_REACH", FIRST_REACH.into()),
@@ -50,21 +48,21 @@ impl SearchPasses {
             ];
             Pass::new(gpu, &SEARCH, &constants)
         };
-        Ok(Self { rounds: [round(0)?, round(1)?] })
+        Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
     }
 
-    /// Finds the neighbourhoods of the queries of `round`, 0 for active points, 1 for recovered ones.
+    /// Finds the neighbourhoods of the queries of `round`.
     pub(crate) fn steps(
         &self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
         screen: &ScreenBuffers,
         neighborhoods: &wgpu::Buffer,
-        round: usize,
+        round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, cell_start, points, queries, .. } = screen;
         let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods];
-        vec![self.rounds[round].step(gpu, &buffers, screen.groups(ROUND_WORK[round]))]
+        vec![self.rounds[round as usize].step(gpu, &buffers, screen.groups(round.work_64()))]
     }
 }
 

@@ -49,7 +49,7 @@ impl Device {
         let layers = upload_layers(gpu, layers);
         let mut buffers = ShadeBuffers::new(gpu, layers.size, keep_linear).expect("room");
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(scene.view, 0, 10)));
+        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(scene.view, 10)));
         let counters = gpu.storage::<u32>("counters", COUNTERS).expect("room");
         let uniform = ShadeUniform::new(scene, shading, &layers, keep_linear).into_format(format);
         buffers.write(gpu, &uniform, shading);
@@ -398,7 +398,7 @@ fn tables_follow_the_settings() {
     let layers = upload_layers(gpu, &host);
     let mut buffers = ShadeBuffers::new(gpu, size, false).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&view, 0, 10)));
+    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&view, 10)));
     let counters = gpu.storage::<u32>("counters", COUNTERS).expect("room");
     let depth = Shading { color: ColorMode::Depth, ..Shading::default() };
     let mut passes = device.passes.borrow_mut();

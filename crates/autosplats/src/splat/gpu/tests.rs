@@ -61,7 +61,7 @@ impl Scene<'_> {
         });
         screen.values = gpu.storage_with("values", &values.collect::<Vec<u32>>()).expect("room");
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(self.view, 0, 1)));
+        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(self.view, 1)));
         Buffers {
             frame,
             surfels: gpu.storage_with("surfels", self.surfels).expect("room"),

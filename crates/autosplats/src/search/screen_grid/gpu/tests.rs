@@ -19,7 +19,7 @@ pub(crate) fn frame_buffer(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu:
     let told = FrameUniform {
         outlier_growth: rules.outlier_radius(1.0),
         gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
-        ..FrameUniform::new(view, 0, rules.k)
+        ..FrameUniform::new(view, rules.k)
     };
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
@@ -100,7 +100,7 @@ fn on_device(
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let frame = frame_buffer(gpu, view, rules);
     let mut recorder = Recorder::new(gpu, &Clock::Off);
-    for round in [0, 1] {
+    for round in [Round::Active, Round::Recovered] {
         passes.steps(gpu, &frame, &buffers, &neighborhoods, round).iter().for_each(|step| recorder.run(step));
     }
     recorder.finish();

@@ -1,0 +1,84 @@
+//! The names that options take.
+
+use clap::ValueEnum;
+
+/// Which way normals point.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum OrientChoice {
+    /// To the sensor where the file tells its place, else upward for land, else outward
+    Auto,
+    /// To the sensor
+    Sensor,
+    /// Upward, along z
+    Up,
+    /// Away from the middle
+    Outward,
+}
+
+/// Where to look from.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Side {
+    Iso,
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+}
+
+/// Which way is up.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum AxesChoice {
+    Auto,
+    /// Surveys, robots
+    ZUp,
+    /// Models
+    YUp,
+    /// X right, y down, z forward, seen from the origin: depth cameras
+    Camera,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Engine {
+    /// Buckets of screen points, exact
+    ScreenGrid,
+}
+
+impl From<Engine> for autosplats::SearchEngine {
+    fn from(engine: Engine) -> Self {
+        match engine {
+            Engine::ScreenGrid => Self::ScreenGrid,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Backend {
+    /// A hardware GPU where there is one, else the CPU
+    Auto,
+    /// All cores; needs no driver
+    Cpu,
+    /// The best device that Vulkan, Metal or DirectX 12 has; also one that is a program on the CPU, which is slower than
+    /// 'cpu'
+    Gpu,
+}
+
+impl From<Backend> for autosplats::Backend {
+    fn from(backend: Backend) -> Self {
+        match backend {
+            Backend::Auto => Self::Auto,
+            Backend::Cpu => Self::Cpu,
+            Backend::Gpu => Self::Gpu,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Map {
+    Viridis,
+    Inferno,
+    Turbo,
+    Gray,
+    Reds,
+}
