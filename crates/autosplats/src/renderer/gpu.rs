@@ -12,7 +12,8 @@ use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
-use crate::search::screen_grid::gpu::{SearchPasses, neighborhood_buffer};
+use crate::search::gpu::{EnginePasses, SearchBuffers, compile};
+use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
 use crate::shade::{ColorMode, Image, Scene, linear_steps};
@@ -45,11 +46,11 @@ struct Resident {
     values: Option<(u64, Option<ColorSource>, Option<String>)>,
 }
 
-/// Compiled passes: those of the last k and channels are kept.
+/// Compiled passes: those of the last engine, k and channels are kept.
 #[derive(Debug)]
 struct Passes {
     project: ProjectPasses,
-    search: Option<(u32, SearchPasses)>,
+    search: Option<((SearchEngine, u32), Box<dyn EnginePasses>)>,
     fit: FitPasses,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
@@ -59,7 +60,7 @@ struct Passes {
 #[derive(Clone, Debug, PartialEq)]
 struct Shape {
     size: [u32; 2],
-    k: u32,
+    search: (SearchEngine, u32),
     depth_refinement: bool,
     channels: Channels,
     find_range: bool,
@@ -266,10 +267,9 @@ impl GpuRenderer {
 
     /// Makes buffers and steps for a frame unless the last frame's will do.
     fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<(), Error> {
-        let SearchEngine::ScreenGrid = settings.reconstruction.engine;
         let shape = Shape {
             size,
-            k: settings.reconstruction.k,
+            search: (settings.reconstruction.engine, settings.reconstruction.k),
             depth_refinement: settings.reconstruction.depth_refinement,
             channels: Channels {
                 color: wanted.colors.is_some(),
@@ -287,8 +287,9 @@ impl GpuRenderer {
         self.prepared = None;
         let Self { gpu, cloud, frame, passes, .. } = self;
         let Passes { project, search, fit, splat, shade } = passes;
-        if search.as_ref().is_none_or(|(k, _)| *k != shape.k) {
-            *search = Some((shape.k, SearchPasses::new(gpu, shape.k)?));
+        if search.as_ref().is_none_or(|(of, _)| *of != shape.search) {
+            let (engine, k) = shape.search;
+            *search = Some((shape.search, compile(gpu, engine, k)?));
         }
         if splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
             *splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
@@ -302,11 +303,13 @@ impl GpuRenderer {
         let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
         let steps = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
-            for round in [Round::Active, Round::Recovered] {
+            let buffers = SearchBuffers { frame, screen: &screen, neighborhoods: &neighborhoods };
+            let searches = search.steps(gpu, buffers)?;
+            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(searches) {
                 if round == Round::Recovered {
                     steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
                 }
-                steps.extend(search.steps(gpu, frame, &screen, &neighborhoods, round));
+                steps.extend(search);
                 steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
                 steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
             }

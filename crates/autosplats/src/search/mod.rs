@@ -13,6 +13,7 @@
 //!   outliers costs a bounded time per point. An engine may go without the rectangle, and so without the bound, where it
 //!   reads less than [`CROWDED`] screen points.
 
+pub(crate) mod gpu;
 pub(crate) mod moments;
 pub(crate) mod screen_grid;
 pub(crate) mod select;
