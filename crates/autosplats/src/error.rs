@@ -61,6 +61,14 @@ pub enum Error {
     /// The GPU stopped working, by its driver's message; a new renderer may find it working again.
     #[error("GPU: the device was lost: {0}; make a new renderer, or use the CPU backend")]
     DeviceLost(String),
+    /// Normals given for a cloud do not belong to it.
+    #[error("normals, radii and curvatures must be one of each per point: {normals} normals for {points} points")]
+    Normals {
+        /// Normals given.
+        normals: usize,
+        /// Points of the cloud.
+        points: usize,
+    },
     /// The texture to render into is none that it can: its message says why.
     #[error("texture to render into: {0}")]
     Texture(String),

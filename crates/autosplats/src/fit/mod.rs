@@ -8,11 +8,13 @@
 
 mod cpu;
 mod eigen;
+mod given;
 pub(crate) mod gpu;
 #[cfg(test)]
 pub(crate) mod tests;
 
 pub(crate) use cpu::{FitRules, Fitted, fit};
+pub(crate) use given::{GivenPlanes, place};
 
 /// An oriented disc in view space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]

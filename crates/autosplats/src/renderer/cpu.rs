@@ -5,10 +5,11 @@ use std::time::Instant;
 use autosplats_cloud::PointCloud;
 
 use super::attributes::Wanted;
-use super::{Counts, Frame, Settings, Timings, check};
+use super::surfels::point_surfels;
+use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
-use crate::fit::{FitRules, Surfels, fit};
+use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{Projector, ScreenPoints};
 use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
 use crate::shade::{Image, Scene, linear_steps, shade};
@@ -25,6 +26,8 @@ pub(super) struct CpuRenderer {
     splatter: Splatter,
     image: Image,
     linear: [f32; 256],
+    /// Of the last frame.
+    view: Option<View>,
 }
 
 impl Default for CpuRenderer {
@@ -37,20 +40,28 @@ impl Default for CpuRenderer {
             splatter: Splatter::default(),
             image: Image::default(),
             linear: linear_steps(),
+            view: None,
         }
     }
 }
 
 impl CpuRenderer {
-    /// See [`Renderer::render`](super::Renderer::render).
+    /// See [`Renderer::surfels`](super::Renderer::surfels).
+    pub(super) fn surfels(&self) -> Vec<PointSurfel> {
+        self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
+    }
+
+    /// See [`Renderer::render`](super::Renderer::render); `given` planes are drawn instead of what a search would find.
     pub(super) fn render(
         &mut self,
         cloud: &PointCloud,
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
+        given: Option<GivenPlanes<'_>>,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
+        self.view = Some(view);
         let wanted = Wanted::new(cloud, settings)?;
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
@@ -67,7 +78,7 @@ impl CpuRenderer {
 
         surfels.clear();
         splatter.begin(&view);
-        let reconstruct = Reconstruct { screen, view: &view, settings };
+        let reconstruct = Reconstruct { screen, view: &view, settings, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
@@ -117,6 +128,7 @@ struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     settings: &'a Settings,
+    given: Option<GivenPlanes<'a>>,
 }
 
 impl Reconstruct<'_> {
@@ -129,8 +141,16 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
-        let Self { screen, view, settings } = *self;
+        let Self { screen, view, settings, given } = *self;
         let settings = &settings.reconstruction;
+        let first = surfels.len();
+        if let Some(planes) = given {
+            place(screen, queries, &planes, view, settings.k, settings.splat_scale, surfels);
+            clock.lap(|timings| &mut timings.fit);
+            splatter.add(surfels, first, view);
+            clock.lap(|timings| &mut timings.splat);
+            return crate::search::SearchCounts::default();
+        }
         let rules = SearchRules {
             k: settings.k,
             outlier_expansions: settings.outlier_expansions,
@@ -147,7 +167,6 @@ impl Reconstruct<'_> {
             ellipses: settings.ellipses,
             keep_outliers: settings.outlier_expansions.is_none(),
         };
-        let first = surfels.len();
         fit(screen, queries, neighborhoods, view, &rules, surfels);
         clock.lap(|timings| &mut timings.fit);
 

@@ -5,9 +5,11 @@ use std::time::Instant;
 use autosplats_cloud::PointCloud;
 
 use super::attributes::{ColorSource, Wanted};
-use super::{Counts, Frame, Settings, Timings, check, check_count};
+use super::surfels::point_surfels;
+use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
 use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
+use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
@@ -33,6 +35,8 @@ pub(super) struct GpuRenderer {
     frame: wgpu::Buffer,
     passes: Passes,
     prepared: Option<Prepared>,
+    /// Of the last frame.
+    view: Option<View>,
     readback: Readback,
     image: Image,
     layers: GBuffer,
@@ -73,6 +77,8 @@ struct Shape {
 struct Prepared {
     shape: Shape,
     screen: ScreenBuffers,
+    /// [`Surfel`] per query.
+    surfels: wgpu::Buffer,
     layers: LayerBuffers,
     picture: ShadeBuffers,
     steps: Vec<Step>,
@@ -96,6 +102,7 @@ impl GpuRenderer {
                 shade: ShadePasses::new(&gpu)?,
             },
             prepared: None,
+            view: None,
             readback: Readback::default(),
             image: Image::default(),
             layers: GBuffer::default(),
@@ -155,6 +162,25 @@ impl GpuRenderer {
         Ok(())
     }
 
+    /// See [`Renderer::surfels`](super::Renderer::surfels).
+    pub(super) fn surfels(&mut self) -> Result<Vec<PointSurfel>, Error> {
+        let Self { gpu, prepared, view, readback, .. } = self;
+        let (Some(prepared), Some(view)) = (prepared, view) else { return Ok(Vec::new()) };
+        gpu.checked(|| {
+            let mut recorder = Recorder::new(gpu, &Clock::Off);
+            readback.copy(gpu, &mut recorder.encoder, &[&prepared.screen.counters, &prepared.surfels])?;
+            recorder.finish();
+            readback.read(gpu, |parts| {
+                let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
+                let len: u32 =
+                    [Counter::Active, Counter::Recovered].map(|counter| counters[counter as usize]).iter().sum();
+                let surfels: Vec<Surfel> =
+                    bytemuck::pod_collect_to_vec(&parts[1][..len as usize * size_of::<Surfel>()]);
+                point_surfels(&surfels, view)
+            })
+        })?
+    }
+
     /// See [`Renderer::render`](super::Renderer::render).
     pub(super) fn render(
         &mut self,
@@ -181,6 +207,7 @@ impl GpuRenderer {
         self.make_resident(cloud, &wanted, &|_| true)?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
         self.prepare(size, &wanted, settings)?;
+        self.view = Some(*view);
         let Self { gpu, clock, prepared, readback, image, layers, times, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
@@ -253,6 +280,7 @@ impl GpuRenderer {
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
         self.prepare([texture.width(), texture.height()], &wanted, settings)?;
+        self.view = Some(*view);
         let Self { gpu, prepared, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
@@ -318,7 +346,7 @@ impl GpuRenderer {
             steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
             Ok::<_, Error>(steps)
         })??;
-        self.prepared = Some(Prepared { shape, screen, layers, picture, steps });
+        self.prepared = Some(Prepared { shape, screen, surfels, layers, picture, steps });
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ mod attributes;
 mod cpu;
 mod gpu;
 mod settings;
+mod surfels;
 
 use autosplats_cloud::PointCloud;
 
@@ -11,11 +12,14 @@ use self::cpu::CpuRenderer;
 use self::gpu::GpuRenderer;
 use crate::Error;
 use crate::camera::{Camera, View};
+use crate::fit::GivenPlanes;
 use crate::gpu::{AdapterSummary, Gpu, PassTime};
+use crate::normals::Normals;
 use crate::shade::Image;
 use crate::splat::GBuffer;
 
 pub use settings::{Reconstruction, Settings};
+pub use surfels::PointSurfel;
 
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 16_384;
@@ -169,8 +173,49 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<Frame<'_>, Error> {
         match &mut self.form {
-            Form::Cpu(renderer) => renderer.render(cloud, camera, size, settings),
+            Form::Cpu(renderer) => renderer.render(cloud, camera, size, settings, None),
             Form::Gpu(renderer) => renderer.render(cloud, camera, size, settings),
+        }
+    }
+
+    /// Renders `cloud` with normals and radii found beforehand instead of on the fly: what [`estimate_normals`] gives for
+    /// the same `k`, on either side. Neither outliers nor gaps are looked for. On the CPU only.
+    ///
+    /// [`estimate_normals`]: crate::estimate_normals
+    ///
+    /// # Errors
+    /// Those of [`render`](Self::render); [`Error::Normals`] if there is not one of each for each point, [`Error::Device`]
+    /// if this renderer runs on a GPU.
+    pub fn render_with_normals(
+        &mut self,
+        cloud: &PointCloud,
+        normals: &Normals,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: &Settings,
+    ) -> Result<Frame<'_>, Error> {
+        let Normals { normals, curvature, radius } = normals;
+        if [normals.len(), curvature.len(), radius.len()] != [cloud.len(); 3] {
+            return Err(Error::Normals { normals: normals.len(), points: cloud.len() });
+        }
+        match &mut self.form {
+            Form::Cpu(renderer) => {
+                let planes = GivenPlanes { normals, curvature, radius };
+                renderer.render(cloud, camera, size, settings, Some(planes))
+            }
+            Form::Gpu(_) => Err(Error::Device("normals found beforehand are rendered on the CPU only".into())),
+        }
+    }
+
+    /// The surfels of the last frame: what the search and the fit found for each visible point that they took up, in no
+    /// order to rely on. Empty before the first frame.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`], [`Error::DeviceLimit`] and [`Error::DeviceLost`] on a GPU, which they are read back from.
+    pub fn surfels(&mut self) -> Result<Vec<PointSurfel>, Error> {
+        match &mut self.form {
+            Form::Cpu(renderer) => Ok(renderer.surfels()),
+            Form::Gpu(renderer) => renderer.surfels(),
         }
     }
 

@@ -1,0 +1,50 @@
+//! Surfels of points whose planes are known beforehand.
+
+use glam::Vec3;
+
+use super::{Surfel, Surfels};
+use crate::camera::View;
+use crate::project::ScreenPoints;
+
+/// Planes of all points of a cloud, in its order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GivenPlanes<'a> {
+    /// Unit normals in the cloud's axes, on either side.
+    pub(crate) normals: &'a [[f32; 3]],
+    /// Splat radii, before they are scaled.
+    pub(crate) radius: &'a [f32],
+    pub(crate) curvature: &'a [f32],
+}
+
+/// Appends the surfels of `queries`, indices of screen points, to `surfels`: circles as given, seen from the eye.
+pub(crate) fn place(
+    screen: &ScreenPoints,
+    queries: &[u32],
+    planes: &GivenPlanes<'_>,
+    view: &View,
+    k: u32,
+    splat_scale: f32,
+    surfels: &mut Surfels,
+) {
+    surfels.extend(queries.iter().map(|&query| {
+        let point = &screen.points[query as usize];
+        let source = screen.source[query as usize];
+        let normal = view.view_from_world * Vec3::from(planes.normals[source as usize]);
+        let to_eye = if view.perspective { -Vec3::from(point.position_view) } else { Vec3::NEG_Z };
+        let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+        let radius = planes.radius[source as usize];
+        Surfel {
+            center: point.position_view,
+            radius: splat_scale * radius,
+            normal: normal.to_array(),
+            // The radius is 2·√(r_k²/k).
+            k_radius: 0.5 * radius * (k as f32).sqrt(),
+            major_axis: normal.any_orthonormal_vector().to_array(),
+            major_ratio: 1.0,
+            curvature: planes.curvature[source as usize],
+            pixel: point.pixel,
+            source,
+            screen: query,
+        }
+    }));
+}

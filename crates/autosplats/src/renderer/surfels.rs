@@ -1,0 +1,34 @@
+//! What the last frame found out about each visible point.
+
+use glam::{Mat3A, Vec3A};
+
+use crate::camera::View;
+use crate::fit::Surfel;
+
+/// The disc that a visible point was drawn as: the outcome of the search and the fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct PointSurfel {
+    /// Index of the point in the cloud.
+    pub point: u32,
+    /// Unit normal towards the eye, in the cloud's axes.
+    pub normal: [f32; 3],
+    /// Semi-minor axis in the cloud's unit; 0 if the point was discarded as an outlier.
+    pub radius: f32,
+    /// Distance to the furthest neighbour in the cloud's unit; 0 if there is none.
+    pub k_radius: f32,
+    /// Surface variation, 0 (flat) to 1/3.
+    pub curvature: f32,
+}
+
+/// The surfels of a frame as they are handed out.
+pub(super) fn point_surfels(surfels: &[Surfel], view: &View) -> Vec<PointSurfel> {
+    let world_from_view = Mat3A::from(view.view_from_world).transpose();
+    let surfel = |surfel: &Surfel| PointSurfel {
+        point: surfel.source,
+        normal: (world_from_view * Vec3A::from(surfel.normal)).to_array(),
+        radius: surfel.radius,
+        k_radius: surfel.k_radius,
+        curvature: surfel.curvature,
+    };
+    surfels.iter().map(surfel).collect()
+}

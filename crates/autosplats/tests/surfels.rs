@@ -1,0 +1,109 @@
+//! What a frame found, on the host, and frames from planes found beforehand.
+
+#[path = "../src/test_clouds.rs"]
+mod test_clouds;
+
+use autosplats::cloud::PointCloud;
+use autosplats::cloud::glam::{DVec3, Vec3};
+use autosplats::{
+    Backend, Camera, Error, NormalSettings, Normals, PointSurfel, Projection, Renderer, Settings, estimate_normals,
+};
+use test_clouds::EYE;
+
+const SIZE: [u32; 2] = [300, 300];
+
+fn camera() -> Camera {
+    let projection = Projection::PerspectiveFovDeg(35.0);
+    Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection }
+}
+
+fn sphere() -> PointCloud {
+    PointCloud::new(DVec3::ZERO, test_clouds::sphere(20_000))
+}
+
+fn by_point(mut surfels: Vec<PointSurfel>) -> Vec<PointSurfel> {
+    surfels.sort_by_key(|surfel| surfel.point);
+    surfels
+}
+
+fn normals(cloud: &PointCloud) -> Normals {
+    estimate_normals(cloud, &NormalSettings::default(), &()).expect("normals")
+}
+
+#[test]
+fn surfels_of_a_sphere_lie_on_it_and_face_the_eye() {
+    let cloud = sphere();
+    let mut renderer = Renderer::new();
+    assert!(renderer.surfels().expect("none yet").is_empty(), "before the first frame");
+    let counts = renderer.render(&cloud, &camera(), SIZE, &Settings::default()).expect("a picture").counts;
+    let surfels = renderer.surfels().expect("surfels");
+    assert_eq!(surfels.len(), counts.active + counts.recovered);
+    let mut errors = Vec::new();
+    for surfel in &surfels {
+        let at = Vec3::from(cloud.positions()[surfel.point as usize]);
+        let normal = Vec3::from(surfel.normal);
+        assert!(normal.dot(EYE.as_vec3() - at) >= 0.0, "{surfel:?} looks away");
+        assert!((normal.length() - 1.0).abs() < 1e-4, "{surfel:?}");
+        errors.push(normal.dot(at.normalize()).abs().min(1.0).acos().to_degrees());
+    }
+    let mean = errors.iter().sum::<f32>() / errors.len() as f32;
+    assert!(mean < 3.0, "normals are off by {mean} degrees in the mean");
+}
+
+#[test]
+fn both_backends_hand_out_the_same_surfels() {
+    let mut gpu = match Renderer::with_backend(Backend::Gpu) {
+        Ok(renderer) => renderer,
+        Err(error) => {
+            assert!(std::env::var_os("CI").is_none(), "{error}");
+            eprintln!("nothing checked: {error}");
+            return;
+        }
+    };
+    let cloud = sphere();
+    let mut cpu = Renderer::new();
+    assert!(gpu.surfels().expect("none yet").is_empty(), "before the first frame");
+    cpu.render(&cloud, &camera(), SIZE, &Settings::default()).expect("a picture");
+    gpu.render(&cloud, &camera(), SIZE, &Settings::default()).expect("a picture");
+    let [host, device] = [&mut cpu, &mut gpu].map(|renderer| by_point(renderer.surfels().expect("surfels")));
+    assert_eq!(host.len(), device.len());
+    let alike = |(a, b): &(&PointSurfel, &PointSurfel)| {
+        a.point == b.point
+            && (a.k_radius - b.k_radius).abs() <= 1e-4 * a.k_radius
+            && Vec3::from(a.normal).dot(b.normal.into()) > 0.9999
+    };
+    let unlike = host.iter().zip(&device).filter(|pair| !alike(pair)).count();
+    assert!(unlike * 1000 <= host.len(), "{unlike} of {} differ", host.len());
+}
+
+#[test]
+fn planes_found_beforehand_make_nearly_the_picture_of_those_found_on_the_fly() {
+    let cloud = sphere();
+    let normals = normals(&cloud);
+    let mut renderer = Renderer::new();
+    let on_the_fly = renderer.render(&cloud, &camera(), SIZE, &Settings::default()).expect("a picture").image.clone();
+    let beforehand = renderer
+        .render_with_normals(&cloud, &normals, &camera(), SIZE, &Settings::default())
+        .expect("a picture")
+        .image
+        .clone();
+    let apart = |(a, b): (&[u8; 4], &[u8; 4])| (0..3).map(|i| f64::from(a[i].abs_diff(b[i]))).sum::<f64>();
+    let mean =
+        on_the_fly.pixels.iter().zip(&beforehand.pixels).map(apart).sum::<f64>() / 3.0 / beforehand.pixels.len() as f64;
+    assert!((0.01..4.0).contains(&mean), "pictures differ by {mean} steps in the mean");
+    for surfel in renderer.surfels().expect("surfels") {
+        let known = Vec3::from(normals.normals[surfel.point as usize]);
+        assert!(known.dot(surfel.normal.into()).abs() > 0.9999, "{surfel:?} is not as given: {known}");
+        assert!((surfel.radius - normals.radius[surfel.point as usize]).abs() <= 1e-6, "{surfel:?}");
+    }
+}
+
+#[test]
+fn planes_of_another_cloud_are_refused() {
+    let cloud = sphere();
+    let mut normals = normals(&cloud);
+    normals.radius.pop();
+    let mut renderer = Renderer::new();
+    let error = renderer.render_with_normals(&cloud, &normals, &camera(), SIZE, &Settings::default());
+    assert!(matches!(error, Err(Error::Normals { points: 20_000, .. })), "{:?}", error.err());
+}
