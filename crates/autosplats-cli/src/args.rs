@@ -377,11 +377,14 @@ Examples:
   autosplats bench
   autosplats bench --scene cathedral:10M --backend cpu,gpu
   autosplats bench --scene statue:1M -k 20 --size 1280x720 --frames 100 --json
-  autosplats bench --scene cathedral:10M --backend gpu --stream";
+  autosplats bench --scene cathedral:10M --backend gpu --stream
+  autosplats bench paper --quick --out /tmp/paper";
 
 #[derive(Args, Debug)]
-#[command(after_help = BENCH_EXAMPLES)]
+#[command(after_help = BENCH_EXAMPLES, args_conflicts_with_subcommands = true)]
 pub(crate) struct BenchArgs {
+    #[command(subcommand)]
+    pub(crate) evaluation: Option<Evaluation>,
     /// Generated scene to render, with its number of points
     #[arg(long, value_name = "NAME[:COUNT]", default_value = "statue:1M")]
     pub(crate) scene: String,
@@ -406,6 +409,44 @@ pub(crate) struct BenchArgs {
     /// One JSON object on standard output: scene, device, counts, milliseconds per stage and pass
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Evaluation {
+    /// Repeat the evaluation of the Auto Splats paper and write a page about it
+    Paper(PaperArgs),
+}
+
+const PAPER_EXAMPLES: &str = "\
+Examples:
+  autosplats bench paper
+  autosplats bench paper --quick --out /tmp/paper
+  autosplats bench paper --scenes bunny,imperia --bunny bunny.ply
+  autosplats bench paper --gallop horse_gallop/ --fresh";
+
+#[derive(Args, Debug)]
+#[command(after_help = PAPER_EXAMPLES)]
+pub(crate) struct PaperArgs {
+    /// Scenes of the paper's to take, with commas
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', default_values = ["bunny", "imperia", "horses", "cathedral"])]
+    pub(crate) scenes: Vec<String>,
+    /// The Stanford bunny [default: a generated figure stands in]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) bunny: Option<PathBuf>,
+    /// Folder of meshes of a galloping horse, the first with the triangles of all [default: a generated herd stands in]
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) gallop: Option<PathBuf>,
+    /// Folder for RESULTS.md and results/, which has pictures, charts and the measurements
+    #[arg(long, value_name = "FOLDER", default_value = "docs")]
+    pub(crate) out: PathBuf,
+    /// Small scenes and pictures and few ks: minutes even without a graphics card
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Measure everything anew instead of going on where the last run in this folder stopped
+    #[arg(long)]
+    pub(crate) fresh: bool,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

@@ -1,12 +1,14 @@
 //! `autosplats bench`: how long each stage and pass of a frame takes, on each backend asked for.
 
+mod paper;
+
 use std::time::Instant;
 
 use autosplats::{Counts, PassTime, Renderer, SearchEngine, Settings, Timings};
 use autosplats_cloud::PointCloud;
 use serde::Serialize;
 
-use crate::args::BenchArgs;
+use crate::args::{BenchArgs, Evaluation};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
@@ -48,7 +50,10 @@ struct Run {
 
 /// Renders the same frame again and again and prints the medians.
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let BenchArgs { scene, engine, backends, k, size, frames, stream, json, run } = args;
+    let BenchArgs { evaluation, scene, engine, backends, k, size, frames, stream, json, run } = args;
+    if let Some(Evaluation::Paper(args)) = evaluation {
+        return paper::run(args);
+    }
     start_threads(run)?;
     let mut settings = Settings::default();
     settings.reconstruction.k = *k;

@@ -1,0 +1,180 @@
+//! The paper's pictures: rendered, joined side by side, and what can be counted about them.
+
+use std::path::Path;
+
+use autosplats::{Camera, ColorMode, Image, NormalSettings, Projection, Renderer, Settings, estimate_normals};
+use autosplats_cloud::PointCloud;
+use autosplats_cloud::glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::measure::{K, Loaded};
+use super::scenes::generated;
+use crate::exit::Failure;
+use crate::output::{write_file, write_png};
+use crate::render::render_failure;
+
+/// Pixels between pictures side by side.
+const GAP: u32 = 8;
+/// Splat scale at which single splats are seen.
+const APART: f32 = 0.35;
+
+/// How far normals found on the fly are from those found beforehand, degrees.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct NormalError {
+    pub(super) points: usize,
+    pub(super) mean: f64,
+    pub(super) median: f64,
+    pub(super) rmse: f64,
+    /// Parts of the points.
+    pub(super) within_5: f64,
+    pub(super) within_10: f64,
+    /// Of one picture with the other as the truth, decibels.
+    pub(super) psnr: f64,
+}
+
+/// The k-radii of a scene, in its unit.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Radii {
+    pub(super) points: usize,
+    /// Quantiles: 1, 25, 50, 75 and 99 of a hundred.
+    pub(super) quantiles: [f64; 5],
+}
+
+/// Figure 6: normals on the fly beside precomputed ones, by the same estimator.
+pub(super) fn normals(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<NormalError, Failure> {
+    let Loaded { cloud, camera, .. } = loaded;
+    let size = [side, side];
+    let settings = Settings::default();
+    let mut renderer = Renderer::new();
+    let normal_settings = NormalSettings { k: K, ..NormalSettings::default() };
+    let beforehand = estimate_normals(cloud, &normal_settings, &()).map_err(render_failure)?;
+    let on_the_fly = renderer.render(cloud, camera, size, &settings).map_err(render_failure)?.image.clone();
+    let surfels = renderer.surfels().map_err(render_failure)?;
+    let angle = |surfel: &autosplats::PointSurfel| {
+        let known = Vec3::from(beforehand.normals[surfel.point as usize]);
+        f64::from(known.dot(surfel.normal.into()).abs().min(1.0).acos().to_degrees())
+    };
+    let mut angles: Vec<f64> = surfels.iter().filter(|surfel| surfel.radius > 0.0).map(angle).collect();
+    angles.sort_unstable_by(f64::total_cmp);
+    let given = renderer
+        .render_with_normals(cloud, &beforehand, camera, size, &settings)
+        .map_err(render_failure)?
+        .image
+        .clone();
+    write_side_by_side(&[&on_the_fly, &given], path)?;
+    let count = angles.len().max(1) as f64;
+    let mean = |value: &dyn Fn(f64) -> f64| angles.iter().map(|&angle| value(angle)).sum::<f64>() / count;
+    Ok(NormalError {
+        points: angles.len(),
+        mean: mean(&|angle| angle),
+        median: angles.get(angles.len() / 2).copied().unwrap_or_default(),
+        rmse: mean(&|angle| angle * angle).sqrt(),
+        within_5: mean(&|angle| f64::from(u8::from(angle < 5.0))),
+        within_10: mean(&|angle| f64::from(u8::from(angle < 10.0))),
+        psnr: psnr(&on_the_fly, &given),
+    })
+}
+
+/// Figure 7: two scales in one scene; the surface, single splats, and the k-radius in colours.
+pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Result<Radii, Failure> {
+    let (cloud, camera) = generated(&format!("two-scales:{count}"), quiet)?;
+    let mut renderer = Renderer::new();
+    let mut apart = Settings::default();
+    apart.reconstruction.splat_scale = APART;
+    let mut colored = Settings::default();
+    colored.shading.color = ColorMode::KRadius;
+    let mut images = Vec::new();
+    for settings in [&apart, &colored, &Settings::default()] {
+        let frame = renderer.render(&cloud, &camera, [side, side], settings).map_err(render_failure)?;
+        images.insert(0, frame.image.clone());
+    }
+    images.swap(1, 2);
+    write_side_by_side(&images.iter().collect::<Vec<_>>(), path)?;
+    let surfels = renderer.surfels().map_err(render_failure)?;
+    let mut radii: Vec<f64> =
+        surfels.iter().filter(|surfel| surfel.radius > 0.0).map(|surfel| f64::from(surfel.k_radius)).collect();
+    radii.sort_unstable_by(f64::total_cmp);
+    let quantile = |part: f64| radii.get((part * radii.len() as f64) as usize).copied().unwrap_or_default();
+    Ok(Radii { points: radii.len(), quantiles: [0.01, 0.25, 0.5, 0.75, 0.99].map(quantile) })
+}
+
+/// Figure 9: a scan and, nearer, the curvature of its points.
+pub(super) fn curvature(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<(), Failure> {
+    let Loaded { cloud, camera, .. } = loaded;
+    let near = closer(cloud, camera);
+    let mut colored = Settings::default();
+    colored.shading.color = ColorMode::Curvature;
+    let mut renderer = Renderer::new();
+    let mut images = Vec::new();
+    for (camera, settings) in [(camera, &Settings::default()), (&near, &Settings::default()), (&near, &colored)] {
+        let frame = renderer.render(cloud, camera, [side, side * 3 / 2], settings).map_err(render_failure)?;
+        images.push(frame.image.clone());
+    }
+    write_side_by_side(&images.iter().collect::<Vec<_>>(), path)
+}
+
+/// The same camera on the upper part of the cloud, three times as near.
+fn closer(cloud: &PointCloud, camera: &Camera) -> Camera {
+    let up = camera.up.normalize();
+    let height = |position: &[f32; 3]| (Vec3::from(*position).as_dvec3() + cloud.origin()).dot(up);
+    let [low, high] =
+        [f64::min, f64::max].map(|of| cloud.positions().iter().map(height).reduce(of).unwrap_or_default());
+    let aim = low + 0.83 * (high - low);
+    let look_at = camera.look_at + up * (aim - camera.look_at.dot(up));
+    let projection = match camera.projection {
+        Projection::PerspectiveFovDeg(fov) => Projection::PerspectiveFovDeg(fov / 3.0),
+        Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height / 3.0),
+    };
+    Camera { look_at, projection, ..*camera }
+}
+
+/// Writes pictures of one height beside each other, white between them.
+fn write_side_by_side(images: &[&Image], path: &Path) -> Result<(), Failure> {
+    let height = images.iter().map(|image| image.height).max().unwrap_or(1);
+    let width = images.iter().map(|image| image.width + GAP).sum::<u32>() - GAP;
+    let mut pixels = vec![[255; 4]; (width * height) as usize];
+    let mut left = 0;
+    for image in images {
+        for (row, line) in image.pixels.chunks_exact(image.width as usize).enumerate() {
+            let at = row * width as usize + left as usize;
+            pixels[at..at + line.len()].copy_from_slice(line);
+        }
+        left += image.width + GAP;
+    }
+    let joined = Image { width, height, pixels, ..Image::default() };
+    write_file(path, |writer| write_png(&joined, false, writer)).map(|_| ())
+}
+
+/// Peak signal-to-noise ratio in decibels; infinite for equal pictures.
+fn psnr(image: &Image, truth: &Image) -> f64 {
+    let squared = |(a, b): (&[u8; 4], &[u8; 4])| (0..3).map(|i| f64::from(a[i].abs_diff(b[i])).powi(2)).sum::<f64>();
+    let sum: f64 = image.pixels.iter().zip(&truth.pixels).map(squared).sum();
+    10.0 * (255.0f64.powi(2) * 3.0 * image.pixels.len() as f64 / sum).log10()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn psnr_of_one_step_everywhere() {
+        let image = |value| Image { width: 2, height: 1, pixels: vec![[value; 4]; 2], ..Image::default() };
+        assert!((psnr(&image(10), &image(11)) - 48.13).abs() < 0.01, "20 log 255");
+        assert_eq!(psnr(&image(10), &image(10)), f64::INFINITY);
+    }
+
+    #[test]
+    fn pictures_keep_their_sides() -> Result<(), Failure> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("joined.png");
+        let image = |value| Image { width: 3, height: 2, pixels: vec![[value; 4]; 6], ..Image::default() };
+        write_side_by_side(&[&image(1), &image(2)], &path)?;
+        let joined = image::open(&path).expect("a picture").to_rgb8();
+        assert_eq!(joined.dimensions(), (6 + GAP, 2));
+        assert_eq!(
+            [joined.get_pixel(2, 1)[0], joined.get_pixel(4, 0)[0], joined.get_pixel(3 + GAP, 1)[0]],
+            [1, 255, 2]
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,86 @@
+//! What was measured so far, kept in a file so that a run that was stopped goes on where it was.
+
+use std::collections::BTreeMap;
+use std::fs::read_to_string;
+use std::io::{ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::exit::{Exit, Failure};
+use crate::output::write_file;
+
+/// Measurements by what was measured, in a JSON file.
+#[derive(Debug)]
+pub(super) struct Journal {
+    path: PathBuf,
+    entries: BTreeMap<String, Value>,
+}
+
+impl Journal {
+    /// Opens the journal at `path`, or starts one; a `fresh` one forgets what is there.
+    pub(super) fn open(path: &Path, fresh: bool) -> Result<Self, Failure> {
+        let bad = |why: String| {
+            Failure::new(
+                Exit::Input,
+                format!("{}: no journal of measurements: {why}; --fresh starts anew", path.display()),
+            )
+        };
+        let entries = match read_to_string(path) {
+            _ if fresh => BTreeMap::new(),
+            Ok(text) => serde_json::from_str(&text).map_err(|error| bad(error.to_string()))?,
+            Err(error) if error.kind() == ErrorKind::NotFound => BTreeMap::new(),
+            Err(error) => return Err(bad(error.to_string())),
+        };
+        Ok(Self { path: path.into(), entries })
+    }
+
+    /// Whether this was measured.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.entries.contains_key(key)
+    }
+
+    /// What is noted of `key`, if it can be understood.
+    pub(super) fn get<T: DeserializeOwned>(&self, key: &str) -> Option<T> {
+        self.entries.get(key).and_then(|value| serde_json::from_value(value.clone()).ok())
+    }
+
+    /// Notes a measurement at once.
+    pub(super) fn note(&mut self, key: &str, measured: &impl Serialize) -> Result<(), Failure> {
+        let fail = |error: serde_json::Error| Failure::new(Exit::Output, format!("{key}: {error}"));
+        self.entries.insert(key.into(), serde_json::to_value(measured).map_err(fail)?);
+        let text = serde_json::to_string_pretty(&self.entries).map_err(fail)?;
+        write_file(&self.path, |writer| writer.write_all(text.as_bytes())).map(|_| ())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_noted_is_there_the_next_time() -> Result<(), Failure> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("journal.json");
+        let mut journal = Journal::open(&path, false)?;
+        assert!(!journal.has("a"), "nothing was measured yet");
+        journal.note("a", &[1.5, 2.0])?;
+        journal.note("b", &"text")?;
+        let journal = Journal::open(&path, false)?;
+        assert_eq!(journal.get::<Vec<f64>>("a"), Some(vec![1.5, 2.0]));
+        assert_eq!(journal.get::<Vec<f64>>("b"), None, "a text is no list");
+        assert!(!Journal::open(&path, true)?.has("a"), "a fresh one is empty");
+        Ok(())
+    }
+
+    #[test]
+    fn a_broken_journal_is_named_with_the_remedy() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("journal.json");
+        std::fs::write(&path, "{\"a\": ").expect("written");
+        let failure = Journal::open(&path, false).expect_err("it is cut off");
+        assert!(failure.message.contains("--fresh"), "{}", failure.message);
+    }
+}

@@ -1,0 +1,177 @@
+//! The scenes of the paper's evaluation, or what stands in for them.
+
+use std::path::{Path, PathBuf};
+
+use autosplats::{Camera, Projection, ViewDirection, guess_axes};
+use autosplats_cloud::glam::{DMat4, DVec3};
+use autosplats_cloud::{Contents, PointCloud, ReadOptions, Scene, read_mesh, read_with, sample_surface};
+
+use crate::exit::{Exit, Failure};
+use crate::input::{Inputs, read_failure};
+use crate::progress::Bar;
+use crate::render::{render_failure, scene_camera};
+
+/// The paper's pictures.
+const SIZE: [u32; 2] = [1760, 900];
+/// Sides of the pictures of a quick run.
+const QUICK_SIZE: [u32; 2] = [440, 225];
+/// Horses in the herd, and in a row of it.
+const HORSES: usize = 10;
+const ROW: usize = 5;
+
+/// A scene of Table 1.
+#[derive(Clone, Debug)]
+pub(super) struct PaperScene {
+    pub(super) name: &'static str,
+    /// What the paper says of it.
+    pub(super) paper: PaperFigures,
+    pub(super) points: usize,
+    /// Width and height of its pictures.
+    pub(super) size: [u32; 2],
+    source: Source,
+}
+
+/// Table 1 of the paper: a GeForce GTX 580, k = 10. Milliseconds; `None` where it gives none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PaperFigures {
+    pub(super) points: &'static str,
+    pub(super) pixels: &'static str,
+    pub(super) kd_tree: Option<f64>,
+    pub(super) splat_communication: f64,
+    /// With grid culling.
+    pub(super) culled: Option<f64>,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    /// A built-in scene by this name.
+    Generated(&'static str),
+    /// All points of a file, seen from its front.
+    File(PathBuf),
+    /// Horses at different moments of a gallop, from a folder with meshes of one topology.
+    Gallop(PathBuf),
+}
+
+/// The names of the scenes, as `--scenes` takes them.
+pub(super) const NAMES: [&str; 4] = ["bunny", "imperia", "horses", "cathedral"];
+
+impl PaperScene {
+    /// The scene of this name; `quick` makes it small.
+    pub(super) fn new(name: &'static str, bunny: Option<&Path>, gallop: Option<&Path>, quick: bool) -> Self {
+        let figures = |points, pixels, kd_tree, splat_communication, culled| PaperFigures {
+            points,
+            pixels,
+            kd_tree,
+            splat_communication,
+            culled,
+        };
+        let (paper, points, source) = match name {
+            "bunny" => (
+                figures("36K", "34K", Some(14.0), 9.0, None),
+                [35_947, 8_000],
+                bunny.map_or(Source::Generated("figure"), |path| Source::File(path.into())),
+            ),
+            "imperia" => {
+                (figures("546K", "291K", Some(95.0), 37.0, None), [546_000, 20_000], Source::Generated("statue"))
+            }
+            "horses" => (
+                figures("1M", "690K", Some(169.0), 117.0, Some(71.0)),
+                [1_000_000, 30_000],
+                gallop.map_or(Source::Generated("herd"), |path| Source::Gallop(path.into())),
+            ),
+            _ => {
+                (figures("10M", "1.3M", None, 264.0, Some(123.0)), [10_000_000, 60_000], Source::Generated("cathedral"))
+            }
+        };
+        let [width, height] = if quick { QUICK_SIZE } else { SIZE };
+        // The statue was rendered in portrait format.
+        let size = if name == "imperia" { [height, width] } else { [width, height] };
+        Self { name, paper, points: points[usize::from(quick)], size, source }
+    }
+
+    /// What it is made of, for the report.
+    pub(super) fn origin(&self) -> String {
+        match &self.source {
+            Source::Generated(scene) => format!("generated, `scene:{scene}`, in its place"),
+            Source::File(_) => "the Stanford bunny's own points".into(),
+            Source::Gallop(_) => format!("{HORSES} moments of a galloping horse, its surface resampled"),
+        }
+    }
+
+    /// What tells its measurements from others'.
+    pub(super) fn key(&self) -> String {
+        let source = match &self.source {
+            Source::Generated(scene) => scene,
+            Source::File(_) => "file",
+            Source::Gallop(_) => "gallop",
+        };
+        let [width, height] = self.size;
+        format!("{}({source}:{}, {width}x{height})", self.name, self.points)
+    }
+
+    /// The files that it needs, for a check before the work begins.
+    pub(super) fn file(&self) -> Option<&Path> {
+        match &self.source {
+            Source::Generated(_) => None,
+            Source::File(path) | Source::Gallop(path) => Some(path),
+        }
+    }
+
+    /// Its points, and the camera that shows them.
+    pub(super) fn load(&self, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
+        match &self.source {
+            Source::Generated(scene) => generated(&format!("{scene}:{}", self.points), quiet),
+            Source::File(path) => {
+                let bar = Bar::on_file("reading", path, quiet);
+                let cloud = read_with(path, &ReadOptions::default(), &bar).map_err(read_failure)?;
+                self.fitted(cloud, ViewDirection::Front)
+            }
+            Source::Gallop(folder) => self.fitted(herd(folder, self.points, quiet)?, ViewDirection::Iso),
+        }
+    }
+
+    fn fitted(&self, cloud: PointCloud, direction: ViewDirection) -> Result<(PointCloud, Camera), Failure> {
+        let aspect = f64::from(self.size[0]) / f64::from(self.size[1]);
+        let projection = Projection::PerspectiveFovDeg(30.0);
+        let camera = Camera::fit(&cloud, guess_axes(&cloud), direction, aspect, projection).map_err(render_failure)?;
+        Ok((cloud, camera))
+    }
+}
+
+/// A built-in scene, `NAME[:COUNT]`, and its camera.
+pub(super) fn generated(name: &str, quiet: bool) -> Result<(PointCloud, Camera), Failure> {
+    let inputs = Inputs::scene(name)?;
+    let scene: &Scene = inputs.only_scene().ok_or_else(|| Failure::usage(format!("{name} is no scene")))?;
+    Ok((inputs.read(quiet)?, scene_camera(scene)))
+}
+
+/// Horses in two rows at moments of one gallop, `count` points in all, strewn over their surfaces.
+fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure> {
+    let unreadable = |error: std::io::Error| Failure::new(Exit::Input, format!("{}: {error}", folder.display()));
+    let mut files = Vec::new();
+    for entry in folder.read_dir().map_err(unreadable)? {
+        files.push(entry.map_err(unreadable)?.path());
+    }
+    files.sort();
+    if files.is_empty() {
+        return Err(Failure::new(Exit::Input, format!("{}: there is no file in it", folder.display())));
+    }
+    let bar = Bar::new("resampling the gallop", quiet);
+    let options = ReadOptions::default();
+    // The first file has the triangles of all.
+    let triangles = read_mesh(&files[0], &options, &()).map_err(read_failure)?.triangles;
+    let mut horses = Vec::new();
+    for horse in 0..HORSES {
+        autosplats_cloud::Progress::report(&bar, horse as f32 / HORSES as f32);
+        // Seven frames apart, so that neighbours are at different moments.
+        let file = &files[horse * 7 % files.len()];
+        let cloud = read_with(file, &options, &()).map_err(read_failure)?;
+        let mesh = Contents { cloud, triangles: triangles.clone() };
+        let share = count / HORSES + usize::from(horse < count % HORSES);
+        let points = sample_surface(&mesh, share, horse as u64, &()).map_err(read_failure)?;
+        let [across, along] = [(horse % ROW) as f64, (horse / ROW) as f64];
+        let place = DVec3::new(1.3 * across + 0.5 * along, 0.0, -2.6 * along - 0.3 * (across * 2.4).sin());
+        horses.push((points, DMat4::from_translation(place)));
+    }
+    Ok(PointCloud::merge(horses))
+}
