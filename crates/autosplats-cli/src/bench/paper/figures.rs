@@ -4,7 +4,7 @@ use std::path::Path;
 
 use autosplats::{Camera, ColorMode, Image, NormalSettings, Projection, Renderer, Settings, estimate_normals};
 use autosplats_cloud::PointCloud;
-use autosplats_cloud::glam::Vec3;
+use autosplats_cloud::glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::measure::{K, Loaded};
@@ -32,12 +32,20 @@ pub(super) struct NormalError {
     pub(super) psnr: f64,
 }
 
-/// The k-radii of a scene, in its unit.
+/// Medians of the k-radii of two bodies, in the scene's unit, each seen large enough.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Radii {
-    pub(super) points: usize,
-    /// Quantiles: 1, 25, 50, 75 and 99 of a hundred.
-    pub(super) quantiles: [f64; 5],
+    pub(super) large: f64,
+    pub(super) small: f64,
+}
+
+/// The scene as it is measured, at half the size.
+pub(super) fn picture(loaded: &Loaded<'_>, path: &Path) -> Result<(), Failure> {
+    let Loaded { scene, cloud, camera } = loaded;
+    let size = scene.size.map(|side| side / 2);
+    let mut renderer = Renderer::new();
+    let frame = renderer.render(cloud, camera, size, &Settings::default()).map_err(render_failure)?;
+    write_file(path, |writer| write_png(frame.image, false, writer)).map(|_| ())
 }
 
 /// Figure 6: normals on the fly beside precomputed ones, by the same estimator.
@@ -75,27 +83,45 @@ pub(super) fn normals(loaded: &Loaded<'_>, side: u32, path: &Path) -> Result<Nor
     })
 }
 
-/// Figure 7: two scales in one scene; the surface, single splats, and the k-radius in colours.
+/// Figure 7: a small body on the head of a large one; the surface, the k-radius in colours, and single splats, the last
+/// also near the small one.
 pub(super) fn scales(count: usize, side: u32, quiet: bool, path: &Path) -> Result<Radii, Failure> {
     let (cloud, camera) = generated(&format!("two-scales:{count}"), quiet)?;
-    let mut renderer = Renderer::new();
+    let up = camera.up.normalize();
+    let height = |position: &[f32; 3]| (Vec3::from(*position).as_dvec3() + cloud.origin()).dot(up);
+    let mut heights: Vec<f64> = cloud.positions().iter().map(height).collect();
+    heights.sort_unstable_by(f64::total_cmp);
+    // As many points are on the small one as on the large one, and it stands on top.
+    let border = heights.get(heights.len() / 2).copied().unwrap_or_default();
+    let is_small = |position: &[f32; 3]| height(position) > border;
+    let small: Vec<DVec3> =
+        cloud.positions().iter().filter(|at| is_small(at)).map(|at| Vec3::from(*at).as_dvec3()).collect();
+    let middle = cloud.origin() + small.iter().sum::<DVec3>() / small.len().max(1) as f64;
+    let near = zoomed(&camera, middle, 7.0);
+
     let mut apart = Settings::default();
     apart.reconstruction.splat_scale = APART;
     let mut colored = Settings::default();
     colored.shading.color = ColorMode::KRadius;
+    let plain = Settings::default();
+    let mut renderer = Renderer::new();
     let mut images = Vec::new();
-    for settings in [&apart, &colored, &Settings::default()] {
-        let frame = renderer.render(&cloud, &camera, [side, side], settings).map_err(render_failure)?;
-        images.insert(0, frame.image.clone());
+    let mut medians = [0.0; 2];
+    for (camera, settings) in [(&camera, &plain), (&camera, &colored), (&camera, &apart), (&near, &apart)] {
+        let frame = renderer.render(&cloud, camera, [side, side], settings).map_err(render_failure)?;
+        images.push(frame.image.clone());
+        let wants_small = std::ptr::eq(camera, &near);
+        let surfels = renderer.surfels().map_err(render_failure)?;
+        let of_body = surfels
+            .iter()
+            .filter(|surfel| surfel.radius > 0.0)
+            .filter(|surfel| is_small(&cloud.positions()[surfel.point as usize]) == wants_small);
+        let mut radii: Vec<f32> = of_body.map(|surfel| surfel.k_radius).collect();
+        radii.sort_unstable_by(f32::total_cmp);
+        medians[usize::from(wants_small)] = radii.get(radii.len() / 2).copied().unwrap_or_default().into();
     }
-    images.swap(1, 2);
     write_side_by_side(&images.iter().collect::<Vec<_>>(), path)?;
-    let surfels = renderer.surfels().map_err(render_failure)?;
-    let mut radii: Vec<f64> =
-        surfels.iter().filter(|surfel| surfel.radius > 0.0).map(|surfel| f64::from(surfel.k_radius)).collect();
-    radii.sort_unstable_by(f64::total_cmp);
-    let quantile = |part: f64| radii.get((part * radii.len() as f64) as usize).copied().unwrap_or_default();
-    Ok(Radii { points: radii.len(), quantiles: [0.01, 0.25, 0.5, 0.75, 0.99].map(quantile) })
+    Ok(Radii { large: medians[0], small: medians[1] })
 }
 
 /// Figure 9: a scan and, nearer, the curvature of its points.
@@ -120,10 +146,14 @@ fn closer(cloud: &PointCloud, camera: &Camera) -> Camera {
     let [low, high] =
         [f64::min, f64::max].map(|of| cloud.positions().iter().map(height).reduce(of).unwrap_or_default());
     let aim = low + 0.83 * (high - low);
-    let look_at = camera.look_at + up * (aim - camera.look_at.dot(up));
+    zoomed(camera, camera.look_at + up * (aim - camera.look_at.dot(up)), 3.0)
+}
+
+/// A camera that sees `look_at` in the middle, `times` as large.
+fn zoomed(camera: &Camera, look_at: DVec3, times: f64) -> Camera {
     let projection = match camera.projection {
-        Projection::PerspectiveFovDeg(fov) => Projection::PerspectiveFovDeg(fov / 3.0),
-        Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height / 3.0),
+        Projection::PerspectiveFovDeg(fov) => Projection::PerspectiveFovDeg(fov / times),
+        Projection::OrthographicHeight(height) => Projection::OrthographicHeight(height / times),
     };
     Camera { look_at, projection, ..*camera }
 }

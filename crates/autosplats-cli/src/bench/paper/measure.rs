@@ -93,6 +93,8 @@ pub(super) struct Accuracy {
     pub(super) on_screen: f64,
     /// Part whose k-radius is the exact one among all points.
     pub(super) in_space: f64,
+    /// Part whose search met the bound on its work.
+    pub(super) bounded: f64,
     /// Microseconds of search per visible point.
     pub(super) us_per_point: f64,
 }
@@ -189,7 +191,8 @@ pub(super) fn time(
             Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
         };
         counts = [rendered.counts.visible, rendered.counts.active + rendered.counts.recovered];
-        let built = rendered.passes.iter().filter(|time| is_build(time)).map(|time| time.ms).sum();
+        // An empty sum of floats is -0.
+        let built = rendered.passes.iter().filter(|time| is_build(time)).map(|time| time.ms).sum::<f64>() + 0.0;
         let sample = (rendered.timings, built);
         if frame > 0 || sample.0.frame > SLOW_MS {
             samples.push(sample);
@@ -270,8 +273,8 @@ pub(super) fn accuracy(
         Ok(renderer) => renderer,
         Err(why) => return Ok(Outcome::Refused(why)),
     };
-    let search_ms = match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method)))? {
-        Outcome::Measured(frame) => frame.timings.search,
+    let (search_ms, bounded) = match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method)))? {
+        Outcome::Measured(frame) => (frame.timings.search, frame.counts.bounded),
         Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
     };
     let surfels = renderer.surfels().map_err(render_failure)?;
@@ -286,6 +289,7 @@ pub(super) fn accuracy(
     Ok(Outcome::Measured(Accuracy {
         on_screen: on_screen as f64 / count,
         in_space: in_space as f64 / count,
+        bounded: bounded as f64 / count,
         us_per_point: 1e3 * search_ms / count,
     }))
 }

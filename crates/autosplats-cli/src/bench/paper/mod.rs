@@ -40,6 +40,8 @@ const SIDE: [u32; 2] = [600, 150];
 /// What is to be measured of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Task {
+    /// What it looks like.
+    Picture,
     /// A line of Table 1, with grid culling or without.
     Table(Method, bool),
     /// kiddo's times beside it.
@@ -65,6 +67,7 @@ impl Task {
                 let culled = if culled { "culled" } else { "all" };
                 format!("{scene} | {} | {} | table {culled}", renderers.device(method), method.name())
             }
+            Self::Picture => format!("{scene} | picture"),
             Self::Kiddo => format!("{scene} | {} | kiddo", renderers.device(Method::GridCpu)),
             Self::Stages(method, k) => {
                 format!("{scene} | {} | {} | stages k={k}", renderers.device(method), method.name())
@@ -82,6 +85,7 @@ impl Task {
     fn describe(self) -> String {
         match self {
             Self::Table(method, _) => format!("Table 1, {}", method.name()),
+            Self::Picture => "picture".into(),
             Self::Kiddo => "Table 1, kiddo".into(),
             Self::Stages(method, k) => format!("Figure 10, {}, k = {k}", method.name()),
             Self::Accuracy(method) => format!("accuracy, {}", method.name()),
@@ -95,8 +99,8 @@ impl Task {
 /// What belongs to a scene, in the order of the page.
 fn tasks(scene: &PaperScene, ks: &[u32]) -> Vec<Task> {
     let methods = || Method::ALL.into_iter();
-    let mut tasks: Vec<Task> =
-        methods().flat_map(|method| [false, true].map(|culled| Task::Table(method, culled))).collect();
+    let mut tasks = vec![Task::Picture];
+    tasks.extend(methods().flat_map(|method| [false, true].map(|culled| Task::Table(method, culled))));
     tasks.push(Task::Kiddo);
     tasks.extend(methods().map(Task::Accuracy));
     tasks.push(Task::Culling);
@@ -152,6 +156,10 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
                 exact = Some(Exact::new(&mut renderers, &loaded)?);
             }
             match (task, &exact) {
+                (Task::Picture, _) => {
+                    figures::picture(&loaded, &pictures.join(picture_name(scene)))?;
+                    journal.note(&key, &true)?;
+                }
                 (Task::Table(method, culled), _) => {
                     let settings = settings(method, K, culled);
                     journal.note(&key, &time(&mut renderers, &loaded, method, &settings, FRAMES)?)?;
@@ -186,6 +194,11 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
     report.write_charts(&pictures)?;
     write_file(&page, |writer| std::io::Write::write_all(writer, report.page().as_bytes()))?;
     print_line(&page.display().to_string())
+}
+
+/// The file with a scene's picture.
+fn picture_name(scene: &PaperScene) -> String {
+    format!("scene-{}.png", scene.name)
 }
 
 fn scene(name: &str, bunny: Option<&Path>, gallop: Option<&Path>, quick: bool) -> Result<PaperScene, Failure> {

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::Task;
 use super::chart::{Labels, stacked_bars};
 use super::figures::{NormalError, Radii};
 use super::journal::Journal;
 use super::measure::{Accuracy, K, KiddoTimes, Method, Outcome, Renderers, Timing};
 use super::scenes::PaperScene;
+use super::{Task, picture_name};
 use crate::exit::Failure;
 use crate::output::write_file;
 
@@ -66,6 +66,10 @@ impl Report<'_> {
                 paper.pixels,
                 scene.origin()
             );
+        }
+        page += "\n";
+        for scene in self.scenes {
+            _ = writeln!(page, "![{}](results/{})", scene.name, picture_name(scene));
         }
         self.table_1(&mut page);
         self.culling(&mut page);
@@ -159,24 +163,27 @@ impl Report<'_> {
             "\n## Accuracy\n\n\
              Parts of the visible points whose neighbourhood is the exact one, by its k-radius to a part in ten thousand: among \
              visible points (what a search in the picture can find), and among all points of the cloud (the price of searching \
-             in the picture). k = {K}; rules for outliers and gaps off, no culling.\n\n\
-             | scene | method | exact on the screen | exact in space | search, µs a point |\n|---|---|--:|--:|--:|\n"
+             in the picture). A search that meets its bound keeps what it is sure of, and is not exact. k = {K}; rules for \
+             outliers and gaps off, no culling; one frame, the first.\n\n\
+             | scene | method | exact on the screen | met the bound | exact in space | search, µs a point |\n\
+             |---|---|--:|--:|--:|--:|\n"
         );
         for scene in self.scenes {
             for method in Method::ALL {
                 let measured: Option<Outcome<Accuracy>> =
                     self.journal.get(&Task::Accuracy(method).key(scene, self.renderers));
-                let Some(Accuracy { on_screen, in_space, us_per_point }) =
+                let Some(Accuracy { on_screen, in_space, bounded, us_per_point }) =
                     measured.as_ref().and_then(Outcome::measured)
                 else {
                     continue;
                 };
                 _ = writeln!(
                     page,
-                    "| {} | {} | {} | {} | {us_per_point:.2} |",
+                    "| {} | {} | {} | {} | {} | {us_per_point:.2} |",
                     scene.name,
                     method.name(),
                     percent(*on_screen),
+                    percent(*bounded),
                     percent(*in_space)
                 );
             }
@@ -205,17 +212,15 @@ impl Report<'_> {
     }
 
     fn figure_7(&self, page: &mut String) {
-        let Some(Radii { points, quantiles }) = self.journal.get(self.scales) else { return };
-        let [q1, q25, q50, q75, q99] = quantiles;
+        let Some(Radii { large, small }) = self.journal.get(self.scales) else { return };
         _ = write!(
             page,
             "\n## Figure 7: two scales\n\n\
-             ![surface; k-radius; single splats](results/figure-7.png)\n\n\
-             As many points on the small body as on the large one; the surface, the k-radius in colours, and splats made \
-             smaller so that single ones are seen. No parameter says how large anything is: over {points} points the k-radius \
-             has the quantiles {q1:.4} (1 %), {q25:.4}, {q50:.4} (the median), {q75:.4} and {q99:.4} (99 %), a range of \
-             {:.0} to one.\n",
-            q99 / q1
+             ![surface; k-radius; single splats; nearer](results/figure-7.png)\n\n\
+             As many points on the small body as on the large one: the surface, the k-radius in colours, splats made smaller so \
+             that single ones are seen, and those of the small one seven times as near. No parameter says how large anything \
+             is: the k-radius is {large:.4} on the large body and {small:.4} on the small one in the median, {:.1} to one.\n",
+            large / small
         );
     }
 
