@@ -381,7 +381,7 @@ Examples:
   autosplats bench paper --quick --out /tmp/paper";
 
 #[derive(Args, Debug)]
-#[command(after_help = BENCH_EXAMPLES, args_conflicts_with_subcommands = true)]
+#[command(after_help = BENCH_EXAMPLES, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
 pub(crate) struct BenchArgs {
     #[command(subcommand)]
     pub(crate) evaluation: Option<Evaluation>,

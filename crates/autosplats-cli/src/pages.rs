@@ -45,14 +45,19 @@ pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The program's page and that of each command, by name.
+/// The program's page and those of all commands, by name.
 fn pages() -> Vec<(String, Command)> {
     let mut program = CommandLine::command().disable_help_subcommand(true);
     program.build();
-    let mut pages = vec![("autosplats".to_owned(), program.clone())];
-    for command in program.get_subcommands() {
-        let page = format!("autosplats-{}", command.get_name());
-        pages.push((page, command.clone().version(env!("CARGO_PKG_VERSION"))));
+    let mut pages = vec![("autosplats".to_owned(), program)];
+    let mut next = 0;
+    while next < pages.len() {
+        let (name, command) = pages[next].clone();
+        let commands = command.get_subcommands().filter(|command| command.get_name() != "help");
+        pages.extend(commands.map(|command| {
+            (format!("{name}-{}", command.get_name()), command.clone().version(env!("CARGO_PKG_VERSION")))
+        }));
+        next += 1;
     }
     pages
 }

@@ -1,7 +1,5 @@
 //! What is measured of each scene, and the measuring.
 
-use std::time::Instant;
-
 use autosplats::{
     Backend, Camera, Error, Image, NormalSettings, PassTime, Renderer, SearchEngine, Settings, Timings,
     estimate_normals,
@@ -305,7 +303,7 @@ pub(super) fn kiddo(loaded: &Loaded<'_>, exact: &Exact) -> Outcome<KiddoTimes> {
 #[cfg(feature = "kiddo")]
 fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
     use kiddo::{ImmutableKdTree, SquaredEuclidean};
-    let start = Instant::now();
+    let start = std::time::Instant::now();
     let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(points) else { return f64::NAN };
     // The point itself is found too.
     let nearest = std::num::NonZero::new(K as usize + 1).unwrap_or(std::num::NonZero::<usize>::MIN);
