@@ -22,6 +22,7 @@ const SHARED: &[(&str, &str)] = &[
     ("shading", include_str!("../shared/shading.wgsl")),
     ("depth_map", include_str!("../shared/depth_map.wgsl")),
     ("hidden", include_str!("../shared/hidden.wgsl")),
+    ("recovered", include_str!("../shared/recovered.wgsl")),
     ("splat", include_str!("../shared/splat.wgsl")),
     ("fragment", include_str!("../shared/fragment.wgsl")),
     ("patch", include_str!("../shared/patch.wgsl")),

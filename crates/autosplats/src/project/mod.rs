@@ -116,8 +116,14 @@ impl DensityGrid {
     /// point's cell [Paper, §5.1].
     #[inline(always)]
     pub(crate) fn initial_radius(&self, point: &ScreenPoint, k: u32, view: &View) -> f32 {
+        self.initial_radius_px(point, k) * view.pixel_size(point.position_view[2])
+    }
+
+    /// The same in pixels.
+    #[inline(always)]
+    pub(crate) fn initial_radius_px(&self, point: &ScreenPoint, k: u32) -> f32 {
         let area_px = (self.cell_px * self.cell_px) as f32;
         let count = self.count[self.cell(point.pixel_xy())] as f32;
-        (area_px * k as f32 / (std::f32::consts::PI * count)).sqrt() * view.pixel_size(point.position_view[2])
+        (area_px * k as f32 / (std::f32::consts::PI * count)).sqrt()
     }
 }

@@ -83,7 +83,8 @@ impl CpuRenderer {
         recovered.clear();
         let hidden = |&index: &u32| {
             let point = &screen.points[index as usize];
-            splatter.hides(point.pixel_xy(), point.position_view[2], &view)
+            let radius_px = screen.density.initial_radius_px(point, settings_splat.k);
+            splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
         };
         recovered.extend(screen.passive.iter().filter(|index| !hidden(index)));
         clock.lap(|timings| &mut timings.splat);

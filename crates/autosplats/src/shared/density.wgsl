@@ -14,6 +14,11 @@ fn culling_depth(nearest: f32, cell_px: u32) -> f32 {
 
 // First search radius in world units: that of the circle which holds k points at the cell's density [Paper, §5.1].
 fn first_radius(count: u32, cell_px: u32, depth: f32) -> f32 {
+    return first_radius_px(count, cell_px) * pixel_size(depth);
+}
+
+// The same in pixels.
+fn first_radius_px(count: u32, cell_px: u32) -> f32 {
     let area_px = f32(cell_px * cell_px);
-    return sqrt(area_px * f32(frame.k) / (3.14159265 * f32(count))) * pixel_size(depth);
+    return sqrt(area_px * f32(frame.k) / (3.14159265 * f32(count)));
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
 use super::raster::{Tile, draw_attributes, draw_depth};
+use super::setup::RECOVER_REACH;
 use super::trim::{Rim, rim, sticks_out};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::camera::View;
@@ -50,9 +51,17 @@ impl Splatter {
         draw_depth_map(runs, view, &mut self.depth);
     }
 
-    /// Whether a point at this pixel and depth lies behind the depth map.
-    pub(crate) fn hides(&self, [x, y]: [usize; 2], depth: f32, view: &View) -> bool {
-        depth > self.depth[tiled_index(view.width as usize, x, y)]
+    /// Whether a point at this pixel and depth lies behind the depth map, and will however silhouettes change:
+    /// `initial_radius_px` is its first search radius.
+    pub(crate) fn hides(&self, [x, y]: [usize; 2], depth: f32, initial_radius_px: f32, view: &View) -> bool {
+        let [width, height] = [view.width as usize, view.height as usize];
+        let hidden = |x: usize, y: usize| depth > self.depth[tiled_index(width, x, y)];
+        let reach = (RECOVER_REACH * initial_radius_px) as usize;
+        hidden(x, y)
+            && hidden(x.saturating_sub(reach), y)
+            && hidden((x + reach).min(width - 1), y)
+            && hidden(x, y.saturating_sub(reach))
+            && hidden(x, (y + reach).min(height - 1))
     }
 
     /// Redraws the depth map with only those surfels whose point it does not hide [Paper, §7, Depth Refinement].

@@ -8,7 +8,7 @@
 
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, SUPPORT};
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, STRIDES_PER_REACH};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -130,6 +130,7 @@ impl SplatPasses {
             ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
             ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
         ];
+        let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {
@@ -138,9 +139,9 @@ impl SplatPasses {
             clear_depth: pass(&CLEAR_DEPTH)?,
             depth: [depth(0.0)?, depth(1.0)?],
             depth_large: Pass::new(gpu, &DEPTH_LARGE, &[dot_radius])?,
-            recover_count: pass(&RECOVER_COUNT)?,
+            recover_count: Pass::new(gpu, &RECOVER_COUNT, &reach)?,
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
-            recover: pass(&RECOVER)?,
+            recover: Pass::new(gpu, &RECOVER, &reach)?,
             work: WorkPass::new(gpu)?,
             refine: pass(&REFINE)?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
@@ -192,7 +193,7 @@ impl SplatPasses {
         ]
     }
 
-    /// Appends the passive points that the depth map does not hide to the queries [Paper, §7, Grid Culling].
+    /// Appends the passive points that the depth map does not hide for sure to the queries [Paper, §7, Grid Culling].
     pub(crate) fn steps_recover(
         &self,
         gpu: &Gpu,
@@ -200,12 +201,13 @@ impl SplatPasses {
         screen: &ScreenBuffers,
         splats: &SplatBuffers,
     ) -> Vec<Step> {
-        let ScreenBuffers { counters, points, passive, block_sums, queries, .. } = screen;
+        let ScreenBuffers { counters, density, points, passive, block_sums, queries, .. } = screen;
         let depth = &splats.depth[0];
         let blocks = || screen.groups(Work::PassiveBlocks);
-        let recover = [frame, points, passive, counters, depth, block_sums, queries];
+        let count = [frame, points, passive, counters, density, depth, block_sums];
+        let recover = [frame, points, passive, counters, density, depth, block_sums, queries];
         vec![
-            self.recover_count.step(gpu, &[frame, points, passive, counters, depth, block_sums], blocks()),
+            self.recover_count.step(gpu, &count, blocks()),
             self.scan_recovered.step(gpu, &[frame, block_sums, counters], 1),
             self.recover.step(gpu, &recover, blocks()),
             self.work.step(gpu, frame, screen),

@@ -9,9 +9,9 @@ use super::*;
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::ScreenPoint;
 use crate::project::gpu::COUNTERS;
 use crate::project::gpu::tests::find_work;
+use crate::project::{DensityGrid, ScreenPoint};
 use crate::test_clouds::Random;
 
 /// One pixel, patches and tiles that are cut off, several tiles.
@@ -136,7 +136,7 @@ fn other_depths(splatter: &Splatter, depth: &[f32], view: &View) -> usize {
     let wrong = |&pixel: &usize| {
         let at = [pixel % view.width as usize, pixel / view.width as usize];
         let near = depth[pixel].abs() * 1e-5;
-        let hides = |depth: f32| splatter.hides(at, depth.min(f32::MAX), view);
+        let hides = |depth: f32| splatter.hides(at, depth.min(f32::MAX), 0.0, view);
         hides(depth[pixel] - near) || (depth[pixel].is_finite() && !hides(depth[pixel] + near))
     };
     (0..depth.len()).filter(wrong).count()
@@ -297,6 +297,11 @@ fn hidden_points_are_not_recovered() {
     screen.points = gpu.storage_with("points", &points).expect("room");
     screen.passive = gpu.storage_with("passive", &passive).expect("room");
     screen.queries = gpu.storage::<u32>("queries", 5000).expect("room");
+    // One density cell holds all.
+    let density = DensityGrid { cell_px: 200, columns: 1, count: vec![1500], ..DensityGrid::default() };
+    screen.density = gpu.storage_with("density", &[density.count[0], 0]).expect("room");
+    set_counter(&gpu, screen, Counter::CellPx, density.cell_px);
+    set_counter(&gpu, screen, Counter::CellColumns, density.columns);
     set_counter(&gpu, screen, Counter::Active, 500);
     set_counter(&gpu, screen, Counter::Passive, passive.len());
     let Buffers { frame, screen, surfels: on_device, splats, .. } = &buffers;
@@ -309,7 +314,8 @@ fn hidden_points_are_not_recovered() {
     let (splatter, _) = scene.host(Channels::default());
     let seen = |&index: &u32| {
         let point = &points[index as usize];
-        !splatter.hides(point.pixel_xy(), point.position_view[2], &view)
+        let radius_px = density.initial_radius_px(point, 1);
+        !splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
     };
     let expected: Vec<u32> = passive.iter().copied().filter(seen).collect();
     assert!(expected.len() > 500 && expected.len() + 500 < passive.len(), "some of each: {}", expected.len());
