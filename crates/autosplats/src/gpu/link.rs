@@ -17,6 +17,7 @@ const SHARED: &[(&str, &str)] = &[
     ("eigen", include_str!("../shared/eigen.wgsl")),
     ("window", include_str!("../shared/window.wgsl")),
     ("nearest", include_str!("../shared/nearest.wgsl")),
+    ("search_task", include_str!("../shared/search_task.wgsl")),
     ("layers", include_str!("../shared/layers.wgsl")),
     ("range_keys", include_str!("../shared/range_keys.wgsl")),
     ("shading", include_str!("../shared/shading.wgsl")),

@@ -50,6 +50,8 @@ pub(crate) enum Work {
     Recovered256,
     Queries256,
     LargeSplats,
+    LeftActive64,
+    LeftRecovered64,
 }
 
 /// Which queries the search, the fit and the splatting take up.
@@ -67,6 +69,11 @@ impl Round {
         [Work::Active64, Work::Recovered64][self as usize]
     }
 
+    /// Those that one pass of the search left to another, in workgroups of 64 invocations.
+    pub(crate) fn left_64(self) -> Work {
+        [Work::LeftActive64, Work::LeftRecovered64][self as usize]
+    }
+
     /// In workgroups of 256 invocations.
     pub(crate) fn work_256(self) -> Work {
         [Work::Active256, Work::Recovered256][self as usize]
@@ -76,7 +83,7 @@ impl Round {
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 /// How many of them there are.
-const WORKS: u64 = Work::LargeSplats as u64 + 1;
+const WORKS: u64 = Work::LeftRecovered64 as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
@@ -105,10 +112,12 @@ pub(crate) enum Counter {
     RangeHigh,
     Covered,
     Large,
+    LeftActive,
+    LeftRecovered,
 }
 
 /// Length of [`ScreenBuffers::counters`].
-pub(crate) const COUNTERS: usize = Counter::Large as usize + 1;
+pub(crate) const COUNTERS: usize = Counter::LeftRecovered as usize + 1;
 
 /// [`ScreenPoints`](super::ScreenPoints) on the device.
 #[derive(Debug)]
@@ -133,6 +142,8 @@ pub(crate) struct ScreenBuffers {
     /// Screen points to reconstruct: the active ones, and after them those recovered.
     pub(crate) queries: wgpu::Buffer,
     pub(crate) passive: wgpu::Buffer,
+    /// Queries of a round that one pass of the search leaves to another.
+    pub(crate) left: wgpu::Buffer,
     pub(crate) block_sums: wgpu::Buffer,
     /// Workgroups of each [`Work`], three `u32`.
     arguments: wgpu::Buffer,
@@ -161,6 +172,7 @@ impl ScreenBuffers {
             values: gpu.storage::<u32>("values of screen points", capacity * values)?,
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
+            left: gpu.storage::<u32>("queries left", capacity)?,
             block_sums: gpu.storage::<u32>("sums of blocks", pixels.div_ceil(BLOCK as usize))?,
             arguments: gpu.buffer(
                 "arguments",

@@ -82,6 +82,12 @@ fn cameras() -> [Camera; 2] {
     [camera(Projection::PerspectiveFovDeg(30.0)), camera(Projection::OrthographicHeight(2.1))]
 }
 
+/// Both forms of the passes, whichever suits this k.
+fn forms(gpu: &Gpu, k: u32) -> [(&'static str, SearchPasses); 2] {
+    [("one by one", false), ("four at a time", true)]
+        .map(|(name, four)| (name, SearchPasses::with_form(gpu, k, four).expect("passes")))
+}
+
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
@@ -128,7 +134,7 @@ fn the_device_finds_what_the_host_finds() {
     let Some(gpu) = test_gpu() else { return };
     let (mut compared, mut different) = (0, 0);
     for k in KS {
-        let passes = SearchPasses::new(&gpu, k).expect("passes");
+        let forms = forms(&gpu, k);
         for camera in cameras() {
             let sized = |size| test_clouds::all(4000).into_iter().map(move |(name, cloud)| (name, cloud, size));
             for (name, positions, size) in [[121, 90], [300, 2], [1, 1]].into_iter().flat_map(sized) {
@@ -137,17 +143,21 @@ fn the_device_finds_what_the_host_finds() {
                     let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
                     let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
-                    let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules);
-                    assert_eq!(device.len(), host.len(), "{case}: every point is a query");
-                    for (device, host) in device.iter().zip(&host) {
-                        if let Err(error) = device.compare(host) {
-                            eprintln!("{case}: {error}");
-                            different += 1;
+                    for (form, passes) in &forms {
+                        let case = format!("{form}, {case}");
+                        let (device, counted) = on_device(&gpu, passes, &screen, &view, &rules);
+                        assert_eq!(device.len(), host.len(), "{case}: every point is a query");
+                        for (device, host) in device.iter().zip(&host) {
+                            if let Err(error) = device.compare(host) {
+                                eprintln!("{case}: {error}");
+                                different += 1;
+                            }
                         }
-                    }
-                    compared += host.len();
-                    for (device, host) in counted.iter().zip(counted_by_host) {
-                        assert!(device.abs_diff(host) <= 1, "{case}: counted {counted:?}, host: {counted_by_host:?}");
+                        compared += host.len();
+                        for (device, host) in counted.iter().zip(counted_by_host) {
+                            let apart = device.abs_diff(host);
+                            assert!(apart <= 1, "{case}: counted {counted:?}, host: {counted_by_host:?}");
+                        }
                     }
                 }
             }
