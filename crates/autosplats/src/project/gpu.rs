@@ -2,31 +2,17 @@
 
 use super::ScreenPoint;
 use super::cpu::STRIP_SPACINGS;
-use super::device_cloud::DeviceCloud;
+use super::device_cloud::{Chunk, DeviceCloud};
 use crate::Error;
 use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
 
 #[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[
-    CLEAR,
-    PROJECT,
-    PROJECT_DEPTH,
-    PROJECT_INDEX,
-    OCCUPANCY,
-    GRID,
-    COUNT,
-    SCAN,
-    COMPACT,
-    GATHER,
-    SPLIT_COUNT,
-    SPLIT,
-    WORK,
-];
+pub(crate) const PASSES: &[PassSource] =
+    &[CLEAR, PROJECT, PROJECT_32, OCCUPANCY, GRID, COUNT, SCAN, COMPACT, GATHER, SPLIT_COUNT, SPLIT, WORK];
 const CLEAR: PassSource = PassSource::new("project/clear", include_str!("clear.wgsl"));
 const PROJECT: PassSource =
     PassSource { needs: INT64_ATOMICS, ..PassSource::new("project/project", include_str!("project.wgsl")) };
-const PROJECT_DEPTH: PassSource = PassSource::new("project/project_depth", include_str!("project_depth.wgsl"));
-const PROJECT_INDEX: PassSource = PassSource::new("project/project_index", include_str!("project_index.wgsl"));
+const PROJECT_32: PassSource = PassSource::new("project/project_32", include_str!("project_32.wgsl"));
 const OCCUPANCY: PassSource = PassSource::new("project/occupancy", include_str!("occupancy.wgsl"));
 const GRID: PassSource = PassSource::new("project/grid", include_str!("grid.wgsl"));
 const COUNT: PassSource = PassSource::new("project/count", include_str!("count.wgsl"));
@@ -214,11 +200,49 @@ pub(crate) fn scan_pass(gpu: &Gpu, total: Counter, scanned: Option<Counter>) -> 
     Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32)), ("SCANNED", f64::from(scanned as u32))])
 }
 
+/// How each pixel finds its nearest point.
+#[derive(Debug)]
+enum NearestPass {
+    /// With 64-bit atomics.
+    Once(Pass),
+    /// With 32 bits: the pass, and what tells it each turn.
+    Twice(Pass, [wgpu::Buffer; 2]),
+}
+
+impl NearestPass {
+    fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
+        if int64 {
+            return Ok(Self::Once(Pass::new(gpu, &PROJECT, &[])?));
+        }
+        let turn = |turn: u32| {
+            let told = gpu.uniform::<u32>("turn")?;
+            gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&turn));
+            Ok(told)
+        };
+        Ok(Self::Twice(Pass::new(gpu, &PROJECT_32, &[])?, [turn(0)?, turn(1)?]))
+    }
+
+    fn steps(&self, gpu: &Gpu, frame: &wgpu::Buffer, cloud: &DeviceCloud, screen: &ScreenBuffers) -> Vec<Step> {
+        let run = |pass: &Pass, turn: Option<&wgpu::Buffer>| -> Vec<Step> {
+            let step = |chunk: &Chunk| {
+                let buffers = [frame, &chunk.uniform, &chunk.positions, &screen.keys, &screen.counters];
+                let buffers: Vec<_> = buffers.into_iter().chain(turn).collect();
+                pass.step(gpu, &buffers, chunk.capacity.div_ceil(GROUP))
+            };
+            cloud.chunks().iter().map(step).collect()
+        };
+        match self {
+            Self::Once(pass) => run(pass, None),
+            Self::Twice(pass, turns) => turns.iter().flat_map(|turn| run(pass, Some(turn))).collect(),
+        }
+    }
+}
+
 /// The passes of projection.
 #[derive(Debug)]
 pub(crate) struct ProjectPasses {
     clear: Pass,
-    nearest: Vec<Pass>,
+    nearest: NearestPass,
     occupancy: Pass,
     grid: Pass,
     count: Pass,
@@ -232,7 +256,7 @@ pub(crate) struct ProjectPasses {
 }
 
 impl ProjectPasses {
-    /// Compiles them; `int64` asks for one pass with 64-bit atomics instead of two with 32 bits.
+    /// Compiles them; `int64` asks for 64-bit atomics, instead of a pass with 32 bits that runs twice.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -240,7 +264,7 @@ impl ProjectPasses {
         let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
         Ok(Self {
             clear: pass(&CLEAR)?,
-            nearest: if int64 { vec![pass(&PROJECT)?] } else { vec![pass(&PROJECT_DEPTH)?, pass(&PROJECT_INDEX)?] },
+            nearest: NearestPass::new(gpu, int64)?,
             occupancy: pass(&OCCUPANCY)?,
             grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
             count: pass(&COUNT)?,
@@ -268,14 +292,7 @@ impl ProjectPasses {
         let area = width * height;
         let pixel_blocks = area.div_ceil(BLOCK);
         let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], area.div_ceil(GROUP))];
-        for pass in &self.nearest {
-            for chunk in cloud.chunks() {
-                // The last of two passes has nothing left to count.
-                let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters];
-                let bound = if pass.bindings() == 4 { &buffers[..4] } else { &buffers };
-                steps.push(pass.step(gpu, bound, chunk.capacity.div_ceil(GROUP)));
-            }
-        }
+        steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         let blocks_16 = width.div_ceil(16) * height.div_ceil(16);
         steps.push(self.occupancy.step(gpu, &[frame, keys, counters], blocks_16));
         steps.push(self.grid.step(gpu, &[frame, counters], 1));

@@ -28,9 +28,9 @@ override LEAST_GROWTH: f32;
 // Whether only those queries are searched for that `search_four` left.
 override LEFT_ONLY: bool;
 
-// Screen points that a query lists at most, all windows together, before it counts as bounded: software devices end an
-// invocation silently after 65535 rounds of its loops.
-const MOST_READS = 40000u;
+// Rounds of loops after which a query counts as bounded. Much less than a software device allows: it runs several invocations
+// at once, as many rounds as the longest of them in each loop.
+const MOST_ROUNDS = 25000u;
 
 var<workgroup> clamped: atomic<u32>;
 var<workgroup> bounded: atomic<u32>;
@@ -65,8 +65,10 @@ fn squared_length(v: vec3f) -> f32 {
 fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
     var list = nearest_none();
     let strips = window_strips(window, task.strip_px);
+    rounds += strips.y - strips.x + 1u;
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);
+        rounds += (run.y - run.x) / 2u;
         // Two at a time: the loads of both are on their way together.
         for (var at = run.x; at < run.y; at += 2u) {
             let next = min(at + 1u, run.y - 1u);
@@ -125,12 +127,10 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px, CROWDED);
     }
-    var reads = 0u;
     var seen: Seen;
     // How far the search goes at most, once that is found.
     var farthest = 0.0;
     for (var step = 0u; step < 256u; step++) {
-        reads += len;
         var nearest = read_window(query, center, window);
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
@@ -182,7 +182,8 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         }
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px, CROWDED);
-        if reads + len > MOST_READS {
+        let strips = window_strips(window, task.strip_px);
+        if rounds + len / 2u + strips.y - strips.x > MOST_ROUNDS {
             break;
         }
     }

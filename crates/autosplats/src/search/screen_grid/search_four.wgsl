@@ -29,8 +29,8 @@
 
 override K: u32;
 
-// Windows that are read before the queries not settled are left to `search`, and screen points in them at most: with all
-// their readings less than half of the 65535 rounds after which software devices end an invocation.
+// Windows that are read before the queries not settled are left to `search`, and screen points and strips in them at most: with
+// all their readings less than half of the 65535 rounds after which software devices end an invocation.
 const MOST_WINDOWS = 3u;
 const MOST_SHARED = 1536u;
 const MOST_COUNTS = 3u;
@@ -217,7 +217,8 @@ fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
     for (var step = 0u; step < MOST_WINDOWS && any(open); step++) {
         let window = window_of_four(four, radius, open);
         let len = window_len(window, task.strip_px, CROWDED);
-        if len > MOST_SHARED {
+        let strips = window_strips(window, task.strip_px);
+        if len + strips.y - strips.x > MOST_SHARED {
             break;
         }
         // The query itself is at distance 0 and counts.

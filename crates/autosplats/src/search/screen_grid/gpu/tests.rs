@@ -230,3 +230,73 @@ fn huge_coordinates_reach_no_sum() {
         }
     }
 }
+
+/// Windows of tall pictures have many strips: software devices end invocations after so many rounds of their loops.
+#[test]
+fn tall_pictures_are_searched_to_the_end() {
+    let Some(gpu) = test_gpu() else { return };
+    let up = DVec3::Y;
+    let camera =
+        Camera { eye: -4.0 * DVec3::Z, look_at: DVec3::ZERO, up, projection: Projection::OrthographicHeight(2.1) };
+    // A column of points at all heights and some depths, dense in the middle.
+    let height = |i: usize| (i as f32 / 10_000.0 - 1.0).powi(3);
+    let column: Vec<_> = (0..20_000).map(|i| [0.0, height(i), 0.1 * (i % 7) as f32]).collect();
+    let sparse = column.iter().step_by(499).copied().collect();
+    for (name, positions, size) in [
+        ("column", column, [1, 16384]),
+        ("sparse column", sparse, [1, 16384]),
+        ("outliers", test_clouds::outliers(6000), [1024, 8192]),
+        ("edge", test_clouds::edge(30_000), [1024, 8192]),
+    ] {
+        for k in [10, 64] {
+            let (screen, view) = screen(&positions, &camera, size, k);
+            for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
+                let (host, counted_by_host) = on_host(&screen, &view, &rules);
+                for (form, passes) in forms(&gpu, k) {
+                    let case = format!("{form}, {name}, {rules:?}");
+                    let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules);
+                    let different = device.iter().zip(&host).filter(|(device, host)| device.compare(host).is_err());
+                    let different = different.count();
+                    assert!(different * 1000 <= host.len(), "{case}: {different} of {} differ", host.len());
+                    assert!(
+                        counted[1].abs_diff(counted_by_host[1]) <= 1,
+                        "{case}: {counted:?}, host: {counted_by_host:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// More points at exactly the same distance than lie between two thresholds at the end: all of them belong.
+#[test]
+fn all_at_the_same_distance_are_neighbours() {
+    let Some(gpu) = test_gpu() else { return };
+    // Whole numbers, the middle of a circle and the 108 points on it: squares are exact.
+    let radius = 1105i32;
+    let half = |x: i32| f64::from(radius * radius - x * x).sqrt();
+    let whole = (-radius..=radius).filter(|&x| half(x).fract() == 0.0);
+    let mut points: Vec<_> = whole.flat_map(|x| [[x as f32, half(x) as f32], [x as f32, -half(x) as f32]]).collect();
+    points.push([0.0, 0.0]);
+    let positions: Vec<_> = points.iter().map(|[x, y]| [x / 1024.0, y / 1024.0, 0.0]).collect();
+    let projection = Projection::OrthographicHeight(2.5);
+    let camera = Camera { eye: -4.0 * DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, projection };
+    for k in [16, 17, 40, 64] {
+        let (screen, view) = screen(&positions, &camera, [700, 700], k);
+        let queries = [&screen.active[..], &screen.passive].concat();
+        let is_middle = |&query: &u32| screen.points[query as usize].position_view[..2] == [0.0, 0.0];
+        let middle = queries.iter().position(is_middle).expect("the middle");
+        for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
+            let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
+            let (host, _) = on_host(&screen, &view, &rules);
+            assert!(lambda.is_some() || host[middle].count > 100.0, "{rules:?}: {:?}", host[middle]);
+            for (form, passes) in forms(&gpu, k) {
+                let (device, _) = on_device(&gpu, &passes, &screen, &view, &rules);
+                for (device, host) in device.iter().zip(&host) {
+                    assert_eq!(device.compare(host), Ok(()), "{form}, {rules:?}");
+                }
+            }
+        }
+    }
+}
