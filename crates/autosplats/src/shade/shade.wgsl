@@ -4,6 +4,7 @@
 
 #import frame
 #import groups
+#import divide
 #import counters
 #import layers
 #import shading
@@ -110,8 +111,8 @@ fn put(pixel: vec2u, color: vec3f, rgba: u32) {
 @compute @workgroup_size(32, 2)
 fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
     let columns = (frame.size.x + 31u) / 32u;
-    let group = group_index(workgroup);
-    let first = vec2u(group % columns, group / columns) * vec2u(32u, 8u) + local.xy;
+    let group = divide(group_index(workgroup), columns);
+    let first = group.yx * vec2u(32u, 8u) + local.xy;
     // Background first; which of the pixels are covered become bits. A software device runs both sides of a branch but a
     // loop only as often as it must: so where nothing is covered little is computed in vain.
     var covered = 0u;
