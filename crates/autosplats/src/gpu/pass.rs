@@ -45,7 +45,6 @@ pub(crate) struct Pass {
     label: String,
     pipeline: wgpu::ComputePipeline,
     layout: wgpu::BindGroupLayout,
-    bindings: usize,
 }
 
 impl Pass {
@@ -86,13 +85,8 @@ impl Pass {
                 },
                 cache: None,
             });
-            Self { path: source.path, label: label.clone(), pipeline, layout, bindings: entries.len() }
+            Self { path: source.path, label: label.clone(), pipeline, layout }
         })
-    }
-
-    /// Number of buffers it is bound to.
-    pub(crate) fn bindings(&self) -> usize {
-        self.bindings
     }
 
     /// The pass bound to buffers, in the order of their binding numbers, to run in `groups` workgroups.

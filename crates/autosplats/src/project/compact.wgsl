@@ -33,12 +33,13 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         }
     }
     rank_finish(local);
+    let before = block_sums[block];
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let at = block * 2048u + flag;
         if at < area {
             let place = cell_pixel(at, strip_px);
-            let index = block_sums[block] + rank_of(flag);
+            let index = before + rank_of(flag);
             if place.first {
                 cell_start[place.cell] = index;
             }
@@ -47,10 +48,11 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
                 source[index] = key.x;
                 pixels[index] = (place.pixel.y << 16u) | place.pixel.x;
             }
-            if at == area - 1u {
-                // The end of the last cell.
-                cell_start[place.cell + 1u] = counters[VISIBLE];
-            }
         }
+    }
+    if block == 0u && local == 0u {
+        // The end of the last cell.
+        let strips = (frame.size.y + strip_px - 1u) / strip_px;
+        cell_start[strips * frame.size.x] = counters[VISIBLE];
     }
 }

@@ -24,16 +24,18 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     workgroupBarrier();
     let block = group_index(workgroup);
+    let strip_px = counters[STRIP_PX];
     let cell_px = counters[CELL_PX];
+    let cell_columns = counters[CELL_COLUMNS];
     var own = 0u;
     for (var step = 0u; step < 8u; step++) {
         let at = block * 2048u + step * 256u + local;
         if at < frame.size.x * frame.size.y {
-            let pixel = cell_pixel(at, counters[STRIP_PX]).pixel;
+            let pixel = cell_pixel(at, strip_px).pixel;
             let key = keys[pixel.y * frame.size.x + pixel.x];
             if key.x != EMPTY_KEY {
                 own += 1u;
-                let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
+                let cell = density_cell(pixel, cell_px, cell_columns);
                 atomicAdd(&density[2u * cell], 1u);
                 atomicMin(&density[2u * cell + 1u], key.y);
             }

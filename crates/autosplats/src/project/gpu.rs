@@ -2,31 +2,17 @@
 
 use super::ScreenPoint;
 use super::cpu::STRIP_SPACINGS;
-use super::device_cloud::DeviceCloud;
+use super::device_cloud::{Chunk, DeviceCloud};
 use crate::Error;
 use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
 
 #[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[
-    CLEAR,
-    PROJECT,
-    PROJECT_DEPTH,
-    PROJECT_INDEX,
-    OCCUPANCY,
-    GRID,
-    COUNT,
-    SCAN,
-    COMPACT,
-    GATHER,
-    SPLIT_COUNT,
-    SPLIT,
-    WORK,
-];
+pub(crate) const PASSES: &[PassSource] =
+    &[CLEAR, PROJECT, PROJECT_32, OCCUPANCY, GRID, COUNT, SCAN, COMPACT, GATHER, SPLIT_COUNT, SPLIT, WORK];
 const CLEAR: PassSource = PassSource::new("project/clear", include_str!("clear.wgsl"));
 const PROJECT: PassSource =
     PassSource { needs: INT64_ATOMICS, ..PassSource::new("project/project", include_str!("project.wgsl")) };
-const PROJECT_DEPTH: PassSource = PassSource::new("project/project_depth", include_str!("project_depth.wgsl"));
-const PROJECT_INDEX: PassSource = PassSource::new("project/project_index", include_str!("project_index.wgsl"));
+const PROJECT_32: PassSource = PassSource::new("project/project_32", include_str!("project_32.wgsl"));
 const OCCUPANCY: PassSource = PassSource::new("project/occupancy", include_str!("occupancy.wgsl"));
 const GRID: PassSource = PassSource::new("project/grid", include_str!("grid.wgsl"));
 const COUNT: PassSource = PassSource::new("project/count", include_str!("count.wgsl"));
@@ -50,6 +36,8 @@ pub(crate) enum Work {
     Recovered256,
     Queries256,
     LargeSplats,
+    LeftActive64,
+    LeftRecovered64,
 }
 
 /// Which queries the search, the fit and the splatting take up.
@@ -67,6 +55,11 @@ impl Round {
         [Work::Active64, Work::Recovered64][self as usize]
     }
 
+    /// Those that one pass of the search left to another, in workgroups of 64 invocations.
+    pub(crate) fn left_64(self) -> Work {
+        [Work::LeftActive64, Work::LeftRecovered64][self as usize]
+    }
+
     /// In workgroups of 256 invocations.
     pub(crate) fn work_256(self) -> Work {
         [Work::Active256, Work::Recovered256][self as usize]
@@ -76,7 +69,7 @@ impl Round {
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 /// How many of them there are.
-const WORKS: u64 = Work::LargeSplats as u64 + 1;
+const WORKS: u64 = Work::LeftRecovered64 as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
@@ -105,10 +98,12 @@ pub(crate) enum Counter {
     RangeHigh,
     Covered,
     Large,
+    LeftActive,
+    LeftRecovered,
 }
 
 /// Length of [`ScreenBuffers::counters`].
-pub(crate) const COUNTERS: usize = Counter::Large as usize + 1;
+pub(crate) const COUNTERS: usize = Counter::LeftRecovered as usize + 1;
 
 /// [`ScreenPoints`](super::ScreenPoints) on the device.
 #[derive(Debug)]
@@ -133,6 +128,8 @@ pub(crate) struct ScreenBuffers {
     /// Screen points to reconstruct: the active ones, and after them those recovered.
     pub(crate) queries: wgpu::Buffer,
     pub(crate) passive: wgpu::Buffer,
+    /// Queries of a round that one pass of the search leaves to another.
+    pub(crate) left: wgpu::Buffer,
     pub(crate) block_sums: wgpu::Buffer,
     /// Workgroups of each [`Work`], three `u32`.
     arguments: wgpu::Buffer,
@@ -161,6 +158,7 @@ impl ScreenBuffers {
             values: gpu.storage::<u32>("values of screen points", capacity * values)?,
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
+            left: gpu.storage::<u32>("queries left", capacity)?,
             block_sums: gpu.storage::<u32>("sums of blocks", pixels.div_ceil(BLOCK as usize))?,
             arguments: gpu.buffer(
                 "arguments",
@@ -202,11 +200,49 @@ pub(crate) fn scan_pass(gpu: &Gpu, total: Counter, scanned: Option<Counter>) -> 
     Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32)), ("SCANNED", f64::from(scanned as u32))])
 }
 
+/// How each pixel finds its nearest point.
+#[derive(Debug)]
+enum NearestPass {
+    /// With 64-bit atomics.
+    Once(Pass),
+    /// With 32 bits: the pass, and what tells it each turn.
+    Twice(Pass, [wgpu::Buffer; 2]),
+}
+
+impl NearestPass {
+    fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
+        if int64 {
+            return Ok(Self::Once(Pass::new(gpu, &PROJECT, &[])?));
+        }
+        let turn = |turn: u32| {
+            let told = gpu.uniform::<u32>("turn")?;
+            gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&turn));
+            Ok(told)
+        };
+        Ok(Self::Twice(Pass::new(gpu, &PROJECT_32, &[])?, [turn(0)?, turn(1)?]))
+    }
+
+    fn steps(&self, gpu: &Gpu, frame: &wgpu::Buffer, cloud: &DeviceCloud, screen: &ScreenBuffers) -> Vec<Step> {
+        let run = |pass: &Pass, turn: Option<&wgpu::Buffer>| -> Vec<Step> {
+            let step = |chunk: &Chunk| {
+                let buffers = [frame, &chunk.uniform, &chunk.positions, &screen.keys, &screen.counters];
+                let buffers: Vec<_> = buffers.into_iter().chain(turn).collect();
+                pass.step(gpu, &buffers, chunk.capacity.div_ceil(GROUP))
+            };
+            cloud.chunks().iter().map(step).collect()
+        };
+        match self {
+            Self::Once(pass) => run(pass, None),
+            Self::Twice(pass, turns) => turns.iter().flat_map(|turn| run(pass, Some(turn))).collect(),
+        }
+    }
+}
+
 /// The passes of projection.
 #[derive(Debug)]
 pub(crate) struct ProjectPasses {
     clear: Pass,
-    nearest: Vec<Pass>,
+    nearest: NearestPass,
     occupancy: Pass,
     grid: Pass,
     count: Pass,
@@ -220,7 +256,7 @@ pub(crate) struct ProjectPasses {
 }
 
 impl ProjectPasses {
-    /// Compiles them; `int64` asks for one pass with 64-bit atomics instead of two with 32 bits.
+    /// Compiles them; `int64` asks for 64-bit atomics, instead of a pass with 32 bits that runs twice.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -228,7 +264,7 @@ impl ProjectPasses {
         let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
         Ok(Self {
             clear: pass(&CLEAR)?,
-            nearest: if int64 { vec![pass(&PROJECT)?] } else { vec![pass(&PROJECT_DEPTH)?, pass(&PROJECT_INDEX)?] },
+            nearest: NearestPass::new(gpu, int64)?,
             occupancy: pass(&OCCUPANCY)?,
             grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
             count: pass(&COUNT)?,
@@ -256,14 +292,7 @@ impl ProjectPasses {
         let area = width * height;
         let pixel_blocks = area.div_ceil(BLOCK);
         let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], area.div_ceil(GROUP))];
-        for pass in &self.nearest {
-            for chunk in cloud.chunks() {
-                // The last of two passes has nothing left to count.
-                let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters];
-                let bound = if pass.bindings() == 4 { &buffers[..4] } else { &buffers };
-                steps.push(pass.step(gpu, bound, chunk.capacity.div_ceil(GROUP)));
-            }
-        }
+        steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         let blocks_16 = width.div_ceil(16) * height.div_ceil(16);
         steps.push(self.occupancy.step(gpu, &[frame, keys, counters], blocks_16));
         steps.push(self.grid.step(gpu, &[frame, counters], 1));

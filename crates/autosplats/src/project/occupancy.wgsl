@@ -7,6 +7,7 @@
 #import groups
 #import counters
 #import keys
+#import divide
 
 @group(0) @binding(1) var<storage, read> keys: array<vec2u>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
@@ -20,8 +21,8 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     }
     workgroupBarrier();
     let columns = (frame.size.x + 15u) / 16u;
-    let block = group_index(workgroup);
-    let pixel = 16u * vec2u(block % columns, block / columns) + vec2u(local % 16u, local / 16u);
+    let block = divide(group_index(workgroup), columns);
+    let pixel = 16u * block.yx + vec2u(local % 16u, local / 16u);
     if all(pixel < frame.size) && keys[pixel.y * frame.size.x + pixel.x].x != EMPTY_KEY {
         atomicAdd(&owned, 1u);
     }

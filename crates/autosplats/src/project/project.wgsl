@@ -1,6 +1,6 @@
 // Every point to its pixel, the nearest wins [Paper, §3]: depth and index in one 64-bit atomic minimum.
 //
-// Reads: a chunk of the cloud. Writes: keys, counters. `project_depth` and `project_index` do the same with 32 bits.
+// Reads: a chunk of the cloud. Writes: keys, counters. `project_32` does the same with 32 bits.
 
 #import frame
 #import groups

@@ -32,10 +32,11 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         }
     }
     rank_finish(local);
+    let active_before = block_sums[block];
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let index = block * 2048u + flag;
-        let before = block_sums[block] + rank_of(flag);
+        let before = active_before + rank_of(flag);
         if index < visible {
             if (is_active & (1u << step)) != 0u {
                 queries[before] = index;

@@ -19,6 +19,8 @@ const RECOVERED64 = 5u;
 const RECOVERED256 = 6u;
 const QUERIES256 = 7u;
 const LARGE_SPLATS = 8u;
+const LEFT_ACTIVE64 = 9u;
+const LEFT_RECOVERED64 = 10u;
 
 fn put(kind: u32, items: u32, per_group: u32) {
     let groups = (items + per_group - 1u) / per_group;
@@ -37,5 +39,7 @@ fn work() {
     put(RECOVERED64, counters[RECOVERED], 64u);
     put(RECOVERED256, counters[RECOVERED], 256u);
     put(LARGE_SPLATS, counters[LARGE], 1u);
+    put(LEFT_ACTIVE64, counters[LEFT_ACTIVE], 64u);
+    put(LEFT_RECOVERED64, counters[LEFT_RECOVERED], 64u);
     put(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
 }

@@ -4,6 +4,7 @@
 
 #import frame
 #import groups
+#import divide
 #import counters
 #import layers
 #import shading
@@ -94,21 +95,43 @@ fn encode(channel: f32) -> u32 {
     return (tables[step / 4u] >> (8u * (step % 4u))) & 255u;
 }
 
-// A workgroup shades 32 by 8 pixels: whole cache lines of the image, and few rows of neighbours.
-@compute @workgroup_size(32, 8)
+fn put(pixel: vec2u, color: vec3f, rgba: u32) {
+    var word = rgba;
+    if shading.swap_red_blue == 1u {
+        word = (word & 0xff00ff00u) | ((word & 0xffu) << 16u) | ((word >> 16u) & 0xffu);
+    }
+    image[pixel.y * shading.pitch + pixel.x] = word;
+    if shading.keep_linear == 1u {
+        linear[pixel.y * frame.size.x + pixel.x] = vec4f(color, 0.0);
+    }
+}
+
+// A workgroup shades 32 by 8 pixels, whole cache lines of the image and few rows of neighbours; an invocation four of them, two
+// rows apart.
+@compute @workgroup_size(32, 2)
 fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
     let columns = (frame.size.x + 31u) / 32u;
-    let group = group_index(workgroup);
-    let pixel = vec2u(group % columns, group / columns) * vec2u(32u, 8u) + local.xy;
-    if pixel.x >= frame.size.x || pixel.y >= frame.size.y {
-        return;
+    let group = divide(group_index(workgroup), columns);
+    let first = group.yx * vec2u(32u, 8u) + local.xy;
+    // Background first; which of the pixels are covered become bits. A software device runs both sides of a branch but a
+    // loop only as often as it must: so where nothing is covered little is computed in vain.
+    var covered = 0u;
+    for (var step = 0u; step < 4u; step++) {
+        let pixel = first + vec2u(0u, 2u * step);
+        if pixel.x < frame.size.x && pixel.y < frame.size.y {
+            if is_covered(surface[pixel.y * frame.size.x + pixel.x].w) {
+                covered |= 1u << step;
+            } else {
+                put(pixel, vec3f(0.0), tables[shading.backgrounds + pixel.y]);
+            }
+        }
     }
-    let index = pixel.y * frame.size.x + pixel.x;
-    let surface_here = surface[index];
-    var color = vec3f(0.0);
-    var word = 0u;
-    if is_covered(surface_here.w) {
-        color = base_color(pixel, index, surface_here);
+    while covered != 0u {
+        let pixel = first + vec2u(0u, 2u * firstTrailingBit(covered));
+        covered &= covered - 1u;
+        let index = pixel.y * frame.size.x + pixel.x;
+        let surface_here = surface[index];
+        var color = base_color(pixel, index, surface_here);
         var lit = 1.0;
         if shading.lighting == 1u {
             lit = light(surface_here.xyz);
@@ -117,15 +140,6 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
             lit *= eye_dome(pixel, index, surface_here.w);
         }
         color *= lit;
-        word = encode(color.r) | (encode(color.g) << 8u) | (encode(color.b) << 16u) | 0xff000000u;
-    } else {
-        word = tables[shading.backgrounds + pixel.y];
-    }
-    if shading.swap_red_blue == 1u {
-        word = (word & 0xff00ff00u) | ((word & 0xffu) << 16u) | ((word >> 16u) & 0xffu);
-    }
-    image[pixel.y * shading.pitch + pixel.x] = word;
-    if shading.keep_linear == 1u {
-        linear[index] = vec4f(color, 0.0);
+        put(pixel, color, encode(color.r) | (encode(color.g) << 8u) | (encode(color.b) << 16u) | 0xff000000u);
     }
 }

@@ -24,3 +24,6 @@ const RANGE_HIGH = 15u;
 const COVERED = 16u;
 // Splats too large for one invocation.
 const LARGE = 17u;
+// Queries of each round that the search of four at a time left to that of one.
+const LEFT_ACTIVE = 18u;
+const LEFT_RECOVERED = 19u;

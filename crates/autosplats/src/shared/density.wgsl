@@ -1,9 +1,11 @@
 // The low-resolution grid of [Paper, §5.1]: square cells of about k screen points; x of a cell is its number of screen points,
 // y the bits of its nearest depth. Imports: frame. The including pass binds `density` and `counters`.
 
+#import divide
+
 // Index of the density cell of a pixel.
 fn density_cell(pixel: vec2u, cell_px: u32, columns: u32) -> u32 {
-    return pixel.y / cell_px * columns + pixel.x / cell_px;
+    return divide(pixel.y, cell_px).x * columns + divide(pixel.x, cell_px).x;
 }
 
 // Depth beyond which points of a cell are probably hidden: the nearest, and the width of the cell in world units there

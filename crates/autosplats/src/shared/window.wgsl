@@ -3,6 +3,10 @@
 // Added to projected bounds in pixels, against the rounding of projected coordinates.
 override MARGIN_PX: f32;
 
+// Strips that the invocation has gone through and half of the screen points it has read, two at a time: about the rounds of its
+// loops, of which software devices end an invocation silently after 65535.
+var<private> rounds: u32;
+
 // Pixels, all sides included; whole numbers.
 struct Window {
     low: vec2f,
@@ -72,6 +76,7 @@ fn window_len(window: Window, strip_px: u32, few: u32) -> u32 {
         return area;
     }
     let strips = window_strips(window, strip_px);
+    rounds += strips.y - strips.x + 1u;
     var len = 0u;
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);

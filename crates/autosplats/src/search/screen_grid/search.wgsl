@@ -4,7 +4,7 @@
 // the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. Unlike on the CPU no two
 // queries share a window, and a window has no depths: nothing is gained by leaving out what has been read.
 //
-// Reads: counters, density, cell_start, points, queries. Writes: neighborhoods, counters.
+// Reads: counters, density, cell_start, points, queries, left. Writes: neighborhoods, counters.
 
 #import frame
 #import groups
@@ -14,6 +14,7 @@
 #import surfel
 #import window
 #import nearest
+#import search_task
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -21,31 +22,16 @@
 @group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
 @group(0) @binding(6) var<storage, read_write> neighborhoods: array<Neighborhood>;
+@group(0) @binding(7) var<storage, read> left: array<u32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
-override ROUND: u32;
-override FIRST_REACH: f32;
 override LEAST_GROWTH: f32;
-override MAX_CANDIDATES: u32;
-override CROWDED: u32;
-override BOUND_STEP: f32;
+// Whether only those queries are searched for that `search_four` left.
+override LEFT_ONLY: bool;
 
-// Screen points that a query lists at most, all windows together, before it counts as bounded: software devices end an
-// invocation silently after 65535 rounds of its loops.
-const MOST_READS = 40000u;
-const MIN_POSITIVE = 1.1754943508222875e-38;
+// Rounds of loops after which a query counts as bounded. Much less than a software device allows: it runs several invocations
+// at once, as many rounds as the longest of them in each loop.
+const MOST_ROUNDS = 25000u;
 
-// What all queries of a workgroup need to know.
-struct Task {
-    first: u32,
-    len: u32,
-    visible: u32,
-    strip_px: u32,
-    cell_px: u32,
-    cell_columns: u32,
-}
-
-var<workgroup> task: Task;
 var<workgroup> clamped: atomic<u32>;
 var<workgroup> bounded: atomic<u32>;
 
@@ -79,8 +65,10 @@ fn squared_length(v: vec3f) -> f32 {
 fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
     var list = nearest_none();
     let strips = window_strips(window, task.strip_px);
+    rounds += strips.y - strips.x + 1u;
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);
+        rounds += (run.y - run.x) / 2u;
         // Two at a time: the loads of both are on their way together.
         for (var at = run.x; at < run.y; at += 2u) {
             let next = min(at + 1u, run.y - 1u);
@@ -139,12 +127,10 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px, CROWDED);
     }
-    var reads = 0u;
     var seen: Seen;
     // How far the search goes at most, once that is found.
     var farthest = 0.0;
     for (var step = 0u; step < 256u; step++) {
-        reads += len;
         var nearest = read_window(query, center, window);
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
@@ -196,7 +182,8 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         }
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px, CROWDED);
-        if reads + len > MOST_READS {
+        let strips = window_strips(window, task.strip_px);
+        if rounds + len / 2u + strips.y - strips.x > MOST_ROUNDS {
             break;
         }
     }
@@ -244,19 +231,17 @@ fn moments(center: vec3f, squared: f32) -> Neighborhood {
 @compute @workgroup_size(64)
 fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     if local == 0u {
-        let active_points = atomicLoad(&counters[ACTIVE]);
-        task.first = select(0u, active_points, ROUND == 1u);
-        task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
-        task.visible = atomicLoad(&counters[VISIBLE]);
-        task.strip_px = atomicLoad(&counters[STRIP_PX]);
-        task.cell_px = atomicLoad(&counters[CELL_PX]);
-        task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+        task_load();
         atomicStore(&clamped, 0u);
         atomicStore(&bounded, 0u);
     }
     workgroupBarrier();
-    let index = group_index(workgroup) * 64u + local;
-    if index < task.len {
+    let place = group_index(workgroup) * 64u + local;
+    if place < select(task.len, task.left, LEFT_ONLY) {
+        var index = place;
+        if LEFT_ONLY {
+            index = left[place];
+        }
         let query = queries[task.first + index];
         let point = points[query];
         let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);

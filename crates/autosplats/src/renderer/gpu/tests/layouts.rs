@@ -166,8 +166,8 @@ fn a_shifted_field_is_found() {
 #[test]
 fn constants_are_alike_in_rust_and_wgsl() {
     use Counter::{
-        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, Covered, Large, NotFinite, Outliers, Outside,
-        Passive, RangeHigh, RangeLow, Recovered, StripPx, Visible,
+        Active, Behind, Blocks, Bounded, CellColumns, CellPx, Clamped, Covered, Large, LeftActive, LeftRecovered,
+        NotFinite, Outliers, Outside, Passive, RangeHigh, RangeLow, Recovered, StripPx, Visible,
     };
     let counters: [Counter; COUNTERS] = [
         NotFinite,
@@ -188,6 +188,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
         RangeHigh,
         Covered,
         Large,
+        LeftActive,
+        LeftRecovered,
     ];
     let counters = counters.map(|counter| (screaming(&counter), counter as u32));
     assert_eq!(constants(&parse("#import counters\n")), counters, "counters in WGSL, and in Rust");
@@ -200,8 +202,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
     assert_eq!(in_wgsl, shown, "what is shown in WGSL, and in Rust");
 
     use Work::{
-        Active64, Active256, LargeSplats, PassiveBlocks, Queries256, Recovered64, Recovered256, Visible256,
-        VisibleBlocks,
+        Active64, Active256, LargeSplats, LeftActive64, LeftRecovered64, PassiveBlocks, Queries256, Recovered64,
+        Recovered256, Visible256, VisibleBlocks,
     };
     let works = [
         Visible256,
@@ -213,6 +215,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
         Recovered256,
         Queries256,
         LargeSplats,
+        LeftActive64,
+        LeftRecovered64,
     ];
     let works = works.map(|work| (screaming(&work), work as u32));
     let pass = passes().find(|pass| pass.path == "project/work").expect("a pass").module();

@@ -82,6 +82,12 @@ fn cameras() -> [Camera; 2] {
     [camera(Projection::PerspectiveFovDeg(30.0)), camera(Projection::OrthographicHeight(2.1))]
 }
 
+/// Both forms of the passes, whichever suits this k.
+fn forms(gpu: &Gpu, k: u32) -> [(&'static str, SearchPasses); 2] {
+    [("one by one", false), ("four at a time", true)]
+        .map(|(name, four)| (name, SearchPasses::with_form(gpu, k, four).expect("passes")))
+}
+
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
@@ -128,7 +134,7 @@ fn the_device_finds_what_the_host_finds() {
     let Some(gpu) = test_gpu() else { return };
     let (mut compared, mut different) = (0, 0);
     for k in KS {
-        let passes = SearchPasses::new(&gpu, k).expect("passes");
+        let forms = forms(&gpu, k);
         for camera in cameras() {
             let sized = |size| test_clouds::all(4000).into_iter().map(move |(name, cloud)| (name, cloud, size));
             for (name, positions, size) in [[121, 90], [300, 2], [1, 1]].into_iter().flat_map(sized) {
@@ -137,17 +143,21 @@ fn the_device_finds_what_the_host_finds() {
                     let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
                     let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
-                    let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules);
-                    assert_eq!(device.len(), host.len(), "{case}: every point is a query");
-                    for (device, host) in device.iter().zip(&host) {
-                        if let Err(error) = device.compare(host) {
-                            eprintln!("{case}: {error}");
-                            different += 1;
+                    for (form, passes) in &forms {
+                        let case = format!("{form}, {case}");
+                        let (device, counted) = on_device(&gpu, passes, &screen, &view, &rules);
+                        assert_eq!(device.len(), host.len(), "{case}: every point is a query");
+                        for (device, host) in device.iter().zip(&host) {
+                            if let Err(error) = device.compare(host) {
+                                eprintln!("{case}: {error}");
+                                different += 1;
+                            }
                         }
-                    }
-                    compared += host.len();
-                    for (device, host) in counted.iter().zip(counted_by_host) {
-                        assert!(device.abs_diff(host) <= 1, "{case}: counted {counted:?}, host: {counted_by_host:?}");
+                        compared += host.len();
+                        for (device, host) in counted.iter().zip(counted_by_host) {
+                            let apart = device.abs_diff(host);
+                            assert!(apart <= 1, "{case}: counted {counted:?}, host: {counted_by_host:?}");
+                        }
                     }
                 }
             }
@@ -216,6 +226,76 @@ fn huge_coordinates_reach_no_sum() {
             assert_eq!(on_device(&gpu, &passes, &screen, &view, &rules).1, counted, "{near} + {huge}, k = {k}");
             for (device, host) in on_device(&gpu, &passes, &screen, &view, &rules).0.iter().zip(&host) {
                 assert_eq!(device.compare(host), Ok(()), "{near} + {huge} points, k = {k}");
+            }
+        }
+    }
+}
+
+/// Windows of tall pictures have many strips: software devices end invocations after so many rounds of their loops.
+#[test]
+fn tall_pictures_are_searched_to_the_end() {
+    let Some(gpu) = test_gpu() else { return };
+    let up = DVec3::Y;
+    let camera =
+        Camera { eye: -4.0 * DVec3::Z, look_at: DVec3::ZERO, up, projection: Projection::OrthographicHeight(2.1) };
+    // A column of points at all heights and some depths, dense in the middle.
+    let height = |i: usize| (i as f32 / 10_000.0 - 1.0).powi(3);
+    let column: Vec<_> = (0..20_000).map(|i| [0.0, height(i), 0.1 * (i % 7) as f32]).collect();
+    let sparse = column.iter().step_by(499).copied().collect();
+    for (name, positions, size) in [
+        ("column", column, [1, 16384]),
+        ("sparse column", sparse, [1, 16384]),
+        ("outliers", test_clouds::outliers(6000), [1024, 8192]),
+        ("edge", test_clouds::edge(30_000), [1024, 8192]),
+    ] {
+        for k in [10, 64] {
+            let (screen, view) = screen(&positions, &camera, size, k);
+            for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
+                let (host, counted_by_host) = on_host(&screen, &view, &rules);
+                for (form, passes) in forms(&gpu, k) {
+                    let case = format!("{form}, {name}, {rules:?}");
+                    let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules);
+                    let different = device.iter().zip(&host).filter(|(device, host)| device.compare(host).is_err());
+                    let different = different.count();
+                    assert!(different * 1000 <= host.len(), "{case}: {different} of {} differ", host.len());
+                    assert!(
+                        counted[1].abs_diff(counted_by_host[1]) <= 1,
+                        "{case}: {counted:?}, host: {counted_by_host:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// More points at exactly the same distance than lie between two thresholds at the end: all of them belong.
+#[test]
+fn all_at_the_same_distance_are_neighbours() {
+    let Some(gpu) = test_gpu() else { return };
+    // Whole numbers, the middle of a circle and the 108 points on it: squares are exact.
+    let radius = 1105i32;
+    let half = |x: i32| f64::from(radius * radius - x * x).sqrt();
+    let whole = (-radius..=radius).filter(|&x| half(x).fract() == 0.0);
+    let mut points: Vec<_> = whole.flat_map(|x| [[x as f32, half(x) as f32], [x as f32, -half(x) as f32]]).collect();
+    points.push([0.0, 0.0]);
+    let positions: Vec<_> = points.iter().map(|[x, y]| [x / 1024.0, y / 1024.0, 0.0]).collect();
+    let projection = Projection::OrthographicHeight(2.5);
+    let camera = Camera { eye: -4.0 * DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y, projection };
+    for k in [16, 17, 40, 64] {
+        let (screen, view) = screen(&positions, &camera, [700, 700], k);
+        let queries = [&screen.active[..], &screen.passive].concat();
+        let is_middle = |&query: &u32| screen.points[query as usize].position_view[..2] == [0.0, 0.0];
+        let middle = queries.iter().position(is_middle).expect("the middle");
+        for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
+            let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
+            let (host, _) = on_host(&screen, &view, &rules);
+            assert!(lambda.is_some() || host[middle].count > 100.0, "{rules:?}: {:?}", host[middle]);
+            for (form, passes) in forms(&gpu, k) {
+                let (device, _) = on_device(&gpu, &passes, &screen, &view, &rules);
+                for (device, host) in device.iter().zip(&host) {
+                    assert_eq!(device.compare(host), Ok(()), "{form}, {rules:?}");
+                }
             }
         }
     }

@@ -1,0 +1,39 @@
+// What `project` does, where there are no 64-bit atomics: run twice, it finds the nearest depth of each pixel, then the lowest
+// index among the points at that depth. One pass that is told which turn it is and not two, because no device owes two
+// programs the same bits: a point whose depth differed between them would leave a hole.
+//
+// Reads: a chunk of the cloud, turn. Writes: keys, as pairs of atomics; counters.
+
+#import frame
+#import groups
+#import counters
+#import project_point
+#import count_dropped
+
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+@group(0) @binding(2) var<storage, read> positions: array<f32>;
+@group(0) @binding(3) var<storage, read_write> keys: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
+// 0 for depths, 1 for indices.
+@group(0) @binding(5) var<uniform> turn: u32;
+
+@compute @workgroup_size(256)
+fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    count_dropped_clear(local);
+    let index = group_index(workgroup) * 256u + local;
+    if index < chunk.len {
+        let at = 3u * index;
+        let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));
+        let depth = bitcast<u32>(projected.depth);
+        if projected.pixel >= PIXEL_OUTSIDE {
+            if turn == 0u {
+                count_dropped(projected.pixel);
+            }
+        } else if turn == 0u {
+            atomicMin(&keys[2u * projected.pixel + 1u], depth);
+        } else if atomicLoad(&keys[2u * projected.pixel + 1u]) == depth {
+            atomicMin(&keys[2u * projected.pixel], chunk.first + index);
+        }
+    }
+    count_dropped_finish(local);
+}

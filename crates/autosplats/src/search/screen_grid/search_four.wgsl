@@ -1,0 +1,351 @@
+// The k nearest screen points of four queries at a time, summed up in moments [Paper, §4, §5], for larger k; the rules are
+// stated in search/mod.rs.
+//
+// How it works: queries that follow each other lie side by side on the screen. Four are the components of vectors and share a
+// window, so that what is read of a candidate serves all four. The window is read a few times. First, candidates are counted
+// below eight thresholds, evenly spaced in squared distance, with which counts on a surface grow evenly; then below eight
+// between the two on either side of the k-th, until there are few in between. These are listed, which tells the k-th. A
+// neighbourhood that none of the rules can end early is settled so. What is left is for `search`, which knows all the rules:
+// gaps, outliers, crowds, many points in the same place.
+//
+// Reads: counters, density, cell_start, points, queries. Writes: neighborhoods, left, counters.
+
+#import frame
+#import groups
+#import counters
+#import density
+#import screen
+#import surfel
+#import window
+#import search_task
+
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read> cell_start: array<u32>;
+@group(0) @binding(4) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(5) var<storage, read> queries: array<u32>;
+@group(0) @binding(6) var<storage, read_write> neighborhoods: array<Neighborhood>;
+@group(0) @binding(7) var<storage, read_write> left: array<u32>;
+
+override K: u32;
+
+// Windows that are read before the queries not settled are left to `search`, and screen points and strips in them at most: with
+// all their readings less than half of the 65535 rounds after which software devices end an invocation.
+const MOST_WINDOWS = 3u;
+const MOST_SHARED = 1536u;
+const MOST_COUNTS = 3u;
+// Candidates between two thresholds that the list of eight can tell the k-th of: from below or from above.
+const FEW = 15u;
+
+// Queries of a workgroup that are left.
+var<workgroup> left_len: atomic<u32>;
+var<workgroup> left_first: u32;
+
+// Positions of four queries.
+struct Four {
+    x: vec4f,
+    y: vec4f,
+    z: vec4f,
+}
+
+alias Eight = array<vec4f, 8>;
+alias EightCounts = array<vec4u, 8>;
+
+// Squared distances on either side of the k-th, and how many candidates lie there or nearer, the query itself included.
+struct Bracket {
+    low: vec4f,
+    high: vec4f,
+    low_count: vec4u,
+    high_count: vec4u,
+}
+
+struct Listed {
+    // Squared distance to the k-th.
+    kth: vec4f,
+    // The largest squared distance up to a limit.
+    furthest: vec4f,
+}
+
+fn center(four: Four, lane: u32) -> vec3f {
+    return vec3f(four.x[lane], four.y[lane], four.z[lane]);
+}
+
+// The same bits as those of `search`.
+fn squared_lengths(four: Four, at: u32) -> vec4f {
+    let candidate = points[at].position_view;
+    let x = candidate.x - four.x;
+    let y = candidate.y - four.y;
+    let z = candidate.z - four.z;
+    return fma(z, z, fma(y, y, x * x));
+}
+
+// Where points within a radius of each query are, of those `wanted`.
+fn window_of_four(four: Four, radius: vec4f, wanted: vec4<bool>) -> Window {
+    var window = picture();
+    var low = window.high;
+    var high = window.low;
+    for (var lane = 0u; lane < 4u; lane++) {
+        if wanted[lane] {
+            let own = window_of_sphere(center(four, lane), radius[lane]);
+            low = min(low, own.low);
+            high = max(high, own.high);
+        }
+    }
+    return window_grown(Window(low, max(low, high)), f32(task.strip_px));
+}
+
+fn one_if(condition: vec4<bool>) -> vec4u {
+    return select(vec4u(0u), vec4u(1u), condition);
+}
+
+fn raise(bracket: ptr<function, Bracket>, threshold: vec4f, count: vec4u) {
+    let is_low = count <= vec4u(K);
+    (*bracket).low = select((*bracket).low, threshold, is_low);
+    (*bracket).low_count = select((*bracket).low_count, count, is_low);
+}
+
+fn lower(bracket: ptr<function, Bracket>, threshold: vec4f, count: vec4u) {
+    let is_high = count > vec4u(K);
+    (*bracket).high = select((*bracket).high, threshold, is_high);
+    (*bracket).high_count = select((*bracket).high_count, count, is_high);
+}
+
+// Counts at eight thresholds, the upper end of the bracket the last, and chooses the two next to the k-th. Where even the last has
+// fewer than k neighbours the bracket shrinks to it.
+fn narrow(four: Four, window: Window, bracket: ptr<function, Bracket>) {
+    let low = (*bracket).low;
+    let step = 0.125 * ((*bracket).high - low);
+    let t = Eight(
+        low + step,
+        low + 2.0 * step,
+        low + 3.0 * step,
+        low + 4.0 * step,
+        low + 5.0 * step,
+        low + 6.0 * step,
+        low + 7.0 * step,
+        (*bracket).high,
+    );
+    var n = EightCounts();
+    let strips = window_strips(window, task.strip_px);
+    for (var strip = strips.x; strip <= strips.y; strip++) {
+        let run = window_run(window, strip);
+        for (var at = run.x; at < run.y; at++) {
+            let squared = squared_lengths(four, at);
+            n[0] += one_if(squared <= t[0]);
+            n[1] += one_if(squared <= t[1]);
+            n[2] += one_if(squared <= t[2]);
+            n[3] += one_if(squared <= t[3]);
+            n[4] += one_if(squared <= t[4]);
+            n[5] += one_if(squared <= t[5]);
+            n[6] += one_if(squared <= t[6]);
+            n[7] += one_if(squared <= t[7]);
+        }
+    }
+    raise(bracket, t[0], n[0]);
+    raise(bracket, t[1], n[1]);
+    raise(bracket, t[2], n[2]);
+    raise(bracket, t[3], n[3]);
+    raise(bracket, t[4], n[4]);
+    raise(bracket, t[5], n[5]);
+    raise(bracket, t[6], n[6]);
+    raise(bracket, t[7], n[7]);
+    lower(bracket, t[7], n[7]);
+    lower(bracket, t[6], n[6]);
+    lower(bracket, t[5], n[5]);
+    lower(bracket, t[4], n[4]);
+    lower(bracket, t[3], n[3]);
+    lower(bracket, t[2], n[2]);
+    lower(bracket, t[1], n[1]);
+    lower(bracket, t[0], n[0]);
+}
+
+// Lists what lies in the brackets, those with at most FEW candidates.
+fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
+    // From whichever end of the bracket the k-th is nearer to: distances from above are listed by their negatives.
+    let from_low = vec4u(K) - bracket.low_count;
+    let from_high = bracket.high_count - vec4u(K + 1u);
+    let is_upward = from_low <= from_high;
+    let sign = select(vec4f(-1.0), vec4f(1.0), is_upward);
+    let m = vec4f(MOST);
+    var least = Eight(m, m, m, m, m, m, m, m);
+    var furthest = vec4f(0.0);
+    let strips = window_strips(window, task.strip_px);
+    for (var strip = strips.x; strip <= strips.y; strip++) {
+        let run = window_run(window, strip);
+        for (var at = run.x; at < run.y; at++) {
+            let squared = squared_lengths(four, at);
+            furthest = max(furthest, select(vec4f(0.0), squared, squared <= limit));
+            let key = select(m, sign * squared, (squared > bracket.low) & (squared <= bracket.high));
+            // Each place takes the lesser of its own and the greater of the one before and the new one.
+            least[7] = min(least[7], max(least[6], key));
+            least[6] = min(least[6], max(least[5], key));
+            least[5] = min(least[5], max(least[4], key));
+            least[4] = min(least[4], max(least[3], key));
+            least[3] = min(least[3], max(least[2], key));
+            least[2] = min(least[2], max(least[1], key));
+            least[1] = min(least[1], max(least[0], key));
+            least[0] = min(least[0], key);
+        }
+    }
+    let place = min(from_low, from_high);
+    var kth = least[0];
+    kth = select(kth, least[1], place == vec4u(1u));
+    kth = select(kth, least[2], place == vec4u(2u));
+    kth = select(kth, least[3], place == vec4u(3u));
+    kth = select(kth, least[4], place == vec4u(4u));
+    kth = select(kth, least[5], place == vec4u(5u));
+    kth = select(kth, least[6], place == vec4u(6u));
+    kth = select(kth, least[7], place == vec4u(7u));
+    return Listed(sign * kth, furthest);
+}
+
+// Whether the bound on searches is beyond this radius: it is one of radii BOUND_STEP apart.
+fn is_unbounded(center: vec3f, radius: f32) -> bool {
+    let beyond = window_of_sphere(center, 1.01 * BOUND_STEP * radius);
+    return window_len(beyond, task.strip_px, MAX_CANDIDATES) <= MAX_CANDIDATES;
+}
+
+// Squared distances to the k-th neighbours; MOST for those that are left.
+fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
+    var found = vec4f(MOST);
+    var open = valid;
+    var radius = max(FIRST_REACH * initial_radius, vec4f(MIN_POSITIVE));
+    let outlier_radius = frame.outlier_growth * initial_radius;
+    // Up to here no gap begins and nothing is an outlier.
+    let unruled = min(frame.gap_growth * initial_radius, outlier_radius);
+    let is_gap_first = frame.gap_growth * initial_radius <= outlier_radius;
+    for (var step = 0u; step < MOST_WINDOWS && any(open); step++) {
+        let window = window_of_four(four, radius, open);
+        let len = window_len(window, task.strip_px, CROWDED);
+        let strips = window_strips(window, task.strip_px);
+        if len + strips.y - strips.x > MOST_SHARED {
+            break;
+        }
+        // The query itself is at distance 0 and counts.
+        var bracket = Bracket(vec4f(-MIN_POSITIVE), min(radius * radius, vec4f(MOST)), vec4u(0u), vec4u(0u));
+        var is_enough = open;
+        for (var count = 0u; count < MOST_COUNTS; count++) {
+            narrow(four, window, &bracket);
+            is_enough = open & (bracket.high_count > vec4u(K));
+            if !any(is_enough & (bracket.high_count - bracket.low_count > vec4u(FEW))) {
+                break;
+            }
+        }
+        let is_listed = is_enough & (bracket.high_count - bracket.low_count <= vec4u(FEW));
+        if any(is_listed) {
+            let listed = list(four, window, bracket, min(unruled * unruled, vec4f(MOST)));
+            let kth = sqrt(listed.kth);
+            let furthest = sqrt(listed.furthest);
+            // From the furthest within reach of the first radius on the next gap would begin.
+            let is_bridged = is_gap_first & (furthest > initial_radius) & (kth <= frame.gap_growth * furthest);
+            var is_settled = is_listed & ((kth <= unruled) | is_bridged);
+            if len > CROWDED {
+                for (var lane = 0u; lane < 4u; lane++) {
+                    is_settled[lane] = is_settled[lane] && is_unbounded(center(four, lane), kth[lane]);
+                }
+            }
+            found = select(found, listed.kth, is_settled);
+        }
+        open &= !is_enough;
+        let known = vec4f(max(bracket.low_count, vec4u(1u)));
+        radius *= clamp(sqrt(1.3 * f32(K) / known), vec4f(1.2), vec4f(2.5));
+    }
+    return found;
+}
+
+// Sums the points up to the squared distances, about the queries themselves.
+fn sum_moments(four: Four, found: vec4f, first: u32) {
+    let is_found = found < vec4f(MOST);
+    if !any(is_found) {
+        return;
+    }
+    let radius = sqrt(found);
+    let window = window_of_four(four, radius, is_found);
+    let strips = window_strips(window, task.strip_px);
+    // The query itself adds nothing but to the count.
+    var count = vec4f(-1.0);
+    var x = vec4f(0.0);
+    var y = x;
+    var z = x;
+    var xx = x;
+    var xy = x;
+    var xz = x;
+    var yy = x;
+    var yz = x;
+    var zz = x;
+    for (var strip = strips.x; strip <= strips.y; strip++) {
+        let run = window_run(window, strip);
+        for (var at = run.x; at < run.y; at++) {
+            let candidate = points[at].position_view;
+            var dx = candidate.x - four.x;
+            var dy = candidate.y - four.y;
+            var dz = candidate.z - four.z;
+            let is_near = fma(dz, dz, fma(dy, dy, dx * dx)) <= found;
+            dx = select(vec4f(0.0), dx, is_near);
+            dy = select(vec4f(0.0), dy, is_near);
+            dz = select(vec4f(0.0), dz, is_near);
+            count += select(vec4f(0.0), vec4f(1.0), is_near);
+            x += dx;
+            y += dy;
+            z += dz;
+            xx += dx * dx;
+            xy += dx * dy;
+            xz += dx * dz;
+            yy += dy * dy;
+            yz += dy * dz;
+            zz += dz * dz;
+        }
+    }
+    for (var lane = 0u; lane < 4u; lane++) {
+        if is_found[lane] {
+            let offset = vec3f(x[lane], y[lane], z[lane]);
+            let second_x = vec3f(xx[lane], xy[lane], xz[lane]);
+            let second_yz = vec3f(yy[lane], yz[lane], zz[lane]);
+            neighborhoods[task.first + first + lane] =
+                Neighborhood(offset, count[lane], second_x, radius[lane], second_yz, 0u);
+        }
+    }
+}
+
+@compute @workgroup_size(64)
+fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    if local == 0u {
+        task_load();
+        atomicStore(&left_len, 0u);
+    }
+    workgroupBarrier();
+    let first = 4u * (group_index(workgroup) * 64u + local);
+    let indices = vec4u(first, first + 1u, first + 2u, first + 3u);
+    let valid = indices < vec4u(task.len);
+    var found = vec4f(MOST);
+    if first < task.len {
+        var four: Four;
+        var initial_radius: vec4f;
+        for (var lane = 0u; lane < 4u; lane++) {
+            let point = points[queries[task.first + min(first + lane, task.len - 1u)]];
+            let cell = density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns);
+            four.x[lane] = point.position_view.x;
+            four.y[lane] = point.position_view.y;
+            four.z[lane] = point.position_view.z;
+            initial_radius[lane] = first_radius(density[cell].x, task.cell_px, point.position_view.z);
+        }
+        found = find(four, initial_radius, valid);
+        sum_moments(four, found, first);
+    }
+    // The others go to a list, whose order does not matter.
+    let is_left = one_if(valid & (found == vec4f(MOST)));
+    let own = is_left.x + is_left.y + is_left.z + is_left.w;
+    var place = atomicAdd(&left_len, own);
+    workgroupBarrier();
+    if local == 0u {
+        left_first = atomicAdd(&counters[left_counter()], atomicLoad(&left_len));
+    }
+    workgroupBarrier();
+    place += left_first;
+    for (var lane = 0u; lane < 4u; lane++) {
+        if is_left[lane] == 1u {
+            left[place] = first + lane;
+            place += 1u;
+        }
+    }
+}

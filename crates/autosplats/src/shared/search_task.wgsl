@@ -1,0 +1,41 @@
+// What all queries of a search's workgroup need to know. Imports: counters. The including pass binds `counters` as atomics.
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+override FIRST_REACH: f32;
+override MAX_CANDIDATES: u32;
+override CROWDED: u32;
+override BOUND_STEP: f32;
+
+const MIN_POSITIVE = 1.1754943508222875e-38;
+
+struct Task {
+    // Among the queries of both rounds.
+    first: u32,
+    len: u32,
+    // Queries that `search_four` left to `search`.
+    left: u32,
+    visible: u32,
+    strip_px: u32,
+    cell_px: u32,
+    cell_columns: u32,
+}
+
+var<workgroup> task: Task;
+
+// Which counter has the number of queries left.
+fn left_counter() -> u32 {
+    return select(LEFT_ACTIVE, LEFT_RECOVERED, ROUND == 1u);
+}
+
+// Call from one; a barrier must follow.
+fn task_load() {
+    let active_points = atomicLoad(&counters[ACTIVE]);
+    task.first = select(0u, active_points, ROUND == 1u);
+    task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    task.left = atomicLoad(&counters[left_counter()]);
+    task.visible = atomicLoad(&counters[VISIBLE]);
+    task.strip_px = atomicLoad(&counters[STRIP_PX]);
+    task.cell_px = atomicLoad(&counters[CELL_PX]);
+    task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+}
