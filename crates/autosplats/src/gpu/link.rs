@@ -24,6 +24,8 @@ const SHARED: &[(&str, &str)] = &[
     ("hidden", include_str!("../shared/hidden.wgsl")),
     ("splat", include_str!("../shared/splat.wgsl")),
     ("fragment", include_str!("../shared/fragment.wgsl")),
+    ("redraw", include_str!("../shared/redraw.wgsl")),
+    ("erased", include_str!("../shared/erased.wgsl")),
     ("patch", include_str!("../shared/patch.wgsl")),
 ];
 
