@@ -1,5 +1,5 @@
-// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of four pixels, as the components of
-// vectors, so that what it reads of a splat serves four. Imports: frame, splat.
+// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of eight pixels, as the components of
+// two vectors, so that what it reads of a splat serves eight. Imports: frame, splat.
 //
 // The including pass binds `tree` and `splats`, and has two functions: `load(slot, index)` reads what it needs of a splat
 // beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixels. A pixel draws its
@@ -7,7 +7,7 @@
 //
 // How it works: the workgroup descends the tree, testing the children of some nodes at a time, an invocation per child. Hits
 // become bits in workgroup memory and from there a list in order. Splats that are found are drawn, 64 at a time: each
-// invocation loads one; the splats that meet each column and each four rows of the patch become bits, and an invocation's
+// invocation loads one; the splats that meet each column and each eight rows of the patch become bits, and an invocation's
 // splats are those of its column and its rows.
 
 // Columns and rows of a patch, and rows of an invocation.
@@ -50,10 +50,10 @@ var<private> hits_half: u32;
 // Nodes found at each level: see `list_start`.
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
-// The patch's columns in the low 16 bits, above them its bands of rows that each splat meets.
+// The patch's columns in the low 16 bits, above them its bands of eight rows that each splat meets.
 // Scalars: invocations that write components of one vector may overwrite each other's.
 var<workgroup> met: array<u32, GROUP>;
-// The same the other way around: the splats that meet each column, then each four rows, sixteen to a word.
+// The same the other way around: the splats that meet each column, then each band, sixteen to a word.
 var<workgroup> meeting: array<u32, 80>;
 
 // The invocation's pixels, as offsets in the patch: column and first row.

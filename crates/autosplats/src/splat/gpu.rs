@@ -2,8 +2,10 @@
 //!
 //! # How it works
 //! The depth map takes minima, which no order changes: an invocation draws a splat, a workgroup one that is large, by atomic
-//! minima of integers that order as depths do. Attributes are sums, which are to come out as on the CPU and the same each
-//! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×16 pixels finds them, by a
+//! minima of integers that order as depths do. Few splats die in a refinement, and most of them were hidden: what they left
+//! in the map is erased, and only those are drawn again that meet a cell of 8×8 pixels where that was so
+//! (`shared/redraw.wgsl`). Attributes are sums, which are to come out as on the CPU and the same each
+//! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×32 pixels finds them, by a
 //! tree over the list instead of bins (`shared/splat.wgsl`, `shared/patch.wgsl`).
 
 use super::layers::{Channels, LayerBuffers};
