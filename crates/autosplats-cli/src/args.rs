@@ -188,7 +188,7 @@ pub(crate) struct SurfaceArgs {
     /// Look for all k neighbours across any gap
     #[arg(long)]
     pub(crate) bridge_gaps: bool,
-    /// Factor on the size of every splat, 0.01 to 100
+    /// Factor on the size of every splat, 0.01 to 10
     #[arg(long, value_name = "FACTOR", default_value_t = Reconstruction::default().splat_scale, allow_negative_numbers = true)]
     pub(crate) splat_scale: f32,
     /// Draw ellipses that follow the spread of the neighbours, instead of circles

@@ -153,7 +153,7 @@ fn every_setting() {
         ("three expansions", Reconstruction { outlier_expansions: Some(3), ..usual() }),
         ("gaps bridged", Reconstruction { gap_factor: None, ..usual() }),
         ("small splats", Reconstruction { splat_scale: 0.3, ..usual() }),
-        ("huge splats", Reconstruction { splat_scale: 20.0, ..usual() }),
+        ("huge splats", Reconstruction { splat_scale: 10.0, ..usual() }),
         ("ellipses", Reconstruction { ellipses: true, ..usual() }),
         ("no culling", Reconstruction { grid_culling: false, ..usual() }),
         ("no refinement", Reconstruction { depth_refinement: false, ..usual() }),

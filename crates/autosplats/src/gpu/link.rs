@@ -27,6 +27,8 @@ const SHARED: &[(&str, &str)] = &[
     ("recovered", include_str!("../shared/recovered.wgsl")),
     ("splat", include_str!("../shared/splat.wgsl")),
     ("fragment", include_str!("../shared/fragment.wgsl")),
+    ("redraw", include_str!("../shared/redraw.wgsl")),
+    ("erased", include_str!("../shared/erased.wgsl")),
     ("patch", include_str!("../shared/patch.wgsl")),
 ];
 

@@ -28,7 +28,7 @@ pub struct Reconstruction {
     /// λ: a search that has at least one neighbour ends with those it has when its circle's area grows by this factor
     /// without meeting another; above 1. `None` bridges any gap [Paper, §5.3].
     pub gap_factor: Option<f32>,
-    /// Factor on every splat radius, 0.01 to 100.
+    /// Factor on every splat radius, 0.01 to 10.
     pub splat_scale: f32,
     /// Draw ellipses along the principal axes of each neighbourhood instead of circles [Paper, §6].
     pub ellipses: bool,
@@ -68,7 +68,7 @@ impl Settings {
         within("outlier_expansions", e0 <= 8, e0, "within 0 to 8")?;
         let lambda = gap_factor.unwrap_or(4.0);
         within("gap_factor", lambda > 1.0 && lambda.is_finite(), lambda, "above 1")?;
-        within("splat_scale", (0.01..=100.0).contains(&splat_scale), splat_scale, "within 0.01 to 100")?;
+        within("splat_scale", (0.01..=10.0).contains(&splat_scale), splat_scale, "within 0.01 to 10")?;
         within("eye_dome", (0.0..=10.0).contains(&self.shading.eye_dome), self.shading.eye_dome, "within 0 to 10")?;
         if let Some([low, high]) = self.shading.range {
             within(

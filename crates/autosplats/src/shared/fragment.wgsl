@@ -1,9 +1,12 @@
-// Drawing a splat's depth pixel by pixel. Imports: frame, splat, depth_map. The including pass binds `depth_map` as atomics.
+// A splat's depth, pixel by pixel. Imports: frame, splat, depth_map. The including pass binds `depth_map` as atomics.
 
 override DOT_RADIUS_PX: f32;
 
-// Draws the depth of a splat, pushed back by ε, at a pixel. The same sums as where splats are drawn by the patch.
-fn draw_depth(splat: Splat, pixel: vec2u) {
+// Key of no depth: behind everything.
+const NO_DEPTH = 0xffffffffu;
+
+// The depth of a splat, pushed back by ε, at a pixel, as a key. The same sums as where splats are drawn by the patch.
+fn pushed_depth(splat: Splat, pixel: vec2u) -> u32 {
     let dx = f32(pixel.x) + 0.5 - splat.center_px.x;
     let dy = f32(pixel.y) + 0.5 - splat.center_px.y;
     let start = select(splat.depth, 1.0 / splat.depth, frame.perspective == 1u);
@@ -21,11 +24,16 @@ fn draw_depth(splat: Splat, pixel: vec2u) {
     if select(dot, disc, disc < dot) <= 1.0 {
         // The dot reaches beyond the disc, where its plane is of no use.
         let hit = min(max(depth, splat.depth - splat.depth_reach), splat.depth + splat.depth_reach);
-        let key = depth_key(hit + splat.epsilon);
-        let at = pixel.y * frame.size.x + pixel.x;
-        // Most splats lose; a plain load tells them so.
-        if key < atomicLoad(&depth_map[at]) {
-            atomicMin(&depth_map[at], key);
-        }
+        return depth_key(hit + splat.epsilon);
+    }
+    return NO_DEPTH;
+}
+
+fn draw_depth(splat: Splat, pixel: vec2u) {
+    let key = pushed_depth(splat, pixel);
+    let at = pixel.y * frame.size.x + pixel.x;
+    // Most splats lose; a plain load tells them so.
+    if key != NO_DEPTH && key < atomicLoad(&depth_map[at]) {
+        atomicMin(&depth_map[at], key);
     }
 }

@@ -1,5 +1,5 @@
-// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of four pixels, as the components of
-// vectors, so that what it reads of a splat serves four. Imports: frame, splat.
+// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of eight pixels, as the components of
+// two vectors, so that what it reads of a splat serves eight. Imports: frame, splat.
 //
 // The including pass binds `tree` and `splats`, and has two functions: `load(slot, index)` reads what it needs of a splat
 // beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixels. A pixel draws its
@@ -7,12 +7,12 @@
 //
 // How it works: the workgroup descends the tree, testing the children of some nodes at a time, an invocation per child. Hits
 // become bits in workgroup memory and from there a list in order. Splats that are found are drawn, 64 at a time: each
-// invocation loads one; the splats that meet each column and each four rows of the patch become bits, and an invocation's
+// invocation loads one; the splats that meet each column and each eight rows of the patch become bits, and an invocation's
 // splats are those of its column and its rows.
 
-// Side of a patch in pixels, and pixels of an invocation.
-const PATCH = 16u;
-const OWN = 4u;
+// Columns and rows of a patch, and rows of an invocation.
+const PATCH = vec2u(16u, 32u);
+const OWN = 8u;
 // Invocations in a workgroup, and splats drawn at a time.
 const GROUP = 64u;
 // Words of bits for the children that are tested at a time.
@@ -50,15 +50,15 @@ var<private> hits_half: u32;
 // Nodes found at each level: see `list_start`.
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
-// The patch's columns in the low 16 bits, above them its fours of rows that each splat meets.
+// The patch's columns in the low 16 bits, above them its bands of eight rows that each splat meets.
 // Scalars: invocations that write components of one vector may overwrite each other's.
 var<workgroup> met: array<u32, GROUP>;
-// The same the other way around: the splats that meet each column, then each four rows, sixteen to a word.
+// The same the other way around: the splats that meet each column, then each band, sixteen to a word.
 var<workgroup> meeting: array<u32, 80>;
 
 // The invocation's pixels, as offsets in the patch: column and first row.
 fn own_offset(local: u32) -> vec2u {
-    return vec2u(local % PATCH, OWN * (local / PATCH));
+    return vec2u(local % PATCH.x, OWN * (local / PATCH.x));
 }
 
 // Number of workgroups that have a patch.
@@ -217,16 +217,16 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
         );
         let bounds = tree[level_start(SPLATS) + index];
         let low = max(firsts(bounds), corner) - corner;
-        let high = min(lasts(bounds) - corner, vec2u(PATCH - 1u));
-        let fours = vec2u(low.y, high.y) / OWN;
-        meets = ((2u << high.x) - (1u << low.x)) | (((2u << fours.y) - (1u << fours.x)) << PATCH);
+        let high = min(lasts(bounds) - corner, PATCH - 1u);
+        let bands = vec2u(low.y, high.y) / OWN;
+        meets = ((2u << high.x) - (1u << low.x)) | (((2u << bands.y) - (1u << bands.x)) << PATCH.x);
         load(local, index);
     }
     met[local] = meets;
     workgroupBarrier();
-    // An invocation per column and sixteen splats; those of the first columns take fours of rows too.
-    let line = local % PATCH;
-    let part = local / PATCH;
+    // An invocation per column and sixteen splats; those of the first columns take bands of rows too.
+    let line = local % PATCH.x;
+    let part = local / PATCH.x;
     var column = 0u;
     var row = 0u;
     var i = 0u;
@@ -234,23 +234,23 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
         let first = 16u * part + 4u * i;
         let bits = vec4u(met[first], met[first + 1u], met[first + 2u], met[first + 3u]) >> vec4u(line);
         column |= dot(bits & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
-        row |= dot((bits >> vec4u(PATCH)) & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
+        row |= dot((bits >> vec4u(PATCH.x)) & vec4u(1u), vec4u(1u, 2u, 4u, 8u)) << (4u * i);
         i += 1u;
         if i >= 4u {
             break;
         }
     }
     meeting[4u * line + part] = column;
-    if line < PATCH / OWN {
-        meeting[4u * (PATCH + line) + part] = row;
+    if line < PATCH.y / OWN {
+        meeting[4u * (PATCH.x + line) + part] = row;
     }
     workgroupBarrier();
 }
 
 // Draws the splats that may cover the invocation's pixels, in order.
 fn draw_prepared(local: u32) {
-    let column = 4u * (local % PATCH);
-    let row = 4u * (PATCH + local / PATCH);
+    let column = 4u * (local % PATCH.x);
+    let row = 4u * (PATCH.x + local / PATCH.x);
     var low = (meeting[column] & meeting[row]) | ((meeting[column + 1u] & meeting[row + 1u]) << 16u);
     var high = (meeting[column + 2u] & meeting[row + 2u]) | ((meeting[column + 3u] & meeting[row + 3u]) << 16u);
     loop {
@@ -267,13 +267,12 @@ fn draw_prepared(local: u32) {
 }
 
 // A splat at the centres of four pixels in a column.
-fn fragments(slot: u32, x: f32, y: vec4f) -> Fragments {
-    let brush = &brushes[slot];
-    let dx = x - (*brush).center_px.x;
-    let dy = y - (*brush).center_px.y;
-    let plane = ((*brush).start + (*brush).plane.y * dy) + (*brush).plane.x * dx;
-    var u = (*brush).u.y * dy + (*brush).u.x * dx;
-    var v = (*brush).v.y * dy + (*brush).v.x * dx;
+fn fragments(brush: Brush, x: f32, y: vec4f) -> Fragments {
+    let dx = x - brush.center_px.x;
+    let dy = y - brush.center_px.y;
+    let plane = (brush.start + brush.plane.y * dy) + brush.plane.x * dx;
+    var u = brush.u.y * dy + brush.u.x * dx;
+    var v = brush.v.y * dy + brush.v.x * dx;
     var depth = plane;
     if frame.perspective == 1u {
         depth = 1.0 / plane;
@@ -283,6 +282,6 @@ fn fragments(slot: u32, x: f32, y: vec4f) -> Fragments {
     let disc = u * u + v * v;
     let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
     // The dot reaches beyond the disc, where its plane is of no use; the disc may not be a number there.
-    let low = vec4f((*brush).low);
-    return Fragments(select(dot, disc, disc < dot), min(max(depth, low), vec4f((*brush).high)));
+    let low = vec4f(brush.low);
+    return Fragments(select(dot, disc, disc < dot), min(max(depth, low), vec4f(brush.high)));
 }

@@ -56,6 +56,11 @@ fn is_empty(bounds: vec2u) -> bool {
     return any(firsts(bounds) > lasts(bounds));
 }
 
+// The bounds of a splat that is dead as if it were not.
+fn living_bounds(bounds: vec2u) -> vec2u {
+    return vec2u(bounds.x & ~DEAD, bounds.y);
+}
+
 // Pixels of bounds that are not empty.
 fn bounds_area(bounds: vec2u) -> u32 {
     let sides = lasts(bounds) - firsts(bounds) + 1u;

@@ -44,21 +44,38 @@ var<workgroup> scalars: array<vec2f, SCALAR_SLOTS>;
 // Splat radius, k-radius and curvature.
 var<workgroup> measures: array<vec3f, MEASURE_SLOTS>;
 
-// Centres of the invocation's four pixels, which are the components of vectors, and the depth map there.
+// What four pixels below each other, the components of vectors, show.
+struct Sums {
+    // The depth map.
+    limit: vec4f,
+    weight: vec4f,
+    depth: vec4f,
+    normal: mat3x4f,
+    color: mat3x4f,
+    // Sum of the values, and of the weights of those known.
+    scalar: mat2x4f,
+    measures: mat3x4f,
+    // Weight of the heaviest splat, its point and its reach.
+    heaviest: vec4f,
+    point: vec4u,
+    reach: vec4f,
+}
+
+// Of the invocation's eight pixels: their centres, and what the upper and the lower four show.
 var<private> own_x: f32;
 var<private> own_y: vec4f;
-var<private> limit: vec4f;
-var<private> weight_sum: vec4f;
-var<private> depth_sum: vec4f;
-var<private> normal_sum: mat3x4f;
-var<private> color_sum: mat3x4f;
-// Sum of the values, and of the weights of those known.
-var<private> scalar_sum: mat2x4f;
-var<private> measure_sum: mat3x4f;
-// Weight of the heaviest splat, its point and its reach.
-var<private> heaviest: vec4f;
-var<private> point: vec4u;
-var<private> reach: vec4f;
+var<private> upper: Sums;
+var<private> lower: Sums;
+
+// What splats carry.
+struct Carried {
+    normal: vec3f,
+    color: vec3f,
+    scalar: vec2f,
+    measures: vec3f,
+    source: u32,
+    reach: f32,
+}
 
 fn load(slot: u32, index: u32) {
     let surfel = surfels[index];
@@ -90,33 +107,50 @@ fn to_linear(srgb: u32) -> f32 {
 }
 
 fn draw(slot: u32) {
-    let hit = fragments(slot, own_x, own_y);
-    // Much like exp(-2·d²) with d in splat radii, without the exponential, and 0.003 at the end.
+    let brush = brushes[slot];
+    var carried: Carried;
+    carried.normal = normals[slot];
+    carried.source = sources[slot];
+    carried.reach = reaches[slot];
+    if COLOR {
+        carried.color = colors[slot];
+    }
+    if SCALAR {
+        carried.scalar = scalars[slot];
+    }
+    if MEASURES {
+        carried.measures = measures[slot];
+    }
+    add(&upper, fragments(brush, own_x, own_y), carried);
+    add(&lower, fragments(brush, own_x, own_y + 4.0), carried);
+}
+
+fn add(sums: ptr<private, Sums>, hit: Fragments, carried: Carried) {
     var kernel = 1.0 - KERNEL_SLOPE * hit.squared;
     kernel *= kernel;
     kernel *= kernel;
     kernel *= kernel;
-    let weight = select(vec4f(0.0), kernel, (hit.squared <= vec4f(1.0)) & (hit.depth <= limit));
-    weight_sum += weight;
-    depth_sum += weight * hit.depth;
-    let n = normals[slot];
-    normal_sum += mat3x4f(weight * n.x, weight * n.y, weight * n.z);
+    let weight = select(vec4f(0.0), kernel, (hit.squared <= vec4f(1.0)) & (hit.depth <= (*sums).limit));
+    (*sums).weight += weight;
+    (*sums).depth += weight * hit.depth;
+    let n = carried.normal;
+    (*sums).normal += mat3x4f(weight * n.x, weight * n.y, weight * n.z);
     if COLOR {
-        let c = colors[slot];
-        color_sum += mat3x4f(weight * c.x, weight * c.y, weight * c.z);
+        let c = carried.color;
+        (*sums).color += mat3x4f(weight * c.x, weight * c.y, weight * c.z);
     }
     if SCALAR {
-        let s = scalars[slot];
-        scalar_sum += mat2x4f(weight * s.x, weight * s.y);
+        let s = carried.scalar;
+        (*sums).scalar += mat2x4f(weight * s.x, weight * s.y);
     }
     if MEASURES {
-        let m = measures[slot];
-        measure_sum += mat3x4f(weight * m.x, weight * m.y, weight * m.z);
+        let m = carried.measures;
+        (*sums).measures += mat3x4f(weight * m.x, weight * m.y, weight * m.z);
     }
-    let heavier = heaviest < weight;
-    heaviest = select(heaviest, weight, heavier);
-    point = select(point, vec4u(sources[slot]), heavier);
-    reach = select(reach, vec4f(reaches[slot]), heavier);
+    let heavier = (*sums).heaviest < weight;
+    (*sums).heaviest = select((*sums).heaviest, weight, heavier);
+    (*sums).point = select((*sums).point, vec4u(carried.source), heavier);
+    (*sums).reach = select((*sums).reach, vec4f(carried.reach), heavier);
 }
 
 @compute @workgroup_size(64)
@@ -129,13 +163,11 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     let pixel = corner + own_offset(local);
     own_x = f32(pixel.x) + 0.5;
     own_y = f32(pixel.y) + vec4f(0.5, 1.5, 2.5, 3.5);
-    limit = vec4f(limit_at(pixel, 0u), limit_at(pixel, 1u), limit_at(pixel, 2u), limit_at(pixel, 3u));
-    point = vec4u(NO_POINT);
+    begin(&upper, pixel);
+    begin(&lower, pixel + vec2u(0u, 4u));
     draw_patch(corner, local);
-    normalize_sums(pixel, 0u);
-    normalize_sums(pixel, 1u);
-    normalize_sums(pixel, 2u);
-    normalize_sums(pixel, 3u);
+    end(&upper, pixel);
+    end(&lower, pixel + vec2u(0u, 4u));
 }
 
 // Index of a pixel below another; that of the last one if it is beyond the picture.
@@ -148,21 +180,34 @@ fn limit_at(pixel: vec2u, below: u32) -> f32 {
     return key_depth(depth_map[pixel_index(pixel, below)]);
 }
 
-// Divides the sums of one of the four pixels by the weights into the layers.
-fn normalize_sums(first: vec2u, i: u32) {
+fn begin(sums: ptr<private, Sums>, first: vec2u) {
+    (*sums).limit = vec4f(limit_at(first, 0u), limit_at(first, 1u), limit_at(first, 2u), limit_at(first, 3u));
+    (*sums).point = vec4u(NO_POINT);
+}
+
+fn end(sums: ptr<private, Sums>, first: vec2u) {
+    normalize_sums(sums, first, 0u);
+    normalize_sums(sums, first, 1u);
+    normalize_sums(sums, first, 2u);
+    normalize_sums(sums, first, 3u);
+}
+
+// Divides the sums of one of four pixels by the weights into the layers.
+fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
     if any(first + vec2u(0u, i) >= frame.size) {
         return;
     }
     let at = pixel_index(first, i);
-    let weight = weight_sum[i];
+    let weight = (*sums).weight[i];
+    let heaviest = (*sums).heaviest[i];
     var rim = EMPTY_RIM;
-    if heaviest[i] >= CORE_WEIGHT || weight >= INNER_WEIGHT {
+    if heaviest >= CORE_WEIGHT || weight >= INNER_WEIGHT {
         rim = CORE_RIM;
-    } else if heaviest[i] > 0.0 {
-        rim = reach[i];
+    } else if heaviest > 0.0 {
+        rim = (*sums).reach[i];
     }
     let covered = weight > 0.0;
-    let n = vec3f(normal_sum[0][i], normal_sum[1][i], normal_sum[2][i]);
+    let n = vec3f((*sums).normal[0][i], (*sums).normal[1][i], (*sums).normal[2][i]);
     let length = sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
     var normal = vec3f(0.0);
     if length > 0.0 {
@@ -173,18 +218,19 @@ fn normalize_sums(first: vec2u, i: u32) {
         normal = vec3f(0.0, 0.0, -1.0);
     }
     let divisor = select(1.0, weight, covered);
-    surface[at] = vec4f(normal, select(infinity(), depth_sum[i] / divisor, covered));
+    surface[at] = vec4f(normal, select(infinity(), (*sums).depth[i] / divisor, covered));
     var scalar = not_a_number();
-    if scalar_sum[1][i] > 0.0 {
-        scalar = scalar_sum[0][i] / scalar_sum[1][i];
+    if (*sums).scalar[1][i] > 0.0 {
+        scalar = (*sums).scalar[0][i] / (*sums).scalar[1][i];
     }
-    cover[at] = Cover(weight, rim, point[i], scalar);
+    cover[at] = Cover(weight, rim, (*sums).point[i], scalar);
     // Sums are zero where nothing is.
     if COLOR {
-        extras[at] = vec4f(color_sum[0][i], color_sum[1][i], color_sum[2][i], 0.0) / divisor;
+        let c = (*sums).color;
+        extras[at] = vec4f(c[0][i], c[1][i], c[2][i], 0.0) / divisor;
     }
     if MEASURES {
-        let mean = vec4f(measure_sum[0][i], measure_sum[1][i], measure_sum[2][i], 0.0) / divisor;
-        extras[at + u32(COLOR) * frame.size.x * frame.size.y] = mean;
+        let m = (*sums).measures;
+        extras[at + u32(COLOR) * frame.size.x * frame.size.y] = vec4f(m[0][i], m[1][i], m[2][i], 0.0) / divisor;
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! # How it works
 //! The depth map takes minima, which no order changes: an invocation draws a splat, a workgroup one that is large, by atomic
-//! minima of integers that order as depths do. Attributes are sums, which are to come out as on the CPU and the same each
-//! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×16 pixels finds them, by a
+//! minima of integers that order as depths do. Few splats die in a refinement, and most of them were hidden: what they left
+//! in the map is erased, and only those are drawn again that meet a cell of 8×8 pixels where that was so
+//! (`shared/redraw.wgsl`). Attributes are sums, which are to come out as on the CPU and the same each
+//! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×32 pixels finds them, by a
 //! tree over the list instead of bins (`shared/splat.wgsl`, `shared/patch.wgsl`).
 
 use super::layers::{Channels, LayerBuffers};
@@ -15,8 +17,22 @@ use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
 
 #[cfg(test)]
-pub(crate) const PASSES: &[PassSource] =
-    &[SET_UP, BOXES, CLEAR_DEPTH, DEPTH, DEPTH_LARGE, RECOVER_COUNT, RECOVER, REFINE, ATTRIBUTES, TRIM];
+pub(crate) const PASSES: &[PassSource] = &[
+    SET_UP,
+    BOXES,
+    CLEAR_DEPTH,
+    DEPTH,
+    DEPTH_LARGE,
+    RECOVER_COUNT,
+    RECOVER,
+    CLEAR_CELLS,
+    REFINE,
+    ERASE,
+    ERASE_LARGE,
+    REDRAW,
+    ATTRIBUTES,
+    TRIM,
+];
 const SET_UP: PassSource = PassSource::new("splat/set_up", include_str!("set_up.wgsl"));
 const BOXES: PassSource = PassSource::new("splat/boxes", include_str!("boxes.wgsl"));
 const CLEAR_DEPTH: PassSource = PassSource::new("splat/clear_depth", include_str!("clear_depth.wgsl"));
@@ -24,15 +40,23 @@ const DEPTH_LARGE: PassSource = PassSource::new("splat/depth_large", include_str
 const DEPTH: PassSource = PassSource::new("splat/depth", include_str!("depth.wgsl"));
 const RECOVER_COUNT: PassSource = PassSource::new("splat/recover_count", include_str!("recover_count.wgsl"));
 const RECOVER: PassSource = PassSource::new("splat/recover", include_str!("recover.wgsl"));
+const CLEAR_CELLS: PassSource = PassSource::new("splat/clear_cells", include_str!("clear_cells.wgsl"));
 const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.wgsl"));
+const ERASE: PassSource = PassSource::new("splat/erase", include_str!("erase.wgsl"));
+const ERASE_LARGE: PassSource = PassSource::new("splat/erase_large", include_str!("erase_large.wgsl"));
+const REDRAW: PassSource = PassSource::new("splat/redraw", include_str!("redraw.wgsl"));
 const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
 /// Pixels of the bounds of a splat that one invocation draws into the depth map.
 const MOST_PX: u32 = 1024;
-/// Side of a patch in pixels, and splats drawn into it at a time.
-const PATCH: u32 = 16;
+/// Columns and rows of a patch, and splats drawn into it at a time.
+const PATCH: [u32; 2] = [16, 32];
 const BATCH: u32 = 64;
+/// Side of a square of pixels that a workgroup trims.
+const SQUARE: u32 = 32;
+/// Side of a cell of pixels that refinement marks.
+const CELL: u32 = 8;
 /// Splats below each top node of the tree, and nodes: `shared/splat.wgsl`.
 const TOP_SPLATS: u32 = 4096;
 const TOP_NODES: u32 = 1 + 16 + 256 + 4096;
@@ -46,9 +70,11 @@ pub(crate) struct SplatBuffers {
     tree: wgpu::Buffer,
     /// Indices of splats that one invocation cannot draw.
     large: wgpu::Buffer,
-    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is. The
-    /// second one is for refinement.
-    pub(crate) depth: [wgpu::Buffer; 2],
+    /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is.
+    pub(crate) depth: wgpu::Buffer,
+    /// What the last refinement did to each splat, and in which cells of pixels it erased depths: `shared/redraw.wgsl`.
+    changes: wgpu::Buffer,
+    cells: wgpu::Buffer,
 }
 
 impl SplatBuffers {
@@ -63,7 +89,9 @@ impl SplatBuffers {
             splats: gpu.storage::<[u8; SPLAT_BYTES]>("splats", screen_capacity as usize)?,
             large: gpu.storage::<u32>("large splats", screen_capacity as usize)?,
             tree: gpu.storage::<[u32; 2]>("tree of splats", nodes)?,
-            depth: [gpu.storage::<u32>("depth map", pixels)?, gpu.storage::<u32>("other depth map", pixels)?],
+            depth: gpu.storage::<u32>("depth map", pixels)?,
+            changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
+            cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
         })
     }
 }
@@ -81,7 +109,11 @@ pub(crate) struct SplatPasses {
     scan_recovered: Pass,
     recover: Pass,
     work: WorkPass,
+    clear_cells: Pass,
     refine: Pass,
+    erase: Pass,
+    erase_large: Pass,
+    redraw: Pass,
     attributes: Pass,
     trim: Pass,
     /// Linear value of each step of a colour.
@@ -143,7 +175,11 @@ impl SplatPasses {
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
             recover: Pass::new(gpu, &RECOVER, &reach)?,
             work: WorkPass::new(gpu)?,
+            clear_cells: pass(&CLEAR_CELLS)?,
             refine: pass(&REFINE)?,
+            erase: Pass::new(gpu, &ERASE, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
+            erase_large: Pass::new(gpu, &ERASE_LARGE, &[dot_radius])?,
+            redraw: Pass::new(gpu, &REDRAW, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             trim: Pass::new(gpu, &TRIM, &trim)?,
             linear: steps,
@@ -160,36 +196,50 @@ impl SplatPasses {
         splats: &SplatBuffers,
         round: Round,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, large, depth } = splats;
+        let SplatBuffers { splats: list, tree, large, depth, .. } = splats;
         let counters = &screen.counters;
         let set_up = [frame, counters, surfels, list, tree, large];
         let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work_256()))];
         steps.push(self.work.step(gpu, frame, screen));
-        if round == Round::Active {
-            steps.push(self.clear_depth.step(gpu, &[frame, &depth[0]], pixel_groups(screen)));
-        }
-        steps.extend(self.steps_depth(gpu, frame, screen, splats, 0, round));
+        let work = match round {
+            Round::Active => {
+                steps.push(self.clear_depth.step(gpu, &[frame, depth], pixel_groups(screen)));
+                Work::Queries256
+            }
+            Round::Recovered => Work::Recovered256,
+        };
+        let small = [frame, counters, list, tree, depth];
+        steps.push(self.depth[round as usize].step(gpu, &small, screen.groups(work)));
+        steps.push(self.step_depth_large(gpu, frame, screen, splats));
         steps
     }
 
-    /// Draws the living splats of a round into a depth map; large ones of all rounds, which changes nothing.
-    fn steps_depth(
+    /// Draws the large living splats of all rounds into the depth map; to draw one again changes nothing.
+    fn step_depth_large(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers, splats: &SplatBuffers) -> Step {
+        let SplatBuffers { splats, tree, large, depth, .. } = splats;
+        let buffers = [frame, &screen.counters, splats, tree, large, depth];
+        self.depth_large.step(gpu, &buffers, screen.groups(Work::LargeSplats))
+    }
+
+    /// Takes those splats out of the depth map whose point it hides [Paper, §7, Depth Refinement].
+    fn steps_refine(
         &self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
         screen: &ScreenBuffers,
         splats: &SplatBuffers,
-        map: usize,
-        round: Round,
-    ) -> [Step; 2] {
-        let SplatBuffers { splats, tree, large, depth } = splats;
+    ) -> [Step; 6] {
+        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks } = splats;
         let counters = &screen.counters;
-        let work = if round == Round::Active { Work::Queries256 } else { Work::Recovered256 };
-        let small = [frame, counters, splats, tree, &depth[map]];
-        let rest = [frame, counters, splats, tree, large, &depth[map]];
+        let all = || screen.groups(Work::Queries256);
+        let larges = screen.groups(Work::LargeSplats);
         [
-            self.depth[round as usize].step(gpu, &small, screen.groups(work)),
-            self.depth_large.step(gpu, &rest, screen.groups(Work::LargeSplats)),
+            self.clear_cells.step(gpu, &[frame, marks], cells(screen.size).div_ceil(256)),
+            self.refine.step(gpu, &[frame, counters, list, depth, tree, changes], all()),
+            self.erase.step(gpu, &[frame, counters, list, tree, changes, depth, marks], all()),
+            self.erase_large.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], larges),
+            self.redraw.step(gpu, &[frame, counters, list, tree, changes, marks, depth], all()),
+            self.step_depth_large(gpu, frame, screen, splats),
         ]
     }
 
@@ -202,7 +252,7 @@ impl SplatPasses {
         splats: &SplatBuffers,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, points, passive, block_sums, queries, .. } = screen;
-        let depth = &splats.depth[0];
+        let depth = &splats.depth;
         let blocks = || screen.groups(Work::PassiveBlocks);
         let count = [frame, points, passive, counters, density, depth, block_sums];
         let recover = [frame, points, passive, counters, density, depth, block_sums, queries];
@@ -231,16 +281,13 @@ impl SplatPasses {
         let ScreenBuffers { counters, values, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
-        for [before, after] in [[0, 1], [1, 0]].into_iter().filter(|_| depth_refinement) {
-            let groups = screen.groups(Work::Queries256);
-            steps.push(self.refine.step(gpu, &[frame, counters, list, &depth[before], tree], groups));
-            steps.push(self.clear_depth.step(gpu, &[frame, &depth[after]], pixel_groups(screen)));
-            steps.extend(self.steps_depth(gpu, frame, screen, splats, after, Round::Active));
+        for _ in 0..if depth_refinement { 2 } else { 0 } {
+            steps.extend(self.steps_refine(gpu, frame, screen, splats));
         }
         steps.push(self.boxes.step(gpu, &[frame, counters, tree], tops(screen)));
-        let attributes = [frame, &self.linear, list, tree, surfels, values, &depth[0], surface, cover, extras];
-        steps.push(self.attributes.step(gpu, &attributes, patches(screen)));
-        steps.push(self.trim.step(gpu, &[frame, surface, cover, extras, counters], patches(screen)));
+        let attributes = [frame, &self.linear, list, tree, surfels, values, depth, surface, cover, extras];
+        steps.push(self.attributes.step(gpu, &attributes, patches(screen, PATCH)));
+        steps.push(self.trim.step(gpu, &[frame, surface, cover, extras, counters], patches(screen, [SQUARE; 2])));
         steps
     }
 }
@@ -250,15 +297,19 @@ fn tops(screen: &ScreenBuffers) -> u32 {
     screen.capacity.div_ceil(TOP_SPLATS).max(1)
 }
 
+/// Cells of pixels in a picture of this size, and room for one more column and row.
+fn cells([columns, rows]: [u32; 2]) -> u32 {
+    (columns / CELL + 1) * (rows / CELL + 1)
+}
+
 /// Workgroups with an invocation per pixel.
 fn pixel_groups(screen: &ScreenBuffers) -> u32 {
     (screen.size[0] * screen.size[1]).div_ceil(256)
 }
 
-/// Workgroups for a patch each.
-fn patches(screen: &ScreenBuffers) -> u32 {
-    let [columns, rows] = screen.size.map(|side| side.div_ceil(PATCH));
-    columns * rows
+/// Workgroups for rectangles of so many columns and rows.
+fn patches(screen: &ScreenBuffers, [columns, rows]: [u32; 2]) -> u32 {
+    screen.size[0].div_ceil(columns) * screen.size[1].div_ceil(rows)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 // Depth refinement: splats whose own point the depth map hides are dead, the others alive [Paper, §7, Depth Refinement].
 //
-// Reads: counters, splats, depth_map. Reads and writes: tree.
+// Reads: counters, splats, depth_map. Reads and writes: tree. Writes: changes.
 
 #import frame
 #import groups
@@ -9,11 +9,13 @@
 #import depth_map
 #import hidden
 #import splat
+#import redraw
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(4) var<storage, read_write> tree: array<vec2u>;
+@group(0) @binding(5) var<storage, read_write> changes: array<u32>;
 
 @compute @workgroup_size(256)
 fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -24,13 +26,17 @@ fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let place = level_start(SPLATS) + index;
     // Those killed before may live again.
     let before = tree[place].x;
-    let bounds = vec2u(before & ~DEAD, tree[place].y);
+    let bounds = living_bounds(vec2u(before, tree[place].y));
     if is_empty(bounds) {
+        changes[index] = AS_BEFORE;
         return;
     }
     let splat = &splats[index];
     let now = select(bounds.x, bounds.x | DEAD, is_hidden((*splat).pixel, (*splat).depth));
-    if now != before {
-        tree[place].x = now;
+    if now == before {
+        changes[index] = AS_BEFORE;
+        return;
     }
+    tree[place].x = now;
+    changes[index] = select(DIED, REVIVED, now == bounds.x);
 }

@@ -17,32 +17,51 @@ override FURTHEST: f32;
 override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 
-// Pixels of the workgroup that show a surface.
-var<workgroup> covered: atomic<u32>;
+// Side of the square of pixels of a workgroup.
+const SQUARE = 32u;
+const GROUP = 64u;
 
-@compute @workgroup_size(16, 16)
-fn trim(
-    @builtin(workgroup_id) workgroup: vec3u,
-    @builtin(local_invocation_id) local: vec3u,
-    @builtin(local_invocation_index) local_index: u32,
-) {
-    if local_index == 0u {
+// Pixels of the workgroup that stay.
+var<workgroup> covered: atomic<u32>;
+// Those that may stick out, as places in the square: few of many, so that invocations look for them together first and
+// each has one to follow lines from then.
+var<workgroup> tails: array<u32, 1024>;
+var<workgroup> tail_count: atomic<u32>;
+
+@compute @workgroup_size(64)
+fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    if local == 0u {
         atomicStore(&covered, 0u);
+        atomicStore(&tail_count, 0u);
     }
     workgroupBarrier();
-    let columns = (frame.size.x + 15u) / 16u;
+    let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
     let group = group_index(workgroup);
-    let pixel = 16u * vec2u(group % columns, group / columns) + local.xy;
-    if all(pixel < frame.size) {
-        let at = pixel.y * frame.size.x + pixel.x;
-        if sticks_out(vec2i(pixel), cover[at].rim) {
-            clear(at);
-        } else if cover[at].weight > 0.0 {
-            atomicAdd(&covered, 1u);
+    let corner = SQUARE * vec2u(group % columns, group / columns);
+    var stay = 0u;
+    for (var place = local; place < SQUARE * SQUARE; place += GROUP) {
+        let pixel = corner + vec2u(place % SQUARE, place / SQUARE);
+        if all(pixel < frame.size) {
+            let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
+            stay += select(1u, 0u, rim == EMPTY_RIM);
+            if rim != EMPTY_RIM && rim != CORE_RIM {
+                tails[atomicAdd(&tail_count, 1u)] = place;
+            }
         }
     }
     workgroupBarrier();
-    if local_index == 0u && atomicLoad(&covered) > 0u {
+    for (var tail = local; tail < atomicLoad(&tail_count); tail += GROUP) {
+        let pixel = corner + vec2u(tails[tail] % SQUARE, tails[tail] / SQUARE);
+        let at = pixel.y * frame.size.x + pixel.x;
+        if sticks_out(vec2i(pixel), cover[at].rim) {
+            clear(at);
+            stay -= 1u;
+        }
+    }
+    // It may have found more to take off than to stay: the sum over the workgroup is right all the same.
+    atomicAdd(&covered, stay);
+    workgroupBarrier();
+    if local == 0u && atomicLoad(&covered) > 0u {
         atomicAdd(&counters[COVERED], atomicLoad(&covered));
     }
 }
@@ -59,9 +78,6 @@ fn clear(at: u32) {
 }
 
 fn sticks_out(pixel: vec2i, own: f32) -> bool {
-    if own == EMPTY_RIM || own == CORE_RIM {
-        return false;
-    }
     // Wide splats have wide cores, which strides do not miss; so the work per pixel is bounded whatever the density.
     let stride = i32(max(own / STRIDES_PER_REACH, 1.0));
     let strides = i32(FURTHEST * own) / stride + LEAST_REACH_PX;

@@ -115,7 +115,7 @@ impl Scene<'_> {
 
 /// The depth map, as depths.
 fn read_depth(gpu: &Gpu, splats: &SplatBuffers, pixels: usize) -> Vec<f32> {
-    let keys: Vec<u32> = read_back(gpu, &splats.depth[0], pixels).expect("a depth map");
+    let keys: Vec<u32> = read_back(gpu, &splats.depth, pixels).expect("a depth map");
     let mask = |key: u32| if key >= 0x8000_0000 { 0x8000_0000 } else { u32::MAX };
     keys.into_iter().map(|key| f32::from_bits(key ^ mask(key))).collect()
 }

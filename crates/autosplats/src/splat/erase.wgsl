@@ -1,0 +1,43 @@
+// Depth refinement: erases what splats that just died left in the depth map, wherever nothing was in front of them, and
+// marks the cells in which it did [Paper, §7, Depth Refinement]. `erase_large` does it for those that are too large for one
+// invocation.
+//
+// Reads: counters, splats, tree, changes. Reads and writes: depth_map, cells.
+
+#import frame
+#import groups
+#import counters
+#import splat
+#import depth_map
+#import fragment
+#import redraw
+#import erased
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> tree: array<vec2u>;
+@group(0) @binding(4) var<storage, read> changes: array<u32>;
+@group(0) @binding(5) var<storage, read_write> depth_map: array<atomic<u32>>;
+@group(0) @binding(6) var<storage, read_write> cells: array<atomic<u32>>;
+
+override MOST_PX: u32;
+
+@compute @workgroup_size(256)
+fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] || changes[index] != DIED {
+        return;
+    }
+    let bounds = living_bounds(tree[level_start(SPLATS) + index]);
+    let area = bounds_area(bounds);
+    if area > MOST_PX {
+        return;
+    }
+    let splat = splats[index];
+    var pixel = firsts(bounds);
+    for (var drawn = 0u; drawn < area; drawn++) {
+        erase_depth(splat, pixel);
+        let ends = pixel.x == lasts(bounds).x;
+        pixel = select(pixel + vec2u(1u, 0u), vec2u(firsts(bounds).x, pixel.y + 1u), ends);
+    }
+}

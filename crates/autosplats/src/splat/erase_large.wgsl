@@ -1,0 +1,39 @@
+// Depth refinement: as `erase`, for splats that are too large for one invocation: a workgroup each.
+//
+// Reads: counters, splats, tree, changes, large. Reads and writes: depth_map, cells.
+
+#import frame
+#import groups
+#import counters
+#import splat
+#import depth_map
+#import fragment
+#import redraw
+#import erased
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> tree: array<vec2u>;
+@group(0) @binding(4) var<storage, read> changes: array<u32>;
+@group(0) @binding(5) var<storage, read> large: array<u32>;
+@group(0) @binding(6) var<storage, read_write> depth_map: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read_write> cells: array<atomic<u32>>;
+
+@compute @workgroup_size(64)
+fn erase_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let place = group_index(workgroup);
+    if place >= counters[LARGE] {
+        return;
+    }
+    let index = large[place];
+    if changes[index] != DIED {
+        return;
+    }
+    let bounds = living_bounds(tree[level_start(SPLATS) + index]);
+    let splat = splats[index];
+    let columns = lasts(bounds).x - firsts(bounds).x + 1u;
+    let area = bounds_area(bounds);
+    for (var at = local; at < area; at += 64u) {
+        erase_depth(splat, firsts(bounds) + vec2u(at % columns, at / columns));
+    }
+}
