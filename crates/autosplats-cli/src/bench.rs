@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use autosplats::{Counts, PassTime, Renderer, SearchEngine, Settings, Timings};
+use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
 use autosplats_cloud::PointCloud;
 use serde::Serialize;
 
@@ -25,7 +25,7 @@ struct Bench<'a> {
     scene: &'a str,
     size: [u32; 2],
     k: u32,
-    engine: &'static str,
+    engine: String,
     /// Frames measured; times are medians of them.
     frames: usize,
     /// Whether the points were new in each frame.
@@ -44,6 +44,8 @@ struct Run {
     picture_ms: f64,
     timings_ms: Timings,
     passes: Vec<PassTime>,
+    /// Points whose neighbourhood was not yet found, before the first iteration and after each, of an engine that iterates.
+    unconverged: Vec<u32>,
 }
 
 /// Renders the same frame again and again and prints the medians.
@@ -67,10 +69,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         scene,
         size: *size,
         k: *k,
-        engine: match settings.reconstruction.engine {
-            SearchEngine::ScreenGrid => "screen-grid",
-            _ => "?",
-        },
+        engine: engine.name(),
         frames: *frames,
         stream: *stream,
         runs: Vec::new(),
@@ -134,8 +133,23 @@ fn measure(
             frame: of(&|timings| timings.frame),
         },
         passes: passes.collect(),
+        unconverged: renderer.convergence().map_err(render_failure)?,
         device,
     })
+}
+
+/// The passes of a stage; those that iterations repeat are one.
+fn runs_of_passes(passes: &[PassTime], prefix: &str) -> Vec<(String, f64)> {
+    let mut runs: Vec<(&str, usize, f64)> = Vec::new();
+    for PassTime { pass, ms } in passes {
+        let Some(name) = pass.strip_prefix(prefix) else { continue };
+        match runs.iter_mut().find(|(known, ..)| *known == name && known.contains('/')) {
+            Some((_, times, sum)) => (*times, *sum) = (*times + 1, *sum + ms),
+            None => runs.push((name, 1, *ms)),
+        }
+    }
+    let label = |name: &str, times: usize| if times == 1 { name.into() } else { format!("{name}, {times} times") };
+    runs.into_iter().map(|(name, times, ms)| (label(name, times), ms)).collect()
 }
 
 /// Another cloud with the same points.
@@ -159,11 +173,16 @@ impl Bench<'_> {
             "{scene}: {} points, {width}x{height}, k {k}, {engine}; milliseconds, medians of {frames} frames",
             cloud.len()
         )];
-        for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes } in runs {
+        for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes, unconverged } in runs {
             lines.push(String::new());
             lines.push(device.describe());
             let Counts { visible, active, recovered, .. } = counts;
             lines.push(format!("  {visible} points visible, {active} reconstructed at first, {recovered} after that"));
+            if let [queries, left @ ..] = &unconverged[..] {
+                let percent = |left: &u32| format!("{:.2}", 100.0 - 100.0 * f64::from(*left) / f64::from(*queries));
+                let percents: Vec<_> = left.iter().map(percent).collect();
+                lines.push(format!("  found after each iteration, %: {}", percents.join(" ")));
+            }
             let mut line = |name: &str, ms: f64| lines.push(format!("  {name:<32} {ms:>10.3}"));
             let Timings { project, search, fit, splat, shade, frame, .. } = timings_ms;
             for (stage, ms) in
@@ -171,8 +190,8 @@ impl Bench<'_> {
             {
                 line(stage, *ms);
                 let prefix = format!("{stage}/");
-                for PassTime { pass, ms } in passes.iter().filter(|time| time.pass.starts_with(&prefix)) {
-                    line(&format!("  {}", &pass[prefix.len()..]), *ms);
+                for (pass, ms) in runs_of_passes(passes, &prefix) {
+                    line(&format!("  {pass}"), ms);
                 }
             }
             line("frame", *frame);

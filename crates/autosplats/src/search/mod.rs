@@ -17,6 +17,7 @@ pub(crate) mod gpu;
 pub(crate) mod moments;
 pub(crate) mod screen_grid;
 pub(crate) mod select;
+pub(crate) mod splat_communication;
 #[cfg(test)]
 mod tests;
 
@@ -27,11 +28,16 @@ pub enum SearchEngine {
     /// Buckets of screen points read outwards from each point; exact, in one pass.
     #[default]
     ScreenGrid,
+    /// The paper's own: points draw splats onto each other's pixels, on a GPU only. Slower, and exact for at least 99.9 % of
+    /// the points.
+    SplatCommunication,
 }
 
 /// Neighbourhoods that share a [`NeighborhoodBlock`].
 pub(crate) const LANES: usize = 16;
 
+/// Added to projected bounds in pixels, against the rounding of projected coordinates.
+pub(crate) const MARGIN_PX: f32 = 0.02;
 /// Screen points in the projection of the largest sphere that is searched.
 pub(crate) const MAX_CANDIDATES: usize = 4096;
 /// Screen points in a window from which on its points may meet the bound: densities do not rise eightfold in one step.

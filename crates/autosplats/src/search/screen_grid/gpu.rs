@@ -1,11 +1,10 @@
 //! The screen-grid search on the GPU: an invocation per point.
 
 use super::cpu::{FIRST_REACH, LEAST_GROWTH};
-use super::window::MARGIN_PX;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers};
-use crate::search::{BOUND_STEP, CROWDED, MAX_CANDIDATES};
+use crate::search::{BOUND_STEP, CROWDED, MARGIN_PX, MAX_CANDIDATES};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH];

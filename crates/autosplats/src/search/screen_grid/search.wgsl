@@ -13,6 +13,7 @@
 #import screen
 #import surfel
 #import window
+#import window_points
 #import nearest
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
