@@ -138,18 +138,20 @@ fn measure(
     })
 }
 
-/// The passes of a stage; those that iterations repeat are one.
-fn runs_of_passes(passes: &[PassTime], prefix: &str) -> Vec<(String, f64)> {
-    let mut runs: Vec<(&str, usize, f64)> = Vec::new();
-    for PassTime { pass, ms } in passes {
+/// The passes of a stage; those that iterations repeat again and again are one.
+fn listed(passes: &[PassTime], prefix: &str) -> Vec<(String, f64)> {
+    const MANY: usize = 8;
+    let mut listed: Vec<(String, f64)> = Vec::new();
+    for (at, PassTime { pass, ms }) in passes.iter().enumerate() {
         let Some(name) = pass.strip_prefix(prefix) else { continue };
-        match runs.iter_mut().find(|(known, ..)| *known == name && known.contains('/')) {
-            Some((_, times, sum)) => (*times, *sum) = (*times + 1, *sum + ms),
-            None => runs.push((name, 1, *ms)),
+        let same = || passes.iter().filter(|other| other.pass == *pass);
+        if same().count() < MANY {
+            listed.push((name.into(), *ms));
+        } else if passes[..at].iter().all(|before| before.pass != *pass) {
+            listed.push((format!("{name}, {} times", same().count()), same().map(|time| time.ms).sum()));
         }
     }
-    let label = |name: &str, times: usize| if times == 1 { name.into() } else { format!("{name}, {times} times") };
-    runs.into_iter().map(|(name, times, ms)| (label(name, times), ms)).collect()
+    listed
 }
 
 /// Another cloud with the same points.
@@ -190,7 +192,7 @@ impl Bench<'_> {
             {
                 line(stage, *ms);
                 let prefix = format!("{stage}/");
-                for (pass, ms) in runs_of_passes(passes, &prefix) {
+                for (pass, ms) in listed(passes, &prefix) {
                     line(&format!("  {pass}"), ms);
                 }
             }

@@ -10,7 +10,7 @@ use autosplats::cloud::glam::DVec3;
 use autosplats::cloud::{FieldValues, PointCloud, Scene};
 use autosplats::{
     Backend, Background, Camera, ColorMode, Counts, Error, GBuffer, Image, Projection, Reconstruction, Renderer,
-    Settings, Shading, wgpu,
+    SearchEngine, Settings, Shading, wgpu,
 };
 use test_clouds::EYE;
 
@@ -423,4 +423,51 @@ fn colours_come_and_go_without_the_points() {
             Settings { shading: Shading { color: color.clone(), ..Shading::default() }, ..Settings::default() };
         compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("{color:?}"));
     }
+}
+
+fn by_communication() -> Settings {
+    let engine = SearchEngine::SplatCommunication;
+    Settings { reconstruction: Reconstruction { engine, ..Reconstruction::default() }, ..Settings::default() }
+}
+
+/// The paper's own search makes the picture of the exact one, but for the thousandth of the points that it leaves unfinished.
+#[test]
+fn splat_communication_makes_the_same_picture() {
+    let Some(mut gpu) = gpu() else { return };
+    for (name, count) in [("statue", 20_000), ("two-scales", 10_000), ("herd", 10_000)] {
+        let (cloud, camera) = scene(name, count);
+        let mut cpu = Renderer::new();
+        let host = cpu.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture on the CPU");
+        let device = gpu.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture on the GPU");
+        let unlike = unlike(host.image, device.image);
+        assert!(unlike <= 2.0 * UNLIKE, "{name}: {unlike} of the pixels differ");
+        let counts = device.counts;
+        let curve = gpu.convergence().expect("a curve");
+        assert!(curve.len() > 5, "{name}: {curve:?}");
+        assert_eq!(curve[0] as usize, counts.active + counts.recovered, "{name}: what was searched for");
+        assert!(curve.last().is_some_and(|&left| f64::from(left) <= 1e-3 * f64::from(curve[0])), "{name}: {curve:?}");
+        gpu.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture");
+        assert!(gpu.convergence().expect("none").is_empty(), "{name}: the other engine does not iterate");
+    }
+}
+
+#[test]
+fn splat_communication_is_refused_where_it_cannot_run() {
+    let (cloud, camera) = scene("statue", 2_000);
+    let refused = |renderer: &mut Renderer| {
+        let outcome = renderer.render(&cloud, &camera, SIZE, &by_communication()).map(|frame| frame.counts);
+        outcome.expect_err("refused").to_string()
+    };
+    let mut cpu = Renderer::new();
+    let message = refused(&mut cpu);
+    assert!(message.contains("runs on a GPU only") && message.contains("screen-grid"), "{message}");
+    assert!(cpu.convergence().expect("none").is_empty(), "nothing was searched for");
+    if gpu().is_none() {
+        return;
+    }
+    let (device, queue) = own_device(128 << 20).expect("a device");
+    let mut own = Renderer::with_device(device, queue).expect("a renderer");
+    let message = refused(&mut own);
+    assert!(message.contains("FLOAT32_BLENDABLE") && message.contains("screen-grid"), "{message}");
+    compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
 }

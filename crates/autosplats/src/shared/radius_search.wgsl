@@ -2,6 +2,7 @@
 
 // Between which distances the k-th neighbour is being looked for: a and b of the paper.
 struct Search {
+    // While the radius expands, the distance to the furthest neighbour, below 0; see first_sample.
     low: f32,
     // 0 before the first step. Once the search has ended, the radius of the neighbourhood.
     high: f32,
@@ -19,6 +20,8 @@ const OUT_OF_STEPS = -4.0;
 // Not a query: the point only answers.
 const NOT_ASKED = -5.0;
 
+// Least expansion of a radius: steps of √(k/σ) creep when one neighbour is missing that is far away.
+const LEAST_GROWTH = 1.15;
 // A bracket so narrow, relative to its radius, separates no distances any more.
 const NARROWEST = 0x1p-22;
 // Points further apart have squared distances that do not round to 0.
@@ -38,14 +41,30 @@ fn has_neighbors(search: Search) -> bool {
     return search.count == FOUND || search.count == CLAMPED_AT_GAP || search.count == OUT_OF_STEPS;
 }
 
-// Whether a point at this distance is among those that the search is to be told of: the delta region.
+// Whether a point at this distance is among those that the search is to be told of: the delta region; all of the
+// neighbourhood once it has ended.
 fn is_within(search: Search, distance: f32) -> bool {
-    return distance <= search.high && (distance > search.low || search.count == 0.0);
+    return distance <= search.high && (distance > abs(search.low) || search.count <= 0.0);
+}
+
+// How much a radius with so many neighbours expands at most: α of [Paper, §5.2].
+//
+// Differs from the paper: α aims at k + 1 neighbours, since any radius from the k-th to there will do. Aiming at the k-th itself
+// misses it every second time, which costs an iteration.
+fn expansion(count: f32) -> f32 {
+    return max(sqrt((f32(frame.k) + 1.0) / max(count, 1.0)), LEAST_GROWTH);
+}
+
+// Where the samples begin: a. The textures have no channel for both a and d_max; as an expanding radius has d_max alone, its a
+// is found again from b, rounded downwards.
+fn first_sample(search: Search) -> f32 {
+    return max(abs(search.low), search.high / expansion(search.count) * (1.0 - 0x1p-22) * f32(search.low < 0.0));
 }
 
 // The m = 4 radii at which neighbours are counted. Fused, so that every pass gets the same bits.
 fn sample_radii(search: Search) -> vec4f {
-    let radii = fma(vec4f(search.high - search.low), vec4f(0.25, 0.5, 0.75, 1.0), vec4f(search.low));
+    let low = first_sample(search);
+    let radii = fma(vec4f(search.high - low), vec4f(0.25, 0.5, 0.75, 1.0), vec4f(low));
     return vec4f(radii.xyz, search.high);
 }
 
@@ -64,7 +83,7 @@ struct Known {
 
 fn recall(radii: vec4f, counters: vec4f) -> Known {
     let asked = Search(radii.x, radii.y, radii.z);
-    return Known(asked, max(radii.x, radii.w), max(asked.count, 0.0) + counters);
+    return Known(asked, max(abs(radii.x), radii.w), max(asked.count, 0.0) + counters);
 }
 
 // What to ask next. `others` is the number of all other screen points.
@@ -93,17 +112,14 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
         }
         // As the gap rule below has it, so that two neighbours met at once have no gap between them.
         let growth = min(sqrt(max(f32(frame.k), 10.0)), frame.gap_growth);
-        return Search(0.0, min(min(radius * growth, limit), MOST), 0.0);
+        return Search(radius, min(min(radius * growth, limit), MOST), 0.0);
     }
     // Differs from the paper: no step is wider than the gap that would end the search, or it would step over the gap.
     let reach = frame.gap_growth * max(known.furthest, initial_radius);
     if is_all || radius >= reach {
         return ended(known.furthest, CLAMPED_AT_GAP);
     }
-    let growth = sqrt(f32(frame.k) / count);
-    // Differs from the paper: a is the furthest neighbour's distance, not the radius before. As many points lie within it, and
-    // it is d_max, which needs no channel of its own then.
-    return Search(known.furthest, min(min(radius * growth, reach), MOST), count);
+    return Search(-known.furthest, min(min(radius * expansion(count), reach), MOST), count);
 }
 
 fn bracket(known: Known) -> Search {
@@ -111,7 +127,7 @@ fn bracket(known: Known) -> Search {
     let radii = sample_radii(known.asked);
     let counts = known.counts;
     // The last sample below k neighbours and the first with them.
-    var low = vec2f(known.asked.low, known.asked.count);
+    var low = vec2f(first_sample(known.asked), known.asked.count);
     var high = vec2f(radii.x, counts.x);
     for (var sample = 1u; sample < 4u; sample++) {
         if high.y < k {

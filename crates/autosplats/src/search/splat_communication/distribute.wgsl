@@ -39,8 +39,6 @@ fn distribute_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
     if IS_LAST {
         search = settle(known, initial_radius, others);
         radius = select(0.0, max(search.high, LEAST_DISTANCE), has_neighbors(search));
-        // The whole neighbourhood answers.
-        search.low = -1.0;
     } else {
         search = advance(known, initial_radius, others);
         // A converged point covers its own pixel and passes along what it found.
