@@ -6,6 +6,8 @@
 #[path = "../src/test_clouds.rs"]
 mod test_clouds;
 
+use std::collections::HashMap;
+
 use autosplats::cloud::glam::DVec3;
 use autosplats::cloud::{FieldValues, PointCloud, Scene};
 use autosplats::{
@@ -430,24 +432,37 @@ fn by_communication() -> Settings {
     Settings { reconstruction: Reconstruction { engine, ..Reconstruction::default() }, ..Settings::default() }
 }
 
-/// The paper's own search makes the picture of the exact one, but for the thousandth of the points that it leaves unfinished.
+/// The paper's own search finds what the exact one finds, but for the thousandth of the points that it leaves unfinished, and
+/// does so in ten iterations at most.
 #[test]
-fn splat_communication_makes_the_same_picture() {
+fn splat_communication_in_every_scene() {
     let Some(mut gpu) = gpu() else { return };
-    for (name, count) in [("statue", 20_000), ("two-scales", 10_000), ("herd", 10_000)] {
-        let (cloud, camera) = scene(name, count);
-        let mut cpu = Renderer::new();
-        let host = cpu.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture on the CPU");
-        let device = gpu.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture on the GPU");
-        let unlike = unlike(host.image, device.image);
+    for (name, _) in Scene::names() {
+        let (cloud, camera) = scene(name, 20_000);
+        let exact = gpu.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture").image.clone();
+        assert!(gpu.convergence().expect("none").is_empty(), "{name}: the screen grid does not iterate");
+        let radii = |gpu: &mut Renderer| -> HashMap<u32, f32> {
+            gpu.surfels().expect("surfels").iter().map(|surfel| (surfel.point, surfel.k_radius)).collect()
+        };
+        let exact_radii = radii(&mut gpu);
+        let frame = gpu.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture");
+        let (counts, unlike) = (frame.counts, unlike(&exact, frame.image));
         assert!(unlike <= 2.0 * UNLIKE, "{name}: {unlike} of the pixels differ");
-        let counts = device.counts;
+
+        let found = radii(&mut gpu);
+        // What the last thousandth hides or lets through may be recovered or not.
+        let both: Vec<_> = found.iter().filter_map(|(point, found)| Some((found, exact_radii.get(point)?))).collect();
+        assert!(both.len() * 1000 >= 999 * exact_radii.len(), "{name}: the same points are searched for");
+        let wrong = both.iter().filter(|(found, exact)| !((*found - *exact).abs() <= 1e-5 * *exact)).count();
+        assert!(wrong * 1000 <= both.len(), "{name}: {wrong} of {} k-radii differ", both.len());
+
         let curve = gpu.convergence().expect("a curve");
-        assert!(curve.len() > 5, "{name}: {curve:?}");
+        eprintln!("{name}: {wrong} of {} k-radii differ, {unlike} of the pixels; {curve:?}", both.len());
         assert_eq!(curve[0] as usize, counts.active + counts.recovered, "{name}: what was searched for");
-        assert!(curve.last().is_some_and(|&left| f64::from(left) <= 1e-3 * f64::from(curve[0])), "{name}: {curve:?}");
-        gpu.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture");
-        assert!(gpu.convergence().expect("none").is_empty(), "{name}: the other engine does not iterate");
+        let left = curve.get(10).or(curve.last()).copied().unwrap_or_default();
+        assert!(left * 1000 <= curve[0], "{name}: after ten iterations: {curve:?}");
+        let left = curve.get(7).copied().unwrap_or_default();
+        assert!(left * 100 <= curve[0], "{name}: after seven iterations: {curve:?}");
     }
 }
 

@@ -4,7 +4,8 @@
 struct Search {
     // While the radius expands, the distance to the furthest neighbour, below 0; see first_sample.
     low: f32,
-    // 0 before the first step. Once the search has ended, the radius of the neighbourhood.
+    // Below 0 before the first step; 0 if the point is not a query and only answers. Once the search has ended, the radius
+    // of the neighbourhood.
     high: f32,
     // Neighbours up to `low`; or, below 0, how the search ended.
     count: f32,
@@ -17,8 +18,6 @@ const OUTLIER = -2.0;
 const CLAMPED_AT_GAP = -3.0;
 // Iterations ended before the k-th neighbour was met.
 const OUT_OF_STEPS = -4.0;
-// Not a query: the point only answers.
-const NOT_ASKED = -5.0;
 
 // Least expansion of a radius: steps of √(k/σ) creep when one neighbour is missing that is far away.
 const LEAST_GROWTH = 1.15;
@@ -33,8 +32,12 @@ fn apart(p: vec3f, q: vec3f) -> f32 {
     return sqrt(fma(v.z, v.z, fma(v.y, v.y, v.x * v.x)));
 }
 
+fn is_query(search: Search) -> bool {
+    return search.high != 0.0 || search.count != 0.0;
+}
+
 fn has_ended(search: Search) -> bool {
-    return search.count < 0.0;
+    return search.count < 0.0 || search.high == 0.0;
 }
 
 fn has_neighbors(search: Search) -> bool {
@@ -92,7 +95,7 @@ fn advance(known: Known, initial_radius: f32, others: f32) -> Search {
     if has_ended(asked) {
         return asked;
     }
-    if asked.high == 0.0 {
+    if asked.high < 0.0 {
         return Search(0.0, initial_radius, 0.0);
     }
     if known.counts.w < f32(frame.k) {

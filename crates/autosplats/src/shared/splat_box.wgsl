@@ -34,3 +34,8 @@ fn splat_vertex(center: vec3f, radius: f32, pixel: vec2u, vertex: u32) -> vec4f 
     }
     return pixel_vertex(pixel, vertex, depth);
 }
+
+// A splat that covers nothing.
+fn no_vertex() -> vec4f {
+    return vec4f(2.0, 2.0, 1.0, 1.0);
+}

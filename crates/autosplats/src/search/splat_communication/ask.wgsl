@@ -1,5 +1,4 @@
-// Every query draws its pixel: from now on its point is searched for. All others keep what the texture was cleared to and
-// only answer.
+// Every query draws its pixel: its search begins. All others keep the 0 that the texture was cleared to, and only answer.
 //
 // Reads: points, queries, counters. Writes: the second radius texture.
 
@@ -26,5 +25,5 @@ fn ask_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn ask_fragment() -> @location(0) vec4f {
-    return vec4f(0.0);
+    return vec4f(0.0, -1.0, 0.0, 0.0);
 }

@@ -33,7 +33,11 @@ fn covariance_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
     let point = points[vertex / BOX_VERTICES];
     let pixel = pixel_xy(point.pixel);
     let radius = textureLoad(feedback, pixel, 0).w;
-    return Splat(splat_vertex(point.position_view, radius, pixel, vertex), point.position_view, point.pixel);
+    var position = no_vertex();
+    if radius > 0.0 {
+        position = splat_vertex(point.position_view, radius, pixel, vertex);
+    }
+    return Splat(position, point.position_view, point.pixel);
 }
 
 @fragment

@@ -44,7 +44,10 @@ fn distribute_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
         // A converged point covers its own pixel and passes along what it found.
         radius = select(search.high, 0.0, has_ended(search));
     }
-    let position = splat_vertex(point.position_view, radius, pixel, vertex);
+    var position = no_vertex();
+    if is_query(search) {
+        position = splat_vertex(point.position_view, radius, pixel, vertex);
+    }
     return Splat(position, point.position_view, point.pixel, vec3f(search.low, search.high, search.count));
 }
 

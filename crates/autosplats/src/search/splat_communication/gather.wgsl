@@ -30,8 +30,13 @@ struct Answer {
 fn gather_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
     let point = points[vertex / BOX_VERTICES];
     let pixel = pixel_xy(point.pixel);
-    let radius = textureLoad(feedback, pixel, 0).w;
-    return Splat(splat_vertex(point.position_view, radius, pixel, vertex), point.position_view, point.pixel);
+    let told = textureLoad(feedback, pixel, 0);
+    // A point that nobody asks covers its own pixel, to pass its bounds along, if it has any.
+    var position = no_vertex();
+    if told.w > 0.0 || is_query(Search(told.x, told.y, told.z)) {
+        position = splat_vertex(point.position_view, told.w, pixel, vertex);
+    }
+    return Splat(position, point.position_view, point.pixel);
 }
 
 @fragment

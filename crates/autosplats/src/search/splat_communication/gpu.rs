@@ -37,9 +37,6 @@ pub(crate) const ITERATIONS: usize = 16;
 /// Part of the points that need not converge: 1 - t_conv [Paper, §5.2].
 pub(crate) const UNCONVERGED: f64 = 0.001;
 
-/// `NOT_ASKED` of `shared/radius_search.wgsl`, where a point keeps how its search ended.
-const NOT_ASKED: [f64; 4] = [0.0, 0.0, -5.0, 0.0];
-
 /// What a gathering pass writes for each pixel: two textures.
 const GATHERED: [Target; 2] = [Target::Add, Target::AddAndMax];
 const GATHERED_BYTES: u32 = 32;
@@ -250,7 +247,7 @@ impl Bound<'_> {
         let resources = buffers([self.buffers.frame, &screen.points, &screen.queries, &screen.counters]);
         let pass = &self.passes.rounds[round as usize].ask;
         let Textures { radii, depth, .. } = self.textures;
-        let colors = vec![(radii.clone(), Load::Cleared(NOT_ASKED))];
+        let colors = vec![(radii.clone(), Load::Cleared([0.0; 4]))];
         let targets = Targets { colors, depth: depth.clone(), clear_depth: None };
         targets.step(vec![self.draw(pass, &resources, at!(queries))])
     }
