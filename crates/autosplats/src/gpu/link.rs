@@ -20,6 +20,7 @@ const SHARED: &[(&str, &str)] = &[
     ("communication", include_str!("../shared/communication.wgsl")),
     ("splat_box", include_str!("../shared/splat_box.wgsl")),
     ("radius_search", include_str!("../shared/radius_search.wgsl")),
+    ("answer", include_str!("../shared/answer.wgsl")),
     ("nearest", include_str!("../shared/nearest.wgsl")),
     ("layers", include_str!("../shared/layers.wgsl")),
     ("range_keys", include_str!("../shared/range_keys.wgsl")),

@@ -10,16 +10,11 @@
 #import window
 #import splat_box
 #import radius_search
+#import answer
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var positions: texture_2d<f32>;
 @group(0) @binding(3) var feedback: texture_2d<f32>;
-
-struct Splat {
-    @builtin(position) position: vec4f,
-    @location(0) @interpolate(flat) center: vec3f,
-    @location(1) @interpolate(flat) pixel: u32,
-}
 
 struct Answer {
     @location(0) counts: vec4f,
@@ -28,25 +23,16 @@ struct Answer {
 
 @vertex
 fn gather_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
-    let point = points[vertex / BOX_VERTICES];
-    let pixel = pixel_xy(point.pixel);
-    let told = textureLoad(feedback, pixel, 0);
-    // A point that nobody asks covers its own pixel, to pass its bounds along, if it has any.
-    var position = no_vertex();
-    if told.w > 0.0 || is_query(Search(told.x, told.y, told.z)) {
-        position = splat_vertex(point.position_view, told.w, pixel, vertex);
-    }
-    return Splat(position, point.position_view, point.pixel);
+    return answer_vertex(vertex, true);
 }
 
 @fragment
 fn gather_fragment(splat: Splat) -> Answer {
     let at = vec2u(splat.position.xy);
-    let told = textureLoad(feedback, at, 0);
-    if all(at == pixel_xy(splat.pixel)) {
-        return Answer(vec4f(0.0), vec4f(told.xyz, 0.0));
+    let search = asked_at(at);
+    if is_own(splat) {
+        return Answer(vec4f(0.0), vec4f(search.low, search.high, search.count, 0.0));
     }
-    let search = Search(told.x, told.y, told.z);
     let distance = apart(splat.center, textureLoad(positions, at, 0).xyz);
     if has_ended(search) || !is_within(search, distance) {
         discard;

@@ -11,16 +11,11 @@
 #import window
 #import splat_box
 #import radius_search
+#import answer
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
 @group(0) @binding(2) var positions: texture_2d<f32>;
 @group(0) @binding(3) var feedback: texture_2d<f32>;
-
-struct Splat {
-    @builtin(position) position: vec4f,
-    @location(0) @interpolate(flat) center: vec3f,
-    @location(1) @interpolate(flat) pixel: u32,
-}
 
 struct Answer {
     @location(0) offset: vec4f,
@@ -29,25 +24,16 @@ struct Answer {
 
 @vertex
 fn mean_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
-    let point = points[vertex / BOX_VERTICES];
-    let pixel = pixel_xy(point.pixel);
-    let radius = textureLoad(feedback, pixel, 0).w;
-    var position = no_vertex();
-    if radius > 0.0 {
-        position = splat_vertex(point.position_view, radius, pixel, vertex);
-    }
-    return Splat(position, point.position_view, point.pixel);
+    return answer_vertex(vertex, false);
 }
 
 @fragment
 fn mean_fragment(splat: Splat) -> Answer {
     let at = vec2u(splat.position.xy);
-    let told = textureLoad(feedback, at, 0);
-    let search = Search(told.x, told.y, told.z);
+    let search = asked_at(at);
     let center = textureLoad(positions, at, 0).xyz;
     let distance = apart(splat.center, center);
-    let is_itself = all(at == pixel_xy(splat.pixel));
-    if is_itself || !has_neighbors(search) || !is_within(search, distance) {
+    if is_own(splat) || !has_neighbors(search) || !is_within(search, distance) {
         discard;
     }
     return Answer(vec4f(splat.center - center, 1.0), vec4f(0.0, 0.0, 0.0, distance));

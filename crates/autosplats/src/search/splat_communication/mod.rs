@@ -5,7 +5,8 @@
 //! of a sphere about it; each fragment loads the one point that owns its pixel from a texture of positions, finds the
 //! distance, and is discarded or blended into the pixel: a message to the point there. The depth mask holds the depths of all
 //! points, and 1 where there is none. Splats are drawn at f(z + r) and pass where that is GREATER, so that pixels that are
-//! empty or hold points too far away fail early-Z and start no fragment.
+//! empty or hold points too far away fail early-Z and start no fragment; depths are only read, so it does not matter that
+//! fragments are discarded.
 //!
 //! `begin` says how much there is to draw, `mask` draws positions and depths, `ask` marks the queries of a round. Then,
 //! again and again (Figure 5 of the paper):
@@ -21,7 +22,7 @@
 //! The next distribution reads what was gathered and moves a and b (`shared/radius_search.wgsl`): with fewer than k neighbours
 //! b expands by α = √(k/σ), else the two counters about k are the new bracket, until one is k. Bounds are handed on between T_F
 //! and T_R2 by each point's own fragment, in colours, which are added where alpha takes the greatest; a converged point
-//! draws that one pixel only.
+//! draws that one pixel only. What is no query has nothing to hand on, and draws nothing but its answers.
 //!
 //! At last every query draws the radius found, and two more gathering passes sum up the moments, `mean` and `covariance`;
 //! the k-radius is the distance to the furthest neighbour that was summed.
