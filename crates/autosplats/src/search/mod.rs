@@ -11,7 +11,8 @@
 //!   projects to a rectangle with at most [`MAX_CANDIDATES`] screen points. If no rule ended the neighbourhood and its k-th
 //!   neighbour lies beyond, P keeps the neighbours within that radius and is counted as bounded. So a cloud of nothing but
 //!   outliers costs a bounded time per point. An engine may go without the rectangle, and so without the bound, where it
-//!   reads less than [`CROWDED`] screen points.
+//!   reads less than [`CROWDED`] screen points. Splat communication goes without it: what bounds it is the number of its
+//!   iterations.
 
 pub(crate) mod gpu;
 pub(crate) mod moments;

@@ -216,16 +216,32 @@ fn comparison_sees_a_wrong_neighbourhood() {
     assert!(different(&other, &right, "another k") > allowed(&screen), "another k is another question");
 }
 
+/// A device with so many bytes per pixel to draw into.
+fn own_device(required_features: wgpu::Features, bytes: u32) -> Gpu {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
+    let required_limits = wgpu::Limits { max_color_attachment_bytes_per_sample: bytes, ..wgpu::Limits::default() };
+    let descriptor = wgpu::DeviceDescriptor { required_features, required_limits, ..Default::default() };
+    let device = adapter.expect("a device").request_device(&descriptor);
+    let (device, queue) = pollster::block_on(device).expect("a device within WebGPU's default limits");
+    Gpu::from_parts(device, queue)
+}
+
 #[test]
-fn a_device_that_cannot_blend_floats_is_refused() {
+fn devices_that_cannot_run_it_are_refused() {
     if test_gpu().is_none() {
         return;
     }
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
-    let device = adapter.expect("a device").request_device(&wgpu::DeviceDescriptor::default());
-    let (device, queue) = pollster::block_on(device).expect("a device within WebGPU's default limits");
-    let refused = CommunicationPasses::new(&Gpu::from_parts(device, queue)).expect_err("refused").to_string();
-    assert!(refused.contains("FLOAT32_BLENDABLE"), "the message says why: {refused}");
-    assert!(refused.contains("--engine screen-grid"), "and what to do: {refused}");
+    let blends = wgpu::Features::FLOAT32_BLENDABLE;
+    let cases = [(wgpu::Features::empty(), GATHERED_BYTES, "FLOAT32_BLENDABLE"), (blends, 16, "the device allows 16")];
+    for (features, bytes, why) in cases {
+        let refused = CommunicationPasses::new(&own_device(features, bytes)).expect_err("refused").to_string();
+        assert!(refused.contains(why), "the message says why: {refused}");
+        assert!(refused.contains("--engine screen-grid"), "and what to do: {refused}");
+    }
+    let gpu = own_device(blends, GATHERED_BYTES);
+    assert!(CommunicationPasses::new(&gpu).is_ok(), "WebGPU's default limits are enough");
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    let refused = Textures::new(&gpu, [most + 1, 1]).err().expect("refused").to_string();
+    assert!(refused.contains("smaller picture") && refused.contains(&most.to_string()), "{refused}");
 }
