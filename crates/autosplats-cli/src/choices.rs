@@ -43,12 +43,22 @@ pub(crate) enum AxesChoice {
 pub(crate) enum Engine {
     /// Buckets of screen points, exact
     ScreenGrid,
+    /// The paper's own: points draw splats onto each other's pixels; on a GPU only, slower
+    SplatCommunication,
+}
+
+impl Engine {
+    /// As it is asked for.
+    pub(crate) fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
 }
 
 impl From<Engine> for autosplats::SearchEngine {
     fn from(engine: Engine) -> Self {
         match engine {
             Engine::ScreenGrid => Self::ScreenGrid,
+            Engine::SplatCommunication => Self::SplatCommunication,
         }
     }
 }

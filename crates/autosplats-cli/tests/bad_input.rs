@@ -125,6 +125,13 @@ fn a_gpu_that_is_not_there() {
     }
 }
 
+#[test]
+fn an_engine_that_the_cpu_has_not() {
+    let folder = Folder::with_sphere();
+    let arguments = ["--engine", "splat-communication", "--backend", "cpu"];
+    folder.fail(&[&render("sphere.ply")[..], &arguments].concat(), 5, &["GPU only", "screen-grid"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn more_than_fits_into_memory() {

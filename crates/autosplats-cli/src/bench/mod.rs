@@ -4,7 +4,7 @@ mod paper;
 
 use std::time::Instant;
 
-use autosplats::{Counts, PassTime, Renderer, SearchEngine, Settings, Timings};
+use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
 use autosplats_cloud::PointCloud;
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ struct Bench<'a> {
     scene: &'a str,
     size: [u32; 2],
     k: u32,
-    engine: &'static str,
+    engine: String,
     /// Frames measured; times are medians of them.
     frames: usize,
     /// Whether the points were new in each frame.
@@ -46,6 +46,8 @@ struct Run {
     picture_ms: f64,
     timings_ms: Timings,
     passes: Vec<PassTime>,
+    /// Points whose neighbourhood was not yet found, before the first iteration and after each, of an engine that iterates.
+    unconverged: Vec<u32>,
 }
 
 /// Renders the same frame again and again and prints the medians.
@@ -72,10 +74,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         scene,
         size: *size,
         k: *k,
-        engine: match settings.reconstruction.engine {
-            SearchEngine::ScreenGrid => "screen-grid",
-            _ => "?",
-        },
+        engine: engine.name(),
         frames: *frames,
         stream: *stream,
         runs: Vec::new(),
@@ -139,8 +138,25 @@ fn measure(
             frame: of(&|timings| timings.frame),
         },
         passes: passes.collect(),
+        unconverged: renderer.convergence().map_err(render_failure)?,
         device,
     })
+}
+
+/// The passes of a stage; those that iterations repeat again and again are one.
+fn listed(passes: &[PassTime], prefix: &str) -> Vec<(String, f64)> {
+    const MANY: usize = 8;
+    let mut listed: Vec<(String, f64)> = Vec::new();
+    for (at, PassTime { pass, ms }) in passes.iter().enumerate() {
+        let Some(name) = pass.strip_prefix(prefix) else { continue };
+        let same = || passes.iter().filter(|other| other.pass == *pass);
+        if same().count() < MANY {
+            listed.push((name.into(), *ms));
+        } else if passes[..at].iter().all(|before| before.pass != *pass) {
+            listed.push((format!("{name}, {} times", same().count()), same().map(|time| time.ms).sum()));
+        }
+    }
+    listed
 }
 
 /// Another cloud with the same points.
@@ -164,11 +180,16 @@ impl Bench<'_> {
             "{scene}: {} points, {width}x{height}, k {k}, {engine}; milliseconds, medians of {frames} frames",
             cloud.len()
         )];
-        for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes } in runs {
+        for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes, unconverged } in runs {
             lines.push(String::new());
             lines.push(device.describe());
             let Counts { visible, active, recovered, .. } = counts;
             lines.push(format!("  {visible} points visible, {active} reconstructed at first, {recovered} after that"));
+            if let [queries, left @ ..] = &unconverged[..] {
+                let percent = |left: &u32| format!("{:.2}", 100.0 - 100.0 * f64::from(*left) / f64::from(*queries));
+                let percents: Vec<_> = left.iter().map(percent).collect();
+                lines.push(format!("  found after each iteration, %: {}", percents.join(" ")));
+            }
             let mut line = |name: &str, ms: f64| lines.push(format!("  {name:<32} {ms:>10.3}"));
             let Timings { project, search, fit, splat, shade, frame, .. } = timings_ms;
             for (stage, ms) in
@@ -176,8 +197,8 @@ impl Bench<'_> {
             {
                 line(stage, *ms);
                 let prefix = format!("{stage}/");
-                for PassTime { pass, ms } in passes.iter().filter(|time| time.pass.starts_with(&prefix)) {
-                    line(&format!("  {}", &pass[prefix.len()..]), *ms);
+                for (pass, ms) in listed(passes, &prefix) {
+                    line(&format!("  {pass}"), ms);
                 }
             }
             line("frame", *frame);

@@ -36,6 +36,31 @@ impl Gpu {
         self.buffer(label, size, BufferUsages::UNIFORM | BufferUsages::COPY_DST)
     }
 
+    /// A texture of the size of the picture that passes draw into and, but for depth, load from.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`] if the device has no room.
+    pub(crate) fn target(
+        &self,
+        label: &'static str,
+        [width, height]: [u32; 2],
+        format: wgpu::TextureFormat,
+    ) -> Result<wgpu::TextureView, Error> {
+        let texture = self.checked(|| {
+            self.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+        })?;
+        Ok(texture.create_view(&wgpu::TextureViewDescriptor { label: Some(label), ..Default::default() }))
+    }
+
     /// A buffer of any kind.
     ///
     /// # Errors

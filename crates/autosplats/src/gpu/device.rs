@@ -88,7 +88,7 @@ impl Gpu {
                     .into(),
             )
         })?;
-        let optional = INT64_ATOMICS | wgpu::Features::TIMESTAMP_QUERY;
+        let optional = INT64_ATOMICS | wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::FLOAT32_BLENDABLE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("autosplats"),
             required_features: adapter.features() & optional,

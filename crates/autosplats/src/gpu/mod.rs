@@ -9,6 +9,7 @@ mod device;
 mod frame;
 mod link;
 mod pass;
+mod raster;
 mod recorder;
 
 pub(crate) use buffers::Readback;
@@ -22,6 +23,7 @@ pub(crate) use frame::FrameUniform;
 #[cfg(test)]
 pub(crate) use link::link;
 pub(crate) use pass::{Groups, Pass, PassSource, Step};
+pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
 #[cfg(test)]
 pub(crate) use recorder::GROUPS_PER_ROW;
 pub use recorder::PassTime;

@@ -1,16 +1,18 @@
-//! A pass: one WGSL file made into a pipeline.
+//! A pass: one WGSL file made into a compute pipeline. `raster.rs` has those that draw.
 
 use std::borrow::Cow;
 
 use wgpu::naga;
 
+use super::raster::Raster;
 use super::{Gpu, link::link};
 use crate::Error;
 
 /// Where the code of a pass is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassSource {
-    /// Folder and file name without its ending: `project/compact`. The entry point has the file's name.
+    /// Folder and file name without its ending: `project/compact`. The entry point has the file's name, those of a
+    /// raster pass that name and the stage's: `gather_vertex`, `gather_fragment`.
     pub(crate) path: &'static str,
     pub(crate) source: &'static str,
     /// What the shader uses beyond WebGPU's core.
@@ -21,6 +23,11 @@ impl PassSource {
     /// A pass that runs on every WebGPU device.
     pub(crate) const fn new(path: &'static str, source: &'static str) -> Self {
         Self { path, source, needs: wgpu::Features::empty() }
+    }
+
+    /// A pass that draws and blends.
+    pub(crate) const fn blending(path: &'static str, source: &'static str) -> Self {
+        Self { path, source, needs: wgpu::Features::FLOAT32_BLENDABLE }
     }
 
     pub(crate) fn entry_point(&self) -> &'static str {
@@ -53,61 +60,107 @@ impl Pass {
     /// # Errors
     /// [`Error::Device`] if the device lacks a feature or refuses the shader.
     pub(crate) fn new(gpu: &Gpu, source: &PassSource, constants: &[(&str, f64)]) -> Result<Self, Error> {
+        let Linked { label, module, entries } = Linked::new(gpu, source, wgpu::ShaderStages::COMPUTE)?;
+        gpu.checked(|| {
+            let made = Made::new(gpu, &label, module, &entries);
+            let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(&label),
+                layout: Some(&made.pipeline_layout),
+                module: &made.shader,
+                entry_point: Some(source.entry_point()),
+                compilation_options: compilation_options(constants),
+                cache: None,
+            });
+            Self { path: source.path, label: label.clone(), pipeline, layout: made.layout }
+        })
+    }
+
+    /// The pass bound to buffers, in the order of their binding numbers, to run in `groups` workgroups.
+    pub(crate) fn step(&self, gpu: &Gpu, buffers: &[&wgpu::Buffer], groups: impl Into<Groups>) -> Step {
+        let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+        self.step_with(gpu, &resources, groups)
+    }
+
+    /// The pass bound to buffers and textures alike.
+    pub(crate) fn step_with(
+        &self,
+        gpu: &Gpu,
+        resources: &[wgpu::BindingResource<'_>],
+        groups: impl Into<Groups>,
+    ) -> Step {
+        let work = Work::Compute {
+            pipeline: self.pipeline.clone(),
+            bindings: bind(gpu, &self.label, &self.layout, resources),
+            groups: groups.into(),
+        };
+        Step { path: self.path, label: self.label.clone(), work }
+    }
+}
+
+/// A pass's source made ready for the device.
+pub(super) struct Linked {
+    pub(super) label: String,
+    pub(super) module: naga::Module,
+    pub(super) entries: Vec<wgpu::BindGroupLayoutEntry>,
+}
+
+impl Linked {
+    /// # Errors
+    /// [`Error::Device`] if the device lacks a feature.
+    pub(super) fn new(gpu: &Gpu, source: &PassSource, stages: wgpu::ShaderStages) -> Result<Self, Error> {
         let missing = source.needs - gpu.device.features();
         if !missing.is_empty() {
             return Err(Error::Device(format!("{} needs {missing:?}, which the device was made without", source.path)));
         }
         let label = format!("autosplats.{}", source.path.replace('/', "."));
         let module = source.module();
-        let entries = layout_entries(&module);
-        gpu.checked(|| {
-            let device = &gpu.device;
-            let layout = device
-                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(&label), entries: &entries });
-            let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(&label),
-                source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
-            });
-            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(&label),
-                bind_group_layouts: &[Some(&layout)],
-                immediate_size: 0,
-            });
-            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(&label),
-                layout: Some(&pipeline_layout),
-                module: &shader,
-                entry_point: Some(source.entry_point()),
-                // Buffers are ours and sized by us; workgroup memory is written before it is read.
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants,
-                    zero_initialize_workgroup_memory: false,
-                },
-                cache: None,
-            });
-            Self { path: source.path, label: label.clone(), pipeline, layout }
-        })
+        let entries = layout_entries(&module, stages);
+        Ok(Self { label, module, entries })
     }
+}
 
-    /// The pass bound to buffers, in the order of their binding numbers, to run in `groups` workgroups.
-    pub(crate) fn step(&self, gpu: &Gpu, buffers: &[&wgpu::Buffer], groups: impl Into<Groups>) -> Step {
-        let entries: Vec<_> = (0..)
-            .zip(buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        let bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(&self.label),
-            layout: &self.layout,
-            entries: &entries,
+/// What pipelines of either kind are made from.
+pub(super) struct Made {
+    pub(super) layout: wgpu::BindGroupLayout,
+    pub(super) shader: wgpu::ShaderModule,
+    pub(super) pipeline_layout: wgpu::PipelineLayout,
+}
+
+impl Made {
+    pub(super) fn new(gpu: &Gpu, label: &str, module: naga::Module, entries: &[wgpu::BindGroupLayoutEntry]) -> Self {
+        let device = &gpu.device;
+        let label = Some(label);
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label, entries });
+        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label,
+            source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
         });
-        Step {
-            path: self.path,
-            label: self.label.clone(),
-            pipeline: self.pipeline.clone(),
-            bindings,
-            groups: groups.into(),
-        }
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        Self { layout, shader, pipeline_layout }
     }
+}
+
+/// Buffers are ours and sized by us; workgroup memory is written before it is read.
+pub(super) fn compilation_options<'a>(constants: &'a [(&'a str, f64)]) -> wgpu::PipelineCompilationOptions<'a> {
+    wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: false }
+}
+
+/// Binds resources in the order of their binding numbers.
+pub(super) fn bind(
+    gpu: &Gpu,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = (0..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 
 /// How many workgroups a step has.
@@ -130,31 +183,39 @@ impl From<u32> for Groups {
 pub(crate) struct Step {
     pub(super) path: &'static str,
     pub(super) label: String,
-    pub(super) pipeline: wgpu::ComputePipeline,
-    pub(super) bindings: wgpu::BindGroup,
-    pub(super) groups: Groups,
+    pub(super) work: Work,
+}
+
+/// What a step does.
+#[derive(Clone, Debug)]
+pub(super) enum Work {
+    Compute { pipeline: wgpu::ComputePipeline, bindings: wgpu::BindGroup, groups: Groups },
+    Raster(Raster),
 }
 
 /// The layout that a module declares, whether or not it uses all of it.
-fn layout_entries(module: &naga::Module) -> Vec<wgpu::BindGroupLayoutEntry> {
+fn layout_entries(module: &naga::Module, visibility: wgpu::ShaderStages) -> Vec<wgpu::BindGroupLayoutEntry> {
     let mut entries: Vec<_> = module
         .global_variables
         .iter()
         .filter_map(|(_, variable)| {
-            let binding = variable.binding?;
+            let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
             let ty = match variable.space {
-                naga::AddressSpace::Uniform => wgpu::BufferBindingType::Uniform,
+                naga::AddressSpace::Uniform => buffer(wgpu::BufferBindingType::Uniform),
                 naga::AddressSpace::Storage { access } => {
-                    wgpu::BufferBindingType::Storage { read_only: !access.contains(naga::StorageAccess::STORE) }
+                    let read_only = !access.contains(naga::StorageAccess::STORE);
+                    buffer(wgpu::BufferBindingType::Storage { read_only })
                 }
+                // Textures hold numbers that are loaded one by one.
+                naga::AddressSpace::Handle => wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
                 _ => return None,
             };
-            Some(wgpu::BindGroupLayoutEntry {
-                binding: binding.binding,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-                count: None,
-            })
+            let binding = variable.binding?.binding;
+            Some(wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None })
         })
         .collect();
     entries.sort_by_key(|entry| entry.binding);

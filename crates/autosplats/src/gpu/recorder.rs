@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::Gpu;
 use super::buffers::map;
-use super::pass::{Groups, Step};
+use super::pass::{Groups, Step, Work};
 use crate::Error;
 
 /// Workgroups in a row of a dispatch: more than 65535 need a second dimension. `shared/groups.wgsl` undoes this.
@@ -103,29 +103,42 @@ impl<'a> Recorder<'a> {
 
     /// Runs a step.
     pub(crate) fn run(&mut self, step: &Step) {
-        if matches!(step.groups, Groups::Number(0)) {
+        if matches!(step.work, Work::Compute { groups: Groups::Number(0), .. }) {
             return;
         }
         let at = 2 * self.times.len() as u32;
-        let timestamp_writes = match self.clock {
-            Clock::Timestamps { queries, .. } if at < 2 * MOST_PASSES => Some(wgpu::ComputePassTimestampWrites {
-                query_set: queries,
-                beginning_of_pass_write_index: Some(at),
-                end_of_pass_write_index: Some(at + 1),
-            }),
+        let timestamps = match self.clock {
+            Clock::Timestamps { queries, .. } if at < 2 * MOST_PASSES => Some((queries, Some(at), Some(at + 1))),
             _ => None,
         };
         let label = Some(step.label.as_str());
-        let mut compute = self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
-        compute.set_pipeline(&step.pipeline);
-        compute.set_bind_group(0, &step.bindings, &[]);
-        match &step.groups {
-            Groups::Number(groups) => {
-                compute.dispatch_workgroups(*groups.min(&GROUPS_PER_ROW), groups.div_ceil(GROUPS_PER_ROW), 1);
+        match &step.work {
+            Work::Compute { pipeline, bindings, groups } => {
+                let timestamp_writes = timestamps.map(|(query_set, begin, end)| wgpu::ComputePassTimestampWrites {
+                    query_set,
+                    beginning_of_pass_write_index: begin,
+                    end_of_pass_write_index: end,
+                });
+                let descriptor = wgpu::ComputePassDescriptor { label, timestamp_writes };
+                let mut compute = self.encoder.begin_compute_pass(&descriptor);
+                compute.set_pipeline(pipeline);
+                compute.set_bind_group(0, bindings, &[]);
+                match groups {
+                    Groups::Number(groups) => {
+                        compute.dispatch_workgroups(*groups.min(&GROUPS_PER_ROW), groups.div_ceil(GROUPS_PER_ROW), 1);
+                    }
+                    Groups::Counted(arguments, at) => compute.dispatch_workgroups_indirect(arguments, *at),
+                }
             }
-            Groups::Counted(arguments, at) => compute.dispatch_workgroups_indirect(arguments, *at),
+            Work::Raster(raster) => {
+                let timestamp_writes = timestamps.map(|(query_set, begin, end)| wgpu::RenderPassTimestampWrites {
+                    query_set,
+                    beginning_of_pass_write_index: begin,
+                    end_of_pass_write_index: end,
+                });
+                raster.record(&mut self.encoder, label, timestamp_writes);
+            }
         }
-        drop(compute);
         if matches!(self.clock, Clock::Off) {
             return;
         }

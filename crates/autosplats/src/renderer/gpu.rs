@@ -14,7 +14,7 @@ use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
-use crate::search::gpu::{EnginePasses, SearchBuffers, compile};
+use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, compile, convergence};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
@@ -81,6 +81,8 @@ struct Prepared {
     surfels: wgpu::Buffer,
     layers: LayerBuffers,
     picture: ShadeBuffers,
+    /// Of an engine that iterates.
+    convergence: Option<wgpu::Buffer>,
     steps: Vec<Step>,
 }
 
@@ -178,6 +180,18 @@ impl GpuRenderer {
                     bytemuck::pod_collect_to_vec(&parts[1][..len as usize * size_of::<Surfel>()]);
                 point_surfels(&surfels, view)
             })
+        })?
+    }
+
+    /// See [`Renderer::convergence`](super::Renderer::convergence).
+    pub(super) fn convergence(&mut self) -> Result<Vec<u32>, Error> {
+        let Self { gpu, prepared, readback, .. } = self;
+        let Some(Prepared { convergence: Some(buffer), .. }) = prepared else { return Ok(Vec::new()) };
+        gpu.checked(|| {
+            let mut recorder = Recorder::new(gpu, &Clock::Off);
+            readback.copy(gpu, &mut recorder.encoder, &[buffer])?;
+            recorder.finish();
+            readback.read(gpu, |parts| convergence(&bytemuck::pod_collect_to_vec::<u8, u32>(parts[0])))
         })?
     }
 
@@ -329,11 +343,11 @@ impl GpuRenderer {
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
         let layers = LayerBuffers::new(gpu, size, shape.channels)?;
         let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
-        let steps = gpu.checked(|| {
+        let (steps, convergence) = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
             let buffers = SearchBuffers { frame, screen: &screen, neighborhoods: &neighborhoods };
-            let searches = search.steps(gpu, buffers)?;
-            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(searches) {
+            let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
+            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
                 if round == Round::Recovered {
                     steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
                 }
@@ -344,9 +358,9 @@ impl GpuRenderer {
             let refine = shape.depth_refinement;
             steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
             steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
-            Ok::<_, Error>(steps)
+            Ok::<_, Error>((steps, convergence))
         })??;
-        self.prepared = Some(Prepared { shape, screen, surfels, layers, picture, steps });
+        self.prepared = Some(Prepared { shape, screen, surfels, layers, picture, convergence, steps });
         Ok(())
     }
 }

@@ -140,8 +140,8 @@ impl Renderer {
     }
 
     /// A renderer on the caller's own device. It uses the features `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and
-    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none. Without the last, passes are not timed, and the
-    /// time of a frame includes reading it back.
+    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none, but [`SplatCommunication`](crate::SearchEngine::SplatCommunication) needs
+    /// `FLOAT32_BLENDABLE`. Without timestamps passes are not timed, and the time of a frame includes reading it back.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
@@ -216,6 +216,19 @@ impl Renderer {
         match &mut self.form {
             Form::Cpu(renderer) => Ok(renderer.surfels()),
             Form::Gpu(renderer) => renderer.surfels(),
+        }
+    }
+
+    /// How the k-radius search of the last frame converged: the number of points that were searched for, and after each
+    /// iteration how many of them had not yet been found their radius. Empty before the first frame, on the CPU, and with
+    /// [engines](crate::SearchEngine) that do not iterate.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
+    pub fn convergence(&mut self) -> Result<Vec<u32>, Error> {
+        match &mut self.form {
+            Form::Cpu(_) => Ok(Vec::new()),
+            Form::Gpu(renderer) => renderer.convergence(),
         }
     }
 

@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use super::SearchEngine;
 use super::screen_grid::gpu::SearchPasses;
+use super::splat_communication::gpu::CommunicationPasses;
 use crate::Error;
 use crate::gpu::{Gpu, Step};
 use crate::project::gpu::{Round, ScreenBuffers};
@@ -24,7 +25,30 @@ pub(crate) trait EnginePasses: Debug {
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<[Vec<Step>; 2], Error>;
+    fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<EngineSteps, Error>;
+}
+
+/// What an engine does in a frame.
+#[derive(Debug)]
+pub(crate) struct EngineSteps {
+    /// The steps of each [`Round`].
+    pub(crate) rounds: [Vec<Step>; 2],
+    /// Of an engine that iterates: for each round a run of `u32`, the points that had not converged before the first
+    /// iteration and after each.
+    pub(crate) convergence: Option<wgpu::Buffer>,
+}
+
+/// The points of both rounds that had not converged before the first iteration and after each, as far as there were any.
+pub(crate) fn convergence(runs: &[u32]) -> Vec<u32> {
+    let (active, recovered) = runs.split_at(runs.len() / 2);
+    let mut curve: Vec<u32> = active.iter().zip(recovered).map(|(a, b)| a + b).collect();
+    // After the last iteration the numbers stay.
+    while let [.., before, last] = curve[..]
+        && before == last
+    {
+        curve.pop();
+    }
+    curve
 }
 
 /// Compiles the passes of an engine.
@@ -34,12 +58,14 @@ pub(crate) trait EnginePasses: Debug {
 pub(crate) fn compile(gpu: &Gpu, engine: SearchEngine, k: u32) -> Result<Box<dyn EnginePasses>, Error> {
     match engine {
         SearchEngine::ScreenGrid => Ok(Box::new(SearchPasses::new(gpu, k)?)),
+        SearchEngine::SplatCommunication => Ok(Box::new(CommunicationPasses::new(gpu)?)),
     }
 }
 
 impl EnginePasses for SearchPasses {
-    fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<[Vec<Step>; 2], Error> {
+    fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<EngineSteps, Error> {
         let SearchBuffers { frame, screen, neighborhoods, .. } = buffers;
-        Ok([Round::Active, Round::Recovered].map(|round| self.steps(gpu, frame, screen, neighborhoods, round)))
+        let round = |round| self.steps(gpu, frame, screen, neighborhoods, round);
+        Ok(EngineSteps { rounds: [Round::Active, Round::Recovered].map(round), convergence: None })
     }
 }

@@ -1,11 +1,7 @@
-// Windows: rectangles of the screen, and the screen points in them. Imports: frame. The including pass binds `cell_start`.
+// Windows: rectangles of the screen. Imports: frame.
 
 // Added to projected bounds in pixels, against the rounding of projected coordinates.
 override MARGIN_PX: f32;
-
-// Strips that the invocation has gone through and half of the screen points it has read, two at a time: about the rounds of its
-// loops, of which software devices end an invocation silently after 65535.
-var<private> rounds: u32;
 
 // Pixels, all sides included; whole numbers.
 struct Window {
@@ -44,43 +40,4 @@ fn window_of_sphere(center: vec3f, radius: f32) -> Window {
     let high = floor(vec2f(x.y, y.y) * frame.focal_px + middle + MARGIN_PX);
     let all = picture();
     return Window(select(all.low, low, low > all.low), select(all.high, high, high < all.high));
-}
-
-// The window grown to what is read anyway: whole strips.
-fn window_grown(window: Window, strip_px: f32) -> Window {
-    let top = floor(window.low.y / strip_px) * strip_px;
-    let bottom = floor(window.high.y / strip_px) * strip_px + strip_px - 1.0;
-    return Window(vec2f(window.low.x, top), vec2f(window.high.x, min(bottom, picture().high.y)));
-}
-
-fn window_contains(outer: Window, inner: Window) -> bool {
-    return all(outer.low <= inner.low) && all(outer.high >= inner.high);
-}
-
-// First and last strip of a window.
-fn window_strips(window: Window, strip_px: u32) -> vec2u {
-    return vec2u(u32(window.low.y), u32(window.high.y)) / strip_px;
-}
-
-// The screen points of a strip that lie in a window: from x on, below y. They are contiguous.
-fn window_run(window: Window, strip: u32) -> vec2u {
-    let row = strip * frame.size.x;
-    return vec2u(cell_start[row + u32(window.low.x)], cell_start[row + u32(window.high.x) + 1u]);
-}
-
-// Number of screen points in the window, or of its pixels where these are few.
-fn window_len(window: Window, strip_px: u32, few: u32) -> u32 {
-    let sides = window.high - window.low + 1.0;
-    let area = u32(sides.x * sides.y);
-    if area <= few {
-        return area;
-    }
-    let strips = window_strips(window, strip_px);
-    rounds += strips.y - strips.x + 1u;
-    var len = 0u;
-    for (var strip = strips.x; strip <= strips.y; strip++) {
-        let run = window_run(window, strip);
-        len += run.y - run.x;
-    }
-    return len;
 }

@@ -6,10 +6,17 @@ use crate::gpu::{INT64_ATOMICS, PassSource};
 
 mod layouts;
 
+/// Those that draw.
+fn is_raster(pass: &PassSource) -> bool {
+    crate::search::splat_communication::gpu::RASTER_PASSES.iter().any(|raster| raster.path == pass.path)
+}
+
 fn passes() -> impl Iterator<Item = &'static PassSource> {
     let stages = [
         crate::project::gpu::PASSES,
         crate::search::screen_grid::gpu::PASSES,
+        crate::search::splat_communication::gpu::PASSES,
+        crate::search::splat_communication::gpu::RASTER_PASSES,
         crate::fit::gpu::PASSES,
         crate::splat::gpu::PASSES,
         crate::shade::gpu::PASSES,
@@ -33,7 +40,13 @@ fn passes_are_valid_with_what_they_declare() {
         let validated = Validator::new(ValidationFlags::all(), capabilities(pass)).validate(&module);
         assert!(validated.is_ok(), "{}: {:?}", pass.path, validated.err());
         let entries: Vec<_> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
-        assert_eq!(entries, [pass.entry_point()], "{}: one entry point, named after the file", pass.path);
+        let name = pass.entry_point();
+        if is_raster(pass) {
+            let stages = ["vertex", "fragment"].map(|stage| format!("{name}_{stage}"));
+            assert_eq!(entries, stages, "{}: an entry point for each stage, named after the file", pass.path);
+        } else {
+            assert_eq!(entries, [name], "{}: one entry point, named after the file", pass.path);
+        }
     }
 }
 

@@ -1,11 +1,10 @@
 //! The screen-grid search on the GPU: an invocation per point, or for larger k one for four points.
 
 use super::cpu::{FIRST_REACH, LEAST_GROWTH};
-use super::window::MARGIN_PX;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers, WorkPass};
-use crate::search::{BOUND_STEP, CROWDED, MAX_CANDIDATES};
+use crate::search::{BOUND_STEP, CROWDED, MARGIN_PX, MAX_CANDIDATES};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH, SEARCH_FOUR];

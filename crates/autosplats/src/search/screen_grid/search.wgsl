@@ -13,6 +13,7 @@
 #import screen
 #import surfel
 #import window
+#import window_points
 #import nearest
 #import search_task
 

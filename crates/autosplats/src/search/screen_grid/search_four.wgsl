@@ -17,6 +17,7 @@
 #import screen
 #import surfel
 #import window
+#import window_points
 #import search_task
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;

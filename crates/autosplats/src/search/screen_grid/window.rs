@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use crate::camera::View;
 use crate::project::ScreenCells;
-
-/// Added to projected bounds in pixels, against the rounding of projected coordinates.
-pub(super) const MARGIN_PX: f32 = 0.02;
+use crate::search::MARGIN_PX;
 
 /// A rectangle of pixels and a range of depths, all sides included.
 #[derive(Clone, Copy, Debug, PartialEq)]

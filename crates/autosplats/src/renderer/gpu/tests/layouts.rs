@@ -9,6 +9,7 @@ use crate::fit::Surfel;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
 use crate::project::gpu::{BLOCK, COUNTERS, Counter, Work};
 use crate::project::{ChunkUniform, ScreenPoint};
+use crate::search::splat_communication::gpu::Arguments;
 use crate::shade::gpu::{ShadeUniform, Shown};
 use crate::splat::Cover;
 
@@ -39,7 +40,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 6] {
+fn mirrored() -> [Mirrored; 7] {
     [
         mirrored!(
             "Frame",
@@ -61,6 +62,7 @@ fn mirrored() -> [Mirrored; 6] {
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
+        mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(

@@ -53,7 +53,7 @@ impl Moments {
         }
     }
 
-    fn of_device([x, y, z, count, xx, xy, xz, k_radius, yy, yz, zz, _]: Neighborhood) -> Self {
+    pub(crate) fn of_device([x, y, z, count, xx, xy, xz, k_radius, yy, yz, zz, _]: Neighborhood) -> Self {
         Self { count, k_radius, offset: [x, y, z], second: [xx, xy, xz, yy, yz, zz] }
     }
 
@@ -63,7 +63,7 @@ impl Moments {
     }
 
     /// Compares with what the host found.
-    fn compare(&self, host: &Self) -> Result<(), String> {
+    pub(crate) fn compare(&self, host: &Self) -> Result<(), String> {
         let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(format!("{what}: {self:?}, host: {host:?}")) };
         // Rounding of a sum of squares and a root.
         ensure((self.k_radius - host.k_radius).abs() <= 1e-6 * host.k_radius, "k-radius")?;
@@ -77,7 +77,7 @@ impl Moments {
     }
 }
 
-fn cameras() -> [Camera; 2] {
+pub(crate) fn cameras() -> [Camera; 2] {
     let camera = |projection| Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
     [camera(Projection::PerspectiveFovDeg(30.0)), camera(Projection::OrthographicHeight(2.1))]
 }
@@ -88,7 +88,7 @@ fn forms(gpu: &Gpu, k: u32) -> [(&'static str, SearchPasses); 2] {
         .map(|(name, four)| (name, SearchPasses::with_form(gpu, k, four).expect("passes")))
 }
 
-fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
+pub(crate) fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
     (Projector::default().project(&cloud, &view, k, true).clone(), view)
@@ -116,7 +116,7 @@ fn on_device(
     (found.into_iter().map(Moments::of_device).collect(), counted)
 }
 
-fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -> (Vec<Moments>, [usize; 2]) {
+pub(crate) fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -> (Vec<Moments>, [usize; 2]) {
     let mut all = Vec::new();
     let mut counted = [0; 2];
     for queries in [&screen.active, &screen.passive] {

@@ -1,0 +1,218 @@
+//! Passes that draw: one WGSL file made into a render pipeline.
+
+use super::Gpu;
+use super::pass::{Linked, Made, PassSource, Step, Work, bind, compilation_options};
+use crate::Error;
+
+/// Four numbers per pixel: all that passes draw into.
+const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// How what is drawn meets what is there, colour and alpha apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Target {
+    Replace,
+    /// Sums in all channels.
+    Add,
+    /// Sums in colour, the greatest in alpha.
+    AddAndMax,
+}
+
+impl Target {
+    fn blend(self) -> Option<wgpu::BlendState> {
+        let blend = |operation| wgpu::BlendComponent {
+            src_factor: wgpu::BlendFactor::One,
+            dst_factor: wgpu::BlendFactor::One,
+            operation,
+        };
+        let [add, max] = [wgpu::BlendOperation::Add, wgpu::BlendOperation::Max].map(blend);
+        match self {
+            Self::Replace => None,
+            Self::Add => Some(wgpu::BlendState { color: add, alpha: add }),
+            Self::AddAndMax => Some(wgpu::BlendState { color: add, alpha: max }),
+        }
+    }
+}
+
+/// What a pass does with the depth buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DepthMask {
+    /// Writes what it draws.
+    Write,
+    /// Draws where it is further than what is there, and leaves that.
+    Greater,
+}
+
+/// What a texture holds when drawing begins.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Load {
+    /// What it held.
+    Kept,
+    /// The same everywhere.
+    Cleared([f64; 4]),
+}
+
+/// A render pipeline with the layout of what it is bound to.
+#[derive(Debug)]
+pub(crate) struct RasterPass {
+    path: &'static str,
+    label: String,
+    pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+/// A pass bound to what it reads; how many vertices it has is read from a buffer.
+#[derive(Clone, Debug)]
+pub(crate) struct Draw {
+    path: &'static str,
+    label: String,
+    pipeline: wgpu::RenderPipeline,
+    bindings: wgpu::BindGroup,
+    arguments: wgpu::Buffer,
+    at: u64,
+}
+
+/// What a step draws into.
+#[derive(Clone, Debug)]
+pub(crate) struct Targets {
+    pub(crate) colors: Vec<(wgpu::TextureView, Load)>,
+    pub(crate) depth: wgpu::TextureView,
+    /// Depth everywhere before drawing; `None` if depths are only read.
+    pub(crate) clear_depth: Option<f32>,
+}
+
+/// A step that draws.
+#[derive(Clone, Debug)]
+pub(super) struct Raster {
+    targets: Targets,
+    draws: Vec<Draw>,
+}
+
+impl RasterPass {
+    /// Compiles a pass that draws triangles into `targets`; `constants` are its overrides.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device lacks a feature or refuses the shader.
+    pub(crate) fn new(
+        gpu: &Gpu,
+        source: &PassSource,
+        constants: &[(&str, f64)],
+        targets: &[Target],
+        depth: DepthMask,
+    ) -> Result<Self, Error> {
+        let Linked { label, module, entries } = Linked::new(gpu, source, wgpu::ShaderStages::VERTEX_FRAGMENT)?;
+        let targets: Vec<_> = targets
+            .iter()
+            .map(|target| {
+                let write_mask = wgpu::ColorWrites::ALL;
+                Some(wgpu::ColorTargetState { format: COLOR_FORMAT, blend: target.blend(), write_mask })
+            })
+            .collect();
+        let [vertex, fragment] = ["vertex", "fragment"].map(|stage| format!("{}_{stage}", source.entry_point()));
+        gpu.checked(|| {
+            let made = Made::new(gpu, &label, module, &entries);
+            let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(&label),
+                layout: Some(&made.pipeline_layout),
+                vertex: wgpu::VertexState {
+                    module: &made.shader,
+                    entry_point: Some(&vertex),
+                    compilation_options: compilation_options(constants),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH_FORMAT,
+                    depth_write_enabled: Some(depth == DepthMask::Write),
+                    depth_compare: Some(match depth {
+                        DepthMask::Write => wgpu::CompareFunction::Always,
+                        DepthMask::Greater => wgpu::CompareFunction::Greater,
+                    }),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &made.shader,
+                    entry_point: Some(&fragment),
+                    compilation_options: compilation_options(constants),
+                    targets: &targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            });
+            Self { path: source.path, label: label.clone(), pipeline, layout: made.layout }
+        })
+    }
+
+    /// The pass bound to what it reads, in the order of binding numbers; the arguments of its draw lie in a buffer, at this
+    /// byte.
+    pub(crate) fn draw(
+        &self,
+        gpu: &Gpu,
+        resources: &[wgpu::BindingResource<'_>],
+        arguments: &wgpu::Buffer,
+        at: u64,
+    ) -> Draw {
+        Draw {
+            path: self.path,
+            label: self.label.clone(),
+            pipeline: self.pipeline.clone(),
+            bindings: bind(gpu, &self.label, &self.layout, resources),
+            arguments: arguments.clone(),
+            at,
+        }
+    }
+}
+
+impl Targets {
+    /// Draws one after the other, as one step with the last one's name.
+    ///
+    /// # Panics
+    /// If there is nothing to draw.
+    pub(crate) fn step(self, draws: Vec<Draw>) -> Step {
+        let [.., last] = &draws[..] else { panic!("a step that draws nothing") };
+        Step { path: last.path, label: last.label.clone(), work: Work::Raster(Raster { targets: self, draws }) }
+    }
+}
+
+impl Raster {
+    pub(super) fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        label: Option<&str>,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) {
+        let Targets { colors, depth, clear_depth } = &self.targets;
+        let colors: Vec<_> = colors
+            .iter()
+            .map(|(view, load)| {
+                let load = match *load {
+                    Load::Kept => wgpu::LoadOp::Load,
+                    Load::Cleared([r, g, b, a]) => wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                };
+                let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
+                Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+            })
+            .collect();
+        let depth_ops =
+            clear_depth.map(|depth| wgpu::Operations { load: wgpu::LoadOp::Clear(depth), store: wgpu::StoreOp::Store });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label,
+            color_attachments: &colors,
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: depth,
+                depth_ops,
+                stencil_ops: None,
+            }),
+            timestamp_writes,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        for draw in &self.draws {
+            pass.set_pipeline(&draw.pipeline);
+            pass.set_bind_group(0, &draw.bindings, &[]);
+            pass.draw_indirect(&draw.arguments, draw.at);
+        }
+    }
+}

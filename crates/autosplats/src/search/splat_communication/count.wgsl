@@ -1,0 +1,50 @@
+// Counts the queries that have not converged, an invocation for each.
+//
+// Differs from the paper, which counts by an occlusion query [Paper, §5.2]: WebGPU's tell only whether there were any.
+//
+// Reads: points, queries, counters, arguments, the position texture and both radius textures. Writes: convergence.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import radius_search
+#import communication
+
+@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(2) var<storage, read> queries: array<u32>;
+@group(0) @binding(3) var<storage, read> counters: array<u32>;
+@group(0) @binding(4) var<storage, read> arguments: Arguments;
+@group(0) @binding(5) var<storage, read_write> convergence: array<atomic<u32>>;
+@group(0) @binding(6) var positions: texture_2d<f32>;
+@group(0) @binding(7) var counts: texture_2d<f32>;
+@group(0) @binding(8) var radii: texture_2d<f32>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+
+var<workgroup> unconverged: atomic<u32>;
+
+@compute @workgroup_size(256)
+fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    if local == 0u {
+        atomicStore(&unconverged, 0u);
+    }
+    workgroupBarrier();
+    let first = select(0u, counters[ACTIVE], ROUND == 1u);
+    let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let index = group_index(workgroup) * 256u + local;
+    if index < len {
+        let pixel = pixel_xy(points[queries[first + index]].pixel);
+        let known = recall(textureLoad(radii, pixel, 0), textureLoad(counts, pixel, 0));
+        let others = f32(counters[VISIBLE] - 1u);
+        if !has_ended(advance(known, textureLoad(positions, pixel, 0).w, others)) {
+            atomicAdd(&unconverged, 1u);
+        }
+    }
+    workgroupBarrier();
+    if local == 0u && atomicLoad(&unconverged) > 0u {
+        let curve = arrayLength(&convergence) / 2u;
+        atomicAdd(&convergence[ROUND * curve + arguments.iterations + 1u], atomicLoad(&unconverged));
+    }
+}

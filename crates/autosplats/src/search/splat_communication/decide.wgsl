@@ -1,0 +1,32 @@
+// Says after an iteration whether there is to be another: passes that have nothing to draw cost next to nothing. One
+// invocation.
+//
+// Reads: counters. Writes: arguments, convergence.
+
+#import frame
+#import counters
+#import communication
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read_write> arguments: Arguments;
+@group(0) @binding(3) var<storage, read_write> convergence: array<u32>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+// Part of the points that need not converge: 1 - t_conv [Paper, §5.2].
+override UNCONVERGED: f32;
+
+@compute @workgroup_size(1)
+fn decide() {
+    let at = ROUND * (arrayLength(&convergence) / 2u) + arguments.iterations;
+    if arguments.boxes.instances == 0u {
+        convergence[at + 1u] = convergence[at];
+    }
+    arguments.iterations += 1u;
+    let queries = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    if f32(convergence[at + 1u]) <= UNCONVERGED * f32(queries) {
+        arguments.clear.instances = 0u;
+        arguments.boxes.instances = 0u;
+        arguments.count = vec3u(0u);
+    }
+}

@@ -1,0 +1,247 @@
+//! Splat communication against the screen grid on the host.
+
+use autosplats_cloud::glam::DVec3;
+
+use super::*;
+use crate::camera::{Camera, Projection, View};
+use crate::gpu::{Clock, Recorder, read_back, test_gpu};
+use crate::project::ScreenPoints;
+use crate::project::gpu::tests::upload_screen;
+use crate::project::gpu::{COUNTERS, Counter};
+use crate::search::SearchRules;
+use crate::search::gpu::convergence;
+use crate::search::screen_grid::gpu::neighborhood_buffer;
+use crate::search::screen_grid::gpu::tests::{Moments, cameras, frame_buffer, on_host, screen};
+use crate::test_clouds;
+
+const SIZE: [u32; 2] = [121, 90];
+
+/// What one frame's search left.
+struct Found {
+    /// The active points, and after them the passive ones.
+    neighborhoods: Vec<Moments>,
+    clamped: usize,
+    bounded: usize,
+    /// Points without their radius before the first iteration and after each.
+    curve: Vec<u32>,
+}
+
+fn on_device(
+    gpu: &Gpu,
+    passes: &CommunicationPasses,
+    screen: &ScreenPoints,
+    view: &View,
+    rules: &SearchRules,
+) -> Found {
+    let buffers = upload_screen(gpu, screen, view);
+    let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
+    let frame = frame_buffer(gpu, view, rules);
+    let searched = SearchBuffers { frame: &frame, screen: &buffers, neighborhoods: &neighborhoods };
+    let steps = passes.steps(gpu, searched).expect("steps");
+    let mut recorder = Recorder::new(gpu, &Clock::Off);
+    steps.rounds.iter().flatten().for_each(|step| recorder.run(step));
+    recorder.finish();
+    let found: Vec<[f32; 12]> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
+    let counters: Vec<u32> = read_back(gpu, &buffers.counters, COUNTERS).expect("counters");
+    let runs: Vec<u32> = read_back(gpu, &steps.convergence.expect("a curve"), 2 * (ITERATIONS + 1)).expect("a curve");
+    Found {
+        neighborhoods: found.into_iter().map(Moments::of_device).collect(),
+        clamped: counters[Counter::Clamped as usize] as usize,
+        bounded: counters[Counter::Bounded as usize] as usize,
+        curve: convergence(&runs),
+    }
+}
+
+fn rules(k: u32) -> SearchRules {
+    SearchRules { k, outlier_expansions: Some(1), gap_factor: Some(4.0) }
+}
+
+/// How many points have another neighbourhood than on the host, which is exact.
+fn different(device: &[Moments], host: &[Moments], case: &str) -> usize {
+    assert_eq!(device.len(), host.len(), "{case}: every point is a query");
+    let errors = device.iter().zip(host).filter_map(|(device, host)| device.compare(host).err());
+    errors.inspect(|error| eprintln!("{case}: {error}")).count()
+}
+
+/// A thousandth of each round's points may be left when iterations end; one more for rounding at a rule's threshold.
+fn allowed(screen: &ScreenPoints) -> usize {
+    [&screen.active, &screen.passive].map(|queries| queries.len() / 1000).iter().sum::<usize>() + 1
+}
+
+#[test]
+fn all_but_a_thousandth_is_what_the_host_finds() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let (mut compared, mut wrong) = (0, 0);
+    for k in [1, 3, 10, 17, 64] {
+        for camera in cameras() {
+            for (name, positions) in test_clouds::all(2000) {
+                let (screen, view) = screen(&positions, &camera, SIZE, k);
+                for (e0, lambda) in [(Some(1), Some(4.0)), (Some(3), None), (None, Some(2.0))] {
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
+                    let case = format!("{name}, {:?}, {rules:?}", camera.projection);
+                    let (host, [clamped, _]) = on_host(&screen, &view, &rules);
+                    let found = on_device(&gpu, &passes, &screen, &view, &rules);
+                    let different = different(&found.neighborhoods, &host, &case);
+                    assert!(different <= allowed(&screen), "{case}: {different} of {} differ", host.len());
+                    assert!(
+                        found.clamped.abs_diff(clamped) <= allowed(&screen),
+                        "{case}: {} clamped, {clamped}",
+                        found.clamped
+                    );
+                    assert!(found.bounded <= allowed(&screen), "{case}: {} ended unfinished", found.bounded);
+                    compared += host.len();
+                    wrong += different;
+                }
+            }
+        }
+    }
+    assert!(compared > 100_000, "there is something to compare: {compared}");
+    assert!(wrong * 1000 <= compared, "{wrong} of {compared} differ");
+}
+
+#[test]
+fn pictures_of_any_shape() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    for size in [[1, 1], [2, 300], [301, 3], [64, 64]] {
+        for camera in cameras() {
+            let (screen, view) = screen(&test_clouds::sphere(2000), &camera, size, 10);
+            let host = on_host(&screen, &view, &rules(10)).0;
+            let found = on_device(&gpu, &passes, &screen, &view, &rules(10));
+            let different = different(&found.neighborhoods, &host, "sphere");
+            assert!(different <= allowed(&screen), "{size:?}: {different} of {} differ", host.len());
+        }
+    }
+}
+
+/// The paper's Figure 11: most points are found within seven iterations, 99.9 % within ten.
+#[test]
+fn the_search_converges_as_in_the_paper() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    for (name, positions) in [("sphere", test_clouds::sphere(9000)), ("edge", test_clouds::edge(6000))] {
+        let (screen, view) = screen(&positions, &cameras()[0], [240, 180], 10);
+        let Found { curve, .. } = on_device(&gpu, &passes, &screen, &view, &rules(10));
+        let queries = screen.points.len() as f64;
+        let left: Vec<_> = curve.iter().map(|&left| f64::from(left) / queries).collect();
+        assert_eq!(left[0], 1.0, "{name}: every point is searched for");
+        assert!(left.is_sorted_by(|before, after| before >= after), "{name}: none gets lost: {left:?}");
+        assert!(left.len() - 1 <= 10, "{name}: {} iterations", left.len() - 1);
+        assert!(left[left.len() - 1] <= UNCONVERGED, "{name}: t_conv is reached: {left:?}");
+        assert!(left.get(7).is_none_or(|&left| left <= 0.02), "{name}: after seven iterations: {left:?}");
+    }
+}
+
+/// Among equal distances no bracket finds its way: all points at the k-th distance belong.
+#[test]
+fn ties_belong() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let lattice: Vec<_> = (0..400).map(|i| [(i % 20) as f32, (i / 20) as f32, 64.0]).collect();
+    let camera = Camera {
+        eye: DVec3::new(10.0, 10.0, 0.0),
+        look_at: DVec3::new(10.0, 10.0, 1.0),
+        up: DVec3::NEG_Y,
+        projection: Projection::OrthographicHeight(32.0),
+    };
+    for k in [1, 3, 4, 5, 10, 16] {
+        let (screen, view) = screen(&lattice, &camera, [64, 64], k);
+        let host = on_host(&screen, &view, &rules(k)).0;
+        let found = on_device(&gpu, &passes, &screen, &view, &rules(k));
+        assert_eq!(different(&found.neighborhoods, &host, "lattice"), 0, "k = {k}: {:?}", found.curve);
+        assert_eq!(found.curve.last(), Some(&0), "k = {k}: all converge: {:?}", found.curve);
+    }
+}
+
+/// Of points in the same place one is seen; what is nearly there is as near as numbers tell.
+#[test]
+fn coincident_points() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let mut positions = vec![[0.25, 0.125, 0.0]; 5000];
+    positions.extend(test_clouds::plane(500));
+    // A crowd so dense that rounding makes many of its distances equal.
+    positions.extend((0..900).map(|i| [0.5 + 1e-6 * (i % 30) as f32, 0.5 + 1e-6 * (i / 30) as f32, 0.0]));
+    let near = Camera {
+        eye: DVec3::new(0.5, 0.5, -1e-4),
+        look_at: DVec3::new(0.5, 0.5, 0.0),
+        up: DVec3::NEG_Y,
+        projection: Projection::PerspectiveFovDeg(30.0),
+    };
+    for camera in [cameras()[0], cameras()[1], near] {
+        for k in [1, 10] {
+            let (screen, view) = screen(&positions, &camera, SIZE, k);
+            let host = on_host(&screen, &view, &rules(k)).0;
+            let found = on_device(&gpu, &passes, &screen, &view, &rules(k));
+            let different = different(&found.neighborhoods, &host, "crowd");
+            assert!(different <= allowed(&screen), "k = {k}: {different} of {} differ, {:?}", host.len(), found.curve);
+        }
+    }
+}
+
+/// Points whose squared distances overflow are nobody's neighbours.
+#[test]
+fn huge_coordinates_reach_no_sum() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    for (near, huge) in [(1, 0), (1, 40), (200, 40)] {
+        let mut positions = test_clouds::sphere(near);
+        let forward = (test_clouds::EYE / test_clouds::EYE.z).as_vec3();
+        positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
+        let (screen, view) = screen(&positions, &cameras()[1], [90, 70], 10);
+        let host = on_host(&screen, &view, &rules(10)).0;
+        let found = on_device(&gpu, &passes, &screen, &view, &rules(10));
+        let different = different(&found.neighborhoods, &host, "huge");
+        assert!(different <= allowed(&screen), "{near} + {huge}: {different} of {} differ", host.len());
+    }
+}
+
+#[test]
+fn the_same_again() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let (screen, view) = screen(&test_clouds::edge(4000), &cameras()[0], SIZE, 17);
+    let [first, second] = [(); 2].map(|()| on_device(&gpu, &passes, &screen, &view, &rules(17)));
+    assert_eq!(first.neighborhoods, second.neighborhoods, "to the last bit");
+    assert_eq!(first.curve, second.curve, "and the way there");
+}
+
+#[test]
+fn comparison_sees_a_wrong_neighbourhood() {
+    let (screen, view) = screen(&test_clouds::sphere(500), &cameras()[0], SIZE, 10);
+    let right = on_host(&screen, &view, &rules(10)).0;
+    let other = on_host(&screen, &view, &rules(9)).0;
+    assert_eq!(different(&right, &right, "same"), 0, "nothing is wrong yet");
+    assert!(different(&other, &right, "another k") > allowed(&screen), "another k is another question");
+}
+
+/// A device with so many bytes per pixel to draw into.
+fn own_device(required_features: wgpu::Features, bytes: u32) -> Gpu {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
+    let required_limits = wgpu::Limits { max_color_attachment_bytes_per_sample: bytes, ..wgpu::Limits::default() };
+    let descriptor = wgpu::DeviceDescriptor { required_features, required_limits, ..Default::default() };
+    let device = adapter.expect("a device").request_device(&descriptor);
+    let (device, queue) = pollster::block_on(device).expect("a device within WebGPU's default limits");
+    Gpu::from_parts(device, queue)
+}
+
+#[test]
+fn devices_that_cannot_run_it_are_refused() {
+    if test_gpu().is_none() {
+        return;
+    }
+    let blends = wgpu::Features::FLOAT32_BLENDABLE;
+    let cases = [(wgpu::Features::empty(), GATHERED_BYTES, "FLOAT32_BLENDABLE"), (blends, 16, "the device allows 16")];
+    for (features, bytes, why) in cases {
+        let refused = CommunicationPasses::new(&own_device(features, bytes)).expect_err("refused").to_string();
+        assert!(refused.contains(why), "the message says why: {refused}");
+        assert!(refused.contains("--engine screen-grid"), "and what to do: {refused}");
+    }
+    let gpu = own_device(blends, GATHERED_BYTES);
+    assert!(CommunicationPasses::new(&gpu).is_ok(), "WebGPU's default limits are enough");
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    let refused = Textures::new(&gpu, [most + 1, 1]).err().expect("refused").to_string();
+    assert!(refused.contains("smaller picture") && refused.contains(&most.to_string()), "{refused}");
+}

@@ -1,0 +1,33 @@
+// Takes each query's second moments from its pixel.
+//
+// Reads: points, queries, counters and both radius textures. Writes: neighborhoods.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import surfel
+
+@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(2) var<storage, read> queries: array<u32>;
+@group(0) @binding(3) var<storage, read> counters: array<u32>;
+@group(0) @binding(4) var<storage, read_write> neighborhoods: array<Neighborhood>;
+@group(0) @binding(5) var first_products: texture_2d<f32>;
+@group(0) @binding(6) var last_products: texture_2d<f32>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+
+@compute @workgroup_size(256)
+fn keep_covariance(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let first = select(0u, counters[ACTIVE], ROUND == 1u);
+    let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let index = group_index(workgroup) * 256u + local;
+    if index >= len {
+        return;
+    }
+    let pixel = pixel_xy(points[queries[first + index]].pixel);
+    let xx_yy = textureLoad(first_products, pixel, 0);
+    neighborhoods[first + index].second_x = xx_yy.xyz;
+    neighborhoods[first + index].second_yz = vec3f(xx_yy.w, textureLoad(last_products, pixel, 0).xy);
+}

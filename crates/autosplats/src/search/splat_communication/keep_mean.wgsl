@@ -1,0 +1,44 @@
+// Takes each query's count, mean offset and k-radius from its pixel.
+//
+// Reads: points, queries, the feedback texture and both radius textures. Writes: neighborhoods, counters.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import surfel
+#import radius_search
+
+@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(2) var<storage, read> queries: array<u32>;
+@group(0) @binding(3) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> neighborhoods: array<Neighborhood>;
+@group(0) @binding(5) var feedback: texture_2d<f32>;
+@group(0) @binding(6) var sums: texture_2d<f32>;
+@group(0) @binding(7) var furthest: texture_2d<f32>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+
+@compute @workgroup_size(256)
+fn keep_mean(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let active_points = atomicLoad(&counters[ACTIVE]);
+    let first = select(0u, active_points, ROUND == 1u);
+    let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    let index = group_index(workgroup) * 256u + local;
+    if index >= len {
+        return;
+    }
+    let pixel = pixel_xy(points[queries[first + index]].pixel);
+    let sum = textureLoad(sums, pixel, 0);
+    let how = textureLoad(feedback, pixel, 0).z;
+    neighborhoods[first + index].offset = sum.xyz;
+    neighborhoods[first + index].count = sum.w;
+    neighborhoods[first + index].k_radius = textureLoad(furthest, pixel, 0).w;
+    if how == CLAMPED_AT_GAP || how == OUT_OF_STEPS {
+        atomicAdd(&counters[CLAMPED], 1u);
+    }
+    if how == OUT_OF_STEPS {
+        atomicAdd(&counters[BOUNDED], 1u);
+    }
+}

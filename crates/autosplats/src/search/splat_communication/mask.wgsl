@@ -1,0 +1,40 @@
+// Every screen point draws its pixel: its position, and its depth into the mask that keeps empty pixels and points too far
+// away from ever starting a fragment [Paper, §4].
+//
+// Reads: points, density, counters. Writes: the position texture (view space, and the first search radius), the depth mask.
+
+#import frame
+#import counters
+#import density
+#import screen
+#import communication
+#import window
+#import splat_box
+
+@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read> counters: array<u32>;
+
+// A radius that rounds to nothing would never grow.
+const MIN_POSITIVE = 1.1754943508222875e-38;
+
+struct Splat {
+    @builtin(position) position: vec4f,
+    @location(0) @interpolate(flat) place: vec4f,
+}
+
+@vertex
+fn mask_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
+    let point = points[vertex / BOX_VERTICES];
+    let pixel = pixel_xy(point.pixel);
+    let depth = point.position_view.z;
+    let cell_px = counters[CELL_PX];
+    let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
+    let radius = max(first_radius(density[cell].x, cell_px, depth), MIN_POSITIVE);
+    return Splat(pixel_vertex(pixel, vertex, mask_depth(depth)), vec4f(point.position_view, radius));
+}
+
+@fragment
+fn mask_fragment(splat: Splat) -> @location(0) vec4f {
+    return splat.place;
+}
