@@ -1,8 +1,8 @@
 //! What is measured of each scene, and the measuring.
 
 use autosplats::{
-    Backend, Camera, Error, Image, NormalSettings, PassTime, Renderer, SearchEngine, Settings, Timings,
-    estimate_normals,
+    Backend, Camera, Error, Image, NormalSettings, PassTime, RadiusTrial, Renderer, SearchEngine, Settings, Timings,
+    best_first_radius, estimate_normals,
 };
 use autosplats_cloud::PointCloud;
 use serde::{Deserialize, Serialize};
@@ -15,6 +15,8 @@ use crate::render::render_failure;
 
 /// The k of Table 1.
 pub(super) const K: u32 = 10;
+/// Part of the points whose k-radius is to be exact, the paper's.
+const ACCURACY: f64 = 0.999;
 /// A frame that takes longer is measured once, the first time.
 const SLOW_MS: f64 = 3000.0;
 /// Radii of neighbourhoods that differ by a greater part are not the same.
@@ -27,22 +29,33 @@ const SEEN: u8 = 2;
 pub(super) enum Method {
     GridCpu,
     GridGpu,
+    /// The paper's own.
+    Communication,
+    /// Its rival.
+    KdTree,
 }
 
 impl Method {
-    pub(super) const ALL: [Self; 2] = [Self::GridCpu, Self::GridGpu];
+    pub(super) const ALL: [Self; 4] = [Self::GridCpu, Self::GridGpu, Self::Communication, Self::KdTree];
+    /// Those that Figure 10 shows: the paper has it for its own search, of which a frame of any k is taken as it comes.
+    pub(super) const BY_STAGE: [Self; 3] = [Self::GridCpu, Self::GridGpu, Self::Communication];
 
     /// How tables call it.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::GridCpu => "screen grid, CPU",
             Self::GridGpu => "screen grid, GPU",
+            Self::Communication => "splat communication, GPU",
+            Self::KdTree => "kd-tree, GPU",
         }
     }
 
-    fn engine(self) -> SearchEngine {
+    /// The engine; a kd-tree has a first radius.
+    fn engine(self, first_radius: f32) -> SearchEngine {
         match self {
             Self::GridCpu | Self::GridGpu => SearchEngine::ScreenGrid,
+            Self::Communication => SearchEngine::SplatCommunication,
+            Self::KdTree => SearchEngine::KdTree { first_radius },
         }
     }
 
@@ -59,7 +72,7 @@ pub(super) enum Outcome<T> {
 }
 
 impl<T> Outcome<T> {
-    pub(super) fn measured(&self) -> Option<&T> {
+    pub(super) fn into_measured(self) -> Option<T> {
         match self {
             Self::Measured(value) => Some(value),
             Self::Refused(_) => None,
@@ -82,6 +95,17 @@ pub(super) struct Timing {
     pub(super) splat: f64,
     pub(super) shade: f64,
     pub(super) frame: f64,
+    /// Points searched for in the last frame, and after each iteration those without a radius yet; empty where nothing
+    /// iterates.
+    pub(super) convergence: Vec<u32>,
+}
+
+/// The first radius of the kd-tree search that was best, as the paper chose it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct FirstRadius {
+    pub(super) radius: f32,
+    /// Part of the visible points whose k-radius is exact with it.
+    pub(super) accuracy: f64,
 }
 
 /// How well an engine's neighbourhoods agree with exact ones.
@@ -148,9 +172,9 @@ pub(super) struct Loaded<'a> {
 }
 
 /// The settings of a measurement: the defaults, but these.
-pub(super) fn settings(method: Method, k: u32, culled: bool) -> Settings {
+pub(super) fn settings(method: Method, first_radius: f32, k: u32, culled: bool) -> Settings {
     let mut settings = Settings::default();
-    settings.reconstruction.engine = method.engine();
+    settings.reconstruction.engine = method.engine(first_radius);
     settings.reconstruction.k = k;
     settings.reconstruction.grid_culling = culled;
     settings
@@ -199,6 +223,7 @@ pub(super) fn time(
             break;
         }
     }
+    let convergence = renderer.convergence().map_err(render_failure)?;
     let of = |value: &dyn Fn(&(Timings, f64)) -> f64| median(samples.iter().map(value));
     Ok(Outcome::Measured(Timing {
         visible: counts[0],
@@ -211,7 +236,28 @@ pub(super) fn time(
         splat: of(&|(timings, _)| timings.splat),
         shade: of(&|(timings, _)| timings.shade),
         frame: of(&|(timings, _)| timings.frame),
+        convergence,
     }))
+}
+
+/// Finds the kd-tree's best first radius.
+pub(super) fn first_radius(
+    renderers: &mut Renderers,
+    loaded: &Loaded<'_>,
+) -> Result<Outcome<FirstRadius>, Failure> {
+    let Loaded { scene, cloud, camera } = loaded;
+    let renderer = match renderers.of(Method::KdTree) {
+        Ok(renderer) => renderer,
+        Err(why) => return Ok(Outcome::Refused(why)),
+    };
+    let settings = settings(Method::KdTree, f32::NAN, K, false);
+    let best = outcome(best_first_radius(renderer, cloud, camera, scene.size, &settings, ACCURACY))?;
+    Ok(match best {
+        Outcome::Measured(RadiusTrial { first_radius, accuracy, .. }) => {
+            Outcome::Measured(FirstRadius { radius: first_radius, accuracy })
+        }
+        Outcome::Refused(why) => Outcome::Refused(why),
+    })
 }
 
 /// Whether a pass makes a search structure that other points could be looked up in.
@@ -232,7 +278,7 @@ impl Exact {
     /// Finds them in a kd-tree of the visible points, and in one of all.
     pub(super) fn new(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<Self, Failure> {
         let Loaded { scene, cloud, camera } = loaded;
-        let settings = without_rules(Method::GridCpu);
+        let settings = without_rules(Method::GridCpu, f32::NAN);
         renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
         let mut visible: Vec<u32> =
             renderers.cpu.surfels().map_err(render_failure)?.iter().map(|surfel| surfel.point).collect();
@@ -244,8 +290,8 @@ impl Exact {
 }
 
 /// Neither outliers nor gaps end a neighbourhood, and no point is left out.
-fn without_rules(method: Method) -> Settings {
-    let mut settings = settings(method, K, false);
+fn without_rules(method: Method, first_radius: f32) -> Settings {
+    let mut settings = settings(method, first_radius, K, false);
     settings.reconstruction.outlier_expansions = None;
     settings.reconstruction.gap_factor = None;
     settings
@@ -264,6 +310,7 @@ pub(super) fn accuracy(
     renderers: &mut Renderers,
     loaded: &Loaded<'_>,
     method: Method,
+    first_radius: f32,
     exact: &Exact,
 ) -> Result<Outcome<Accuracy>, Failure> {
     let Loaded { scene, cloud, camera } = loaded;
@@ -271,7 +318,7 @@ pub(super) fn accuracy(
         Ok(renderer) => renderer,
         Err(why) => return Ok(Outcome::Refused(why)),
     };
-    let (search_ms, bounded) = match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method)))? {
+    let (search_ms, bounded) = match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method, first_radius)))? {
         Outcome::Measured(frame) => (frame.timings.search, frame.counts.bounded),
         Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
     };
@@ -324,7 +371,7 @@ pub(super) fn culling_difference(renderers: &mut Renderers, loaded: &Loaded<'_>)
     let Loaded { scene, cloud, camera } = loaded;
     let mut images: Vec<Image> = Vec::new();
     for culled in [false, true] {
-        let settings = settings(Method::GridCpu, K, culled);
+        let settings = settings(Method::GridCpu, f32::NAN, K, culled);
         let frame = renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
         images.push(frame.image.clone());
     }

@@ -18,7 +18,9 @@ use std::path::Path;
 use autosplats_cloud::Progress as _;
 
 use self::journal::Journal;
-use self::measure::{Exact, K, Loaded, Method, Renderers, accuracy, culling_difference, kiddo, settings, time};
+use self::measure::{
+    Exact, FirstRadius, K, Loaded, Method, Outcome, Renderers, accuracy, culling_difference, kiddo, settings, time,
+};
 use self::report::Report;
 use self::scenes::{NAMES, PaperScene};
 use crate::args::PaperArgs;
@@ -46,6 +48,8 @@ enum Task {
     Table(Method, bool),
     /// kiddo's times beside it.
     Kiddo,
+    /// What the kd-tree is to be searched with.
+    FirstRadius,
     /// A bar of Figure 10.
     Stages(Method, u32),
     /// A line of the table of accuracies.
@@ -69,6 +73,7 @@ impl Task {
             }
             Self::Picture => format!("{scene} | picture"),
             Self::Kiddo => format!("{scene} | {} | kiddo", renderers.device(Method::GridCpu)),
+            Self::FirstRadius => format!("{scene} | {} | first radius", renderers.device(Method::KdTree)),
             Self::Stages(method, k) => {
                 format!("{scene} | {} | {} | stages k={k}", renderers.device(method), method.name())
             }
@@ -87,6 +92,7 @@ impl Task {
             Self::Table(method, _) => format!("Table 1, {}", method.name()),
             Self::Picture => "picture".into(),
             Self::Kiddo => "Table 1, kiddo".into(),
+            Self::FirstRadius => "Table 1, the kd-tree's first radius".into(),
             Self::Stages(method, k) => format!("Figure 10, {}, k = {k}", method.name()),
             Self::Accuracy(method) => format!("accuracy, {}", method.name()),
             Self::Culling => "grid culling".into(),
@@ -99,12 +105,12 @@ impl Task {
 /// What belongs to a scene, in the order of the page.
 fn tasks(scene: &PaperScene, ks: &[u32]) -> Vec<Task> {
     let methods = || Method::ALL.into_iter();
-    let mut tasks = vec![Task::Picture];
+    let mut tasks = vec![Task::Picture, Task::FirstRadius];
     tasks.extend(methods().flat_map(|method| [false, true].map(|culled| Task::Table(method, culled))));
     tasks.push(Task::Kiddo);
     tasks.extend(methods().map(Task::Accuracy));
     tasks.push(Task::Culling);
-    tasks.extend(methods().flat_map(|method| ks.iter().map(move |&k| Task::Stages(method, k))));
+    tasks.extend(Method::BY_STAGE.into_iter().flat_map(|method| ks.iter().map(move |&k| Task::Stages(method, k))));
     match scene.name {
         "bunny" => tasks.push(Task::Normals),
         "imperia" => tasks.push(Task::Curvature),
@@ -155,22 +161,30 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
             if matches!(task, Task::Kiddo | Task::Accuracy(_)) && exact.is_none() {
                 exact = Some(Exact::new(&mut renderers, &loaded)?);
             }
+            // A radius that was refused is refused again, with the reason.
+            let first_radius = match journal.get(&Task::FirstRadius.key(scene, &renderers)) {
+                Some(Outcome::Measured(FirstRadius { radius, .. })) => radius,
+                _ => 1.0,
+            };
             match (task, &exact) {
+                (Task::FirstRadius, _) => {
+                    journal.note(&key, &measure::first_radius(&mut renderers, &loaded)?)?;
+                }
                 (Task::Picture, _) => {
                     figures::picture(&loaded, &pictures.join(picture_name(scene)))?;
                     journal.note(&key, &true)?;
                 }
                 (Task::Table(method, culled), _) => {
-                    let settings = settings(method, K, culled);
+                    let settings = settings(method, first_radius, K, culled);
                     journal.note(&key, &time(&mut renderers, &loaded, method, &settings, FRAMES)?)?;
                 }
                 (Task::Stages(method, k), _) => {
-                    let settings = settings(method, k, true);
+                    let settings = settings(method, first_radius, k, true);
                     journal.note(&key, &time(&mut renderers, &loaded, method, &settings, FRAMES)?)?;
                 }
                 (Task::Kiddo, Some(exact)) => journal.note(&key, &kiddo(&loaded, exact))?,
                 (Task::Accuracy(method), Some(exact)) => {
-                    journal.note(&key, &accuracy(&mut renderers, &loaded, method, exact)?)?;
+                    journal.note(&key, &accuracy(&mut renderers, &loaded, method, first_radius, exact)?)?;
                 }
                 (Task::Kiddo | Task::Accuracy(_), None) => {}
                 (Task::Culling, _) => journal.note(&key, &culling_difference(&mut renderers, &loaded)?)?,
