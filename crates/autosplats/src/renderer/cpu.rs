@@ -61,6 +61,12 @@ impl CpuRenderer {
         given: Option<GivenPlanes<'_>>,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
+        if matches!(settings.reconstruction.engine, SearchEngine::KdTree { .. }) {
+            return Err(Error::Device(
+                "the kd-tree search of [ZHWG08] runs on a GPU only; ask for the GPU backend or the screen-grid engine"
+                    .into(),
+            ));
+        }
         self.view = Some(view);
         let wanted = Wanted::new(cloud, settings)?;
         let colors = wanted.colors(cloud);
@@ -158,6 +164,7 @@ impl Reconstruct<'_> {
         };
         match settings.engine {
             SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, neighborhoods),
+            SearchEngine::KdTree { .. } => unreachable!("refused before the frame begins"),
         }
         clock.lap(|timings| &mut timings.search);
 

@@ -3,9 +3,11 @@
 use std::fmt::Debug;
 
 use super::SearchEngine;
+use super::kd_tree::gpu::KdTreePasses;
 use super::screen_grid::gpu::SearchPasses;
 use crate::Error;
 use crate::gpu::{Gpu, Step};
+use crate::project::DeviceCloud;
 use crate::project::gpu::{Round, ScreenBuffers};
 
 /// What an engine may read, and where it leaves what it finds.
@@ -13,6 +15,7 @@ use crate::project::gpu::{Round, ScreenBuffers};
 pub(crate) struct SearchBuffers<'a> {
     /// [`FrameUniform`](crate::gpu::FrameUniform).
     pub(crate) frame: &'a wgpu::Buffer,
+    pub(crate) cloud: &'a DeviceCloud,
     pub(crate) screen: &'a ScreenBuffers,
     /// `Neighborhood` of `shared/surfel.wgsl` for each query, in the order of the queries.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
@@ -34,6 +37,7 @@ pub(crate) trait EnginePasses: Debug {
 pub(crate) fn compile(gpu: &Gpu, engine: SearchEngine, k: u32) -> Result<Box<dyn EnginePasses>, Error> {
     match engine {
         SearchEngine::ScreenGrid => Ok(Box::new(SearchPasses::new(gpu, k)?)),
+        SearchEngine::KdTree { .. } => Ok(Box::new(KdTreePasses::new(gpu)?)),
     }
 }
 

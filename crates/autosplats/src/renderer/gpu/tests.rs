@@ -10,6 +10,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
     let stages = [
         crate::project::gpu::PASSES,
         crate::search::screen_grid::gpu::PASSES,
+        crate::search::kd_tree::gpu::PASSES,
         crate::fit::gpu::PASSES,
         crate::splat::gpu::PASSES,
         crate::shade::gpu::PASSES,

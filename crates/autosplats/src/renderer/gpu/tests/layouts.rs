@@ -57,7 +57,7 @@ fn mirrored() -> [Mirrored; 6] {
                 splat_scale,
                 outlier_growth,
                 gap_growth,
-                padding,
+                first_radius,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),

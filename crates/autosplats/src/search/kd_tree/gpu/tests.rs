@@ -1,0 +1,189 @@
+//! The tree's form, and what is found in it, against brute force.
+
+use autosplats_cloud::PointCloud;
+use autosplats_cloud::glam::DVec3;
+
+use super::*;
+use crate::camera::{Camera, Projection, View};
+use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::project::gpu::tests::upload_screen;
+use crate::project::gpu::{COUNTERS, Counter};
+use crate::project::{DeviceCloud, Projector, ScreenPoints, Uploader};
+use crate::search::screen_grid::gpu::neighborhood_buffer;
+use crate::test_clouds::{self, EYE, Random};
+
+const SIZE: [u32; 2] = [121, 90];
+
+/// What a search leaves.
+#[derive(Debug, PartialEq)]
+struct Found {
+    /// Indices in the cloud of the queries, and what was found for them.
+    sources: Vec<u32>,
+    neighborhoods: Vec<[f32; 12]>,
+    points: Vec<Point>,
+    nodes: Vec<Node>,
+    finite: usize,
+    clamped: u32,
+}
+
+impl Found {
+    fn count(&self, query: usize) -> f32 {
+        self.neighborhoods[query][3]
+    }
+
+    fn k_radius(&self, query: usize) -> f32 {
+        self.neighborhoods[query][7]
+    }
+}
+
+/// Sees all the points, were none hidden behind others.
+fn view(scale: f64) -> View {
+    let projection = Projection::OrthographicHeight(2.4 * scale);
+    let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+    camera.view(DVec3::ZERO, SIZE).expect("a view")
+}
+
+fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k: u32, first_radius: f32) -> Found {
+    let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
+    let screen: ScreenPoints = Projector::default().project(&cloud, view, k, true).clone();
+    let mut device_cloud = DeviceCloud::default();
+    device_cloud.resize(gpu, cloud.len()).expect("room");
+    Uploader::new().positions(gpu, &cloud, &device_cloud, &|_| true).expect("an upload");
+    let uploaded = upload_screen(gpu, &screen, view);
+    let neighborhoods = neighborhood_buffer(gpu, uploaded.capacity).expect("room");
+    let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
+    let told = FrameUniform { first_radius, ..FrameUniform::new(view, k) };
+    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
+    let tree = TreeBuffers::new(gpu, cloud.len()).expect("room");
+    let buffers =
+        SearchBuffers { frame: &frame, cloud: &device_cloud, screen: &uploaded, neighborhoods: &neighborhoods };
+    let mut recorder = Recorder::new(gpu, &Clock::Off);
+    passes.steps_in(gpu, buffers, &tree).iter().flatten().for_each(|step| recorder.run(step));
+    recorder.finish();
+    let queries = screen.active.iter().chain(&screen.passive);
+    let counters: Vec<u32> = read_back(gpu, &uploaded.counters, COUNTERS).expect("counters");
+    let state: Vec<u32> = read_back(gpu, &tree.state[0], 6).expect("a state");
+    let nodes = (tree.nodes.size() / 32) as usize;
+    Found {
+        sources: queries.map(|&query| screen.source[query as usize]).collect(),
+        neighborhoods: read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods"),
+        points: read_back(gpu, &tree.points[0], cloud.len()).expect("points"),
+        nodes: read_back(gpu, &tree.nodes, nodes).expect("nodes"),
+        finite: state[5] as usize,
+        clamped: counters[Counter::Clamped as usize],
+    }
+}
+
+fn squared(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|axis| (f64::from(a[axis]) - f64::from(b[axis])).powi(2)).sum()
+}
+
+/// Distances from a point to all others that have a distance, in order.
+fn distances(positions: &[[f32; 3]], own: u32) -> Vec<f64> {
+    let center = positions[own as usize];
+    let others = positions.iter().enumerate().filter(|&(index, _)| index != own as usize);
+    let mut distances: Vec<f64> =
+        others.map(|(_, &other)| squared(center, other).sqrt()).filter(|d| *d < 1e18).collect();
+    distances.sort_unstable_by(f64::total_cmp);
+    distances
+}
+
+/// A radius within which nearly all points of a cloud have k neighbours, but not many more.
+fn ample_radius(positions: &[[f32; 3]], k: u32) -> f32 {
+    let mut radii: Vec<f64> = (0..positions.len() as u32)
+        .step_by(positions.len().div_ceil(50))
+        .filter_map(|own| distances(positions, own).get(k as usize - 1).copied())
+        .collect();
+    radii.sort_unstable_by(f64::total_cmp);
+    2.0 * radii.last().copied().unwrap_or(1.0).max(1e-12) as f32
+}
+
+/// Goes through a tree and checks it; leaves that are larger than a small node may be, and the deepest level.
+fn check_tree(found: &Found, positions: &[[f32; 3]], case: &str) -> (usize, usize) {
+    let is_finite = |p: &[f32; 3]| p.iter().all(|c| c.abs() <= 1e18);
+    let finite = positions.iter().filter(|p| is_finite(p)).count();
+    assert_eq!(found.finite, finite, "{case}: finite points");
+    let mut seen = vec![0; positions.len()];
+    let (mut large, mut deepest) = (0, 0);
+    let mut open = vec![(1, 0)];
+    while let Some((node, depth)) = open.pop() {
+        deepest = deepest.max(depth);
+        let [low_x, low_y, low_z, first, high_x, high_y, high_z, len] = found.nodes[node as usize];
+        let low = [low_x, low_y, low_z].map(f32::from_bits);
+        let high = [high_x, high_y, high_z].map(f32::from_bits);
+        if len == 0 {
+            open.extend([(first, depth + 1), (first + 1, depth + 1)]);
+            for child in [first, first + 1] {
+                let child = &found.nodes[child as usize];
+                let inside = |axis: usize| {
+                    low[axis] <= f32::from_bits(child[axis]) && f32::from_bits(child[4 + axis]) <= high[axis]
+                };
+                assert!((0..3).all(inside), "{case}: node {node} holds its children");
+            }
+            continue;
+        }
+        if low[0] > high[0] {
+            assert_eq!(finite, 0, "{case}: only no points at all have no box");
+            continue;
+        }
+        for point in &found.points[first as usize..(first + len) as usize] {
+            let index = point[3] as usize;
+            seen[index] += 1;
+            let position: [f32; 3] = std::array::from_fn(|axis| f32::from_bits(point[axis]));
+            assert_eq!(position, positions[index], "{case}: point {index} is where it was");
+            assert!((0..3).all(|a| low[a] <= position[a] && position[a] <= high[a]), "{case}: {index} in its box");
+        }
+        if len > SMALL as u32 {
+            large += 1;
+            assert_eq!(low, high, "{case}: a leaf of {len} points is in one place");
+        }
+    }
+    for (index, &seen) in seen.iter().enumerate() {
+        assert_eq!(seen, usize::from(is_finite(&positions[index])), "{case}: point {index} is in one leaf");
+    }
+    (large, deepest)
+}
+
+#[test]
+fn trees_hold_each_point_once_in_tight_boxes() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = KdTreePasses::new(&gpu).expect("passes");
+    for (name, mut positions) in test_clouds::all(6000) {
+        let found = find(&gpu, &passes, &positions, &view(1.0), 10, 0.1);
+        let (large, depth) = check_tree(&found, &positions, name);
+        assert_eq!(large, 0, "{name}: nothing is too large to be split");
+        assert!(depth <= 24, "{name}: {depth} levels");
+        positions.extend([[f32::NAN, 0.0, 0.0], [f32::INFINITY, 1.0, 0.0], [0.0, 3e38, -3e38]]);
+        positions.swap_remove(0);
+        check_tree(&find(&gpu, &passes, &positions, &view(1.0), 10, 0.1), &positions, &format!("{name} and others"));
+    }
+}
+
+/// Share of the queries whose k-radius is that of brute force to 1e-4, of those that have k neighbours.
+fn accuracy(found: &Found, positions: &[[f32; 3]], k: u32) -> (usize, usize) {
+    let (mut right, mut compared) = (0, 0);
+    for (query, &own) in found.sources.iter().enumerate().step_by(7) {
+        let Some(&exact) = distances(positions, own).get(k as usize - 1) else { continue };
+        compared += 1;
+        right += usize::from((f64::from(found.k_radius(query)) - exact).abs() <= 1e-4 * exact);
+    }
+    (right, compared)
+}
+
+#[test]
+fn k_radii_are_those_of_brute_force() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = KdTreePasses::new(&gpu).expect("passes");
+    for k in [1, 3, 10, 17, 64] {
+        let (mut right, mut compared) = (0, 0);
+        for (name, positions) in test_clouds::all(4000) {
+            let radius = ample_radius(&positions, k);
+            let found = find(&gpu, &passes, &positions, &view(1.0), k, radius);
+            let (here, of) = accuracy(&found, &positions, k);
+            eprintln!("{k} {name} {here} of {of}, first radius {radius}");
+            (right, compared) = (right + here, compared + of);
+        }
+        assert!(compared > 1000, "there is something to compare: {compared}");
+        println!("k = {k}: {right} of {compared}");
+    }
+}

@@ -1,0 +1,2 @@
+//! The kd-tree engine.
+pub(crate) mod gpu;
