@@ -18,6 +18,9 @@ use crate::threads::start_threads;
 /// Frames before those that count: buffers are made, caches filled, clocks sped up.
 const WARM_UP: usize = 3;
 
+/// Passes that build the kd-tree, which are no part of searching it.
+const BUILD: &str = "search/kd_tree/build/";
+
 /// Everything that `--json` prints.
 #[derive(Debug, Serialize)]
 struct Bench<'a> {
@@ -48,11 +51,11 @@ struct Run {
 
 /// Renders the same frame again and again and prints the medians.
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let BenchArgs { scene, engine, backends, k, size, frames, stream, json, run } = args;
+    let BenchArgs { scene, engine, first_radius, backends, k, size, frames, stream, json, run } = args;
     start_threads(run)?;
     let mut settings = Settings::default();
     settings.reconstruction.k = *k;
-    settings.reconstruction.engine = (*engine).into();
+    settings.reconstruction.engine = engine.with_first_radius(*first_radius);
     settings.check().map_err(render_failure)?;
     let name = scene.strip_prefix("scene:").unwrap_or(scene);
     let inputs = Inputs::scene(name)?;
@@ -69,6 +72,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         k: *k,
         engine: match settings.reconstruction.engine {
             SearchEngine::ScreenGrid => "screen-grid",
+            SearchEngine::KdTree { .. } => "kd-tree",
             _ => "?",
         },
         frames: *frames,
@@ -97,6 +101,7 @@ fn measure(
     let device = Device::of(renderer);
     let scene = inputs.only_scene().ok_or_else(|| Failure::usage("a bench needs a scene"))?;
     let camera = scene_camera(scene);
+    let settings = &args.first_radius.settle(renderer, cloud, &camera, args.size, settings, args.run.quiet)?;
     let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), args.run.quiet);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
     let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
@@ -152,6 +157,18 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
+/// Passes in the order of their first time, how often each runs, and its milliseconds, all times together.
+fn summed(passes: &[PassTime]) -> Vec<(&'static str, usize, f64)> {
+    let mut sums: Vec<(&'static str, usize, f64)> = Vec::new();
+    for &PassTime { pass, ms } in passes {
+        match sums.iter_mut().find(|(other, ..)| *other == pass) {
+            Some((_, times, sum)) => (*times, *sum) = (*times + 1, *sum + ms),
+            None => sums.push((pass, 1, ms)),
+        }
+    }
+    sums
+}
+
 impl Bench<'_> {
     fn table(&self, cloud: &PointCloud) -> String {
         let Self { scene, size: [width, height], k, engine, frames, runs, .. } = self;
@@ -171,8 +188,14 @@ impl Bench<'_> {
             {
                 line(stage, *ms);
                 let prefix = format!("{stage}/");
-                for PassTime { pass, ms } in passes.iter().filter(|time| time.pass.starts_with(&prefix)) {
-                    line(&format!("  {}", &pass[prefix.len()..]), *ms);
+                for (pass, times, ms) in summed(passes).into_iter().filter(|(pass, ..)| pass.starts_with(&prefix)) {
+                    let repeated = if times > 1 { format!(" x{times}") } else { String::new() };
+                    line(&format!("  {}{repeated}", &pass[prefix.len()..]), ms);
+                }
+                let build: f64 = passes.iter().filter(|time| time.pass.starts_with(BUILD)).map(|time| time.ms).sum();
+                if stage == "search" && build > 0.0 {
+                    line("  building the tree", build);
+                    line("  searching it", search - build);
                 }
             }
             line("frame", *frame);

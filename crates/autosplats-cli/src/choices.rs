@@ -2,6 +2,8 @@
 
 use clap::ValueEnum;
 
+use crate::first_radius::FirstRadius;
+
 /// Which way normals point.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum OrientChoice {
@@ -43,12 +45,16 @@ pub(crate) enum AxesChoice {
 pub(crate) enum Engine {
     /// Buckets of screen points, exact
     ScreenGrid,
+    /// The paper's rival: a kd-tree over all points, built anew in each frame; needs a GPU backend, see --first-radius
+    KdTree,
 }
 
-impl From<Engine> for autosplats::SearchEngine {
-    fn from(engine: Engine) -> Self {
-        match engine {
-            Engine::ScreenGrid => Self::ScreenGrid,
+impl Engine {
+    /// The engine that it names; `first_radius` is what the kd-tree begins with.
+    pub(crate) fn with_first_radius(self, first_radius: FirstRadius) -> autosplats::SearchEngine {
+        match self {
+            Self::ScreenGrid => autosplats::SearchEngine::ScreenGrid,
+            Self::KdTree => autosplats::SearchEngine::KdTree { first_radius: first_radius.unless_best() },
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod attributes;
 mod cpu;
+mod first_radius;
 mod gpu;
 mod settings;
 mod surfels;
@@ -18,6 +19,7 @@ use crate::normals::Normals;
 use crate::shade::Image;
 use crate::splat::GBuffer;
 
+pub use first_radius::{RadiusTrial, best_first_radius};
 pub use settings::{Reconstruction, Settings};
 pub use surfels::PointSurfel;
 
