@@ -62,7 +62,7 @@ fn levels(capacity: usize) -> usize {
     2 * capacity.div_ceil(SMALL).next_power_of_two().ilog2() as usize + 6
 }
 
-/// A tree of up to so many points, and what building it takes: 51 bytes a point.
+/// A tree of up to so many points, and what building it takes: 52 bytes a point.
 #[derive(Debug)]
 struct TreeBuffers {
     capacity: u32,
