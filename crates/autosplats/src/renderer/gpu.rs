@@ -51,11 +51,14 @@ struct Resident {
     values: Option<(u64, Option<ColorSource>, Option<String>)>,
 }
 
+/// Which engine, whatever its parameters, and k: what search passes are compiled for.
+type SearchKind = (Discriminant<SearchEngine>, u32);
+
 /// Compiled passes: those of the last engine, k and channels are kept.
 #[derive(Debug)]
 struct Passes {
     project: ProjectPasses,
-    search: Option<((Discriminant<SearchEngine>, u32), Box<dyn EnginePasses>)>,
+    search: Option<(SearchKind, Box<dyn EnginePasses>)>,
     fit: FitPasses,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
@@ -65,7 +68,7 @@ struct Passes {
 #[derive(Clone, Debug, PartialEq)]
 struct Shape {
     size: [u32; 2],
-    search: (Discriminant<SearchEngine>, u32),
+    search: SearchKind,
     depth_refinement: bool,
     channels: Channels,
     find_range: bool,
