@@ -9,7 +9,6 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{DeviceCloud, Projector, ScreenPoints, Uploader};
-use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::test_clouds::{self, EYE, Random};
 
 const SIZE: [u32; 2] = [121, 90];
@@ -50,7 +49,7 @@ fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k
     device_cloud.resize(gpu, cloud.len()).expect("room");
     Uploader::new().positions(gpu, &cloud, &device_cloud, &|_| true).expect("an upload");
     let uploaded = upload_screen(gpu, &screen, view);
-    let neighborhoods = neighborhood_buffer(gpu, uploaded.capacity).expect("room");
+    let neighborhoods = gpu.storage::<[f32; 12]>("neighbourhoods", uploaded.capacity as usize).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     let told = FrameUniform { first_radius, ..FrameUniform::new(view, k) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
