@@ -28,8 +28,8 @@ pub enum SearchEngine {
     /// Buckets of screen points read outwards from each point; exact, in one pass.
     #[default]
     ScreenGrid,
-    /// The paper's rival (Zhou et al. 2008): a kd-tree over all points of the cloud, built anew in each frame, and the k-radius of
-    /// each of them. On a GPU only. Its neighbours are those in the cloud, seen or not; it knows no gaps.
+    /// The paper's rival (Zhou et al. 2008): a kd-tree over all points of the cloud, built anew in each frame, and the
+    /// k-radius of each of them. On a GPU only. Its neighbours are those in the cloud, seen or not; it knows no gaps.
     KdTree {
         /// Within it, in world units, a point's k neighbours must lie: those beyond are not found. Much too large a radius
         /// costs time, and exactness.

@@ -37,8 +37,8 @@
 //!   first radius far too large costs a bounded time, not the whole cloud for each point. The neighbourhoods are then too
 //!   large, for a bin is a thousandth of that radius.
 //! - Of one neighbour more than k in the last bin the furthest is left out: 99.8 % of the k-radii are exact at k = 10 with a
-//!   first radius of two to four k-radii, not 97 %; at k = 64, with more points in each bin, 97 %, not 84 %. Other points have
-//!   a few neighbours more than k.
+//!   first radius of two to four k-radii, not 97 %; at k = 64, with more points in each bin, 97 %, not 84 %. Other points
+//!   have a few neighbours more than k.
 //!
 //! # Where it differs from the other engines
 //! - Neighbours are those in the whole cloud: hidden ones behind the silhouette, and others in the same pixel.
