@@ -2,6 +2,8 @@
 
 use clap::ValueEnum;
 
+use crate::first_radius::FirstRadius;
+
 /// Which way normals point.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum OrientChoice {
@@ -45,6 +47,8 @@ pub(crate) enum Engine {
     ScreenGrid,
     /// The paper's own: points draw splats onto each other's pixels; on a GPU only, slower
     SplatCommunication,
+    /// The paper's rival: a kd-tree over all points, built anew in each frame; on a GPU only, see --first-radius
+    KdTree,
 }
 
 impl Engine {
@@ -52,13 +56,13 @@ impl Engine {
     pub(crate) fn name(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
-}
 
-impl From<Engine> for autosplats::SearchEngine {
-    fn from(engine: Engine) -> Self {
-        match engine {
-            Engine::ScreenGrid => Self::ScreenGrid,
-            Engine::SplatCommunication => Self::SplatCommunication,
+    /// The engine that it names; `first_radius` is what the kd-tree begins with.
+    pub(crate) fn with_first_radius(self, first_radius: FirstRadius) -> autosplats::SearchEngine {
+        match self {
+            Self::ScreenGrid => autosplats::SearchEngine::ScreenGrid,
+            Self::SplatCommunication => autosplats::SearchEngine::SplatCommunication,
+            Self::KdTree => autosplats::SearchEngine::KdTree { first_radius: first_radius.unless_best() },
         }
     }
 }

@@ -11,6 +11,7 @@ mod demo;
 mod device;
 mod doctor;
 mod exit;
+mod first_radius;
 mod info;
 mod input;
 mod interrupt;

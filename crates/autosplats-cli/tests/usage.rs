@@ -33,7 +33,10 @@ fn options_that_do_not_fit() {
         (&["--fov", "180"], &["170"]),
         (&["--fov", "40", "--ortho", "2"], &["--ortho"]),
         (&["--ortho", "-1"], &["above 0"]),
-        (&["--engine", "magic"], &["screen-grid"]),
+        (&["--engine", "magic"], &["screen-grid", "kd-tree"]),
+        (&["--first-radius", "0"], &["above 0", "best"]),
+        (&["--first-radius", "nan"], &["above 0"]),
+        (&["--first-radius", "worst"], &["'best'"]),
         (&["--threads", "0"], &["--threads", "from 1 to 1024", "one per core"]),
         (&["--threads", "many"], &["from 1 to 1024"]),
         (&["--pose", "other.ply=pose.txt"], &["sphere.ply"]),
@@ -136,4 +139,13 @@ fn a_reader_that_goes_away_is_no_error() {
     let output = child.wait_with_output().expect("the command ends");
     assert_eq!(output.status.code(), Some(0), "the picture was written all the same");
     assert_eq!(String::from_utf8_lossy(&output.stderr), "", "and nobody needs to know");
+}
+
+#[test]
+fn engines_that_need_a_gpu() {
+    let folder = Folder::with_sphere();
+    for radius in ["best", "0.2"] {
+        let options = ["--engine", "kd-tree", "--first-radius", radius, "--backend", "cpu"];
+        folder.fail(&[&RENDER[..], &options].concat(), 5, &["kd-tree", "GPU", "screen-grid"]);
+    }
 }

@@ -44,7 +44,10 @@ pub use camera::{Camera, Projection, ViewDirection, guess_axes};
 pub use error::Error;
 pub use gpu::{AdapterSummary, PassTime, adapters};
 pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
-pub use renderer::{Backend, Counts, Frame, MAX_SIDE, PointSurfel, Reconstruction, Renderer, Settings, Timings};
+pub use renderer::{
+    Backend, Counts, Frame, MAX_SIDE, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings, Timings,
+    best_first_radius,
+};
 pub use search::SearchEngine;
 pub use shade::{Background, ColorMap, ColorMode, Image, Shading};
 pub use splat::{GBuffer, TILE};

@@ -20,6 +20,9 @@ use crate::threads::start_threads;
 /// Frames before those that count: buffers are made, caches filled, clocks sped up.
 const WARM_UP: usize = 3;
 
+/// Passes that build the kd-tree, which are no part of searching it.
+const BUILD: &str = "search/kd_tree/build/";
+
 /// Everything that `--json` prints.
 #[derive(Debug, Serialize)]
 struct Bench<'a> {
@@ -52,21 +55,23 @@ struct Run {
 
 /// Renders the same frame again and again and prints the medians.
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let BenchArgs { evaluation, scene, engine, backends, k, size, frames, stream, json, run } = args;
+    let BenchArgs { evaluation, scene, engine, first_radius, backends, k, size, frames, stream, json, run } = args;
     if let Some(Evaluation::Paper(args)) = evaluation {
         return paper::run(args);
     }
     start_threads(run)?;
     let mut settings = Settings::default();
     settings.reconstruction.k = *k;
-    settings.reconstruction.engine = (*engine).into();
+    settings.reconstruction.engine = engine.with_first_radius(*first_radius);
     settings.check().map_err(render_failure)?;
     let name = scene.strip_prefix("scene:").unwrap_or(scene);
     let inputs = Inputs::scene(name)?;
     // Devices are looked for before points are made: what cannot run says so at once.
     let mut renderers = Vec::new();
     for &backend in backends {
-        renderers.push(Renderer::with_backend(backend.into()).map_err(render_failure)?);
+        let renderer = Renderer::with_backend(backend.into()).map_err(render_failure)?;
+        renderer.check(&settings).map_err(render_failure)?;
+        renderers.push(renderer);
     }
     let cloud = inputs.read(run.quiet)?;
     let mut bench = Bench {
@@ -101,6 +106,7 @@ fn measure(
     let device = Device::of(renderer);
     let scene = inputs.only_scene().ok_or_else(|| Failure::usage("a bench needs a scene"))?;
     let camera = scene_camera(scene);
+    let settings = &args.first_radius.settle(renderer, cloud, &camera, args.size, settings, args.run.quiet)?;
     let bar = Bar::spinner(&format!("{} frames on {}", args.frames, device.name), args.run.quiet);
     let mut samples: Vec<(f64, Timings, Vec<PassTime>)> = Vec::new();
     let (mut counts, mut first_upload_ms) = (Counts::default(), 0.0);
@@ -143,22 +149,6 @@ fn measure(
     })
 }
 
-/// The passes of a stage; those that iterations repeat again and again are one.
-fn listed(passes: &[PassTime], prefix: &str) -> Vec<(String, f64)> {
-    const MANY: usize = 8;
-    let mut listed: Vec<(String, f64)> = Vec::new();
-    for (at, PassTime { pass, ms }) in passes.iter().enumerate() {
-        let Some(name) = pass.strip_prefix(prefix) else { continue };
-        let same = || passes.iter().filter(|other| other.pass == *pass);
-        if same().count() < MANY {
-            listed.push((name.into(), *ms));
-        } else if passes[..at].iter().all(|before| before.pass != *pass) {
-            listed.push((format!("{name}, {} times", same().count()), same().map(|time| time.ms).sum()));
-        }
-    }
-    listed
-}
-
 /// Another cloud with the same points.
 fn copy(cloud: &PointCloud) -> Result<PointCloud, Failure> {
     let copy = PointCloud::new(cloud.origin(), cloud.positions().to_vec());
@@ -171,6 +161,18 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values[values.len() / 2]
+}
+
+/// Passes in the order of their first time, how often each runs, and its milliseconds, all times together.
+fn summed(passes: &[PassTime]) -> Vec<(&'static str, usize, f64)> {
+    let mut sums: Vec<(&'static str, usize, f64)> = Vec::new();
+    for &PassTime { pass, ms } in passes {
+        match sums.iter_mut().find(|(other, ..)| *other == pass) {
+            Some((_, times, sum)) => (*times, *sum) = (*times + 1, *sum + ms),
+            None => sums.push((pass, 1, ms)),
+        }
+    }
+    sums
 }
 
 impl Bench<'_> {
@@ -197,8 +199,14 @@ impl Bench<'_> {
             {
                 line(stage, *ms);
                 let prefix = format!("{stage}/");
-                for (pass, ms) in listed(passes, &prefix) {
-                    line(&format!("  {pass}"), ms);
+                for (pass, times, ms) in summed(passes).into_iter().filter(|(pass, ..)| pass.starts_with(&prefix)) {
+                    let repeated = if times > 1 { format!(" x{times}") } else { String::new() };
+                    line(&format!("  {}{repeated}", &pass[prefix.len()..]), ms);
+                }
+                let build: f64 = passes.iter().filter(|time| time.pass.starts_with(BUILD)).map(|time| time.ms).sum();
+                if stage == "search" && build > 0.0 {
+                    line("  building the tree", build);
+                    line("  searching it", search - build);
                 }
             }
             line("frame", *frame);

@@ -11,6 +11,7 @@ use super::render_failure;
 use crate::args::{LookArgs, RenderArgs, SurfaceArgs};
 use crate::choices::Map;
 use crate::exit::{Exit, Failure, suggest};
+use crate::first_radius::FirstRadius;
 use crate::input::{Inputs, read_failure};
 use crate::output::{Format, Picture, check_target};
 use crate::threads::start_threads;
@@ -29,6 +30,7 @@ pub(super) struct Job {
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
+    pub(super) first_radius: FirstRadius,
     pub(super) json: bool,
     pub(super) quiet: bool,
 }
@@ -57,8 +59,9 @@ impl Job {
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)
             .map_err(read_failure)?;
-        let backend = surface.backend.into();
-        Ok(Self { inputs, pictures, save_camera, size, camera, settings, backend, json, quiet: run.quiet })
+        let SurfaceArgs { backend, first_radius, .. } = surface;
+        let (backend, quiet) = (backend.into(), run.quiet);
+        Ok(Self { inputs, pictures, save_camera, size, camera, settings, backend, first_radius, json, quiet })
     }
 
     /// Whether the picture has nothing behind the surface.
@@ -102,7 +105,7 @@ impl Job {
 fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings {
     let reconstruction = Reconstruction {
         k: surface.k,
-        engine: surface.engine.into(),
+        engine: surface.engine.with_first_radius(surface.first_radius),
         outlier_expansions: (!surface.keep_outliers).then_some(surface.e0),
         gap_factor: (!surface.bridge_gaps).then_some(surface.gap_factor),
         splat_scale: surface.splat_scale,

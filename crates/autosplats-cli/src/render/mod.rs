@@ -23,6 +23,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let mut job = Job::new(args)?;
     // A device that is not there says so before anything is read.
     let mut renderer = Renderer::with_backend(job.backend).map_err(render_failure)?;
+    renderer.check(&job.settings).map_err(render_failure)?;
     let device = Device::of(&renderer);
 
     let started = Instant::now();
@@ -35,6 +36,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
+    job.settings = job.first_radius.settle(&mut renderer, &cloud, &camera, job.size, &job.settings, job.quiet)?;
     let bar = Bar::spinner("rendering", job.quiet);
     let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
     drop(bar);

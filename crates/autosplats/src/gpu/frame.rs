@@ -24,7 +24,8 @@ pub(crate) struct FrameUniform {
     pub(crate) outlier_growth: f32,
     /// √λ; infinite if any gap is bridged.
     pub(crate) gap_growth: f32,
-    pub(crate) padding: u32,
+    /// Of the kd-tree search, world units.
+    pub(crate) first_radius: f32,
 }
 
 impl FrameUniform {
@@ -46,7 +47,7 @@ impl FrameUniform {
             splat_scale: 1.0,
             outlier_growth: f32::INFINITY,
             gap_growth: f32::INFINITY,
-            padding: 0,
+            first_radius: 1.0,
         }
     }
 }

@@ -124,6 +124,22 @@ pub fn estimate_normals(
     if !(3..=1024).contains(&settings.k) {
         return Err(Error::Setting { name: "k", value: settings.k.to_string(), range: "3 to 1024" });
     }
+    estimate(cloud, settings, progress)
+}
+
+/// The distance from each point to its k-th nearest in the whole cloud, the last there is if it has fewer; NaN for points
+/// that [`Normals`] has none for. Good for any k.
+///
+/// # Errors
+/// [`Error::TooManyPoints`].
+pub(crate) fn exact_k_radii(cloud: &PointCloud, k: u32) -> Result<Vec<f32>, Error> {
+    let finite = finite_points(cloud).len() as u32;
+    let Normals { radius, .. } = estimate(cloud, &NormalSettings { k, ..NormalSettings::default() }, &())?;
+    let of_density = 0.5 * (k.min(finite.saturating_sub(1)).max(1) as f32).sqrt();
+    Ok(radius.into_iter().map(|radius| radius * of_density).collect())
+}
+
+fn estimate(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progress) -> Result<Normals, Error> {
     if u32::try_from(cloud.len()).is_err() {
         return Err(Error::TooManyPoints(cloud.len()));
     }

@@ -18,7 +18,7 @@ mod tests;
 pub(crate) use cpu::Projector;
 #[cfg(test)]
 pub(crate) use device_cloud::ChunkUniform;
-pub(crate) use device_cloud::{DeviceCloud, PointValues, Uploader};
+pub(crate) use device_cloud::{Chunk, DeviceCloud, PointValues, Uploader};
 
 use bytemuck::{Pod, Zeroable};
 

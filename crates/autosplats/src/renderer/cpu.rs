@@ -45,6 +45,17 @@ impl Default for CpuRenderer {
     }
 }
 
+/// # Errors
+/// [`Error::Device`] if the engine is one of those that run on a GPU only.
+pub(super) fn check_engine(engine: SearchEngine) -> Result<(), Error> {
+    let engine = match engine {
+        SearchEngine::ScreenGrid => return Ok(()),
+        SearchEngine::SplatCommunication => "the splat-communication search",
+        SearchEngine::KdTree { .. } => "the kd-tree search of [ZHWG08]",
+    };
+    Err(Error::Device(format!("{engine} runs on a GPU only; ask for the GPU backend or the screen-grid engine")))
+}
+
 impl CpuRenderer {
     /// See [`Renderer::surfels`](super::Renderer::surfels).
     pub(super) fn surfels(&self) -> Vec<PointSurfel> {
@@ -61,11 +72,8 @@ impl CpuRenderer {
         given: Option<GivenPlanes<'_>>,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
-        if settings.reconstruction.engine == SearchEngine::SplatCommunication {
-            return Err(Error::Device(
-                "the splat-communication search runs on a GPU only; ask for the GPU backend or the screen-grid engine"
-                    .into(),
-            ));
+        if given.is_none() {
+            check_engine(settings.reconstruction.engine)?;
         }
         self.view = Some(view);
         let wanted = Wanted::new(cloud, settings)?;
@@ -165,7 +173,9 @@ impl Reconstruct<'_> {
         };
         match settings.engine {
             SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, neighborhoods),
-            SearchEngine::SplatCommunication => unreachable!("refused before the frame begins"),
+            SearchEngine::SplatCommunication | SearchEngine::KdTree { .. } => {
+                unreachable!("refused before the frame begins")
+            }
         }
         clock.lap(|timings| &mut timings.search);
 

@@ -1,12 +1,13 @@
 //! The frame on the GPU: the steps of all stages, made when buffers change and replayed for each picture.
 
+use std::mem::{Discriminant, discriminant};
 use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
 
 use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
-use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
+use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
 use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
@@ -50,11 +51,14 @@ struct Resident {
     values: Option<(u64, Option<ColorSource>, Option<String>)>,
 }
 
+/// Which engine, whatever its parameters, and k: what search passes are compiled for.
+type SearchKind = (Discriminant<SearchEngine>, u32);
+
 /// Compiled passes: those of the last engine, k and channels are kept.
 #[derive(Debug)]
 struct Passes {
     project: ProjectPasses,
-    search: Option<((SearchEngine, u32), Box<dyn EnginePasses>)>,
+    search: Option<(SearchKind, Box<dyn EnginePasses>)>,
     fit: FitPasses,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
@@ -64,7 +68,7 @@ struct Passes {
 #[derive(Clone, Debug, PartialEq)]
 struct Shape {
     size: [u32; 2],
-    search: (SearchEngine, u32),
+    search: SearchKind,
     depth_refinement: bool,
     channels: Channels,
     find_range: bool,
@@ -311,7 +315,7 @@ impl GpuRenderer {
     fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<(), Error> {
         let shape = Shape {
             size,
-            search: (settings.reconstruction.engine, settings.reconstruction.k),
+            search: (discriminant(&settings.reconstruction.engine), settings.reconstruction.k),
             depth_refinement: settings.reconstruction.depth_refinement,
             channels: Channels {
                 color: wanted.colors.is_some(),
@@ -330,7 +334,7 @@ impl GpuRenderer {
         let Self { gpu, cloud, frame, passes, .. } = self;
         let Passes { project, search, fit, splat, shade } = passes;
         if search.as_ref().is_none_or(|(of, _)| *of != shape.search) {
-            let (engine, k) = shape.search;
+            let Reconstruction { engine, k, .. } = settings.reconstruction;
             *search = Some((shape.search, compile(gpu, engine, k)?));
         }
         if splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
@@ -345,7 +349,7 @@ impl GpuRenderer {
         let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
         let (steps, convergence) = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
-            let buffers = SearchBuffers { frame, screen: &screen, neighborhoods: &neighborhoods };
+            let buffers = SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods };
             let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
             for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
                 if round == Round::Recovered {
@@ -381,6 +385,10 @@ impl Prepared {
             splat_scale: reconstruction.splat_scale,
             outlier_growth: rules.outlier_radius(1.0),
             gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
+            first_radius: match reconstruction.engine {
+                SearchEngine::KdTree { first_radius } => first_radius,
+                _ => 0.0,
+            },
             ..FrameUniform::new(view, reconstruction.k)
         };
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));

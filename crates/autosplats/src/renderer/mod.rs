@@ -2,13 +2,14 @@
 
 mod attributes;
 mod cpu;
+mod first_radius;
 mod gpu;
 mod settings;
 mod surfels;
 
 use autosplats_cloud::PointCloud;
 
-use self::cpu::CpuRenderer;
+use self::cpu::{CpuRenderer, check_engine};
 use self::gpu::GpuRenderer;
 use crate::Error;
 use crate::camera::{Camera, View};
@@ -18,6 +19,7 @@ use crate::normals::Normals;
 use crate::shade::Image;
 use crate::splat::GBuffer;
 
+pub use first_radius::{RadiusTrial, best_first_radius};
 pub use settings::{Reconstruction, Settings};
 pub use surfels::PointSurfel;
 
@@ -154,6 +156,18 @@ impl Renderer {
         match &self.form {
             Form::Cpu(_) => None,
             Form::Gpu(renderer) => Some(renderer.adapter()),
+        }
+    }
+
+    /// Checks whether this renderer can do what `settings` ask for, before there is a cloud.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for what lies outside its range, [`Error::Device`] for an engine that does not run here.
+    pub fn check(&self, settings: &Settings) -> Result<(), Error> {
+        settings.check()?;
+        match &self.form {
+            Form::Cpu(_) => check_engine(settings.reconstruction.engine),
+            Form::Gpu(_) => Ok(()),
         }
     }
 

@@ -62,8 +62,11 @@ impl Settings {
         fn within(name: &'static str, ok: bool, value: impl ToString, range: &'static str) -> Result<(), Error> {
             if ok { Ok(()) } else { Err(Error::Setting { name, value: value.to_string(), range }) }
         }
-        let Reconstruction { k, outlier_expansions, gap_factor, splat_scale, .. } = self.reconstruction;
+        let Reconstruction { k, engine, outlier_expansions, gap_factor, splat_scale, .. } = self.reconstruction;
         within("k", (1..=64).contains(&k), k, "within 1 to 64")?;
+        if let SearchEngine::KdTree { first_radius: r } = engine {
+            within("first_radius", r > 0.0 && r.is_finite(), r, "above 0")?;
+        }
         let e0 = outlier_expansions.unwrap_or(0);
         within("outlier_expansions", e0 <= 8, e0, "within 0 to 8")?;
         let lambda = gap_factor.unwrap_or(4.0);

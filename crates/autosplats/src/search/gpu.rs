@@ -3,10 +3,12 @@
 use std::fmt::Debug;
 
 use super::SearchEngine;
+use super::kd_tree::gpu::KdTreePasses;
 use super::screen_grid::gpu::SearchPasses;
 use super::splat_communication::gpu::CommunicationPasses;
 use crate::Error;
 use crate::gpu::{Gpu, Step};
+use crate::project::DeviceCloud;
 use crate::project::gpu::{Round, ScreenBuffers};
 
 /// What an engine may read, and where it leaves what it finds.
@@ -14,6 +16,7 @@ use crate::project::gpu::{Round, ScreenBuffers};
 pub(crate) struct SearchBuffers<'a> {
     /// [`FrameUniform`](crate::gpu::FrameUniform).
     pub(crate) frame: &'a wgpu::Buffer,
+    pub(crate) cloud: &'a DeviceCloud,
     pub(crate) screen: &'a ScreenBuffers,
     /// `Neighborhood` of `shared/surfel.wgsl` for each query, in the order of the queries.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
@@ -59,6 +62,7 @@ pub(crate) fn compile(gpu: &Gpu, engine: SearchEngine, k: u32) -> Result<Box<dyn
     match engine {
         SearchEngine::ScreenGrid => Ok(Box::new(SearchPasses::new(gpu, k)?)),
         SearchEngine::SplatCommunication => Ok(Box::new(CommunicationPasses::new(gpu)?)),
+        SearchEngine::KdTree { .. } => Ok(Box::new(KdTreePasses::new(gpu)?)),
     }
 }
 

@@ -15,6 +15,7 @@
 //!   iterations.
 
 pub(crate) mod gpu;
+pub(crate) mod kd_tree;
 pub(crate) mod moments;
 pub(crate) mod screen_grid;
 pub(crate) mod select;
@@ -23,7 +24,7 @@ pub(crate) mod splat_communication;
 mod tests;
 
 /// An implementation of the k-radius search.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum SearchEngine {
     /// Buckets of screen points read outwards from each point; exact, in one pass.
@@ -32,6 +33,13 @@ pub enum SearchEngine {
     /// The paper's own: points draw splats onto each other's pixels, on a GPU only. Slower, and exact for at least 99.9 % of
     /// the points.
     SplatCommunication,
+    /// The paper's rival (Zhou et al. 2008): a kd-tree over all points of the cloud, built anew in each frame, and the
+    /// k-radius of each of them. On a GPU only. Its neighbours are those in the cloud, seen or not; it knows no gaps.
+    KdTree {
+        /// Within it, in world units, a point's k neighbours must lie: those beyond are not found. Much too large a radius
+        /// costs time, and exactness.
+        first_radius: f32,
+    },
 }
 
 /// Neighbourhoods that share a [`NeighborhoodBlock`].

@@ -20,7 +20,8 @@ struct Frame {
     outlier_growth: f32,
     // √λ.
     gap_growth: f32,
-    padding: u32,
+    // Of the kd-tree search, world units.
+    first_radius: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -8,7 +8,7 @@ use autosplats_cloud::PointCloud;
 use serde::{Deserialize, Serialize};
 
 use super::scenes::PaperScene;
-use crate::bench::median;
+use crate::bench::{BUILD, median};
 use crate::device::Device;
 use crate::exit::Failure;
 use crate::render::render_failure;
@@ -241,10 +241,7 @@ pub(super) fn time(
 }
 
 /// Finds the kd-tree's best first radius.
-pub(super) fn first_radius(
-    renderers: &mut Renderers,
-    loaded: &Loaded<'_>,
-) -> Result<Outcome<FirstRadius>, Failure> {
+pub(super) fn first_radius(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<Outcome<FirstRadius>, Failure> {
     let Loaded { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(Method::KdTree) {
         Ok(renderer) => renderer,
@@ -262,7 +259,7 @@ pub(super) fn first_radius(
 
 /// Whether a pass makes a search structure that other points could be looked up in.
 fn is_build(time: &PassTime) -> bool {
-    time.pass.starts_with("search/kd_tree/build")
+    time.pass.starts_with(BUILD)
 }
 
 /// Distances to the exact k-th neighbours among some points of a cloud, by index in the cloud.
@@ -318,10 +315,11 @@ pub(super) fn accuracy(
         Ok(renderer) => renderer,
         Err(why) => return Ok(Outcome::Refused(why)),
     };
-    let (search_ms, bounded) = match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method, first_radius)))? {
-        Outcome::Measured(frame) => (frame.timings.search, frame.counts.bounded),
-        Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
-    };
+    let (search_ms, bounded) =
+        match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method, first_radius)))? {
+            Outcome::Measured(frame) => (frame.timings.search, frame.counts.bounded),
+            Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
+        };
     let surfels = renderer.surfels().map_err(render_failure)?;
     let same = |found: f32, exact: f32| (found - exact).abs() <= SAME * exact;
     let [mut on_screen, mut in_space] = [0; 2];

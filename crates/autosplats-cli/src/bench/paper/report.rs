@@ -378,11 +378,8 @@ impl Report<'_> {
 
     /// Writes the charts that the page shows.
     pub(super) fn write_charts(&self, folder: &Path) -> Result<(), Failure> {
-        let labels = Labels {
-            title: "splat communication",
-            x: "iteration",
-            y: "% of the points without a radius before it",
-        };
+        let labels =
+            Labels { title: "splat communication", x: "iteration", y: "% of the points without a radius before it" };
         let lines = self.convergence();
         if !lines.is_empty() {
             let svg = log_lines(labels, &lines);

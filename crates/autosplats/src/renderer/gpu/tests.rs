@@ -17,6 +17,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::search::screen_grid::gpu::PASSES,
         crate::search::splat_communication::gpu::PASSES,
         crate::search::splat_communication::gpu::RASTER_PASSES,
+        crate::search::kd_tree::gpu::PASSES,
         crate::fit::gpu::PASSES,
         crate::splat::gpu::PASSES,
         crate::shade::gpu::PASSES,

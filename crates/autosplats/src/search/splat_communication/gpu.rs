@@ -300,7 +300,7 @@ impl Bound<'_> {
     }
 
     fn keep(&self, pass: &Pass, round: Round, kept: &[&wgpu::TextureView]) -> Step {
-        let SearchBuffers { frame, screen, neighborhoods } = self.buffers;
+        let SearchBuffers { frame, screen, neighborhoods, .. } = self.buffers;
         let mut resources = buffers([frame, &screen.points, &screen.queries, &screen.counters, neighborhoods]);
         resources.extend(kept.iter().map(|view| wgpu::BindingResource::TextureView(view)));
         pass.step_with(self.gpu, &resources, screen.groups(round.work_256()))

@@ -58,7 +58,7 @@ fn mirrored() -> [Mirrored; 7] {
                 splat_scale,
                 outlier_growth,
                 gap_growth,
-                padding,
+                first_radius,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),

@@ -5,6 +5,7 @@ use autosplats_cloud::glam::DVec3;
 use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, Recorder, read_back, test_gpu};
+use crate::project::DeviceCloud;
 use crate::project::ScreenPoints;
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
@@ -36,7 +37,8 @@ fn on_device(
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
     let frame = frame_buffer(gpu, view, rules);
-    let searched = SearchBuffers { frame: &frame, screen: &buffers, neighborhoods: &neighborhoods };
+    let cloud = DeviceCloud::default();
+    let searched = SearchBuffers { frame: &frame, cloud: &cloud, screen: &buffers, neighborhoods: &neighborhoods };
     let steps = passes.steps(gpu, searched).expect("steps");
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     steps.rounds.iter().flatten().for_each(|step| recorder.run(step));

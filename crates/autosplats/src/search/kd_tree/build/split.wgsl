@@ -1,0 +1,83 @@
+// Chooses how each large node of a level is split: at the spatial median of the longest axis of its tight box.
+//
+// Empty space is cut off by keeping that box: all of it, where [ZHWG08] makes empty nodes of parts that are large enough.
+//
+// Reads: state, points. Reads and writes: large. Writes: nodes. One invocation per large node.
+
+#import groups
+#import range_keys
+#import kd_tree
+#import kd_build
+
+@group(0) @binding(0) var<storage, read> state: KdState;
+@group(0) @binding(1) var<storage, read> points: array<vec4u>;
+@group(0) @binding(2) var<storage, read_write> large: array<KdLarge>;
+@group(0) @binding(3) var<storage, read_write> nodes: array<KdNode>;
+
+// Points whose median is taken for that of a node.
+const SAMPLES = 15u;
+
+fn corner(keys: vec3u) -> vec3f {
+    return bitcast<vec3f>(vec3u(key_bits(keys.x), key_bits(keys.y), key_bits(keys.z)));
+}
+
+// The coordinate of one of the points that are spread over a node's run.
+fn sample(at: u32, large_node: KdLarge, axis: u32) -> f32 {
+    let place = large_node.first + at * (large_node.len / SAMPLES);
+    return kd_coordinate(kd_position(points[place]), axis);
+}
+
+fn sampled_median(large_node: KdLarge, axis: u32) -> f32 {
+    var median = 0.0;
+    for (var own = 0u; own < SAMPLES; own++) {
+        let x = sample(own, large_node, axis);
+        var less = 0u;
+        var up_to = 0u;
+        for (var other = 0u; other < SAMPLES; other++) {
+            let y = sample(other, large_node, axis);
+            less += select(0u, 1u, y < x);
+            up_to += select(0u, 1u, y <= x);
+        }
+        if less <= SAMPLES / 2u && up_to > SAMPLES / 2u {
+            median = x;
+        }
+    }
+    return median;
+}
+
+@compute @workgroup_size(64)
+fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let at = group_index(workgroup) * 64u + local;
+    if at >= state.large {
+        return;
+    }
+    let own = large[at];
+    if own.node == 0u {
+        large[at].axis = KD_FINITE_LEFT;
+        return;
+    }
+    let low = corner(own.low);
+    let high = corner(own.high);
+    // A leaf, until it turns out to have children.
+    nodes[own.node] = KdNode(low, own.first, high, own.len);
+    let extent = high - low;
+    let longest = max(max(extent.x, extent.y), extent.z);
+    if !(longest > 0.0) {
+        // All its points are in one place.
+        large[at].axis = KD_UNSPLIT;
+        return;
+    }
+    let axis = select(select(2u, 1u, extent.y == longest), 0u, extent.x == longest);
+    let least = kd_coordinate(low, axis);
+    let most = kd_coordinate(high, axis);
+    var plane = 0.5 * least + 0.5 * most;
+    // Differs from [ZHWG08]: no two lopsided splits follow each other, so that the levels are bounded. Without, a cluster
+    // seen from far away would take a level for each halving of the space around it.
+    if own.len > own.parent_len / 4u * 3u {
+        let median = sampled_median(own, axis);
+        plane = select(plane, median, median > least);
+    }
+    // The middle of two neighbouring numbers is one of them; the points at `most` go right, those at `least` left.
+    large[at].plane = select(most, plane, plane > least);
+    large[at].axis = axis;
+}

@@ -1,0 +1,213 @@
+//! The kd-tree on the GPU: built level by level, then searched.
+
+use crate::Error;
+use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
+use crate::project::Chunk;
+use crate::project::gpu::Round;
+use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers};
+
+#[cfg(test)]
+pub(crate) const PASSES: &[PassSource] = &[BEGIN, SPLIT, COUNT, PLACE, SCATTER, SMALL_TREE, SEARCH, MOMENTS];
+const BEGIN: PassSource = PassSource::new("search/kd_tree/build/begin", include_str!("build/begin.wgsl"));
+const SPLIT: PassSource = PassSource::new("search/kd_tree/build/split", include_str!("build/split.wgsl"));
+const COUNT: PassSource = PassSource::new("search/kd_tree/build/count", include_str!("build/count.wgsl"));
+const PLACE: PassSource = PassSource::new("search/kd_tree/build/place", include_str!("build/place.wgsl"));
+const SCATTER: PassSource = PassSource::new("search/kd_tree/build/scatter", include_str!("build/scatter.wgsl"));
+const SMALL_TREE: PassSource =
+    PassSource::new("search/kd_tree/build/small_tree", include_str!("build/small_tree.wgsl"));
+const SEARCH: PassSource = PassSource::new("search/kd_tree/search", include_str!("search.wgsl"));
+const MOMENTS: PassSource = PassSource::new("search/kd_tree/moments", include_str!("moments.wgsl"));
+
+/// Points of a small node at most.
+const SMALL: usize = 64;
+/// Points of a leaf at least, where there are more.
+const LEAST: usize = 8;
+/// Points whose reading costs as much as a step down the tree: with 4, 8, 24 and 40 searches took longer on software Vulkan,
+/// as did building with less.
+const STEP_COST: f64 = 16.0;
+/// Points of a large node that one workgroup takes up.
+const CHUNK: usize = 256;
+/// Nodes and points that a walk through the tree sees at most: software devices end an invocation silently after 65535
+/// rounds of its loops, and a search is two walks.
+const MOST_SEEN: u32 = 12_000;
+
+/// `KdPoint` of `shared/kd_tree.wgsl`.
+type Point = [u32; 4];
+/// `KdNode`: a corner, a child or a point, the other corner, a number of points.
+type Node = [u32; 8];
+/// `KdLarge` of `shared/kd_build.wgsl`.
+type Large = [u32; 16];
+/// `KdSmall`.
+type Small = [u32; 4];
+/// `KdState`.
+type State = [u32; 6];
+
+/// Numbers of workgroups, as `shared/kd_work.wgsl` has them.
+#[derive(Clone, Copy, Debug)]
+enum Work {
+    Large,
+    Chunks,
+    Small,
+    Points,
+}
+
+/// How many of them there are.
+const WORKS: u64 = Work::Points as u64 + 1;
+/// Bytes of the arguments of a dispatch.
+const WORK_BYTES: u64 = 12;
+
+/// Levels of large nodes that there is time for: twice as many as halves make, since one split of two may be lopsided, and
+/// some for those of which sampled medians are off. An even number, so that all points end in the first list.
+fn levels(capacity: usize) -> usize {
+    2 * capacity.div_ceil(SMALL).next_power_of_two().ilog2() as usize + 6
+}
+
+/// A tree of up to so many points, and what building it takes: 52 bytes a point.
+#[derive(Debug)]
+struct TreeBuffers {
+    capacity: u32,
+    /// Points before and after a level in turn; those of the finished tree are in the first.
+    points: [wgpu::Buffer; 2],
+    nodes: wgpu::Buffer,
+    /// Large nodes of a level and of the next in turn, and so the next two.
+    large: [wgpu::Buffer; 2],
+    state: [wgpu::Buffer; 2],
+    arguments: [wgpu::Buffer; 2],
+    small: wgpu::Buffer,
+    chunk_sums: wgpu::Buffer,
+    /// Of each point of the cloud, in its order: the k-radius or a little more; negative if it is not in the tree.
+    radii: wgpu::Buffer,
+}
+
+impl TreeBuffers {
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    fn new(gpu: &Gpu, capacity: usize) -> Result<Self, Error> {
+        // Large nodes of a level have more than `SMALL` points each, but for the root.
+        let large = capacity / (SMALL + 1) + 1;
+        // Nodes above the small ones: twice as many as there would be if all small ones were half full.
+        let upper = capacity / 8 + 64;
+        let lower = capacity / (LEAST / 2) + 1;
+        let points = |_| gpu.storage::<Point>("points of the kd-tree", capacity);
+        let arguments = |_| {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+            gpu.buffer("arguments of the kd-tree", WORKS * WORK_BYTES, usage)
+        };
+        Ok(Self {
+            capacity: capacity as u32,
+            points: both(points)?,
+            nodes: gpu.storage::<Node>("nodes of the kd-tree", upper + lower)?,
+            large: both(|_| gpu.storage::<Large>("large nodes of the kd-tree", large))?,
+            state: both(|_| gpu.storage::<State>("state of the kd-tree", 1))?,
+            arguments: both(arguments)?,
+            small: gpu.storage::<Small>("small nodes of the kd-tree", upper)?,
+            chunk_sums: gpu.storage::<u32>("chunks of the kd-tree", capacity.div_ceil(CHUNK) + large + 1)?,
+            radii: gpu.storage::<f32>("k-radii", capacity)?,
+        })
+    }
+
+    /// As many workgroups as a level of this parity has of `work`.
+    fn groups(&self, parity: usize, work: Work) -> Groups {
+        Groups::Counted(self.arguments[parity].clone(), work as u64 * WORK_BYTES)
+    }
+}
+
+/// One for each parity of levels.
+fn both<T>(make: impl Fn(usize) -> Result<T, Error>) -> Result<[T; 2], Error> {
+    Ok([make(0)?, make(1)?])
+}
+
+/// The passes of the engine.
+#[derive(Debug)]
+pub(crate) struct KdTreePasses {
+    begin: Pass,
+    split: Pass,
+    count: Pass,
+    place: Pass,
+    scatter: Pass,
+    small_tree: Pass,
+    search: Pass,
+    /// One per round.
+    moments: [Pass; 2],
+}
+
+impl KdTreePasses {
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        let pass = |source| Pass::new(gpu, source, &[]);
+        let most_seen = ("MOST_SEEN", MOST_SEEN.into());
+        let moments = |round| Pass::new(gpu, &MOMENTS, &[("ROUND", f64::from(round as u32)), most_seen]);
+        Ok(Self {
+            begin: pass(&BEGIN)?,
+            split: pass(&SPLIT)?,
+            count: pass(&COUNT)?,
+            place: pass(&PLACE)?,
+            scatter: pass(&SCATTER)?,
+            small_tree: Pass::new(gpu, &SMALL_TREE, &[("LEAST", LEAST as f64), ("STEP_COST", STEP_COST)])?,
+            search: Pass::new(gpu, &SEARCH, &[most_seen])?,
+            moments: [moments(Round::Active)?, moments(Round::Recovered)?],
+        })
+    }
+
+    /// Builds the tree of all points of the cloud.
+    fn build(&self, gpu: &Gpu, frame: &wgpu::Buffer, chunk: &Chunk, tree: &TreeBuffers) -> Vec<Step> {
+        let TreeBuffers { points, nodes, large, state, arguments, small, chunk_sums, radii, .. } = tree;
+        let begin = [frame, &chunk.uniform, &chunk.positions, &points[0], radii, &large[0], &state[0], &arguments[0]];
+        let split = self.split.step(gpu, &[&state[0], &points[0], &large[0], nodes], tree.groups(0, Work::Large));
+        let level = |at: usize| {
+            let next = 1 - at;
+            let chunks = || tree.groups(at, Work::Chunks);
+            let split = [&state[at], &points[at], &large[at], nodes];
+            let count = [&state[at], &large[at], &points[at], chunk_sums];
+            let place =
+                [&state[at], &large[at], chunk_sums, &state[next], &large[next], small, nodes, &arguments[next]];
+            let scatter = [&state[at], &large[at], chunk_sums, &points[at], &points[next], &large[next]];
+            [
+                self.split.step(gpu, &split, tree.groups(at, Work::Large)),
+                self.count.step(gpu, &count, chunks()),
+                self.place.step(gpu, &place, 1),
+                self.scatter.step(gpu, &scatter, chunks()),
+            ]
+        };
+        let two_levels: Vec<Step> = (0..2).flat_map(level).collect();
+        let mut steps = vec![self.begin.step(gpu, &begin, tree.capacity.div_ceil(256))];
+        for _ in 0..levels(tree.capacity as usize) / 2 {
+            steps.extend(two_levels.iter().cloned());
+        }
+        // What is large after the last level becomes a leaf.
+        steps.push(split);
+        let small_tree = [frame, &state[0], small, &points[0], &points[1], nodes];
+        steps.push(self.small_tree.step(gpu, &small_tree, tree.groups(0, Work::Small)));
+        steps
+    }
+
+    /// Builds the tree and searches it.
+    fn steps_in(&self, gpu: &Gpu, buffers: SearchBuffers<'_>, tree: &TreeBuffers) -> [Vec<Step>; 2] {
+        let SearchBuffers { frame, cloud, screen, neighborhoods } = buffers;
+        // Room for the tree's points is room for one chunk of the cloud; an empty cloud has none.
+        let [chunk] = cloud.chunks() else { return [Vec::new(), Vec::new()] };
+        let mut first = self.build(gpu, frame, chunk, tree);
+        let TreeBuffers { points: [points, _], nodes, state: [state, _], radii, .. } = tree;
+        let search = [frame, state, points, nodes, radii];
+        first.push(self.search.step(gpu, &search, tree.groups(0, Work::Points)));
+        let [active, recovered] = [Round::Active, Round::Recovered].map(|round| {
+            let (source, queries) = (&screen.source, &screen.queries);
+            let moments =
+                [frame, &screen.counters, source, queries, &chunk.positions, radii, nodes, points, neighborhoods];
+            self.moments[round as usize].step(gpu, &moments, screen.groups(round.work_64()))
+        });
+        first.push(active);
+        [first, vec![recovered]]
+    }
+}
+
+impl EnginePasses for KdTreePasses {
+    fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<EngineSteps, Error> {
+        let tree = TreeBuffers::new(gpu, buffers.cloud.capacity())?;
+        Ok(EngineSteps { rounds: self.steps_in(gpu, buffers, &tree), convergence: None })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,83 @@
+// The k-radius of every point of the tree, by range searches whose histograms of distances narrow the radius [ZHWG08, §5].
+//
+// Each of N_ITER searches counts the neighbours between two radii in N_HIST bins; the bin in which the k-th falls is between
+// the next two. Where a point has fewer than k neighbours within the first radius, that stays.
+//
+// Reads: state, points, nodes. Writes: radii. One invocation per point, in the order of the tree: neighbouring invocations
+// then walk much the same way.
+
+#import frame
+#import groups
+#import range_keys
+#import kd_tree
+#import kd_build
+
+@group(0) @binding(1) var<storage, read> state: KdState;
+@group(0) @binding(2) var<storage, read> points: array<KdPoint>;
+@group(0) @binding(3) var<storage, read> nodes: array<KdNode>;
+@group(0) @binding(4) var<storage, read_write> radii: array<f32>;
+
+const N_HIST = 32u;
+const N_ITER = 2u;
+// Rounding of a distance and of its bin.
+const ROUNDING = 1.000001;
+
+// Nodes and points that one range search sees at most.
+override MOST_SEEN: u32;
+
+@compute @workgroup_size(64)
+fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let at = group_index(workgroup) * 64u + local;
+    if at >= state.finite {
+        return;
+    }
+    let own = points[at].w;
+    let center = kd_position(points[at]);
+    // The k-th neighbour lies between these; so many lie nearer.
+    var low = 0.0;
+    var high = frame.first_radius;
+    var nearer = 0u;
+    // Neighbours in the same place: k of them leave nothing to search for.
+    var coincident = 0u;
+    for (var iteration = 0u; iteration < N_ITER && coincident < frame.k; iteration++) {
+        var bins = array<u32, N_HIST>();
+        let per_bin = (high - low) / f32(N_HIST);
+        coincident = 0u;
+        var walk = kd_walk(center, high);
+        var leaf = kd_next_leaf(&walk);
+        while leaf.y > 0u {
+            for (var place = leaf.x; place < leaf.x + leaf.y; place++) {
+                let squared = kd_squared_length(kd_position(points[place]) - center);
+                let is_other = points[place].w != own;
+                coincident += select(0u, 1u, is_other && squared == 0.0);
+                let distance = sqrt(squared);
+                if is_other && squared <= walk.squared && distance >= low {
+                    bins[u32(min((distance - low) / per_bin, f32(N_HIST - 1u)))] += 1u;
+                }
+                walk.seen += 1u;
+                if walk.seen >= MOST_SEEN || coincident >= frame.k {
+                    break;
+                }
+            }
+            if walk.seen >= MOST_SEEN || coincident >= frame.k {
+                break;
+            }
+            leaf = kd_next_leaf(&walk);
+        }
+        // Differs from [ZHWG08]: a search that saw too much ends. What it saw still bounds the radius from above.
+        let is_whole = walk.seen < MOST_SEEN;
+        var so_far = nearer;
+        var bin = 0u;
+        while bin < N_HIST && so_far + bins[bin] < frame.k {
+            so_far += bins[bin];
+            bin += 1u;
+        }
+        if bin == N_HIST {
+            break;
+        }
+        high = low + f32(bin + 1u) * per_bin;
+        low = select(0.0, low + f32(bin) * per_bin, is_whole);
+        nearer = select(0u, so_far, is_whole);
+    }
+    radii[own] = select(high * ROUNDING, 0.0, coincident >= frame.k);
+}
