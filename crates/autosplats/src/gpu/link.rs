@@ -37,6 +37,7 @@ const SHARED: &[(&str, &str)] = &[
     ("splat", include_str!("../shared/splat.wgsl")),
     ("fragment", include_str!("../shared/fragment.wgsl")),
     ("redraw", include_str!("../shared/redraw.wgsl")),
+    ("marked", include_str!("../shared/marked.wgsl")),
     ("erased", include_str!("../shared/erased.wgsl")),
     ("patch", include_str!("../shared/patch.wgsl")),
 ];

@@ -34,10 +34,10 @@ fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         return;
     }
     let splat = splats[index];
-    var pixel = firsts(bounds);
-    for (var drawn = 0u; drawn < area; drawn++) {
-        draw_depth(splat, pixel);
-        let ends = pixel.x == lasts(bounds).x;
-        pixel = select(pixel + vec2u(1u, 0u), vec2u(firsts(bounds).x, pixel.y + 1u), ends);
+    for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
+        let span = row_span(splat, bounds, row);
+        for (var column = span.x; column <= span.y; column++) {
+            draw_depth(splat, vec2u(u32(column), row));
+        }
     }
 }

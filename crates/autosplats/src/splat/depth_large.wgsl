@@ -1,6 +1,6 @@
 // Visibility pass for splats that are too large for one invocation: a workgroup draws one [Paper, §7].
 //
-// Reads: counters, splats, tree, large. Reads and writes: depth_map.
+// Reads: counters, splats, tree, large, changes, cells. Reads and writes: depth_map.
 
 #import frame
 #import groups
@@ -8,12 +8,20 @@
 #import splat
 #import depth_map
 #import fragment
+#import redraw
+#import marked
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read> large: array<u32>;
-@group(0) @binding(5) var<storage, read_write> depth_map: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read> changes: array<u32>;
+@group(0) @binding(6) var<storage, read> cells: array<u32>;
+@group(0) @binding(7) var<storage, read_write> depth_map: array<atomic<u32>>;
+
+// Whether only the recovered ones are drawn, or only those that a refinement draws again.
+override RECOVERED_ONLY: bool;
+override REDRAWN_ONLY: bool;
 
 @compute @workgroup_size(64)
 fn depth_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -24,13 +32,18 @@ fn depth_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     let index = large[place];
     let bounds = tree[level_start(SPLATS) + index];
     // It may be dead.
-    if is_empty(bounds) {
+    if is_empty(bounds) || (RECOVERED_ONLY && index < counters[ACTIVE]) {
+        return;
+    }
+    if REDRAWN_ONLY && !is_redrawn(index, bounds) {
         return;
     }
     let splat = splats[index];
-    let columns = lasts(bounds).x - firsts(bounds).x + 1u;
-    let area = bounds_area(bounds);
-    for (var at = local; at < area; at += 64u) {
-        draw_depth(splat, firsts(bounds) + vec2u(at % columns, at / columns));
+    // Eight invocations to a row.
+    for (var row = firsts(bounds).y + local / 8u; row <= lasts(bounds).y; row += 8u) {
+        let span = row_span(splat, bounds, row);
+        for (var column = span.x + i32(local % 8u); column <= span.y; column += 8) {
+            draw_depth(splat, vec2u(u32(column), row));
+        }
     }
 }

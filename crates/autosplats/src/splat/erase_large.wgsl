@@ -31,9 +31,11 @@ fn erase_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     }
     let bounds = living_bounds(tree[level_start(SPLATS) + index]);
     let splat = splats[index];
-    let columns = lasts(bounds).x - firsts(bounds).x + 1u;
-    let area = bounds_area(bounds);
-    for (var at = local; at < area; at += 64u) {
-        erase_depth(splat, firsts(bounds) + vec2u(at % columns, at / columns));
+    // Eight invocations to a row.
+    for (var row = firsts(bounds).y + local / 8u; row <= lasts(bounds).y; row += 8u) {
+        let span = row_span(splat, bounds, row);
+        for (var column = span.x + i32(local % 8u); column <= span.y; column += 8) {
+            erase_depth(splat, vec2u(u32(column), row));
+        }
     }
 }

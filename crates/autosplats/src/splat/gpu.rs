@@ -104,7 +104,9 @@ pub(crate) struct SplatPasses {
     boxes: Pass,
     clear_depth: Pass,
     depth: [Pass; 2],
-    depth_large: Pass,
+    /// For each [`Round`].
+    depth_large: [Pass; 2],
+    redraw_large: Pass,
     recover_count: Pass,
     scan_recovered: Pass,
     recover: Pass,
@@ -143,6 +145,10 @@ impl SplatPasses {
         let depth = |recovered: f64| {
             Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), dot_radius, ("MOST_PX", MOST_PX.into())])
         };
+        let depth_large = |recovered: f64, redrawn: f64| {
+            let constants = [("RECOVERED_ONLY", recovered), ("REDRAWN_ONLY", redrawn), dot_radius];
+            Pass::new(gpu, &DEPTH_LARGE, &constants)
+        };
         let Channels { color, scalar, measures } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
@@ -170,7 +176,8 @@ impl SplatPasses {
             boxes: pass(&BOXES)?,
             clear_depth: pass(&CLEAR_DEPTH)?,
             depth: [depth(0.0)?, depth(1.0)?],
-            depth_large: Pass::new(gpu, &DEPTH_LARGE, &[dot_radius])?,
+            depth_large: [depth_large(0.0, 0.0)?, depth_large(1.0, 0.0)?],
+            redraw_large: depth_large(0.0, 1.0)?,
             recover_count: Pass::new(gpu, &RECOVER_COUNT, &reach)?,
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
             recover: Pass::new(gpu, &RECOVER, &reach)?,
@@ -196,7 +203,7 @@ impl SplatPasses {
         splats: &SplatBuffers,
         round: Round,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, large, depth, .. } = splats;
+        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks } = splats;
         let counters = &screen.counters;
         let set_up = [frame, counters, surfels, list, tree, large];
         let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work_256()))];
@@ -210,15 +217,10 @@ impl SplatPasses {
         };
         let small = [frame, counters, list, tree, depth];
         steps.push(self.depth[round as usize].step(gpu, &small, screen.groups(work)));
-        steps.push(self.step_depth_large(gpu, frame, screen, splats));
+        let larges = screen.groups(Work::LargeSplats);
+        let large = [frame, counters, list, tree, large, changes, marks, depth];
+        steps.push(self.depth_large[round as usize].step(gpu, &large, larges));
         steps
-    }
-
-    /// Draws the large living splats of all rounds into the depth map; to draw one again changes nothing.
-    fn step_depth_large(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers, splats: &SplatBuffers) -> Step {
-        let SplatBuffers { splats, tree, large, depth, .. } = splats;
-        let buffers = [frame, &screen.counters, splats, tree, large, depth];
-        self.depth_large.step(gpu, &buffers, screen.groups(Work::LargeSplats))
     }
 
     /// Takes those splats out of the depth map whose point it hides [Paper, §7, Depth Refinement].
@@ -232,14 +234,14 @@ impl SplatPasses {
         let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks } = splats;
         let counters = &screen.counters;
         let all = || screen.groups(Work::Queries256);
-        let larges = screen.groups(Work::LargeSplats);
+        let larges = || screen.groups(Work::LargeSplats);
         [
             self.clear_cells.step(gpu, &[frame, marks], cells(screen.size).div_ceil(256)),
             self.refine.step(gpu, &[frame, counters, list, depth, tree, changes], all()),
             self.erase.step(gpu, &[frame, counters, list, tree, changes, depth, marks], all()),
-            self.erase_large.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], larges),
+            self.erase_large.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], larges()),
             self.redraw.step(gpu, &[frame, counters, list, tree, changes, marks, depth], all()),
-            self.step_depth_large(gpu, frame, screen, splats),
+            self.redraw_large.step(gpu, &[frame, counters, list, tree, large, changes, marks, depth], larges()),
         ]
     }
 

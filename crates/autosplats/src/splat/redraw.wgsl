@@ -10,6 +10,7 @@
 #import depth_map
 #import fragment
 #import redraw
+#import marked
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
@@ -31,26 +32,14 @@ fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         return;
     }
     let area = bounds_area(bounds);
-    if area > MOST_PX || !(changes[index] == REVIVED || meets_marked(bounds)) {
+    if area > MOST_PX || !is_redrawn(index, bounds) {
         return;
     }
     let splat = splats[index];
-    var pixel = firsts(bounds);
-    for (var drawn = 0u; drawn < area; drawn++) {
-        draw_depth(splat, pixel);
-        let ends = pixel.x == lasts(bounds).x;
-        pixel = select(pixel + vec2u(1u, 0u), vec2u(firsts(bounds).x, pixel.y + 1u), ends);
-    }
-}
-
-fn meets_marked(bounds: vec2u) -> bool {
-    let first = firsts(bounds) >> vec2u(CELL_BITS);
-    let last = lasts(bounds) >> vec2u(CELL_BITS);
-    var marked = 0u;
-    for (var row = first.y; row <= last.y; row++) {
-        for (var column = first.x; column <= last.x; column++) {
-            marked |= cells[row * cell_columns() + column];
+    for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
+        let span = row_span(splat, bounds, row);
+        for (var column = span.x; column <= span.y; column++) {
+            draw_depth(splat, vec2u(u32(column), row));
         }
     }
-    return marked != 0u;
 }
