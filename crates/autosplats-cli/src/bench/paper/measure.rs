@@ -1,8 +1,8 @@
 //! What is measured of each scene, and the measuring.
 
 use autosplats::{
-    Backend, Camera, Error, Image, NormalSettings, PassTime, RadiusTrial, Renderer, SearchEngine, Settings, Timings,
-    best_first_radius, estimate_normals,
+    Backend, Camera, Counts, Error, Image, NormalSettings, PassTime, RadiusTrial, Renderer, SearchEngine, Settings,
+    Timings, best_first_radius, estimate_normals,
 };
 use autosplats_cloud::PointCloud;
 use serde::{Deserialize, Serialize};
@@ -59,30 +59,19 @@ impl Method {
         }
     }
 
-    fn is_on_gpu(self) -> bool {
+    pub(super) fn is_on_gpu(self) -> bool {
         self != Self::GridCpu
     }
 }
 
 /// A measurement, or why the device refused it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) enum Outcome<T> {
-    Measured(T),
-    Refused(String),
-}
-
-impl<T> Outcome<T> {
-    pub(super) fn into_measured(self) -> Option<T> {
-        match self {
-            Self::Measured(value) => Some(value),
-            Self::Refused(_) => None,
-        }
-    }
-}
+pub(super) type Outcome<T> = Result<T, String>;
 
 /// Medians of some frames; milliseconds.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Timing {
+    /// Points of the cloud.
+    pub(super) points: usize,
     pub(super) visible: usize,
     /// Points reconstructed, of those.
     pub(super) reconstructed: usize,
@@ -115,10 +104,12 @@ pub(super) struct Accuracy {
     pub(super) on_screen: f64,
     /// Part whose k-radius is the exact one among all points.
     pub(super) in_space: f64,
-    /// Part whose search met the bound on its work.
-    pub(super) bounded: f64,
-    /// Microseconds of search per visible point.
-    pub(super) us_per_point: f64,
+    /// Part whose neighbourhood a rule cut short: a gap, or the bound on work.
+    pub(super) cut_short: f64,
+    /// Points searched for.
+    pub(super) searched: usize,
+    /// Iterations that took; 0 where nothing iterates.
+    pub(super) iterations: usize,
 }
 
 /// Times of kiddo's kd-tree: built, and asked for the neighbours of each point.
@@ -158,6 +149,11 @@ impl Renderers {
         }
     }
 
+    /// Whether the GPU is a program on the processor.
+    pub(super) fn is_software(&self) -> bool {
+        self.gpu.as_ref().is_ok_and(|gpu| gpu.adapter().is_some_and(|adapter| adapter.software))
+    }
+
     fn of(&mut self, method: Method) -> Result<&mut Renderer, String> {
         if method.is_on_gpu() { self.gpu.as_mut().map_err(|error| error.clone()) } else { Ok(&mut self.cpu) }
     }
@@ -183,9 +179,9 @@ pub(super) fn settings(method: Method, first_radius: f32, k: u32, culled: bool) 
 /// Takes what a device refuses as an outcome, everything else as a failure.
 fn outcome<T>(result: Result<T, Error>) -> Result<Outcome<T>, Failure> {
     match result {
-        Ok(value) => Ok(Outcome::Measured(value)),
-        Err(error @ (Error::Device(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_))) => {
-            Ok(Outcome::Refused(error.to_string()))
+        Ok(value) => Ok(Ok(value)),
+        Err(error @ (Error::Device(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) | Error::DeviceLost(_))) => {
+            Ok(Err(error.to_string()))
         }
         Err(error) => Err(render_failure(error)),
     }
@@ -202,17 +198,20 @@ pub(super) fn time(
     let Loaded { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(method) {
         Ok(renderer) => renderer,
-        Err(why) => return Ok(Outcome::Refused(why)),
+        Err(why) => return Ok(Err(why)),
     };
     let mut samples: Vec<(Timings, f64)> = Vec::new();
-    let mut counts = [0; 2];
+    let mut counts = Counts::default();
     // The first frame makes the buffers, and does not count unless it is one of few.
     for frame in 0..=frames {
         let rendered = match outcome(renderer.render(cloud, camera, scene.size, settings))? {
-            Outcome::Measured(rendered) => rendered,
-            Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
+            Ok(rendered) => rendered,
+            Err(why) => return Ok(Err(why)),
         };
-        counts = [rendered.counts.visible, rendered.counts.active + rendered.counts.recovered];
+        if method.is_on_gpu() && rendered.passes.is_empty() {
+            return Ok(Err("this device does not time its passes".into()));
+        }
+        counts = rendered.counts;
         // An empty sum of floats is -0.
         let built = rendered.passes.iter().filter(|time| is_build(time)).map(|time| time.ms).sum::<f64>() + 0.0;
         let sample = (rendered.timings, built);
@@ -225,9 +224,10 @@ pub(super) fn time(
     }
     let convergence = renderer.convergence().map_err(render_failure)?;
     let of = |value: &dyn Fn(&(Timings, f64)) -> f64| median(samples.iter().map(value));
-    Ok(Outcome::Measured(Timing {
-        visible: counts[0],
-        reconstructed: counts[1],
+    Ok(Ok(Timing {
+        points: counts.points,
+        visible: counts.visible,
+        reconstructed: counts.active + counts.recovered,
         frames: samples.len(),
         project: of(&|(timings, _)| timings.project),
         search: of(&|(timings, _)| timings.search),
@@ -245,16 +245,11 @@ pub(super) fn first_radius(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Re
     let Loaded { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(Method::KdTree) {
         Ok(renderer) => renderer,
-        Err(why) => return Ok(Outcome::Refused(why)),
+        Err(why) => return Ok(Err(why)),
     };
     let settings = settings(Method::KdTree, f32::NAN, K, false);
     let best = outcome(best_first_radius(renderer, cloud, camera, scene.size, &settings, ACCURACY))?;
-    Ok(match best {
-        Outcome::Measured(RadiusTrial { first_radius, accuracy, .. }) => {
-            Outcome::Measured(FirstRadius { radius: first_radius, accuracy })
-        }
-        Outcome::Refused(why) => Outcome::Refused(why),
-    })
+    Ok(best.map(|RadiusTrial { first_radius, accuracy, .. }| FirstRadius { radius: first_radius, accuracy }))
 }
 
 /// Whether a pass makes a search structure that other points could be looked up in.
@@ -275,7 +270,7 @@ impl Exact {
     /// Finds them in a kd-tree of the visible points, and in one of all.
     pub(super) fn new(renderers: &mut Renderers, loaded: &Loaded<'_>) -> Result<Self, Failure> {
         let Loaded { scene, cloud, camera } = loaded;
-        let settings = without_rules(Method::GridCpu, f32::NAN);
+        let settings = settings(Method::GridCpu, f32::NAN, K, false);
         renderers.cpu.render(cloud, camera, scene.size, &settings).map_err(render_failure)?;
         let mut visible: Vec<u32> =
             renderers.cpu.surfels().map_err(render_failure)?.iter().map(|surfel| surfel.point).collect();
@@ -286,20 +281,17 @@ impl Exact {
     }
 }
 
-/// Neither outliers nor gaps end a neighbourhood, and no point is left out.
-fn without_rules(method: Method, first_radius: f32) -> Settings {
-    let mut settings = settings(method, first_radius, K, false);
-    settings.reconstruction.outlier_expansions = None;
-    settings.reconstruction.gap_factor = None;
-    settings
-}
-
 /// Distance of each point to its k-th neighbour.
 fn exact_radii(cloud: &PointCloud) -> Result<Vec<f32>, Failure> {
     let settings = NormalSettings { k: K, ..NormalSettings::default() };
     let normals = estimate_normals(cloud, &settings, &()).map_err(render_failure)?;
     // The radius there is 2·√(r²/k).
     Ok(normals.radius.into_iter().map(|radius| 0.5 * radius * (K as f32).sqrt()).collect())
+}
+
+/// Iterations after which nothing changed any more, of how many points were left before the first and after each.
+pub(super) fn iterations(left: &[u32]) -> usize {
+    (1..left.len()).rev().find(|&at| left[at] < left[at - 1]).unwrap_or(0)
 }
 
 /// Compares an engine's k-radii with exact ones.
@@ -313,13 +305,14 @@ pub(super) fn accuracy(
     let Loaded { scene, cloud, camera } = loaded;
     let renderer = match renderers.of(method) {
         Ok(renderer) => renderer,
-        Err(why) => return Ok(Outcome::Refused(why)),
+        Err(why) => return Ok(Err(why)),
     };
-    let (search_ms, bounded) =
-        match outcome(renderer.render(cloud, camera, scene.size, &without_rules(method, first_radius)))? {
-            Outcome::Measured(frame) => (frame.timings.search, frame.counts.bounded),
-            Outcome::Refused(why) => return Ok(Outcome::Refused(why)),
-        };
+    let settings = settings(method, first_radius, K, false);
+    let counts = match outcome(renderer.render(cloud, camera, scene.size, &settings))? {
+        Ok(frame) => frame.counts,
+        Err(why) => return Ok(Err(why)),
+    };
+    let left = renderer.convergence().map_err(render_failure)?;
     let surfels = renderer.surfels().map_err(render_failure)?;
     let same = |found: f32, exact: f32| (found - exact).abs() <= SAME * exact;
     let [mut on_screen, mut in_space] = [0; 2];
@@ -329,11 +322,12 @@ pub(super) fn accuracy(
         in_space += usize::from(same(surfel.k_radius, exact.in_space[surfel.point as usize]));
     }
     let count = surfels.len().max(1) as f64;
-    Ok(Outcome::Measured(Accuracy {
+    Ok(Ok(Accuracy {
         on_screen: on_screen as f64 / count,
         in_space: in_space as f64 / count,
-        bounded: bounded as f64 / count,
-        us_per_point: 1e3 * search_ms / count,
+        cut_short: counts.clamped as f64 / count,
+        searched: if method == Method::KdTree { cloud.len() } else { surfels.len() },
+        iterations: iterations(&left),
     }))
 }
 
@@ -342,7 +336,7 @@ pub(super) fn accuracy(
 pub(super) fn kiddo(loaded: &Loaded<'_>, exact: &Exact) -> Outcome<KiddoTimes> {
     let positions = loaded.cloud.positions();
     let visible: Vec<[f32; 3]> = exact.visible.iter().map(|&point| positions[point as usize]).collect();
-    Outcome::Measured(KiddoTimes { visible_ms: kiddo_ms(&visible), all_ms: kiddo_ms(positions) })
+    Ok(KiddoTimes { visible_ms: kiddo_ms(&visible), all_ms: kiddo_ms(positions) })
 }
 
 #[cfg(feature = "kiddo")]
@@ -361,7 +355,7 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
 /// Says how to have kiddo.
 #[cfg(not(feature = "kiddo"))]
 pub(super) fn kiddo(_: &Loaded<'_>, _: &Exact) -> Outcome<KiddoTimes> {
-    Outcome::Refused("this program was built without it; cargo build --release --features kiddo".into())
+    Err("this program was built without it; cargo build --release --features kiddo".into())
 }
 
 /// Part of the pixels that look different with grid culling.

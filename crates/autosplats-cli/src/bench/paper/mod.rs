@@ -17,9 +17,11 @@ use std::path::Path;
 
 use autosplats_cloud::Progress as _;
 
+use self::figures::{NormalError, Radii};
 use self::journal::Journal;
 use self::measure::{
-    Exact, FirstRadius, K, Loaded, Method, Outcome, Renderers, accuracy, culling_difference, kiddo, settings, time,
+    Accuracy, Exact, FirstRadius, K, KiddoTimes, Loaded, Method, Outcome, Renderers, Timing, accuracy,
+    culling_difference, kiddo, settings, time,
 };
 use self::report::Report;
 use self::scenes::{NAMES, PaperScene};
@@ -31,6 +33,8 @@ use crate::threads::start_threads;
 
 /// The ks of Figure 10.
 const KS: [u32; 10] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50];
+/// Those for splat communication on a device that is a program on the processor: a frame takes it minutes there.
+const FEW_KS: [u32; 4] = [5, 10, 25, 50];
 /// Those of a quick run.
 const QUICK_KS: [u32; 3] = [5, 10, 20];
 /// Frames that medians are taken of.
@@ -38,6 +42,11 @@ const FRAMES: usize = 5;
 /// Points and side of the pictures of Figures 6, 7 and 9, and those of a quick run.
 const TWO_SCALES: [usize; 2] = [72_000, 10_000];
 const SIDE: [u32; 2] = [600, 150];
+
+/// Pictures in the folder of results.
+const FIGURE_6: &str = "figure-6.png";
+const FIGURE_7: &str = "figure-7.png";
+const FIGURE_9: &str = "figure-9.png";
 
 /// What is to be measured of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,17 +109,39 @@ impl Task {
             Self::Curvature => "Figure 9".into(),
         }
     }
+
+    /// Whether it was measured, in a form that is still understood. What was refused may be granted the next time, by
+    /// another build or a device with more memory left.
+    fn is_done(self, key: &str, scene: &PaperScene, journal: &Journal, pictures: &Path) -> bool {
+        fn measured<T: serde::de::DeserializeOwned>(journal: &Journal, key: &str) -> bool {
+            journal.get::<Outcome<T>>(key).is_some_and(|outcome| outcome.is_ok())
+        }
+        let there = |name: &str| pictures.join(name).is_file();
+        match self {
+            Self::Picture => journal.get(key) == Some(true) && there(&picture_name(scene)),
+            Self::Table(..) | Self::Stages(..) => measured::<Timing>(journal, key),
+            Self::Kiddo => measured::<KiddoTimes>(journal, key),
+            Self::FirstRadius => measured::<FirstRadius>(journal, key),
+            Self::Accuracy(_) => measured::<Accuracy>(journal, key),
+            Self::Culling => journal.get::<f64>(key).is_some(),
+            Self::Normals => journal.get::<NormalError>(key).is_some() && there(FIGURE_6),
+            Self::Curvature => journal.get(key) == Some(true) && there(FIGURE_9),
+        }
+    }
 }
 
 /// What belongs to a scene, in the order of the page.
-fn tasks(scene: &PaperScene, ks: &[u32]) -> Vec<Task> {
+fn tasks(scene: &PaperScene, ks: &[u32], few_ks: &[u32]) -> Vec<Task> {
     let methods = || Method::ALL.into_iter();
     let mut tasks = vec![Task::Picture, Task::FirstRadius];
     tasks.extend(methods().flat_map(|method| [false, true].map(|culled| Task::Table(method, culled))));
     tasks.push(Task::Kiddo);
     tasks.extend(methods().map(Task::Accuracy));
     tasks.push(Task::Culling);
-    tasks.extend(Method::BY_STAGE.into_iter().flat_map(|method| ks.iter().map(move |&k| Task::Stages(method, k))));
+    tasks.extend(Method::BY_STAGE.into_iter().flat_map(|method| {
+        let ks = if method == Method::Communication { few_ks } else { ks };
+        ks.iter().map(move |&k| Task::Stages(method, k))
+    }));
     match scene.name {
         "bunny" => tasks.push(Task::Normals),
         "imperia" => tasks.push(Task::Curvature),
@@ -126,21 +157,24 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
     let quick_index = usize::from(*quick);
     let scenes = scenes.iter().map(|name| scene(name, bunny.as_deref(), gallop.as_deref(), *quick));
     let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
-    let pictures = out.join("results");
+    // A quick run does not touch what a full one left.
+    let suffix = if *quick { "-quick" } else { "" };
+    let pictures = out.join(format!("results{suffix}"));
     create_dir_all(&pictures).map_err(|error| {
         Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", pictures.display()))
     })?;
-    let page = out.join("RESULTS.md");
+    let page = out.join(format!("RESULTS{suffix}.md"));
     check_target(&page, [])?;
 
     let mut journal = Journal::open(&pictures.join("measurements.json"), *fresh)?;
     let mut renderers = Renderers::new();
     let ks: &[u32] = if *quick { &QUICK_KS } else { &KS };
+    let few_ks: &[u32] = if !*quick && renderers.is_software() { &FEW_KS } else { ks };
     let side = SIDE[quick_index];
     let scales = format!("two-scales:{} | figure 7", TWO_SCALES[quick_index]);
     let missing = |scene: &PaperScene, journal: &Journal, renderers: &Renderers| -> Vec<Task> {
-        let mut tasks = tasks(scene, ks);
-        tasks.retain(|task| !journal.has(&task.key(scene, renderers)));
+        let mut tasks = tasks(scene, ks, few_ks);
+        tasks.retain(|task| !task.is_done(&task.key(scene, renderers), scene, journal, &pictures));
         tasks
     };
     let mut left: usize = scenes.iter().map(|scene| missing(scene, &journal, &renderers).len()).sum();
@@ -158,53 +192,72 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
             let bar = Bar::new(&format!("{}: {}", scene.name, task.describe()), run.quiet);
             bar.report((all - left) as f32 / all as f32);
             let key = task.key(scene, &renderers);
-            if matches!(task, Task::Kiddo | Task::Accuracy(_)) && exact.is_none() {
-                exact = Some(Exact::new(&mut renderers, &loaded)?);
+            let radius: Outcome<FirstRadius> = journal
+                .get(&Task::FirstRadius.key(scene, &renderers))
+                .unwrap_or_else(|| Err("no first radius was found".into()));
+            let needs_radius = matches!(task, Task::Table(Method::KdTree, _) | Task::Accuracy(Method::KdTree));
+            if let (true, Err(why)) = (needs_radius, &radius) {
+                journal.note(&key, &Outcome::<()>::Err(why.clone()))?;
+                left -= 1;
+                continue;
             }
-            // A radius that was refused is refused again, with the reason.
-            let first_radius = match journal.get(&Task::FirstRadius.key(scene, &renderers)) {
-                Some(Outcome::Measured(FirstRadius { radius, .. })) => radius,
-                _ => 1.0,
+            let first_radius = radius.map_or(f32::NAN, |found| found.radius);
+            let mut exact_radii = |renderers: &mut Renderers| match exact.take() {
+                Some(exact) => Ok(exact),
+                None => Exact::new(renderers, &loaded),
             };
-            match (task, &exact) {
-                (Task::FirstRadius, _) => {
+            match task {
+                Task::FirstRadius => {
                     journal.note(&key, &measure::first_radius(&mut renderers, &loaded)?)?;
                 }
-                (Task::Picture, _) => {
+                Task::Picture => {
                     figures::picture(&loaded, &pictures.join(picture_name(scene)))?;
                     journal.note(&key, &true)?;
                 }
-                (Task::Table(method, culled), _) => {
+                Task::Table(method, culled) => {
                     let settings = settings(method, first_radius, K, culled);
                     journal.note(&key, &time(&mut renderers, &loaded, method, &settings, FRAMES)?)?;
                 }
-                (Task::Stages(method, k), _) => {
+                Task::Stages(method, k) => {
                     let settings = settings(method, first_radius, k, true);
                     journal.note(&key, &time(&mut renderers, &loaded, method, &settings, FRAMES)?)?;
                 }
-                (Task::Kiddo, Some(exact)) => journal.note(&key, &kiddo(&loaded, exact))?,
-                (Task::Accuracy(method), Some(exact)) => {
-                    journal.note(&key, &accuracy(&mut renderers, &loaded, method, first_radius, exact)?)?;
+                Task::Kiddo => {
+                    let found = exact_radii(&mut renderers)?;
+                    journal.note(&key, &kiddo(&loaded, &found))?;
+                    exact = Some(found);
                 }
-                (Task::Kiddo | Task::Accuracy(_), None) => {}
-                (Task::Culling, _) => journal.note(&key, &culling_difference(&mut renderers, &loaded)?)?,
-                (Task::Normals, _) => {
-                    journal.note(&key, &figures::normals(&loaded, side, &pictures.join("figure-6.png"))?)?;
+                Task::Accuracy(method) => {
+                    let found = exact_radii(&mut renderers)?;
+                    journal.note(&key, &accuracy(&mut renderers, &loaded, method, first_radius, &found)?)?;
+                    exact = Some(found);
                 }
-                (Task::Curvature, _) => {
-                    figures::curvature(&loaded, side / 3 * 2, &pictures.join("figure-9.png"))?;
+                Task::Culling => journal.note(&key, &culling_difference(&mut renderers, &loaded)?)?,
+                Task::Normals => {
+                    journal.note(&key, &figures::normals(&loaded, side, &pictures.join(FIGURE_6))?)?;
+                }
+                Task::Curvature => {
+                    figures::curvature(&loaded, side / 3 * 2, &pictures.join(FIGURE_9))?;
                     journal.note(&key, &true)?;
                 }
             }
             left -= 1;
         }
     }
-    if !journal.has(&scales) {
-        let radii = figures::scales(TWO_SCALES[quick_index], side / 3 * 2, run.quiet, &pictures.join("figure-7.png"))?;
+    if journal.get::<Radii>(&scales).is_none() || !pictures.join(FIGURE_7).is_file() {
+        let radii = figures::scales(TWO_SCALES[quick_index], side / 3 * 2, run.quiet, &pictures.join(FIGURE_7))?;
         journal.note(&scales, &radii)?;
     }
 
-    let report = Report { journal: &journal, renderers: &renderers, scenes: &scenes, ks, scales: &scales };
+    let report = Report {
+        journal: &journal,
+        renderers: &renderers,
+        scenes: &scenes,
+        ks,
+        scales: &scales,
+        folder: &format!("results{suffix}"),
+        quick: *quick,
+    };
     report.write_charts(&pictures)?;
     write_file(&page, |writer| std::io::Write::write_all(writer, report.page().as_bytes()))?;
     print_line(&page.display().to_string())

@@ -28,7 +28,8 @@ pub(super) struct PaperScene {
     pub(super) name: &'static str,
     /// What the paper says of it.
     pub(super) paper: PaperFigures,
-    pub(super) points: usize,
+    /// Points asked for; a file has those that it has.
+    points: usize,
     /// Width and height of its pictures.
     pub(super) size: [u32; 2],
     source: Source,
@@ -95,21 +96,25 @@ impl PaperScene {
     /// What it is made of, for the report.
     pub(super) fn origin(&self) -> String {
         match &self.source {
-            Source::Generated(scene) => format!("generated, `scene:{scene}`, in its place"),
-            Source::File(_) => "the Stanford bunny's own points".into(),
-            Source::Gallop(_) => format!("{HORSES} moments of a galloping horse, its surface resampled"),
+            Source::Generated(scene) => format!("generated in its place, `scene:{scene}:{}`", self.points),
+            Source::File(path) => format!("all points of `{}`", file_name(path)),
+            Source::Gallop(folder) => {
+                format!("{HORSES} moments of `{}`, {} points strewn over the surfaces", file_name(folder), self.points)
+            }
         }
     }
 
     /// What tells its measurements from others'.
     pub(super) fn key(&self) -> String {
         let source = match &self.source {
-            Source::Generated(scene) => scene,
-            Source::File(_) => "file",
-            Source::Gallop(_) => "gallop",
+            Source::Generated(scene) => format!("{scene}:{}", self.points),
+            Source::File(path) => {
+                format!("{} of {} bytes", file_name(path), path.metadata().map_or(0, |metadata| metadata.len()))
+            }
+            Source::Gallop(folder) => format!("{}:{}", file_name(folder), self.points),
         };
         let [width, height] = self.size;
-        format!("{}({source}:{}, {width}x{height})", self.name, self.points)
+        format!("{} ({source}, {width}x{height})", self.name)
     }
 
     /// The files that it needs, for a check before the work begins.
@@ -143,6 +148,10 @@ impl PaperScene {
         let camera = Camera::fit(&cloud, guess_axes(&cloud), direction, aspect, projection).map_err(render_failure)?;
         Ok((cloud, camera))
     }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// A built-in scene, `NAME[:COUNT]`, and its camera.
