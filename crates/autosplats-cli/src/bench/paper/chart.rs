@@ -105,7 +105,7 @@ fn plot_height() -> f64 {
 
 /// Everything but the data, and the end.
 fn frame(labels: Labels<'_>, names: &[&str]) -> String {
-    let legend = names.len().div_ceil(legend_columns()) as f64 * 16.0;
+    let legend = names.len().div_ceil(legend_columns()) as f64 * 16.0 + 8.0;
     let height = HEIGHT + legend;
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" \
@@ -127,7 +127,7 @@ fn frame(labels: Labels<'_>, names: &[&str]) -> String {
     );
     for (index, name) in names.iter().enumerate() {
         let [column, row] = [index % legend_columns(), index / legend_columns()].map(|at| at as f64);
-        let [x, y] = [12.0 + column * LEGEND_PX, HEIGHT + 16.0 * row];
+        let [x, y] = [12.0 + column * LEGEND_PX, HEIGHT + 8.0 + 16.0 * row];
         let color = COLORS[index % COLORS.len()];
         _ = writeln!(svg, r#"<rect x="{x}" y="{}" width="10" height="10" fill="{color}"/>"#, y - 9.0);
         text(&mut svg, [x + 14.0, y], "start", name);
