@@ -487,6 +487,9 @@ fn splat_communication_is_refused_where_it_cannot_run() {
     let mut own = Renderer::with_device(device, queue).expect("a renderer");
     let message = refused(&mut own);
     assert!(message.contains("FLOAT32_BLENDABLE") && message.contains("screen-grid"), "{message}");
+    let early = own.check(&by_communication()).expect_err("refused before there is a cloud").to_string();
+    assert_eq!(early, message);
+    assert!(own.check(&Settings::default()).is_ok(), "other engines run");
     compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
 
     // With that one feature, and WebGPU's default limits, it runs; so it does in debug builds, which check indirect draws.

@@ -15,7 +15,7 @@ use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
-use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, compile, convergence};
+use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, check_engine, compile, convergence};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
@@ -119,6 +119,12 @@ impl GpuRenderer {
 
     pub(super) fn adapter(&self) -> AdapterSummary {
         self.gpu.summary()
+    }
+
+    /// # Errors
+    /// [`Error::Device`] if the device cannot run the engine.
+    pub(super) fn check_engine(&self, engine: SearchEngine) -> Result<(), Error> {
+        check_engine(&self.gpu, engine)
     }
 
     /// See [`Renderer::upload`](super::Renderer::upload).

@@ -167,7 +167,7 @@ impl Renderer {
         settings.check()?;
         match &self.form {
             Form::Cpu(_) => check_engine(settings.reconstruction.engine),
-            Form::Gpu(_) => Ok(()),
+            Form::Gpu(renderer) => renderer.check_engine(settings.reconstruction.engine),
         }
     }
 

@@ -2,10 +2,10 @@
 
 use std::fmt::Debug;
 
-use super::SearchEngine;
 use super::kd_tree::gpu::KdTreePasses;
 use super::screen_grid::gpu::SearchPasses;
 use super::splat_communication::gpu::CommunicationPasses;
+use super::{SearchEngine, splat_communication};
 use crate::Error;
 use crate::gpu::{Gpu, Step};
 use crate::project::DeviceCloud;
@@ -52,6 +52,17 @@ pub(crate) fn convergence(runs: &[u32]) -> Vec<u32> {
         curve.pop();
     }
     curve
+}
+
+/// Checks whether an engine runs here, before anything is compiled.
+///
+/// # Errors
+/// [`Error::Device`] if the device cannot run it.
+pub(crate) fn check_engine(gpu: &Gpu, engine: SearchEngine) -> Result<(), Error> {
+    match engine {
+        SearchEngine::SplatCommunication => splat_communication::gpu::check(gpu),
+        SearchEngine::ScreenGrid | SearchEngine::KdTree { .. } => Ok(()),
+    }
 }
 
 /// Compiles the passes of an engine.

@@ -126,7 +126,10 @@ impl CommunicationPasses {
 }
 
 /// Refuses devices on which a pass could not run, saying why.
-fn check(gpu: &Gpu) -> Result<(), Error> {
+///
+/// # Errors
+/// [`Error::Device`].
+pub(crate) fn check(gpu: &Gpu) -> Result<(), Error> {
     let refuse = |what: String| {
         Err(Error::Device(format!(
             "the splat-communication search needs {what}; use the screen-grid engine (--engine screen-grid)"
