@@ -6,7 +6,8 @@ mod test_clouds;
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DVec3, Vec3};
 use autosplats::{
-    Backend, Camera, Error, NormalSettings, Normals, PointSurfel, Projection, Renderer, Settings, estimate_normals,
+    Backend, Camera, ColorMode, Error, NormalSettings, Normals, PointSurfel, Projection, Renderer, Settings,
+    estimate_normals,
 };
 use test_clouds::EYE;
 
@@ -48,6 +49,21 @@ fn surfels_of_a_sphere_lie_on_it_and_face_the_eye() {
     }
     let mean = errors.iter().sum::<f32>() / errors.len() as f32;
     assert!(mean < 3.0, "normals are off by {mean} degrees in the mean");
+}
+
+#[test]
+fn a_frame_that_fails_leaves_the_surfels_of_the_one_before() {
+    let backends = [Backend::Cpu, Backend::Gpu].map(Renderer::with_backend);
+    for mut renderer in backends.into_iter().flatten() {
+        renderer.render(&sphere(), &camera(), SIZE, &Settings::default()).expect("a picture");
+        let before = renderer.surfels().expect("surfels");
+        let mut settings = Settings::default();
+        settings.shading.color = ColorMode::Rgb;
+        let other = Camera { eye: -EYE, ..camera() };
+        let failed = renderer.render(&sphere(), &other, SIZE, &settings).err();
+        assert!(matches!(failed, Some(Error::MissingAttribute { .. })), "{failed:?}");
+        assert_eq!(renderer.surfels().expect("surfels"), before, "seen by the camera that they were found with");
+    }
 }
 
 #[test]

@@ -75,8 +75,9 @@ impl CpuRenderer {
         if given.is_none() {
             check_engine(settings.reconstruction.engine)?;
         }
-        self.view = Some(view);
         let wanted = Wanted::new(cloud, settings)?;
+        // From here on nothing fails: what is kept is all of one frame.
+        self.view = Some(view);
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),

@@ -231,8 +231,7 @@ impl GpuRenderer {
         self.make_resident(cloud, &wanted, &|_| true)?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
         self.prepare(size, &wanted, settings)?;
-        self.view = Some(*view);
-        let Self { gpu, clock, prepared, readback, image, layers, times, frame, .. } = self;
+        let Self { gpu, clock, prepared, view: last_view, readback, image, layers, times, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
@@ -248,6 +247,8 @@ impl GpuRenderer {
         }
         readback.copy(gpu, &mut recorder.encoder, &wants)?;
         *times = recorder.finish();
+        // What was not submitted left the surfels as they were.
+        *last_view = Some(*view);
         let counters = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
@@ -304,8 +305,7 @@ impl GpuRenderer {
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
         self.prepare([texture.width(), texture.height()], &wanted, settings)?;
-        self.view = Some(*view);
-        let Self { gpu, prepared, frame, .. } = self;
+        let Self { gpu, prepared, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
@@ -314,6 +314,7 @@ impl GpuRenderer {
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
         recorder.finish();
+        *last_view = Some(*view);
         gpu.check_lost()
     }
 
