@@ -62,10 +62,12 @@ pub enum Error {
     #[error("GPU: the device was lost: {0}; make a new renderer, or use the CPU backend")]
     DeviceLost(String),
     /// Normals given for a cloud do not belong to it.
-    #[error("normals, radii and curvatures must be one of each per point: {normals} normals for {points} points")]
+    #[error("normals, curvatures and radii must be one of each per point: {given} {what} for {points} points")]
     Normals {
-        /// Normals given.
-        normals: usize,
+        /// What there are too few or too many of: normals, curvatures or radii.
+        what: &'static str,
+        /// How many of them were given.
+        given: usize,
         /// Points of the cloud.
         points: usize,
     },

@@ -115,11 +115,41 @@ fn planes_found_beforehand_make_nearly_the_picture_of_those_found_on_the_fly() {
 }
 
 #[test]
+fn planes_that_are_none_draw_nothing() {
+    let cloud = sphere();
+    let mut renderer = Renderer::new();
+    for projection in [Projection::PerspectiveFovDeg(35.0), Projection::OrthographicHeight(2.5)] {
+        let camera = Camera { projection, ..camera() };
+        for radius in [f32::NAN, f32::INFINITY, 0.0, -1.0] {
+            let mut planes = normals(&cloud);
+            planes.radius.fill(radius);
+            let frame = renderer.render_with_normals(&cloud, &planes, &camera, SIZE, &Settings::default());
+            let counts = frame.expect("a picture").counts;
+            assert_eq!(counts.covered, 0, "radius {radius}: {counts:?}");
+            assert_eq!(counts.outliers, counts.active + counts.recovered, "radius {radius}: {counts:?}");
+        }
+        let mut planes = normals(&cloud);
+        planes.normals.fill([0.0, f32::NAN, 1.0]);
+        let frame = renderer.render_with_normals(&cloud, &planes, &camera, SIZE, &Settings::default());
+        assert_eq!(frame.expect("a picture").counts.covered, 0, "normals that are none");
+    }
+}
+
+#[test]
 fn planes_of_another_cloud_are_refused() {
     let cloud = sphere();
-    let mut normals = normals(&cloud);
-    normals.radius.pop();
-    let mut renderer = Renderer::new();
-    let error = renderer.render_with_normals(&cloud, &normals, &camera(), SIZE, &Settings::default());
-    assert!(matches!(error, Err(Error::Normals { points: 20_000, .. })), "{:?}", error.err());
+    let whole = normals(&cloud);
+    let refused = |normals: &Normals| {
+        let mut renderer = Renderer::new();
+        let refused = renderer.render_with_normals(&cloud, normals, &camera(), SIZE, &Settings::default());
+        refused.expect_err("refused").to_string()
+    };
+    let mut one_less = [(); 3].map(|()| whole.clone());
+    one_less[0].normals.pop();
+    one_less[1].curvature.pop();
+    one_less[2].radius.pop();
+    for (normals, what) in one_less.iter().zip(["normals", "curvatures", "radii"]) {
+        let message = refused(normals);
+        assert!(message.ends_with(&format!("19999 {what} for 20000 points")), "{message}");
+    }
 }

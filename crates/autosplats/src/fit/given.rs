@@ -16,7 +16,8 @@ pub(crate) struct GivenPlanes<'a> {
     pub(crate) curvature: &'a [f32],
 }
 
-/// Appends the surfels of `queries`, indices of screen points, to `surfels`: circles as given, seen from the eye.
+/// Appends the surfels of `queries`, indices of screen points, to `surfels`: circles as given, seen from the eye. Those that
+/// are none, by a normal or a radius that is no number, have radius 0 and are not drawn.
 pub(crate) fn place(
     screen: &ScreenPoints,
     queries: &[u32],
@@ -32,7 +33,9 @@ pub(crate) fn place(
         let normal = view.view_from_world * Vec3::from(planes.normals[source as usize]);
         let to_eye = if view.perspective { -Vec3::from(point.position_view) } else { Vec3::NEG_Z };
         let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
-        let radius = planes.radius[source as usize];
+        // Splat set-up would draw a radius of NaN as wide as splats may be.
+        let is_drawn = normal.is_finite() && planes.radius[source as usize].is_finite();
+        let radius = if is_drawn { planes.radius[source as usize].max(0.0) } else { 0.0 };
         Surfel {
             center: point.position_view,
             radius: splat_scale * radius,

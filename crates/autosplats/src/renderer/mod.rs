@@ -193,7 +193,9 @@ impl Renderer {
     }
 
     /// Renders `cloud` with normals and radii found beforehand instead of on the fly: what [`estimate_normals`] gives for
-    /// the same `k`, on either side. Neither outliers nor gaps are looked for. On the CPU only.
+    /// the same `k`, on either side. Neither outliers nor gaps are looked for, and splats are circles whatever
+    /// [`ellipses`](Reconstruction::ellipses) says. A point with a normal that is not finite, or a radius that is not finite or
+    /// not above 0, draws nothing and is counted as an outlier. On the CPU only.
     ///
     /// [`estimate_normals`]: crate::estimate_normals
     ///
@@ -209,8 +211,10 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<Frame<'_>, Error> {
         let Normals { normals, curvature, radius } = normals;
-        if [normals.len(), curvature.len(), radius.len()] != [cloud.len(); 3] {
-            return Err(Error::Normals { normals: normals.len(), points: cloud.len() });
+        let points = cloud.len();
+        let lengths = [("normals", normals.len()), ("curvatures", curvature.len()), ("radii", radius.len())];
+        if let Some((what, given)) = lengths.into_iter().find(|&(_, given)| given != points) {
+            return Err(Error::Normals { what, given, points });
         }
         match &mut self.form {
             Form::Cpu(renderer) => {
