@@ -16,7 +16,7 @@ const FOUND = -1.0;
 const OUTLIER = -2.0;
 // A gap, or the end of the points, follows the furthest neighbour.
 const CLAMPED_AT_GAP = -3.0;
-// Iterations ended before the k-th neighbour was met.
+// Iterations ended before the k-th neighbour was met, or any, and before a rule said that there is none.
 const OUT_OF_STEPS = -4.0;
 
 // Least expansion of a radius: steps of √(k/σ) creep when one neighbour is missing that is far away.
@@ -154,5 +154,6 @@ fn settle(known: Known, initial_radius: f32, others: f32) -> Search {
     if known.counts.w >= f32(frame.k) {
         return ended(search.high, FOUND);
     }
-    return ended(known.furthest, select(OUT_OF_STEPS, OUTLIER, known.counts.w == 0.0));
+    // Without neighbours the lower bound is what is furthest, and nothing lies within it.
+    return ended(select(known.furthest, 0.0, known.counts.w == 0.0), OUT_OF_STEPS);
 }

@@ -102,6 +102,28 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
     assert!(wrong * 1000 <= compared, "{wrong} of {compared} differ");
 }
 
+/// What so many iterations cannot reach is said to be unfinished, not to have no neighbours.
+#[test]
+fn short_steps_and_far_outliers() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = CommunicationPasses::new(&gpu).expect("passes");
+    let mut unfinished = 0;
+    for (e0, lambda) in [(Some(1), 1.1), (Some(8), 1.1), (None, 1.1), (Some(8), 4.0), (None, 4.0)] {
+        for (name, positions) in test_clouds::all(2000) {
+            let (screen, view) = screen(&positions, &cameras()[0], SIZE, 10);
+            let rules = SearchRules { k: 10, outlier_expansions: e0, gap_factor: Some(lambda) };
+            let case = format!("{name}, {rules:?}");
+            let host = on_host(&screen, &view, &rules).0;
+            let found = on_device(&gpu, &passes, &screen, &view, &rules);
+            let different = different(&found.neighborhoods, &host, &case);
+            let allowed = found.bounded + allowed(&screen);
+            assert!(different <= allowed, "{case}: {different} differ, {} unfinished", found.bounded);
+            unfinished += found.bounded;
+        }
+    }
+    assert!(unfinished > 0, "iterations end too early for some");
+}
+
 #[test]
 fn pictures_of_any_shape() {
     let Some(gpu) = test_gpu() else { return };
