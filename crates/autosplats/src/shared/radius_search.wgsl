@@ -75,6 +75,11 @@ fn ended(radius: f32, how: f32) -> Search {
     return Search(radius, radius, how);
 }
 
+// A radius that holds what one pass found at this distance for every other: WGSL owes no two of them the same bits.
+fn up_to(distance: f32) -> f32 {
+    return distance * (1.0 + 0x1p-21);
+}
+
 // What a point knows after a gathering pass: what it had asked, as it was passed along with the distance to the furthest
 // neighbour that answered, and how many did by sample.
 struct Known {
@@ -120,7 +125,7 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
     // Differs from the paper: no step is wider than the gap that would end the search, or it would step over the gap.
     let reach = frame.gap_growth * max(known.furthest, initial_radius);
     if is_all || radius >= reach {
-        return ended(known.furthest, CLAMPED_AT_GAP);
+        return ended(up_to(known.furthest), CLAMPED_AT_GAP);
     }
     return Search(-known.furthest, min(min(radius * expansion(count), reach), MOST), count);
 }
@@ -139,8 +144,11 @@ fn bracket(known: Known) -> Search {
         }
     }
     // Where several points share the k-th distance, no bracket comes between them, and all belong.
-    if high.y == k || high.x - low.x <= NARROWEST * high.x {
+    if high.y == k {
         return ended(high.x, FOUND);
+    }
+    if high.x - low.x <= NARROWEST * high.x {
+        return ended(up_to(high.x), FOUND);
     }
     return Search(low.x, high.x, low.y);
 }
@@ -155,5 +163,5 @@ fn settle(known: Known, initial_radius: f32, others: f32) -> Search {
         return ended(search.high, FOUND);
     }
     // Without neighbours the lower bound is what is furthest, and nothing lies within it.
-    return ended(select(known.furthest, 0.0, known.counts.w == 0.0), OUT_OF_STEPS);
+    return ended(select(up_to(known.furthest), 0.0, known.counts.w == 0.0), OUT_OF_STEPS);
 }
