@@ -42,8 +42,9 @@ fn row_span(splat: Splat, bounds: vec2u, row: u32) -> vec2i {
     return vec2i(max(first, i32(floor(middle + low)) - 1), min(last, i32(ceil(middle + high)) + 1));
 }
 
-// The depth of a splat, pushed back by ε, at a pixel, as a key. The same sums as where splats are drawn by the patch.
-fn pushed_depth(splat: Splat, pixel: vec2u) -> u32 {
+// The depth of a splat, pushed back by ε, at a pixel, as a key; NO_DEPTH outside the disc and the dot, whose rim is where their
+// squared distances are `rim`. The same sums as where splats are drawn by the patch.
+fn pushed_depth(splat: Splat, pixel: vec2u, rim: f32) -> u32 {
     let dx = f32(pixel.x) + 0.5 - splat.center_px.x;
     let dy = f32(pixel.y) + 0.5 - splat.center_px.y;
     let start = select(splat.depth, 1.0 / splat.depth, frame.perspective == 1u);
@@ -58,7 +59,7 @@ fn pushed_depth(splat: Splat, pixel: vec2u) -> u32 {
     }
     let disc = u * u + v * v;
     let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
-    if select(dot, disc, disc < dot) <= 1.0 {
+    if select(dot, disc, disc < dot) <= rim {
         // The dot reaches beyond the disc, where its plane is of no use.
         let hit = min(max(depth, splat.depth - splat.depth_reach), splat.depth + splat.depth_reach);
         return depth_key(hit + splat.epsilon);
@@ -67,7 +68,7 @@ fn pushed_depth(splat: Splat, pixel: vec2u) -> u32 {
 }
 
 fn draw_depth(splat: Splat, pixel: vec2u) {
-    let key = pushed_depth(splat, pixel);
+    let key = pushed_depth(splat, pixel, 1.0);
     let at = pixel.y * frame.size.x + pixel.x;
     // Most splats lose; a plain load tells them so.
     if key != NO_DEPTH && key < atomicLoad(&depth_map[at]) {
