@@ -27,4 +27,4 @@ pub(crate) use raster::{DepthMask, Draw, Load, RasterPass, Target, Targets};
 #[cfg(test)]
 pub(crate) use recorder::GROUPS_PER_ROW;
 pub use recorder::PassTime;
-pub(crate) use recorder::{Clock, Recorder};
+pub(crate) use recorder::{Clock, Recorder, stage_ms};

@@ -73,16 +73,24 @@ impl Clock {
 }
 
 impl Clock {
-    /// Fills in the times of a frame that was submitted, waiting for it, and returns the time from the first pass's start
-    /// to the last one's end.
+    /// Fills in the times of a frame that was submitted, waiting for it, and returns when each pass timed began and ended, in
+    /// milliseconds from the first one's start.
     ///
     /// # Errors
     /// [`Error::DeviceLost`].
-    pub(crate) fn read(&self, gpu: &Gpu, times: &mut [PassTime]) -> Result<f64, Error> {
+    pub(crate) fn read(&self, gpu: &Gpu, times: &mut [PassTime]) -> Result<Vec<[f64; 2]>, Error> {
         let timed = times.len().min(MOST_PASSES as usize);
-        let Self::Timestamps { mapped, .. } = self else { return Ok(times.iter().map(|time| time.ms).sum()) };
+        let Self::Timestamps { mapped, .. } = self else {
+            // One after the other.
+            let one = |end: &mut f64, time: &PassTime| {
+                let begin = *end;
+                *end += time.ms;
+                Some([begin, *end])
+            };
+            return Ok(times.iter().scan(0.0, one).collect());
+        };
         if timed == 0 {
-            return Ok(0.0);
+            return Ok(Vec::new());
         }
         let period_ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
         map(gpu, mapped, 16 * timed as u64, |bytes| {
@@ -91,9 +99,18 @@ impl Clock {
             for (time, ticks) in times.iter_mut().zip(ticks.chunks_exact(2)) {
                 time.ms = ms(ticks[0], ticks[1]);
             }
-            ms(ticks[0], ticks[ticks.len() - 1])
+            ticks.chunks_exact(2).map(|of_pass| [ms(ticks[0], of_pass[0]), ms(ticks[0], of_pass[1])]).collect()
         })
     }
+}
+
+/// Milliseconds that a stage took: from the begin to the end of each run of its passes, what lies between them included.
+/// Without that a stage of many short passes would look faster than it is.
+pub(crate) fn stage_ms(stage: &str, times: &[PassTime], spans: &[[f64; 2]]) -> f64 {
+    let stage_of = |time: &PassTime| time.pass.split('/').next();
+    let passes: Vec<_> = times.iter().map(stage_of).zip(spans).collect();
+    let runs = passes.chunk_by(|(before, _), (after, _)| before == after).filter(|run| run[0].0 == Some(stage));
+    runs.map(|run| run[run.len() - 1].1[1] - run[0].1[0]).sum()
 }
 
 impl<'a> Recorder<'a> {
@@ -170,4 +187,19 @@ impl<'a> Recorder<'a> {
 
 fn encoder(gpu: &Gpu) -> wgpu::CommandEncoder {
     gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("autosplats.frame") })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{PassTime, stage_ms};
+
+    #[test]
+    fn a_stages_time_has_the_gaps_between_its_passes() {
+        let times = ["search/a", "search/b", "fit/fit", "search/a", "search/b"].map(|pass| PassTime { pass, ms: 1.0 });
+        let spans = [[0.0, 1.0], [1.5, 2.5], [4.0, 5.0], [7.0, 8.0], [8.25, 9.25]];
+        assert_eq!(stage_ms("search", &times, &spans), 2.5 + 2.25, "but not what lies between its runs");
+        assert_eq!(stage_ms("fit", &times, &spans), 1.0);
+        assert_eq!(stage_ms("splat", &times, &spans), 0.0, "there is none");
+        assert_eq!(stage_ms("search", &times, &spans[..1]), 1.0, "those beyond the last span were not timed");
+    }
 }

@@ -12,7 +12,7 @@ use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
-use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step};
+use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step, stage_ms};
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, check_engine, compile, convergence};
@@ -260,14 +260,13 @@ impl GpuRenderer {
             };
             counters
         })?;
+        let waited_ms = waited.elapsed().as_secs_f64() * 1e3;
+        let spans = clock.read(gpu, times)?;
         let frame_ms = match clock {
-            Clock::Off => waited.elapsed().as_secs_f64() * 1e3,
-            _ => clock.read(gpu, times)?,
+            Clock::Off => waited_ms,
+            _ => spans.last().map_or(0.0, |[_, end]| *end),
         };
-
-        let stage = |name: &str| {
-            times.iter().filter(|time| time.pass.split('/').next() == Some(name)).map(|time| time.ms).sum::<f64>()
-        };
+        let stage = |name: &str| stage_ms(name, times, &spans);
         let timings = Timings {
             upload,
             project: stage("project"),

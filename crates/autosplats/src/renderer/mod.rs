@@ -57,7 +57,8 @@ pub struct Counts {
     pub covered: usize,
 }
 
-/// Milliseconds spent in each stage of one frame.
+/// Milliseconds spent in each stage of one frame. On a GPU with timestamps from the begin to the end of a stage's passes that
+/// follow each other, what lies between them included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs, reason = "one field per stage")]
 pub struct Timings {
