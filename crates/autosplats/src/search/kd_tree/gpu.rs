@@ -56,10 +56,12 @@ const WORKS: u64 = Work::Points as u64 + 1;
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 
-/// Levels of large nodes that there is time for: twice as many as halves make, since one split of two may be lopsided, and
-/// some for those of which sampled medians are off. An even number, so that all points end in the first list.
+/// Levels of large nodes that there is time for: for each halving of the points 5/2, since a split that leaves three quarters
+/// to one side is not lopsided yet, and takes 1/log₂(4/3) = 2.41 of them; a lopsided one and the median after it take two.
+/// And some for sampled medians that are off. An even number, so that all points end in the first list.
 fn levels(capacity: usize) -> usize {
-    2 * capacity.div_ceil(SMALL).next_power_of_two().ilog2() as usize + 6
+    let halvings = capacity.div_ceil(SMALL).next_power_of_two().ilog2() as usize;
+    (5 * halvings).div_ceil(4) * 2 + 6
 }
 
 /// A tree of up to so many points, and what building it takes: 52 bytes a point.

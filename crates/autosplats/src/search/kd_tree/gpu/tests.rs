@@ -305,6 +305,18 @@ fn units_do_not_matter() {
     }
 }
 
+#[test]
+fn levels_are_enough_for_splits_as_uneven_as_they_may_be() {
+    for capacity in [1, 64, 65, 1000, 20_000, 1_000_000, 134_217_728] {
+        let levels = levels(capacity);
+        let left = capacity as f64 * 0.75f64.powi(levels as i32);
+        assert!(
+            left <= SMALL as f64 && levels.is_multiple_of(2),
+            "{capacity}: {left} points are left after {levels} levels"
+        );
+    }
+}
+
 /// Clusters within clusters: halves of space alone would take a level for each factor of two.
 #[test]
 fn clusters_far_apart_take_few_levels() {
