@@ -28,7 +28,8 @@ pub struct RadiusTrial {
 
 /// Tries first radii for [`SearchEngine::KdTree`], from one that holds the k neighbours of nine visible points of ten on,
 /// and returns the fastest with which at least `accuracy` of the visible points, 0 to 1, have their exact k-radius. Where
-/// none comes so far, the most accurate one: its own accuracy says that. The engine in `settings` is not looked at.
+/// none comes so far, the most accurate one: its own accuracy says that. The engine in `settings` is not looked at, nor is
+/// grid culling: without, all visible points are searched for.
 ///
 /// # Errors
 /// Those of [`Renderer::render`]; [`Error::NothingVisible`] if no point is seen that has neighbours.
@@ -41,6 +42,7 @@ pub fn best_first_radius(
     accuracy: f64,
 ) -> Result<RadiusTrial, Error> {
     let mut settings = settings.clone();
+    settings.reconstruction.grid_culling = false;
     let k = settings.reconstruction.k;
     let mut run = |first_radius: f32, frames: usize| {
         settings.reconstruction.engine = SearchEngine::KdTree { first_radius };
