@@ -1,7 +1,9 @@
 //! Search: the k nearest screen points of each screen point, summed up in moments [Paper, §4, §5].
 //!
-//! Every engine answers the same question, stated here without iterations so that the answer depends on the screen points
-//! alone. For point P with first search radius r̃₀ (§5.1) and the distances d₁ ≤ d₂ ≤ … to the other screen points:
+//! The question is stated here without iterations, so that the answer depends on the screen points alone. The screen grid and
+//! splat communication answer it; the kd-tree answers another, as the paper's rival does: its neighbours are all points of the
+//! cloud, seen or not, it knows no gap, and its bound is its own. For point P with first search radius r̃₀ (§5.1) and the
+//! distances d₁ ≤ d₂ ≤ … to the other screen points:
 //!
 //! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions that met nothing;
 //! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀

@@ -42,13 +42,15 @@
 //! | d_max | tracked | is the lower bound while a radius expands, and a is found from b | four channels hold no more; a few instructions |
 //! | brackets between equal distances | – | end when narrower than four steps of their numbers | all points at the k-th distance belong; about 14 iterations, which only lattices need |
 //! | mean, then covariance about it | | both about the point itself, which is not counted | what all engines hand on; nothing |
+//! | the point itself | told from others by its position | by its pixel, which holds one point | points so near that their distance rounds to 0 are neighbours still; nothing |
+//! | t_conv | of all points | of each round's, active and recovered | grid culling makes two searches of one; at most as many are left in all |
 //! | end of iterations | at t_conv | at t_conv or after 16 | a frame is recorded before it is known; sixteen steps of √λ or √k may not reach the end of a gap or the outlier radius, with λ near 1 or a large e0: such points are counted as bounded |
 //!
 //! # What differs from the other engines' answer
 //!
 //! Up to 0.1 % of each round's points are left when the iterations end. Those between two counters keep the wider bound: one or
-//! two neighbours too many. Those still expanding keep the neighbours met, if any, and are counted as *bounded*. The bound on search
-//! work of [`search`](super) is not kept: a search without the outlier rule draws splats as wide as the picture. Distances
-//! that round to 0 although the points differ, in clouds some 1e-19 units wide, count as such.
+//! two neighbours too many. Those still expanding keep the neighbours met, if any, and are counted as *bounded*. The bound on
+//! search work of [`search`](super) is not kept: a search without the outlier rule draws splats as wide as the picture.
+//! Distances that round to 0 although the points differ, in clouds some 1e-19 units wide, count as such.
 
 pub(crate) mod gpu;
