@@ -104,7 +104,7 @@ pub(super) struct Accuracy {
     pub(super) on_screen: f64,
     /// Part whose k-radius is the exact one among all points.
     pub(super) in_space: f64,
-    /// Part whose neighbourhood a rule cut short: a gap, or the bound on work.
+    /// Part whose neighbourhood a rule cut short, a gap or the bound on work, or that has none.
     pub(super) cut_short: f64,
     /// Points searched for.
     pub(super) searched: usize,
@@ -321,11 +321,13 @@ pub(super) fn accuracy(
         on_screen += usize::from(seen.is_ok_and(|exact| same(surfel.k_radius, exact)));
         in_space += usize::from(same(surfel.k_radius, exact.in_space[surfel.point as usize]));
     }
+    // No two visible points are in one place.
+    let alone = surfels.iter().filter(|surfel| surfel.k_radius == 0.0).count();
     let count = surfels.len().max(1) as f64;
     Ok(Ok(Accuracy {
         on_screen: on_screen as f64 / count,
         in_space: in_space as f64 / count,
-        cut_short: counts.clamped as f64 / count,
+        cut_short: (counts.clamped + alone) as f64 / count,
         searched: if method == Method::KdTree { cloud.len() } else { surfels.len() },
         iterations: iterations(&left),
     }))

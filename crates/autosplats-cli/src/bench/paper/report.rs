@@ -263,8 +263,8 @@ impl Report<'_> {
             "\n## Accuracy\n\n\
              Parts of the visible points whose neighbourhood is the exact one, by its k-radius to a part in ten thousand: among \
              visible points (what a search in the picture can find), and among all points of the cloud (the price of searching \
-             in the picture, which is what the kd-tree does not pay). A neighbourhood that a rule cuts short, at a gap or at the \
-             bound on work, is not exact. The work: how many points are searched for, and in how many iterations. k = {K}, no \
+             in the picture, which is what the kd-tree does not pay). A neighbourhood that a rule cuts short, at a gap, at the \
+             bound on work or because it has no point near enough, is not exact. The work: how many points are searched for, and in how many iterations. k = {K}, no \
              culling.\n\n\
              | scene | method | exact on the screen | cut short | exact in space | points searched for | iterations |\n\
              |---|---|--:|--:|--:|--:|--:|\n"
