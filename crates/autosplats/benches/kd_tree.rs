@@ -14,7 +14,7 @@ use std::{hint::black_box, num::NonZero, time::Instant};
 
 use autosplats::cloud::{
     PointCloud,
-    glam::{DVec3, Mat3, Vec3},
+    glam::{DVec3, Vec3},
 };
 use autosplats::{Camera, Projection, Renderer, Settings};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -62,11 +62,11 @@ fn main() {
 
 /// Times one cloud and prints a line of the table.
 fn compare(name: &str, order: &str, cloud: &PointCloud, camera: &Camera, rounds: usize) {
-    let visible = visible_points(cloud, camera);
     let mut unculled = Settings::default();
     unculled.reconstruction.grid_culling = false;
     let settings = Settings::default();
     let mut renderer = Renderer::new();
+    let visible = visible_points(&mut renderer, cloud, camera, &unculled);
     // The first frame makes the buffers, as the first of many does.
     let (_, count) = frame(&mut renderer, cloud, camera, &settings);
     assert_eq!(visible.len(), count, "the kd-tree must get the points that the search gets");
@@ -170,26 +170,11 @@ impl Query {
     }
 }
 
-/// The points that own a pixel, in the cloud's order: projection once more, to the same bits.
-fn visible_points(cloud: &PointCloud, camera: &Camera) -> Vec<[f32; 3]> {
-    let Projection::PerspectiveFovDeg(fov) = camera.projection else { unreachable!("no scene is orthographic") };
-    let [right, down, forward] = camera.axes().expect("a valid camera").map(DVec3::as_vec3);
-    let view_from_world = Mat3::from_cols(right, down, forward).transpose();
-    let eye = (camera.eye - cloud.origin()).as_vec3();
-    let near = ((camera.look_at - camera.eye).length() * 1e-5) as f32;
-    let [width, height] = SIZE.map(|side| side as f32);
-    let focal_px = (0.5 * f64::from(SIZE[1]) / (0.5 * fov.to_radians()).tan()) as f32;
-    let mut owners = vec![u64::MAX; (SIZE[0] * SIZE[1]) as usize];
-    for (index, &position) in (0u64..).zip(cloud.positions()) {
-        let point = view_from_world * (Vec3::from(position) - eye);
-        let scale = focal_px / point.z;
-        let [x, y] = [point.x * scale + 0.5 * width, point.y * scale + 0.5 * height];
-        if point.z > near && x >= 0.0 && y >= 0.0 && x < width && y < height {
-            let owner = &mut owners[y as usize * SIZE[0] as usize + x as usize];
-            *owner = (*owner).min(u64::from(point.z.to_bits()) << 32 | index);
-        }
-    }
-    let mut indices: Vec<u32> = owners.into_iter().filter(|&key| key != u64::MAX).map(|key| key as u32).collect();
+/// The points that own a pixel, in the cloud's order.
+fn visible_points(renderer: &mut Renderer, cloud: &PointCloud, camera: &Camera, unculled: &Settings) -> Vec<[f32; 3]> {
+    frame(renderer, cloud, camera, unculled);
+    let mut indices: Vec<u32> =
+        renderer.surfels().expect("a frame was rendered").iter().map(|surfel| surfel.point).collect();
     indices.sort_unstable();
     indices.into_iter().map(|index| cloud.positions()[index as usize]).collect()
 }
