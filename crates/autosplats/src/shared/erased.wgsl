@@ -6,11 +6,11 @@
 const ROUNDING = 64u;
 const WIDER_RIM = 1.0 + 1e-4;
 
-fn erase_depth(splat: Splat, pixel: vec2u) {
-    let key = pushed_depth(splat, pixel, WIDER_RIM);
-    let at = pixel.y * frame.size.x + pixel.x;
+fn erase_depth(splat: Splat, line: Line, column: u32) {
+    let key = pushed_depth(splat, line, column, WIDER_RIM);
+    let at = line.row * frame.size.x + column;
     if key != NO_DEPTH && key - ROUNDING <= atomicLoad(&depth_map[at]) {
         atomicStore(&depth_map[at], depth_key(infinity()));
-        atomicStore(&cells[cell_of(pixel)], 1u);
+        atomicStore(&cells[cell_of(vec2u(column, line.row))], 1u);
     }
 }

@@ -5,33 +5,51 @@ override DOT_RADIUS_PX: f32;
 // Key of no depth: behind everything.
 const NO_DEPTH = 0xffffffffu;
 
-// First and last column of a splat in a row, with one more to either side for rounding; the first is the greater one if it has
-// none. A splat seen at an angle fills little of its bounds.
-fn row_span(splat: Splat, bounds: vec2u, row: u32) -> vec2i {
+// A row of a splat: what does not change along it.
+struct Line {
+    row: u32,
+    // Of the pixels' centres from the splat's.
+    dy: f32,
+    // The plane of the disc, and the disc's coordinates, level with the centre.
+    plane: f32,
+    u: f32,
+    v: f32,
+    // Nearest and furthest depth of the disc.
+    nearest: f32,
+    furthest: f32,
+}
+
+fn line_of(splat: Splat, row: u32) -> Line {
     let dy = f32(row) + 0.5 - splat.center_px.y;
-    // The disc is where u² + v² <= w², all three of them linear along the row.
-    let in_perspective = frame.perspective == 1u;
-    let at_center = vec3f(
+    let start = select(splat.depth, 1.0 / splat.depth, frame.perspective == 1u);
+    return Line(
+        row,
+        dy,
+        start + splat.plane.y * dy,
         splat.u.y * dy,
         splat.v.y * dy,
-        select(1.0, 1.0 / splat.depth + splat.plane.y * dy, in_perspective),
+        splat.depth - splat.depth_reach,
+        splat.depth + splat.depth_reach,
     );
+}
+
+// First and last column of a splat in a row, with one more to either side for rounding; the first is the greater one if it has
+// none. A splat seen at an angle fills little of its bounds.
+fn span_of(splat: Splat, line: Line, bounds: vec2u) -> vec2i {
+    // The disc is where u² + v² <= w², all three of them linear along the row.
+    let in_perspective = frame.perspective == 1u;
+    let level = vec3f(line.u, line.v, select(1.0, line.plane, in_perspective));
     let slope = vec3f(splat.u.x, splat.v.x, select(0.0, splat.plane.x, in_perspective));
     let a = slope.x * slope.x + slope.y * slope.y - slope.z * slope.z;
-    let b = slope.x * at_center.x + slope.y * at_center.y - slope.z * at_center.z;
-    let c = at_center.x * at_center.x + at_center.y * at_center.y - at_center.z * at_center.z;
-    let rounding = 1e-5 * (b * b + abs(a) * (at_center.x * at_center.x + at_center.y * at_center.y + at_center.z * at_center.z));
+    let b = slope.x * level.x + slope.y * level.y - slope.z * level.z;
+    let c = level.x * level.x + level.y * level.y - level.z * level.z;
+    let rounding = 1e-5 * (b * b + abs(a) * (level.x * level.x + level.y * level.y + level.z * level.z));
     let root = b * b - a * c + rounding;
     let reach = sqrt(max(root, 0.0));
-    var low = (-b - reach) / a;
-    var high = (-b + reach) / a;
-    let dot = select(-1.0, DOT_RADIUS_PX, abs(dy) <= DOT_RADIUS_PX);
-    if !(root >= 0.0) {
-        low = 1.0;
-        high = -1.0;
-    }
-    low = min(low, -dot);
-    high = max(high, dot);
+    let none = !(root >= 0.0);
+    let dot = select(-1.0, DOT_RADIUS_PX, abs(line.dy) <= DOT_RADIUS_PX);
+    let low = min(select((-b - reach) / a, 1.0, none), -dot);
+    let high = max(select((-b + reach) / a, -1.0, none), dot);
     let middle = splat.center_px.x - 0.5;
     let first = i32(firsts(bounds).x);
     let last = i32(lasts(bounds).x);
@@ -44,13 +62,11 @@ fn row_span(splat: Splat, bounds: vec2u, row: u32) -> vec2i {
 
 // The depth of a splat, pushed back by ε, at a pixel, as a key; NO_DEPTH outside the disc and the dot, whose rim is where their
 // squared distances are `rim`. The same sums as where splats are drawn by the patch.
-fn pushed_depth(splat: Splat, pixel: vec2u, rim: f32) -> u32 {
-    let dx = f32(pixel.x) + 0.5 - splat.center_px.x;
-    let dy = f32(pixel.y) + 0.5 - splat.center_px.y;
-    let start = select(splat.depth, 1.0 / splat.depth, frame.perspective == 1u);
-    let plane = (start + splat.plane.y * dy) + splat.plane.x * dx;
-    var u = splat.u.y * dy + splat.u.x * dx;
-    var v = splat.v.y * dy + splat.v.x * dx;
+fn pushed_depth(splat: Splat, line: Line, column: u32, rim: f32) -> u32 {
+    let dx = f32(column) + 0.5 - splat.center_px.x;
+    let plane = line.plane + splat.plane.x * dx;
+    var u = line.u + splat.u.x * dx;
+    var v = line.v + splat.v.x * dx;
     var depth = plane;
     if frame.perspective == 1u {
         depth = 1.0 / plane;
@@ -58,18 +74,18 @@ fn pushed_depth(splat: Splat, pixel: vec2u, rim: f32) -> u32 {
         v *= depth;
     }
     let disc = u * u + v * v;
-    let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
+    let dot = (dx * dx + line.dy * line.dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
     if select(dot, disc, disc < dot) <= rim {
         // The dot reaches beyond the disc, where its plane is of no use.
-        let hit = min(max(depth, splat.depth - splat.depth_reach), splat.depth + splat.depth_reach);
+        let hit = min(max(depth, line.nearest), line.furthest);
         return depth_key(hit + splat.epsilon);
     }
     return NO_DEPTH;
 }
 
-fn draw_depth(splat: Splat, pixel: vec2u) {
-    let key = pushed_depth(splat, pixel, 1.0);
-    let at = pixel.y * frame.size.x + pixel.x;
+fn draw_depth(splat: Splat, line: Line, column: u32) {
+    let key = pushed_depth(splat, line, column, 1.0);
+    let at = line.row * frame.size.x + column;
     // Most splats lose; a plain load tells them so.
     if key != NO_DEPTH && key < atomicLoad(&depth_map[at]) {
         atomicMin(&depth_map[at], key);

@@ -35,9 +35,10 @@ fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     let splat = splats[index];
     for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
-        let span = row_span(splat, bounds, row);
+        let line = line_of(splat, row);
+        let span = span_of(splat, line, bounds);
         for (var column = span.x; column <= span.y; column++) {
-            erase_depth(splat, vec2u(u32(column), row));
+            erase_depth(splat, line, u32(column));
         }
     }
 }

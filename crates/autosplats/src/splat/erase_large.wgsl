@@ -33,9 +33,10 @@ fn erase_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     let splat = splats[index];
     // Eight invocations to a row.
     for (var row = firsts(bounds).y + local / 8u; row <= lasts(bounds).y; row += 8u) {
-        let span = row_span(splat, bounds, row);
+        let line = line_of(splat, row);
+        let span = span_of(splat, line, bounds);
         for (var column = span.x + i32(local % 8u); column <= span.y; column += 8) {
-            erase_depth(splat, vec2u(u32(column), row));
+            erase_depth(splat, line, u32(column));
         }
     }
 }

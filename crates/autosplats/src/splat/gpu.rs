@@ -180,7 +180,7 @@ impl SplatPasses {
             redraw_large: depth_large(0.0, 1.0)?,
             recover_count: Pass::new(gpu, &RECOVER_COUNT, &reach)?,
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
-            recover: Pass::new(gpu, &RECOVER, &reach)?,
+            recover: pass(&RECOVER)?,
             work: WorkPass::new(gpu)?,
             clear_cells: pass(&CLEAR_CELLS)?,
             refine: pass(&REFINE)?,
@@ -257,11 +257,10 @@ impl SplatPasses {
         let depth = &splats.depth;
         let blocks = || screen.groups(Work::PassiveBlocks);
         let count = [frame, points, passive, counters, density, depth, block_sums];
-        let recover = [frame, points, passive, counters, density, depth, block_sums, queries];
         vec![
             self.recover_count.step(gpu, &count, blocks()),
             self.scan_recovered.step(gpu, &[frame, block_sums, counters], 1),
-            self.recover.step(gpu, &recover, blocks()),
+            self.recover.step(gpu, &[frame, passive, counters, block_sums, queries], blocks()),
             self.work.step(gpu, frame, screen),
         ]
     }

@@ -1,24 +1,17 @@
-// Appends the passive points that the depth map does not hide for sure to the active ones, ascending [Paper, §7, Grid Culling].
+// Appends the passive points that were marked to the active ones, ascending [Paper, §7, Grid Culling].
 //
-// Reads: points, passive, counters, density, depth_map, block_sums. Writes: queries.
+// Reads: passive, counters, block_sums. Writes: queries.
 
 #import frame
 #import groups
 #import counters
 #import rank
-#import density
-#import screen
-#import depth_map
-#import hidden
 #import recovered
 
-@group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
-@group(0) @binding(2) var<storage, read> passive: array<u32>;
-@group(0) @binding(3) var<storage, read> counters: array<u32>;
-@group(0) @binding(4) var<storage, read> density: array<vec2u>;
-@group(0) @binding(5) var<storage, read> depth_map: array<u32>;
-@group(0) @binding(6) var<storage, read> block_sums: array<u32>;
-@group(0) @binding(7) var<storage, read_write> queries: array<u32>;
+@group(0) @binding(1) var<storage, read> passive: array<u32>;
+@group(0) @binding(2) var<storage, read> counters: array<u32>;
+@group(0) @binding(3) var<storage, read> block_sums: array<u32>;
+@group(0) @binding(4) var<storage, read_write> queries: array<u32>;
 
 @compute @workgroup_size(256)
 fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -28,19 +21,16 @@ fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let index = block * 2048u + flag;
-        if index < counters[PASSIVE] {
-            let point = points[passive[index]];
-            if is_back(point) {
-                rank_set(flag);
-                is_recovered |= 1u << step;
-            }
+        if index < counters[PASSIVE] && (passive[index] & BACK) != 0u {
+            rank_set(flag);
+            is_recovered |= 1u << step;
         }
     }
     rank_finish(local);
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         if (is_recovered & (1u << step)) != 0u {
-            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * 2048u + flag];
+            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * 2048u + flag] & ~BACK;
         }
     }
 }

@@ -1,6 +1,6 @@
-// Counts, of each block of 2048 passive points, those that the depth map does not hide for sure [Paper, §7, Grid Culling].
+// Marks and counts, of each block of 2048 passive points, those that the depth map does not hide for sure [Paper, §7, Grid Culling].
 //
-// Reads: points, passive, counters, density, depth_map. Writes: block_sums.
+// Reads: points, counters, density, depth_map. Reads and writes: passive. Writes: block_sums.
 
 #import frame
 #import groups
@@ -12,11 +12,14 @@
 #import recovered
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
-@group(0) @binding(2) var<storage, read> passive: array<u32>;
+@group(0) @binding(2) var<storage, read_write> passive: array<u32>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
 @group(0) @binding(4) var<storage, read> density: array<vec2u>;
 @group(0) @binding(5) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(6) var<storage, read_write> block_sums: array<u32>;
+
+// In first search radii: splat/setup.rs says what for.
+override RECOVER_REACH: f32;
 
 var<workgroup> recovered_points: atomic<u32>;
 
@@ -31,8 +34,9 @@ fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
     for (var step = 0u; step < 8u; step++) {
         let index = block * 2048u + step * 256u + local;
         if index < counters[PASSIVE] {
-            let point = points[passive[index]];
-            if is_back(point) {
+            let passive_point = passive[index];
+            if is_back(points[passive_point]) {
+                passive[index] = passive_point | BACK;
                 own += 1u;
             }
         }
@@ -44,4 +48,20 @@ fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
     if local == 0u && block < arrayLength(&block_sums) {
         block_sums[block] = atomicLoad(&recovered_points);
     }
+}
+
+fn is_back(point: ScreenPoint) -> bool {
+    let depth = point.position_view.z;
+    if !is_hidden(point.pixel, depth) {
+        return true;
+    }
+    let pixel = pixel_xy(point.pixel);
+    let cell_px = counters[CELL_PX];
+    let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
+    let last = frame.size - 1u;
+    let reach = u32(min(RECOVER_REACH * first_radius_px(density[cell].x, cell_px), 65535.0));
+    let low = pixel - min(pixel, vec2u(reach));
+    let high = min(pixel + reach, last);
+    return !(is_hidden(low.x | (pixel.y << 16u), depth) && is_hidden(high.x | (pixel.y << 16u), depth)
+        && is_hidden(pixel.x | (low.y << 16u), depth) && is_hidden(pixel.x | (high.y << 16u), depth));
 }

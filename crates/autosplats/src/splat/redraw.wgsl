@@ -37,9 +37,10 @@ fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     }
     let splat = splats[index];
     for (var row = firsts(bounds).y; row <= lasts(bounds).y; row++) {
-        let span = row_span(splat, bounds, row);
+        let line = line_of(splat, row);
+        let span = span_of(splat, line, bounds);
         for (var column = span.x; column <= span.y; column++) {
-            draw_depth(splat, vec2u(u32(column), row));
+            draw_depth(splat, line, u32(column));
         }
     }
 }

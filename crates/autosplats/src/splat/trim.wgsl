@@ -90,7 +90,8 @@ fn sticks_out(pixel: vec2i, own: f32) -> bool {
     for (var line = 0u; line < 8u; line++) {
         let step = lines[line] * stride;
         let ahead = meets_core(pixel, step, strides);
-        let behind = meets_core(pixel, -step, strides);
+        // Where nothing is ahead, what is behind tells only of a core anywhere around.
+        let behind = (ahead || !is_tail) && meets_core(pixel, -step, strides);
         if ahead && behind {
             return false;
         }
