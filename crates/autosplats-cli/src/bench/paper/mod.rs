@@ -9,6 +9,7 @@ mod chart;
 mod figures;
 mod journal;
 mod measure;
+mod numbers;
 mod report;
 mod scenes;
 
