@@ -447,7 +447,8 @@ pub(crate) struct PaperArgs {
     /// Folder of meshes of a galloping horse, the first with the triangles of all [default: a generated herd stands in]
     #[arg(long, value_name = "FOLDER")]
     pub(crate) gallop: Option<PathBuf>,
-    /// Folder for RESULTS.md and results/, which has pictures, charts and the measurements
+    /// Folder for RESULTS.md and results/, which has pictures, charts and the measurements; for RESULTS-quick.md and
+    /// results-quick/ with --quick
     #[arg(long, value_name = "FOLDER", default_value = "docs")]
     pub(crate) out: PathBuf,
     /// Small scenes and pictures and few ks: minutes even without a graphics card

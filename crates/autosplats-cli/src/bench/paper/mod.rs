@@ -34,7 +34,7 @@ use crate::threads::start_threads;
 
 /// The ks of Figure 10.
 const KS: [u32; 10] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50];
-/// Those for splat communication on a device that is a program on the processor: a frame takes it minutes there.
+/// Those for splat communication on a device that is a program on the processor: a frame takes it up to 38 s there.
 const FEW_KS: [u32; 4] = [5, 10, 25, 50];
 /// Those of a quick run.
 const QUICK_KS: [u32; 3] = [5, 10, 20];

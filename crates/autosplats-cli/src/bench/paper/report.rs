@@ -151,11 +151,11 @@ impl Report<'_> {
             "\nWhy they differ: the paper's figures come from a graphics card of 2012, which rasterises by hardware.";
         if self.renderers.is_software() {
             *page += " The GPU here is a program on the processor: it rasterises and blends with a few cores, each pass is waited \
-                      for, and the processor's own backend is faster than it at everything. Only ratios between its columns \
-                      mean anything, and those of splat communication, the one that rasterises, are worse than on a card.";
+                      for. Its times say nothing about a card's; ratios between its columns may, but hardly those of splat \
+                      communication, the one that rasterises.";
         }
-        *page += " The screen grid does other work than either: it reads each neighbourhood once or twice instead of drawing it \
-                  in each of some ten iterations, and it searches for visible points only, which a kd-tree of all points \
+        *page += " The screen grid does other work than either: it reads neighbourhoods instead of drawing them in each of some ten \
+                  iterations, and it searches for visible points only, which a kd-tree of all points \
                   cannot know.\n";
     }
 
@@ -252,10 +252,10 @@ impl Report<'_> {
             let differ: Option<f64> = self.journal.get(&Task::Culling.key(scene, self.renderers));
             _ = writeln!(page, " {} |", differ.map_or_else(|| "–".to_owned(), percent));
         }
-        *page += "\nWhy they differ: points are put back that the first depth map hides only by splats sticking out of \
-                  silhouettes, which keeps holes from opening there and leaves fewer to be saved; and on the CPU sixteen points \
-                  share a window, which serves points that lie thinner less well. The paper does not say what changes in its \
-                  pictures.\n";
+        *page += "\nWhy they differ: how much there is to save depends on how much of what is visible lies behind something, \
+                  which Table 1 tells (reconstructed out of visible), and points are put back that the first depth map hides \
+                  only by splats sticking out of silhouettes: without them holes open there. Splat communication iterates \
+                  anew for the points put back. The paper does not say what changes in its pictures.\n";
     }
 
     fn accuracy(&self, page: &mut String) {
@@ -347,8 +347,9 @@ impl Report<'_> {
     fn figure_10(&self, page: &mut String) {
         *page += "\n## Figure 10: time per stage\n\n\
                   With grid culling, for neighbourhoods of different sizes. The paper's chart gives no numbers; in it the search \
-                  is the main part throughout and grows with k, fitting costs about as much as splatting. Here that is so for \
-                  splat communication; with the screen grid the search is one stage among others. Stages are medians of up to \
+                  is the main part throughout and grows with k, fitting costs about as much as splatting. Here the search is the \
+                  main part with splat communication; with the screen grid it is one stage among others, and fitting costs less \
+                  than splatting everywhere. Stages are medians of up to \
                   five frames, or one of more than three seconds.\n\n";
         let folder = self.folder;
         for scene in self.scenes {
