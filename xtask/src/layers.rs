@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, ensure};
 
 /// The stages in the order of a frame; the renderer uses them all. Normals of whole clouds are no stage, but stand on the
 /// search and the fit.
-const ORDER: [&str; 7] = ["project", "search", "fit", "normals", "splat", "shade", "renderer"];
+const ORDER: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "splat", "shade", "renderer"];
 
 /// Checks every Rust file below `source`, the renderer's `src` folder.
 pub(crate) fn check(source: &Path) -> Result<()> {

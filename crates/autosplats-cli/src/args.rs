@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::choices::{AxesChoice, Backend, Engine, Map, OrientChoice, Side};
 use crate::exit::EXIT_CODES;
 use crate::first_radius::FirstRadius;
-use crate::values::{self, Ortho};
+use crate::values::{self, Neighbors, Ortho};
 
 /// Turns raw point clouds into lit surfaces: no normals, no radii, no preprocessing.
 #[derive(Debug, Parser)]
@@ -156,9 +156,10 @@ pub(crate) struct CameraArgs {
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
-    /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother
-    #[arg(short, value_name = "COUNT", default_value_t = Reconstruction::default().k, allow_negative_numbers = true)]
-    pub(crate) k: u32,
+    /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother. 'auto' takes 10, and more, up to
+    /// thousands, where points scatter about the surface
+    #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
+    pub(crate) k: Neighbors,
     /// How the neighbours are found
     #[arg(long, value_enum, default_value = "screen-grid")]
     pub(crate) engine: Engine,
@@ -403,9 +404,9 @@ pub(crate) struct BenchArgs {
     /// What renders; several, with commas, are measured one after the other
     #[arg(long = "backend", value_enum, value_delimiter = ',', default_value = "auto")]
     pub(crate) backends: Vec<Backend>,
-    /// Neighbours of each point, 1 to 64
-    #[arg(short, value_name = "COUNT", default_value_t = Reconstruction::default().k, allow_negative_numbers = true)]
-    pub(crate) k: u32,
+    /// Neighbours of each point, 1 to 64, or 'auto': 10, and more where points scatter
+    #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
+    pub(crate) k: Neighbors,
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],

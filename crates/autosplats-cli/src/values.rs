@@ -1,8 +1,9 @@
 //! The small values that options take: how they are typed and what is wrong with those that do not fit.
 
+use std::fmt;
 use std::str::FromStr;
 
-use autosplats::{Background, ColorMode, MAX_SIDE};
+use autosplats::{Background, ColorMode, MAX_SIDE, Reconstruction};
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{DepthCamera, parse_count};
 
@@ -20,6 +21,45 @@ pub(crate) const COLOR_MODES: [&str; 11] = [
     "k-radius",
     "depth",
 ];
+
+/// `-k`: how many neighbours a splat is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Neighbors {
+    /// As many as the noise calls for.
+    Auto,
+    Count(u32),
+}
+
+impl Neighbors {
+    /// The least number of neighbours, and whether there may be more.
+    pub(crate) fn settings(self) -> (u32, bool) {
+        match self {
+            Self::Auto => (Reconstruction::default().k, true),
+            Self::Count(k) => (k, false),
+        }
+    }
+}
+
+impl FromStr for Neighbors {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse() {
+            _ if text == "auto" => Ok(Self::Auto),
+            Ok(k) => Ok(Self::Count(k)),
+            _ => Err("a number of neighbours is a whole number, or 'auto'".into()),
+        }
+    }
+}
+
+impl fmt::Display for Neighbors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Count(k) => write!(f, "{k}"),
+        }
+    }
+}
 
 /// A number of frames.
 pub(crate) fn frames(text: &str) -> Result<usize, String> {

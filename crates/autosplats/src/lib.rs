@@ -25,6 +25,7 @@
 //! [`estimate_normals`] computes for all points of a cloud what a picture shows of those seen: normal, curvature and density
 //! radius, from the exact nearest neighbours in space.
 
+mod adapt;
 mod camera;
 mod error;
 mod fit;

@@ -29,7 +29,8 @@ struct Bench<'a> {
     version: &'static str,
     scene: &'a str,
     size: [u32; 2],
-    k: u32,
+    /// A number, or `auto`.
+    k: String,
     engine: String,
     /// Frames measured; times are medians of them.
     frames: usize,
@@ -61,7 +62,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     }
     start_threads(run)?;
     let mut settings = Settings::default();
-    settings.reconstruction.k = *k;
+    (settings.reconstruction.k, settings.reconstruction.adaptive) = k.settings();
     settings.reconstruction.engine = engine.with_first_radius(*first_radius);
     settings.check().map_err(render_failure)?;
     let name = scene.strip_prefix("scene:").unwrap_or(scene);
@@ -78,7 +79,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         version: env!("CARGO_PKG_VERSION"),
         scene,
         size: *size,
-        k: *k,
+        k: k.to_string(),
         engine: engine.name(),
         frames: *frames,
         stream: *stream,
@@ -139,6 +140,7 @@ fn measure(
             project: of(&|timings| timings.project),
             search: of(&|timings| timings.search),
             fit: of(&|timings| timings.fit),
+            adapt: of(&|timings| timings.adapt),
             splat: of(&|timings| timings.splat),
             shade: of(&|timings| timings.shade),
             frame: of(&|timings| timings.frame),
@@ -193,10 +195,9 @@ impl Bench<'_> {
                 lines.push(format!("  found after each iteration, %: {}", percents.join(" ")));
             }
             let mut line = |name: &str, ms: f64| lines.push(format!("  {name:<32} {ms:>10.3}"));
-            let Timings { project, search, fit, splat, shade, frame, .. } = timings_ms;
-            for (stage, ms) in
-                [("project", project), ("search", search), ("fit", fit), ("splat", splat), ("shade", shade)]
-            {
+            let Timings { project, search, fit, adapt, splat, shade, frame, .. } = timings_ms;
+            let stages = [("project", project), ("search", search), ("fit", fit), ("adapt", adapt), ("splat", splat)];
+            for (stage, ms) in stages.into_iter().chain([("shade", shade)]) {
                 line(stage, *ms);
                 let prefix = format!("{stage}/");
                 for (pass, times, ms) in summed(passes).into_iter().filter(|(pass, ..)| pass.starts_with(&prefix)) {

@@ -103,8 +103,10 @@ impl Job {
 }
 
 fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings {
+    let (k, adaptive) = surface.k.settings();
     let reconstruction = Reconstruction {
-        k: surface.k,
+        k,
+        adaptive,
         engine: surface.engine.with_first_radius(surface.first_radius),
         outlier_expansions: (!surface.keep_outliers).then_some(surface.e0),
         gap_factor: (!surface.bridge_gaps).then_some(surface.gap_factor),

@@ -34,6 +34,20 @@ pub(super) fn eigen<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: [F32s<S>; 6]) ->
     Eigen { values: matrix.diagonal, vectors: matrix.vectors }
 }
 
+/// Eigenvalues, ascending, of one symmetric matrix given as xx, xy, xz, yy, yz, zz, and the unit eigenvectors that belong to
+/// them.
+#[inline(always)]
+pub(crate) fn eigenvectors(matrix: [f32; 6]) -> ([f32; 3], [[f32; 3]; 3]) {
+    let simd = pulp::Scalar;
+    let Eigen { values, vectors } = eigen(simd, matrix.map(|entry| F32s::splat(simd, entry)));
+    let first = |vector: F32s<pulp::Scalar>| {
+        let mut value = [0.0];
+        vector.store(&mut value, 0);
+        value[0]
+    };
+    (values.map(first), vectors.map(|vector| vector.map(first)))
+}
+
 /// A matrix on its way to the diagonal.
 struct Rotated<S: Simd> {
     diagonal: [F32s<S>; 3],

@@ -8,6 +8,7 @@ use super::attributes::Wanted;
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
+use crate::adapt::Adapter;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{Projector, ScreenPoints};
@@ -21,6 +22,7 @@ pub(super) struct CpuRenderer {
     projector: Projector,
     neighborhoods: Neighborhoods,
     surfels: Surfels,
+    adapter: Adapter,
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -36,6 +38,7 @@ impl Default for CpuRenderer {
             projector: Projector::default(),
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
+            adapter: Adapter::default(),
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -85,16 +88,20 @@ impl CpuRenderer {
             measures: wanted.measures,
         };
         let settings_splat = &settings.reconstruction;
-        let Self { projector, neighborhoods, surfels, recovered, splatter, image, .. } = self;
+        let Self { projector, neighborhoods, surfels, adapter, recovered, splatter, image, .. } = self;
         let mut clock = Clock::start();
 
         let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
         clock.lap(|timings| &mut timings.project);
 
+        if settings_splat.adaptive {
+            adapter.begin(screen, &view, settings_splat.k);
+            clock.lap(|timings| &mut timings.adapt);
+        }
         surfels.clear();
         splatter.begin(&view);
         let reconstruct = Reconstruct { screen, view: &view, settings, given };
-        let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, splatter, &mut clock);
+        let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
             let point = &screen.points[index as usize];
@@ -104,7 +111,8 @@ impl CpuRenderer {
         recovered.extend(screen.passive.iter().filter(|index| !hidden(index)));
         clock.lap(|timings| &mut timings.splat);
         if !recovered.is_empty() {
-            search_counts = search_counts + reconstruct.run(recovered, neighborhoods, surfels, splatter, &mut clock);
+            search_counts =
+                search_counts + reconstruct.run(recovered, neighborhoods, surfels, adapter, splatter, &mut clock);
         }
 
         if settings_splat.depth_refinement {
@@ -148,12 +156,13 @@ struct Reconstruct<'a> {
 }
 
 impl Reconstruct<'_> {
-    /// Searches, fits and draws the depth of `queries`, adding their surfels to `surfels`.
+    /// Searches, fits, adapts and draws the depth of `queries`, adding their surfels to `surfels`.
     fn run(
         &self,
         queries: &[u32],
         neighborhoods: &mut Neighborhoods,
         surfels: &mut Surfels,
+        adapter: &mut Adapter,
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
@@ -189,6 +198,10 @@ impl Reconstruct<'_> {
         fit(screen, queries, neighborhoods, view, &rules, surfels);
         clock.lap(|timings| &mut timings.fit);
 
+        if settings.adaptive {
+            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k);
+            clock.lap(|timings| &mut timings.adapt);
+        }
         splatter.add(surfels, first, view);
         clock.lap(|timings| &mut timings.splat);
         neighborhoods.counts

@@ -272,6 +272,7 @@ impl GpuRenderer {
             project: stage("project"),
             search: stage("search"),
             fit: stage("fit"),
+            adapt: stage("adapt"),
             splat: stage("splat"),
             shade: stage("shade"),
             frame: frame_ms,

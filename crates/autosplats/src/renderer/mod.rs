@@ -67,6 +67,7 @@ pub struct Timings {
     pub project: f64,
     pub search: f64,
     pub fit: f64,
+    pub adapt: f64,
     pub splat: f64,
     pub shade: f64,
     /// From the first stage's start to the last one's end; reading a picture back from a device is not part of it.

@@ -15,11 +15,14 @@ pub struct Settings {
     pub all_layers: bool,
 }
 
-/// How points become splats. The defaults are the paper's.
+/// How points become splats. But for [`adaptive`](Self::adaptive), the defaults are the paper's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reconstruction {
     /// Neighbours per point, 1 to 64.
     pub k: u32,
+    /// Fit larger neighbourhoods, of up to thousands of points, where points scatter too much for k neighbours to tell the
+    /// surface, and move splats onto what is fitted. A scan without noise is left as it is.
+    pub adaptive: bool,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
     /// e0: points without a neighbour after this many expansions of their first search radius, each by √k (√10 at least),
@@ -42,6 +45,7 @@ impl Default for Reconstruction {
     fn default() -> Self {
         Self {
             k: 10,
+            adaptive: false,
             engine: SearchEngine::default(),
             outlier_expansions: Some(1),
             gap_factor: Some(4.0),

@@ -167,11 +167,12 @@ pub(super) struct Loaded<'a> {
     pub(super) camera: Camera,
 }
 
-/// The settings of a measurement: the defaults, but these.
+/// The settings of a measurement: the paper's, but these.
 pub(super) fn settings(method: Method, first_radius: f32, k: u32, culled: bool) -> Settings {
     let mut settings = Settings::default();
     settings.reconstruction.engine = method.engine(first_radius);
     settings.reconstruction.k = k;
+    settings.reconstruction.adaptive = false;
     settings.reconstruction.grid_culling = culled;
     settings
 }

@@ -1,0 +1,180 @@
+//! Screen points summed up in cells, coarse to fine.
+
+use rayon::prelude::*;
+
+use crate::camera::View;
+use crate::project::ScreenPoints;
+
+/// Slabs of depth in a cell. A surface seen at 76° or less from its normal fills no more; those of another one further away
+/// share the slab nearest to them.
+pub(crate) const SLABS: usize = 4;
+/// Coarser levels are of no use to any ball.
+const MOST_LEVELS: usize = 9;
+
+/// The mean of some screen points near each other, view space, and their number.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Cluster {
+    pub(crate) mean: [f32; 3],
+    /// 0 if there are none.
+    pub(crate) count: f32,
+}
+
+/// The clusters of a cell by slabs of depth, those used first.
+pub(crate) type Cell = [Cluster; SLABS];
+
+/// Cells of one size.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Level {
+    /// Side of a cell in pixels.
+    pub(crate) side_px: usize,
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
+    pub(crate) cells: Vec<Cell>,
+}
+
+/// All screen points of a frame in cells of several sizes, finest first, each level's twice as wide as those before.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Cells {
+    pub(crate) levels: Vec<Level>,
+}
+
+/// A cell being filled.
+#[derive(Clone, Copy, Debug)]
+struct Filling {
+    sum: [[f32; 3]; SLABS],
+    count: [f32; SLABS],
+    /// Slab of depth of each cluster.
+    slab: [u32; SLABS],
+    used: usize,
+}
+
+impl Filling {
+    const EMPTY: Self = Self { sum: [[0.0; 3]; SLABS], count: [0.0; SLABS], slab: [0; SLABS], used: 0 };
+
+    /// Adds `count` points with this mean.
+    #[inline(always)]
+    fn add(&mut self, mean: [f32; 3], count: f32, slab: u32) {
+        let mut at = self.used;
+        let mut nearest = u32::MAX;
+        for index in 0..self.used {
+            let distance = self.slab[index].abs_diff(slab);
+            // The first of several at the same distance.
+            if distance < nearest && (distance == 0 || self.used == SLABS) {
+                (nearest, at) = (distance, index);
+            }
+        }
+        if at == self.used {
+            self.slab[at] = slab;
+            self.used += 1;
+        }
+        self.count[at] += count;
+        for axis in 0..3 {
+            self.sum[at][axis] += mean[axis] * count;
+        }
+    }
+
+    fn finish(&self) -> Cell {
+        std::array::from_fn(|index| {
+            let count = self.count[index];
+            let mean = if count > 0.0 { self.sum[index].map(|sum| sum / count) } else { [0.0; 3] };
+            Cluster { mean, count }
+        })
+    }
+}
+
+/// How depth is cut into slabs about as thick as a cell is wide.
+#[derive(Clone, Copy, Debug)]
+struct Slabs {
+    perspective: bool,
+    /// Perspective: low bits of a depth that do not count, so that slabs get thicker as cells get wider with depth.
+    shift: u32,
+    /// Parallel: slabs per world unit.
+    per_unit: f32,
+}
+
+impl Slabs {
+    fn new(side_px: usize, view: &View) -> Self {
+        // Depths between two powers of two share 2²³ steps.
+        let share = (side_px as f32 / view.focal_px).min(1.0);
+        let shift = (23 - ((1.0 / share) as u32).max(1).ilog2().min(23)).min(23);
+        Self { perspective: view.perspective, shift, per_unit: view.focal_px / side_px as f32 }
+    }
+
+    /// Slab of a depth above 0.
+    #[inline(always)]
+    fn of(&self, depth: f32) -> u32 {
+        if self.perspective { depth.to_bits() >> self.shift } else { (depth * self.per_unit) as u32 }
+    }
+}
+
+impl Cells {
+    /// Sums up the screen points of a frame whose cells in the density grid hold about `k` points.
+    pub(crate) fn fill(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
+        let side_px = finest_side_px(screen.density.cell_px, k);
+        let [mut columns, mut rows] = [view.width, view.height].map(|side| (side as usize).div_ceil(side_px));
+        let levels = 1 + (columns.max(rows) / 4).max(1).ilog2() as usize;
+        self.levels.resize_with(levels.min(MOST_LEVELS), Level::default);
+        for (index, level) in self.levels.iter_mut().enumerate() {
+            level.side_px = side_px << index;
+            (level.columns, level.rows) = (columns, rows);
+            level.cells.resize(columns * rows, Cell::default());
+            (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
+        }
+        let Some((finest, coarser)) = self.levels.split_first_mut() else { return };
+        fill_finest(screen, view, finest);
+        let mut below = &*finest;
+        for level in coarser {
+            merge(below, view, level);
+            below = level;
+        }
+    }
+}
+
+/// Side of the finest cells: about the distance between screen points, at least two pixels.
+pub(crate) fn finest_side_px(density_cell_px: usize, k: u32) -> usize {
+    ((density_cell_px as f32 / (k as f32).sqrt()).round() as usize).max(2)
+}
+
+/// Fills the finest cells with points.
+fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
+    let Level { side_px, columns, .. } = *level;
+    let slabs = Slabs::new(side_px, view);
+    let strip_px = screen.cells.strip_px;
+    let last_x = screen.cells.columns - 1;
+    level.cells.par_chunks_mut(columns).enumerate().for_each_init(Vec::new, |filling, (row, out)| {
+        filling.clear();
+        filling.resize(columns, Filling::EMPTY);
+        let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
+        for strip in y0 / strip_px..=y1 / strip_px {
+            for point in &screen.points[screen.cells.run(strip, 0, last_x)] {
+                let [x, y] = point.pixel_xy();
+                if (y0..=y1).contains(&y) {
+                    filling[x / side_px].add(point.position_view, 1.0, slabs.of(point.position_view[2]));
+                }
+            }
+        }
+        for (out, filling) in out.iter_mut().zip(filling) {
+            *out = filling.finish();
+        }
+    });
+}
+
+/// Fills a level with what the one below it holds.
+fn merge(below: &Level, view: &View, level: &mut Level) {
+    let slabs = Slabs::new(level.side_px, view);
+    level.cells.par_chunks_mut(level.columns).enumerate().for_each(|(row, out)| {
+        for (column, out) in out.iter_mut().enumerate() {
+            let mut filling = Filling::EMPTY;
+            for y in 2 * row..(2 * row + 2).min(below.rows) {
+                for x in 2 * column..(2 * column + 2).min(below.columns) {
+                    for cluster in &below.cells[y * below.columns + x] {
+                        if cluster.count > 0.0 {
+                            filling.add(cluster.mean, cluster.count, slabs.of(cluster.mean[2]));
+                        }
+                    }
+                }
+            }
+            *out = filling.finish();
+        }
+    });
+}

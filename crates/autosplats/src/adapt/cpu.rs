@@ -1,0 +1,158 @@
+//! The choice of a scale for each surfel.
+
+use glam::Vec3;
+use pulp::Simd;
+use rayon::prelude::*;
+
+use super::cells::Cells;
+use super::noise::measure_noise;
+use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
+use super::{LEAST_REACH, SCALES, STEP};
+use crate::camera::View;
+use crate::fit::Surfel;
+use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
+
+/// Surfels per task.
+const TASK: usize = 256;
+/// Standard error of a normal, radians, that no larger ball need better.
+pub(super) const ENOUGH: f32 = 0.025;
+/// Largest standard error of a normal that others are held against.
+pub(super) const RELIABLE: f32 = 0.12;
+/// Most noise, as a part of a ball's radius, with which its points are a surface at all.
+pub(super) const THICKEST: f32 = 0.28;
+/// The same of the first neighbourhood, whose plane has no error of its own to tell.
+pub(super) const THICKEST_FIRST: f32 = 0.15;
+/// Larger balls may scatter this many times the noise.
+pub(super) const SCATTER: f32 = 1.7;
+/// Normals agree within this many standard errors.
+pub(super) const AGREE: f32 = 3.0;
+
+/// What all surfels share.
+#[derive(Clone, Copy)]
+struct Task<'a> {
+    cells: &'a Cells,
+    density: &'a DensityGrid,
+    view: &'a View,
+    k: u32,
+    noise: f32,
+}
+
+/// Fits surfels anew where noise calls for it; keeps its buffers from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct Adapter {
+    cells: Cells,
+    /// Standard deviation of points from their surface, world units; measured by the first surfels of a frame.
+    noise: Option<f32>,
+}
+
+impl Adapter {
+    /// Sums up the screen points of a new frame, whose cells in the density grid hold about `k` points.
+    pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
+        self.cells.fill(screen, view, k);
+        self.noise = None;
+    }
+
+    /// Fits each of `surfels` anew at the scale that the frame's noise calls for.
+    pub(crate) fn adapt(&mut self, surfels: &mut [Surfel], density: &DensityGrid, view: &View, k: u32) {
+        let Self { cells, noise } = self;
+        let noise = *noise.get_or_insert_with(|| measure_noise(surfels, cells, density, view, k));
+        let task = Task { cells, density, view, k, noise };
+        surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
+            adapt_all(surfels, &task, gathered);
+        });
+    }
+}
+
+/// Radius that the balls around a surfel are multiples of.
+#[inline(always)]
+pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
+    let point = ScreenPoint { position_view: surfel.center, pixel: surfel.pixel };
+    surfel.k_radius.max(LEAST_REACH * density.initial_radius(&point, k, view))
+}
+
+#[pulp::with_simd(adapt_all = pulp::Arch::new())]
+#[inline(always)]
+fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
+    for surfel in surfels {
+        // The first neighbourhood's error is about that of its k points over the k-radius.
+        let enough = task.noise <= ENOUGH * surfel.k_radius;
+        if surfel.radius > 0.0
+            && !enough
+            && let Some(quadric) = choose(simd, surfel, task, gathered)
+        {
+            place(surfel, &quadric, task.view);
+        }
+    }
+}
+
+/// The quadric of the largest ball that agrees with the smaller ones; `None` if none is better than the first neighbours.
+#[inline(always)]
+fn choose<S: Simd>(simd: S, surfel: &Surfel, task: &Task, gathered: &mut Gathered) -> Option<Quadric> {
+    let Task { cells, density, view, k, noise } = *task;
+    let mut radius = first_radius(surfel, density, view, k);
+    // Normals to agree with, and their errors.
+    let mut reliable = [(Vec3::ZERO, 0.0); SCALES + 1];
+    let mut count = 0;
+    if noise < THICKEST_FIRST * surfel.k_radius {
+        reliable[0] = (surfel.normal.into(), noise / surfel.k_radius);
+        count = 1;
+    }
+    let mut best = None;
+    // Where nothing is reliable, the least error.
+    let mut fallback: Option<Quadric> = None;
+    // Heights of the first ball are along its plane's normal, those of larger ones along the normal found before.
+    let mut axis = None;
+    for scale in 0..SCALES {
+        radius *= STEP;
+        // Points of a ball that the noise fills are no surface. The largest ball has to do where there is no better.
+        let thin = noise < THICKEST * radius;
+        if !thin & (scale + 1 < SCALES) {
+            continue;
+        }
+        if gathered.read(cells, surfel.center, radius, view) < LEAST_CLUSTERS {
+            continue;
+        }
+        let (along, curvature) = axis.unwrap_or_else(|| gathered.plane(simd));
+        let quadric = gathered.quadric(simd, radius, along, curvature);
+        let error = quadric.error * noise;
+        if !(thin & (error < RELIABLE)) {
+            if fallback.is_none_or(|other| quadric.error < other.error) {
+                fallback = Some(quadric);
+            }
+            continue;
+        }
+        let agrees = |&(normal, other): &(Vec3, f32)| {
+            quadric.normal.cross(normal).length_squared() <= AGREE * AGREE * (error * error + other * other)
+        };
+        let agrees = reliable[..count].iter().all(agrees) & ((count == 0) | (quadric.scatter <= SCATTER * noise));
+        if !agrees {
+            break;
+        }
+        reliable[count] = (quadric.normal, error);
+        count += 1;
+        axis = Some((quadric.normal, curvature));
+        best = Some(quadric);
+        if error < ENOUGH {
+            break;
+        }
+    }
+    if count == 0 { fallback } else { best }
+}
+
+/// Turns and moves a surfel onto a quadric.
+#[inline(always)]
+fn place(surfel: &mut Surfel, quadric: &Quadric, view: &View) {
+    let center = Vec3::from(surfel.center) + quadric.axis * quadric.height;
+    let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
+    let normal = if quadric.normal.dot(to_eye) < 0.0 { -quadric.normal } else { quadric.normal };
+    surfel.normal = normal.to_array();
+    surfel.major_axis = normal.any_orthonormal_vector().to_array();
+    surfel.major_ratio = 1.0;
+    surfel.curvature = quadric.curvature;
+    let [x, y] = view.to_pixel(center);
+    // A centre beside the picture has no pixel to be hidden at.
+    if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {
+        surfel.center = center.to_array();
+        surfel.pixel = (y as u32) << 16 | x as u32;
+    }
+}

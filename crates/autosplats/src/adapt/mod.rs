@@ -1,0 +1,31 @@
+//! Adapt: neighbourhoods as large as the noise calls for.
+//!
+//! # How it works
+//! Ten neighbours tell nothing of a plane that scatters further than they are apart. So larger balls around each point are
+//! tried, [`SCALES`] of them, each [`STEP`] times as wide as the one before, and a quadric is fitted to what lies in them: a
+//! height field with six coefficients, whose slope at the point is free of the bias that curved or one-sided surroundings give
+//! to a plane. A ball of a thousand points costs what one of thirty does, because it is summed up in *cells* (`cells`):
+//! squares of pixels cut into slabs of depth, each level twice as coarse as the one before, of which only the mean and the
+//! count are kept. A ball reads cells of between a quarter and half of its radius.
+//!
+//! How far points scatter is one number for the whole frame (`noise`): it is what is left of the quadrics at the first scale
+//! where many of a sample of points find a surface thinner than their ball is wide. With that number the error of each fit is
+//! known beforehand; a point takes the first scale whose error is small enough. Larger ones are taken only while they agree
+//! with the smaller ones within their errors and scatter no more, which they do on smooth surfaces and do not at edges.
+//! Where the first ten neighbours are good enough, the fit stays as it was; nearly everything does in a scan without noise.
+//! Where they are not, the surfel turns to the fitted normal, and its centre moves along it onto the fitted surface.
+
+mod cells;
+mod cpu;
+mod noise;
+mod quadric;
+
+pub(crate) use cpu::Adapter;
+
+/// Balls tried around each point, beside the neighbourhood that the search found.
+pub(crate) const SCALES: usize = 6;
+/// Radius of a ball over that of the one before; of the first over the k-radius.
+pub(crate) const STEP: f32 = 1.6;
+/// The k-radius counts as at least this part of the first search radius: it is too small where a gap or the end of a
+/// surface left few neighbours.
+pub(crate) const LEAST_REACH: f32 = 0.8;

@@ -1,0 +1,202 @@
+//! A height field with six coefficients over a ball's points.
+
+use glam::Vec3;
+use pulp::Simd;
+
+use super::cells::{Cells, Cluster};
+use crate::camera::View;
+use crate::fit::eigenvectors;
+use crate::search::{LANES, Lanes};
+use crate::simd::F32s;
+
+/// Cells are at most this part of a ball's radius wide.
+const CELLS_PER_RADIUS: f32 = 2.0;
+/// Fewer clusters than this tell too little of six coefficients.
+pub(super) const LEAST_CLUSTERS: usize = 12;
+/// Clusters count in full up to this part of the squared radius, and less and less beyond: none comes or goes at once.
+const FULL: f32 = 0.5;
+/// Weight, as a share of all, that pulls curvatures to 0: a one-sided ball tells little of them.
+const RIDGE: f32 = 0.003;
+/// Least pivot of the elimination, as a share of the weight.
+const LEAST_PIVOT: f32 = 1e-6;
+
+/// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights.
+#[derive(Debug, Default)]
+pub(super) struct Gathered {
+    lanes: Vec<[Lanes; 4]>,
+    len: usize,
+}
+
+/// The quadric fitted to a ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Quadric {
+    /// Unit normal of the surface at the point's place; of either sign.
+    pub(super) normal: Vec3,
+    /// How far the surface is from the point along `axis`, world units.
+    pub(super) height: f32,
+    /// Unit direction of the heights.
+    pub(super) axis: Vec3,
+    /// Standard deviation of points from the surface, world units.
+    pub(super) scatter: f32,
+    /// Standard error of the normal's slope, in radians per world unit of scatter.
+    pub(super) error: f32,
+    /// Surface variation λ0/(λ0+λ1+λ2) of the clusters, 0 to 1/3.
+    pub(super) curvature: f32,
+}
+
+impl Gathered {
+    /// Reads the clusters in the ball of `radius` around `center` (view space) and returns their number.
+    #[inline(always)]
+    pub(super) fn read(&mut self, cells: &Cells, center: [f32; 3], radius: f32, view: &View) -> usize {
+        self.lanes.clear();
+        self.len = 0;
+        let [px, py] = view.to_pixel(center.into());
+        let radius_px = radius / view.pixel_size(center[2]);
+        let Some(mut level) = cells.levels.first() else { return 0 };
+        for coarser in &cells.levels[1..] {
+            if coarser.side_px as f32 * CELLS_PER_RADIUS <= radius_px {
+                level = coarser;
+            }
+        }
+        let side = level.side_px as f32;
+        // Casts from float saturate at 0.
+        let range = |at: f32, count: usize| {
+            [((at - radius_px) / side) as usize, (((at + radius_px) / side) as usize).min(count - 1)]
+        };
+        let [x0, x1] = range(px, level.columns);
+        let [y0, y1] = range(py, level.rows);
+        let [cx, cy, cz] = center;
+        let per_radius = 1.0 / radius;
+        for row in y0..=y1 {
+            for cell in &level.cells[row * level.columns..][..level.columns][x0.min(x1)..=x1] {
+                for &Cluster { mean: [x, y, z], count } in cell {
+                    if count == 0.0 {
+                        break;
+                    }
+                    let [x, y, z] = [(x - cx) * per_radius, (y - cy) * per_radius, (z - cz) * per_radius];
+                    let rest = 1.0 - (x * x + y * y + z * z);
+                    if rest > 0.0 {
+                        self.push([x, y, z, (rest * (1.0 / (1.0 - FULL))).min(1.0) * count]);
+                    }
+                }
+            }
+        }
+        self.len
+    }
+
+    #[inline(always)]
+    fn push(&mut self, values: [f32; 4]) {
+        let lane = self.len % LANES;
+        if lane == 0 {
+            // Lanes without a cluster weigh nothing.
+            self.lanes.push([Lanes::default(); 4]);
+        }
+        if let Some(last) = self.lanes.last_mut() {
+            for (lanes, value) in last.iter_mut().zip(values) {
+                lanes.0[lane] = value;
+            }
+        }
+        self.len += 1;
+    }
+
+    /// Axis of least spread of the clusters, and their surface variation.
+    #[inline(always)]
+    pub(super) fn plane<S: Simd>(&self, simd: S) -> (Vec3, f32) {
+        let [w, x, y, z, xx, xy, xz, yy, yz, zz] = self.sums(simd, |[x, y, z, w]| {
+            let [wx, wy, wz] = [w * x, w * y, w * z];
+            [w, wx, wy, wz, wx * x, wx * y, wx * z, wy * y, wy * z, wz * z]
+        });
+        let share = 1.0 / w;
+        let [x, y, z] = [x * share, y * share, z * share];
+        let second = [xx * share - x * x, xy * share - x * y, xz * share - x * z, yy * share - y * y];
+        let (values, axes) =
+            eigenvectors([second[0], second[1], second[2], second[3], yz * share - y * z, zz * share - z * z]);
+        let least = values[0].max(0.0);
+        let sum = least + values[1] + values[2];
+        (Vec3::from(axes[0]), if sum > 0.0 { least / sum } else { 0.0 })
+    }
+
+    /// Fits heights along `axis`.
+    #[inline(always)]
+    pub(super) fn quadric<S: Simd>(&self, simd: S, radius: f32, axis: Vec3, curvature: f32) -> Quadric {
+        let u = axis.any_orthonormal_vector();
+        let v = axis.cross(u);
+        let frame = [u, v, axis].map(|axis| axis.to_array().map(|c| F32s::splat(simd, c)));
+        #[rustfmt::skip]
+        let [w, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy, h, hx, hy, hxx, hxy, hyy, hh] =
+            self.sums(simd, |[px, py, pz, w]| {
+                let [x, y, h] = frame.map(|axis| axis[0] * px + axis[1] * py + axis[2] * pz);
+                let [xx, xy, yy] = [x * x, x * y, y * y];
+                let [wx, wy, wxx, wxy, wyy, wh] = [w * x, w * y, w * xx, w * xy, w * yy, w * h];
+                [
+                    w, wx, wy, wxx, wxy, wyy, wxx * x, wxx * y, wxy * y, wyy * y,
+                    wxx * xx, wxx * xy, wxx * yy, wxy * yy, wyy * yy,
+                    wh, wh * x, wh * y, wh * xx, wh * xy, wh * yy, wh * h,
+                ]
+            });
+        let ridge = RIDGE * w;
+        // Slopes last, so that what is left of their rows when the others are eliminated is their own.
+        let mut rows = [
+            [xxxx + ridge, xxxy, xxyy, xx, xxx, xxy, hxx],
+            [xxxy, xxyy + ridge, xyyy, xy, xxy, xyy, hxy],
+            [xxyy, xyyy, yyyy + ridge, yy, xyy, yyy, hyy],
+            [xx, xy, yy, w, x, y, h],
+            [xxx, xxy, xyy, x, xx, xy, hx],
+            [xxy, xyy, yyy, y, xy, yy, hy],
+        ];
+        let mut rest = hh;
+        for pivot in 0..6 {
+            // What rounding leaves of a row that others explain must not be divided by.
+            let inverse = 1.0 / rows[pivot][pivot].max(LEAST_PIVOT * w);
+            rest -= rows[pivot][6] * rows[pivot][6] * inverse;
+            for row in pivot + 1..6 {
+                let factor = rows[row][pivot] * inverse;
+                for column in pivot..7 {
+                    rows[row][column] -= factor * rows[pivot][column];
+                }
+            }
+        }
+        let pivot = |at: usize| rows[at][at].max(LEAST_PIVOT * w);
+        let slope_y = rows[5][6] / pivot(5);
+        let slope_x = (rows[4][6] - rows[4][5] * slope_y) / pivot(4);
+        let height = (rows[3][6] - rows[3][4] * slope_x - rows[3][5] * slope_y) / pivot(3);
+        // Trace of the inverse of the 2×2 matrix that is left for the slopes.
+        let tilt = rows[4][5] / pivot(4);
+        let trace = 1.0 / pivot(4) + (1.0 + tilt * tilt) / pivot(5);
+        let freedom = self.len.max(LEAST_CLUSTERS) as f32 - 6.0;
+        Quadric {
+            normal: (axis - u * slope_x - v * slope_y).normalize(),
+            height: height * radius,
+            axis,
+            scatter: (rest.max(0.0) / freedom).sqrt() * radius,
+            error: trace.sqrt() / radius,
+            curvature,
+        }
+    }
+
+    /// Sums of `values` of position and weight over all clusters, each in sixteen lanes that are added up in order: the
+    /// same bits whatever the width of a vector.
+    #[inline(always)]
+    fn sums<S: Simd, const N: usize>(&self, simd: S, values: impl Fn([F32s<S>; 4]) -> [F32s<S>; N]) -> [f32; N] {
+        let mut out = [0.0; N];
+        let zero = F32s::splat(simd, 0.0);
+        let mut lanes = Lanes::default();
+        let vectors = LANES / S::F32_LANES;
+        for vector in 0..vectors {
+            let mut sums = [zero; N];
+            for four in &self.lanes {
+                let four = [0, 1, 2, 3].map(|i: usize| F32s::load(simd, &four[i].0, vector));
+                for (sum, value) in sums.iter_mut().zip(values(four)) {
+                    *sum += value;
+                }
+            }
+            for (out, sum) in out.iter_mut().zip(sums) {
+                sum.store(&mut lanes.0, vector);
+                for lane in vector * S::F32_LANES..(vector + 1) * S::F32_LANES {
+                    *out += lanes.0[lane];
+                }
+            }
+        }
+        out
+    }
+}
