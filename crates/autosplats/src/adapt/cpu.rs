@@ -5,7 +5,7 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
-use super::noise::measure_noise;
+use super::noise::{Noise, measure_noise};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
@@ -34,15 +34,15 @@ struct Task<'a> {
     density: &'a DensityGrid,
     view: &'a View,
     k: u32,
-    noise: f32,
+    noise: Noise,
 }
 
 /// Fits surfels anew where noise calls for it; keeps its buffers from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Adapter {
     cells: Cells,
-    /// Standard deviation of points from their surface, world units; measured by the first surfels of a frame.
-    noise: Option<f32>,
+    /// Measured by the first surfels of a frame.
+    noise: Option<Noise>,
 }
 
 impl Adapter {
@@ -75,10 +75,11 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
 fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
     for surfel in surfels {
         // The first neighbourhood's error is about that of its k points over the k-radius.
-        let enough = task.noise <= ENOUGH * surfel.k_radius;
+        let noise = task.noise.at(surfel.center[2]);
+        let enough = noise <= ENOUGH * surfel.k_radius;
         if surfel.radius > 0.0
             && !enough
-            && let Some(quadric) = choose(simd, surfel, task, gathered)
+            && let Some(quadric) = choose(simd, surfel, noise, task, gathered)
         {
             place(surfel, &quadric, task.view);
         }
@@ -87,8 +88,8 @@ fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Tas
 
 /// The quadric of the largest ball that agrees with the smaller ones; `None` if none is better than the first neighbours.
 #[inline(always)]
-fn choose<S: Simd>(simd: S, surfel: &Surfel, task: &Task, gathered: &mut Gathered) -> Option<Quadric> {
-    let Task { cells, density, view, k, noise } = *task;
+fn choose<S: Simd>(simd: S, surfel: &Surfel, noise: f32, task: &Task, gathered: &mut Gathered) -> Option<Quadric> {
+    let Task { cells, density, view, k, .. } = *task;
     let mut radius = first_radius(surfel, density, view, k);
     // Normals to agree with, and their errors.
     let mut reliable = [(Vec3::ZERO, 0.0); SCALES + 1];

@@ -12,9 +12,11 @@ use crate::fit::Surfel;
 use crate::project::DensityGrid;
 
 /// Surfels looked at.
-pub(crate) const SAMPLE: usize = 4096;
+pub(crate) const SAMPLE: usize = 2048;
+/// The nearest and the farthest third of a sample tell how noise grows with depth if they are this far apart, far over near.
+const APART: f32 = 1.2;
 /// Surfels per task.
-const TASK: usize = 64;
+const TASK: usize = 32;
 /// Fewer that find anything in a ball say nothing.
 const LEAST_SAMPLE: usize = 64;
 /// So does less than one of this many.
@@ -26,16 +28,56 @@ const THIN_SHARE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 const QUANTILE: f32 = 0.3;
 
-/// Standard deviation of points from their surface, world units, from a sample of `surfels`; 0 if there are too few.
-pub(crate) fn measure_noise(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> f32 {
+/// Standard deviation of points from their surface: `factor`·depthᵖ, world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Noise {
+    pub(crate) factor: f32,
+    /// p: 0 for noise that is the same everywhere; up to 2, as depth cameras have it.
+    pub(crate) power: f32,
+}
+
+impl Noise {
+    /// At a depth above 0.
+    #[inline(always)]
+    pub(crate) fn at(&self, depth: f32) -> f32 {
+        if self.power == 0.0 { self.factor } else { self.factor * depth.powf(self.power) }
+    }
+
+    /// From a sample, nearest first.
+    fn of(sample: &[Sampled]) -> Self {
+        let third = sample.len() / 3;
+        let [near, far] = [&sample[..third], &sample[sample.len() - third..]];
+        if let ([.., last], [first, ..]) = (near, far)
+            && first.depth > APART * last.depth
+        {
+            let [near_depth, far_depth] = [near[third / 2].depth, far[third / 2].depth];
+            let [near_noise, far_noise] = [scatter_level(near), scatter_level(far)];
+            if near_noise > 0.0 && far_noise > near_noise {
+                let growth = (far_noise / near_noise).ln() / (far_depth / near_depth).ln();
+                // Little growth is chance, or other things further away.
+                let power = (2.0 * (growth - 0.5)).clamp(0.0, 2.0);
+                if power > 0.0 {
+                    let [noise, depth] = [(near_noise * far_noise).sqrt(), (near_depth * far_depth).sqrt()];
+                    return Self { factor: noise / depth.powf(power), power };
+                }
+            }
+        }
+        Self { factor: scatter_level(sample), power: 0.0 }
+    }
+}
+
+/// Measures the noise of a frame on a sample of `surfels`; none if there are too few.
+pub(crate) fn measure_noise(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> Noise {
     let step = surfels.len().div_ceil(SAMPLE).max(1);
-    let sample: Vec<&Surfel> = surfels.iter().step_by(step).collect();
-    let mut scatter = vec![[None; SCALES]; sample.len()];
-    let sample = sample.par_chunks(TASK).zip(scatter.par_chunks_mut(TASK));
-    sample.for_each_init(Gathered::default, |gathered, (surfels, out)| {
-        scatter_of(surfels, &Task { cells, density, view, k }, gathered, out);
+    // A discarded point has no ball.
+    let kept = surfels.iter().step_by(step).filter(|surfel| surfel.radius > 0.0);
+    let mut sample: Vec<Sampled> =
+        kept.map(|&surfel| Sampled { surfel, depth: surfel.center[2], scatter: [None; SCALES] }).collect();
+    sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
+        measure_scatter(sample, &Task { cells, density, view, k }, gathered);
     });
-    noise(&scatter)
+    sample.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    Noise::of(&sample)
 }
 
 /// What all surfels of a sample share.
@@ -47,28 +89,32 @@ struct Task<'a> {
     k: u32,
 }
 
-#[pulp::with_simd(scatter_of = pulp::Arch::new())]
+/// A surfel of the sample.
+#[derive(Clone, Copy, Debug)]
+struct Sampled {
+    surfel: Surfel,
+    depth: f32,
+    /// In each ball that holds enough to fit.
+    scatter: [Option<Scatter>; SCALES],
+}
+
+#[pulp::with_simd(measure_scatter = pulp::Arch::new())]
 #[inline(always)]
-fn scatter_of_with<'a, S: Simd>(
+fn measure_scatter_with<'a, S: Simd>(
     simd: S,
-    surfels: &'a [&'a Surfel],
+    sample: &'a mut [Sampled],
     task: &'a Task<'a>,
     gathered: &'a mut Gathered,
-    out: &'a mut [[Option<Scatter>; SCALES]],
 ) {
     let Task { cells, density, view, k } = *task;
-    for (surfel, out) in surfels.iter().zip(out) {
-        // A discarded point has no ball.
-        if surfel.radius == 0.0 {
-            continue;
-        }
+    for Sampled { surfel, scatter, .. } in sample {
         let mut radius = first_radius(surfel, density, view, k);
-        for out in out {
+        for out in scatter {
             radius *= STEP;
             if gathered.read(cells, surfel.center, radius, view) >= LEAST_CLUSTERS {
                 let (axis, curvature) = gathered.plane(simd);
-                let scatter = gathered.quadric(simd, radius, axis, curvature).scatter;
-                *out = Some(Scatter { distance: scatter, thin: scatter < THIN * radius });
+                let distance = gathered.quadric(simd, radius, axis, curvature).scatter;
+                *out = Some(Scatter { distance, thin: distance < THIN * radius });
             }
         }
     }
@@ -82,12 +128,12 @@ struct Scatter {
     thin: bool,
 }
 
-/// The noise of a sample with these scatters at each scale.
-fn noise(sample: &[[Option<Scatter>; SCALES]]) -> f32 {
+/// The noise of a sample of points at about the same depth; 0 if it is too small to tell.
+fn scatter_level(sample: &[Sampled]) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
-        let found: Vec<Scatter> = sample.iter().filter_map(|scatter| scatter[scale]).collect();
+        let found: Vec<Scatter> = sample.iter().filter_map(|sampled| sampled.scatter[scale]).collect();
         if found.len() < LEAST_SAMPLE.max(sample.len() / LEAST_SHARE) {
             before = None;
             continue;
