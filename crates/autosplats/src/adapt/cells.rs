@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use crate::camera::View;
 use crate::project::ScreenPoints;
 
-/// Slabs of depth in a cell. A surface seen at 76° or less from its normal fills no more; those of another one further away
-/// share the slab nearest to them.
+/// Most slabs of depth in a cell, each as thick as a cell is wide: a surface seen at 76° or less from its normal fills no
+/// more. A cell with more to hold has thicker ones.
 pub(crate) const SLABS: usize = 4;
 /// Coarser levels are of no use to any ball.
 const MOST_LEVELS: usize = 9;
@@ -19,7 +19,7 @@ pub(crate) struct Cluster {
     pub(crate) count: f32,
 }
 
-/// The clusters of a cell by slabs of depth, those used first.
+/// The clusters of a cell by slabs of depth, those that hold points first.
 pub(crate) type Cell = [Cluster; SLABS];
 
 /// Cells of one size.
@@ -38,38 +38,53 @@ pub(crate) struct Cells {
     pub(crate) levels: Vec<Level>,
 }
 
-/// A cell being filled.
+/// A cell being filled. Its slabs are as thin as the number of them allows, whatever the order of its points.
 #[derive(Clone, Copy, Debug)]
 struct Filling {
     sum: [[f32; 3]; SLABS],
     count: [f32; SLABS],
-    /// Slab of depth of each cluster.
+    /// Slab of depth of each cluster, in slabs of this cell.
     slab: [u32; SLABS],
     used: usize,
+    /// How often the thickness of this cell's slabs was doubled.
+    doubled: u32,
 }
 
 impl Filling {
-    const EMPTY: Self = Self { sum: [[0.0; 3]; SLABS], count: [0.0; SLABS], slab: [0; SLABS], used: 0 };
+    const EMPTY: Self = Self { sum: [[0.0; 3]; SLABS], count: [0.0; SLABS], slab: [0; SLABS], used: 0, doubled: 0 };
 
     /// Adds `count` points with this mean.
     #[inline(always)]
     fn add(&mut self, mean: [f32; 3], count: f32, slab: u32) {
-        let mut at = self.used;
-        let mut nearest = u32::MAX;
-        for index in 0..self.used {
-            let distance = self.slab[index].abs_diff(slab);
-            // The first of several at the same distance.
-            if distance < nearest && (distance == 0 || self.used == SLABS) {
-                (nearest, at) = (distance, index);
-            }
+        let sum = mean.map(|coordinate| coordinate * count);
+        while !self.put(sum, count, slab >> self.doubled) {
+            self.double();
         }
-        if at == self.used {
-            self.slab[at] = slab;
-            self.used += 1;
+    }
+
+    /// Adds a sum to its slab, unless there is none and no room for one.
+    #[inline(always)]
+    fn put(&mut self, sum: [f32; 3], count: f32, slab: u32) -> bool {
+        let at = self.slab[..self.used].iter().position(|&other| other == slab).unwrap_or(self.used);
+        if at == SLABS {
+            return false;
         }
+        self.used = self.used.max(at + 1);
+        self.slab[at] = slab;
         self.count[at] += count;
         for axis in 0..3 {
-            self.sum[at][axis] += mean[axis] * count;
+            self.sum[at][axis] += sum[axis];
+        }
+        true
+    }
+
+    /// Makes slabs twice as thick.
+    #[cold]
+    fn double(&mut self) {
+        let full = *self;
+        *self = Self { doubled: full.doubled + 1, ..Self::EMPTY };
+        for at in 0..full.used {
+            self.put(full.sum[at], full.count[at], full.slab[at] >> 1);
         }
     }
 

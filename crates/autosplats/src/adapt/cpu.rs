@@ -23,7 +23,7 @@ pub(super) const THICKEST: f32 = 0.28;
 /// The same of the first neighbourhood, whose plane has no error of its own to tell.
 pub(super) const THICKEST_FIRST: f32 = 0.15;
 /// Larger balls may scatter this many times the noise.
-pub(super) const SCATTER: f32 = 1.7;
+pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
 pub(super) const AGREE: f32 = 3.0;
 
