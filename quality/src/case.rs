@@ -47,7 +47,7 @@ pub fn full() -> Vec<Case> {
     let [herd, cathedral] = [scene("herd", 1_000_000), scene("cathedral", 3_000_000)];
     let [bunny, dense_bunny] = [Recipe::new(BUNNY, 300_000), Recipe::new(BUNNY, 1_000_000)];
     let [horse, dancer] = [Recipe::new(HORSE, 300_000), Recipe::new(DANCER, 150_000)];
-    let bumpy = Recipe::new(Source::Bumpy(7), 300_000);
+    let bumpy = Recipe::new(Source::Bumpy(7), 800_000);
     let noisy = bunny.noise(0.003);
     let ear = [0.40, 0.30];
     let case = |recipe, shot| Case::new(recipe, shot, [960, 600]);
@@ -91,7 +91,7 @@ pub fn full() -> Vec<Case> {
 /// Small cases that need nothing but the repository.
 pub fn quick() -> Vec<Case> {
     let scene = |name, count| Recipe::new(Source::Scene(name), count);
-    let bumpy = Recipe::new(Source::Bumpy(6), 60_000);
+    let bumpy = Recipe::new(Source::Bumpy(6), 200_000);
     let case = |recipe, shot| Case::new(recipe, shot, [480, 300]);
     vec![
         case(scene("figure", 60_000), Shot::Own).moving(),

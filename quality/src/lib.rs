@@ -8,15 +8,21 @@
 
 pub mod case;
 pub mod exact;
+pub mod flip;
 pub mod light;
 pub mod measure;
 pub mod mesh;
 pub mod method;
+pub mod motion;
 pub mod neighbors;
+pub mod page;
 pub mod picture;
 pub mod random;
 pub mod run;
+pub mod sheet;
 pub mod subject;
 pub mod surface;
+pub mod table;
+pub mod target;
 pub mod verdict;
 pub mod view;

@@ -46,6 +46,11 @@ impl Lit {
         self.pixels[pixel].unwrap_or(BACKGROUND)
     }
 
+    /// All pixels over the background.
+    pub fn flat(&self) -> Vec<[f64; 3]> {
+        (0..self.pixels.len()).map(|pixel| self.over_background(pixel)).collect()
+    }
+
     /// The picture with each pixel's colour changed.
     #[must_use]
     pub fn changed(&self, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Self {

@@ -1,7 +1,8 @@
 //! The numbers of one picture.
 
 use crate::exact::Exact;
-use crate::light::{Lit, psnr};
+use crate::flip::Flip;
+use crate::light::{Lit, either, psnr};
 use crate::picture::Picture;
 use crate::subject::Subject;
 use crate::verdict::{Cover, Verdicts};
@@ -36,17 +37,45 @@ pub struct Measures {
     pub depth_px: f64,
     /// Of the lit picture with the lit truth, decibels, over the pixels that either covers.
     pub psnr: f64,
+    /// Mean FLIP error of the same over the same.
+    pub flip: f64,
 }
 
-impl Measures {
+/// The truth of a case, ready to be compared with.
+#[derive(Debug)]
+pub struct Truth {
+    /// What is there.
+    pub exact: Exact,
+    /// That, lit.
+    pub lit: Lit,
+    band: Vec<bool>,
+    flip: Flip,
+}
+
+impl Truth {
+    /// Lights what is there.
+    pub fn new(exact: Exact) -> Self {
+        let lit = Lit::new(&Picture::truth(&exact), &exact.rays);
+        Self { band: exact.band(), flip: Flip::new(&lit.flat(), lit.width), lit, exact }
+    }
+
     /// Measures `picture`, and `lit`, what it looks like.
-    pub fn new(exact: &Exact, band: &[bool], truth: &Lit, picture: &Picture, lit: &Lit, subject: &Subject) -> Self {
-        Self {
-            cover: Verdicts::new(exact, picture, subject).cover(),
-            angles: angles(exact, band, picture),
-            depth_px: depth_px(exact, picture),
-            psnr: psnr(lit, truth),
+    pub fn measure(&self, picture: &Picture, lit: &Lit, subject: &Subject) -> Measures {
+        Measures {
+            cover: Verdicts::new(&self.exact, picture, subject).cover(),
+            angles: angles(&self.exact, &self.band, picture),
+            depth_px: depth_px(&self.exact, picture),
+            psnr: psnr(lit, &self.lit),
+            flip: self.flip(lit),
         }
+    }
+
+    /// Mean FLIP error over the pixels that either picture covers.
+    fn flip(&self, lit: &Lit) -> f64 {
+        let errors = self.flip.errors(&lit.flat());
+        let mut mean = Mean::default();
+        either(lit, &self.lit).for_each(|pixel| mean.add(errors[pixel]));
+        mean.value()
     }
 }
 

@@ -9,6 +9,8 @@ use crate::subject::Subject;
 
 /// Pixels to all sides that a surface must truly cover around a pixel for it to lie inside the silhouette.
 const INSIDE_PX: usize = 2;
+/// Fewest sampled pixels that say something about a picture.
+const FEWEST: usize = 1000;
 
 /// What is to be said about a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,8 +51,8 @@ pub struct Verdicts {
     sampled: f64,
 }
 
-/// How much of a picture is where it should be, as shares of the pixels whose surface is sampled. No number where there are
-/// none.
+/// How much of a picture is where it should be, as shares of the pixels whose surface is sampled. No numbers where there
+/// are too few of those.
 #[derive(Clone, Copy, Debug)]
 pub struct Cover {
     /// Median distance of points on the surface seen.
@@ -101,14 +103,15 @@ impl Verdicts {
         let [right, leaks, before] = [Verdict::Right, Verdict::Leak, Verdict::Before].map(|what| count(&[what]));
         let covered = right + leaks + before + count(&[Verdict::Beside]);
         let missing = count(&[Verdict::Hole, Verdict::Short]);
+        let enough = if self.inside < FEWEST { f64::NAN } else { 1.0 };
         Cover {
             spacing_px: self.spacing_px,
             sampled: self.sampled,
-            iou: covered / (covered + missing + count(&[Verdict::Over])),
-            wider_px: (count(&[Verdict::Over]) - count(&[Verdict::Short])) / self.edge as f64,
-            holes: count(&[Verdict::Hole]) / self.inside as f64,
-            leaks: leaks / covered,
-            before: before / covered,
+            iou: enough * covered / (covered + missing + count(&[Verdict::Over])),
+            wider_px: enough * (count(&[Verdict::Over]) - count(&[Verdict::Short])) / self.edge as f64,
+            holes: enough * count(&[Verdict::Hole]) / self.inside as f64,
+            leaks: enough * leaks / covered,
+            before: enough * before / covered,
         }
     }
 

@@ -9,6 +9,8 @@ use crate::surface::Surface;
 
 /// Vertical angle of view, degrees.
 const FOV_DEGREES: f64 = 40.0;
+/// Places tried to be near to.
+const NEAR_STEPS: u32 = 40;
 
 /// A way to look at a subject.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,10 +68,16 @@ impl Shot {
             Self::Near(direction, at, times) => {
                 let camera = whole(direction)?;
                 let rays = Rays::new(&camera, size)?;
-                let [x, y] = [at[0] * f64::from(size[0]), at[1] * f64::from(size[1])];
-                let (origin, ray) = rays.through([x, y]);
-                let hit = subject.surface.trace(origin, ray).context("nothing to be near to")?;
-                let look_at = origin + ray * hit.distance;
+                // A place beside the subject is moved towards the picture's middle until it meets it.
+                let mut places = (0..=NEAR_STEPS).map(|step| {
+                    let t = f64::from(step) / f64::from(NEAR_STEPS);
+                    [0, 1].map(|i| (at[i] + (0.5 - at[i]) * t) * f64::from(size[i]))
+                });
+                let look_at = places.find_map(|place| {
+                    let (origin, ray) = rays.through(place);
+                    subject.surface.trace(origin, ray).map(|hit| origin + ray * hit.distance)
+                });
+                let look_at = look_at.context("nothing to be near to")?;
                 Camera { eye: look_at + (camera.eye - look_at) / times, look_at, ..camera }
             }
             Self::From(eye, look_at, fov) => {
