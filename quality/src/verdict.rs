@@ -10,7 +10,7 @@ use crate::subject::Subject;
 /// Pixels to all sides that a surface must truly cover around a pixel for it to lie inside the silhouette.
 const INSIDE_PX: usize = 2;
 /// Fewest sampled pixels that say something about a picture.
-const FEWEST: usize = 1000;
+const FEWEST: usize = 300;
 
 /// What is to be said about a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
