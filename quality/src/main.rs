@@ -10,7 +10,7 @@ use autosplats_quality::measure::Angles;
 use autosplats_quality::method::{Method, Painter};
 use autosplats_quality::page::page;
 use autosplats_quality::run::{Outcome, measure};
-use autosplats_quality::sheet::{self, Row};
+use autosplats_quality::sheet::{Row, write_all};
 use autosplats_quality::subject::Subject;
 use autosplats_quality::target::ratio;
 use clap::Parser;
@@ -51,7 +51,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.clone().or_else(|| whole.then(docs));
     let (outcomes, rows) = measure_all(&cases)?;
     if let Some(out) = out {
-        let sheets = write_sheets(&out.join("quality"), rows)?;
+        let sheets = write_all(&out.join("quality"), &rows)?;
         let path = out.join("QUALITY.md");
         std::fs::write(&path, page(&outcomes, &sheets)).with_context(|| path.display().to_string())?;
         eprintln!("written {}", path.display());
@@ -60,7 +60,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Measures and prints all cases; each subject is made once for all its views.
-fn measure_all(cases: &[Case]) -> Result<(Vec<Outcome>, Vec<(&'static str, Row)>)> {
+fn measure_all(cases: &[Case]) -> Result<(Vec<Outcome>, Vec<Row>)> {
     let start = Instant::now();
     let mut outcomes = Vec::new();
     let mut rows = Vec::new();
@@ -85,29 +85,13 @@ fn measure_all(cases: &[Case]) -> Result<(Vec<Outcome>, Vec<(&'static str, Row)>
             let (outcome, pictures) = measure(case, &subject, &mut painter, &Method::ALL)?;
             print(&outcome);
             if case.sheet {
-                rows.push((recipe.surface_name(), Row::new(case.name(), &pictures)));
+                rows.push(Row::new(case, &pictures));
             }
             outcomes.push(outcome);
         }
     }
     eprintln!("{:4.0} s", start.elapsed().as_secs_f64());
     Ok((outcomes, rows))
-}
-
-/// One sheet for each surface; returns their names.
-fn write_sheets(folder: &Path, rows: Vec<(&'static str, Row)>) -> Result<Vec<String>> {
-    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let mut sheets: Vec<(&str, Vec<Row>)> = Vec::new();
-    for (name, row) in rows {
-        match sheets.iter_mut().find(|(other, _)| *other == name) {
-            Some((_, rows)) => rows.push(row),
-            None => sheets.push((name, vec![row])),
-        }
-    }
-    for (name, rows) in &sheets {
-        sheet::write(&folder.join(format!("{name}.png")), rows)?;
-    }
-    Ok(sheets.into_iter().map(|(name, _)| name.to_owned()).collect())
 }
 
 const HEADER: &str = "\

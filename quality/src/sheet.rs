@@ -6,6 +6,7 @@ use anyhow::{Context as _, Result};
 use font8x8::legacy::BASIC_LEGACY;
 use image::{Rgb, RgbImage};
 
+use crate::case::Case;
 use crate::light::Lit;
 use crate::measure::angle;
 use crate::method::Method;
@@ -28,6 +29,8 @@ const METHODS: [Method; 3] = [Method::Dots, Method::Paper, Method::Ours];
 /// One row of a sheet: five small pictures.
 #[derive(Debug)]
 pub struct Row {
+    /// What the sheet is of.
+    sheet: &'static str,
     title: String,
     pictures: Vec<Small>,
 }
@@ -66,7 +69,7 @@ pub fn error_color(degrees: f64) -> [u8; 3] {
 
 impl Row {
     /// A row for the pictures of a case.
-    pub fn new(title: String, pictures: &Pictures) -> Self {
+    pub fn new(case: &Case, pictures: &Pictures) -> Self {
         let mut small = vec![small_lit(&pictures.truth.lit)];
         for method in METHODS {
             small.extend(pictures.drawn.iter().find(|(drawn, ..)| *drawn == method).map(|(.., lit)| small_lit(lit)));
@@ -85,7 +88,7 @@ impl Row {
             };
             small_picture(exact.width, &(0..exact.seen.len()).map(color).collect::<Vec<_>>())
         }));
-        Self { title, pictures: small }
+        Self { sheet: case.recipe.surface_name(), title: case.name(), pictures: small }
     }
 }
 
@@ -107,11 +110,27 @@ fn small_picture(width: usize, pixels: &[[f64; 3]]) -> Small {
     Small { width: columns, pixels: (0..columns * rows).map(mean).collect() }
 }
 
-/// Writes rows below each other, with a title for each column and a legend.
+/// Writes a sheet for each surface into `folder` and returns their names.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(path: &Path, rows: &[Row]) -> Result<()> {
+pub fn write_all(folder: &Path, rows: &[Row]) -> Result<Vec<String>> {
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !names.contains(&row.sheet) {
+            names.push(row.sheet);
+        }
+    }
+    for name in &names {
+        let rows: Vec<_> = rows.iter().filter(|row| row.sheet == *name).collect();
+        write(&folder.join(format!("{name}.png")), &rows)?;
+    }
+    Ok(names.into_iter().map(str::to_owned).collect())
+}
+
+/// Writes rows below each other, with a title for each column and a legend.
+fn write(path: &Path, rows: &[&Row]) -> Result<()> {
     let first = rows.first().and_then(|row| row.pictures.first()).context("a sheet without pictures")?;
     let height = |row: &Row| row.pictures.first().map_or(0, |small| small.pixels.len() / small.width);
     let columns = METHODS.len() + 2;

@@ -124,7 +124,8 @@ impl Recipe {
     /// A short name for everything.
     pub fn name(&self) -> String {
         let thousands = self.count / 1000;
-        let count = if thousands % 1000 == 0 { format!("{}M", thousands / 1000) } else { format!("{thousands}K") };
+        let count =
+            if thousands.is_multiple_of(1000) { format!("{}M", thousands / 1000) } else { format!("{thousands}K") };
         let mut name = format!("{}:{count}", self.surface_name());
         if self.density != Density::Even {
             name += &format!("-{:?}", self.density).to_lowercase();
