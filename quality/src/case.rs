@@ -65,7 +65,7 @@ pub fn full() -> Vec<Case> {
         case(cathedral, Shot::Own).shown(),
         case(cathedral, Shot::From([-3.0, 7.0, 2.0], [14.0, 6.5, 4.0], 60.0)),
         case(bumpy, Shot::Whole(Front)).shown(),
-        case(bumpy.noise(0.003), Shot::Whole(Front)).moving(),
+        case(bumpy.noise(0.003), Shot::Whole(Front)).shown().moving(),
         case(bunny, Shot::Whole(Front)).shown().moving(),
         case(bunny, Shot::Near(Front, ear, 5.0)),
         case(bunny, Shot::Far(Front, 5.0)),
@@ -94,13 +94,13 @@ pub fn quick() -> Vec<Case> {
     let bumpy = Recipe::new(Source::Bumpy(6), 200_000);
     let case = |recipe, shot| Case::new(recipe, shot, [480, 300]);
     vec![
-        case(scene("figure", 60_000), Shot::Own).moving(),
+        case(scene("figure", 60_000), Shot::Own).shown().moving(),
         case(scene("two-scales", 150_000), Shot::Own),
         case(scene("statue", 150_000), Shot::Own),
         case(scene("statue", 150_000), Shot::Near(Front, [0.5, 0.25], 4.0)),
         case(bumpy, Shot::Whole(Front)),
         case(bumpy.density(Density::Uneven), Shot::Whole(Front)),
-        case(bumpy.noise(0.003), Shot::Whole(Front)).moving(),
-        case(bumpy.outliers(0.02), Shot::Whole(Front)),
+        case(bumpy.noise(0.003), Shot::Whole(Front)).shown().moving(),
+        case(bumpy.outliers(0.02), Shot::Whole(Front)).shown(),
     ]
 }

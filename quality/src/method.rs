@@ -1,10 +1,11 @@
 //! The ways to draw points that are compared.
 
+use std::collections::HashMap;
 use std::num::NonZero;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use anyhow::Result;
-use autosplats::cloud::glam::DVec3;
+use autosplats::cloud::glam::{DVec3, Vec3};
 use autosplats::{Camera, ColorMode, Normals, PointSurfel, Reconstruction, Renderer, SearchEngine, Settings, Shading};
 use rayon::prelude::*;
 
@@ -117,7 +118,7 @@ impl<'a> Painter<'a> {
 struct Fits {
     neighbors: Option<Neighbors>,
     /// Normals for each of [`FIT_KS`].
-    found: Vec<Option<[DVec3; FIT_KS.len()]>>,
+    found: HashMap<u32, [Vec3; FIT_KS.len()]>,
 }
 
 impl Fits {
@@ -127,16 +128,16 @@ impl Fits {
         let cloud = &subject.cloud;
         let first = NonZero::new(FIT_KS[0]).expect("above 0");
         let neighbors = self.neighbors.get_or_insert_with(|| Neighbors::new(cloud, first));
-        self.found.resize(cloud.len(), None);
         // Who has the whole cloud knows its outliers, and draws none.
         let drawn = surfels.iter().filter(|surfel| surfel.radius > 0.0 && !subject.is_outlier(surfel.point));
         let missing: Vec<u32> =
-            drawn.clone().map(|surfel| surfel.point).filter(|&point| self.found[point as usize].is_none()).collect();
-        let fit = |&point: &u32| (point, neighbors.normals(point, &FIT_KS));
+            drawn.clone().map(|surfel| surfel.point).filter(|point| !self.found.contains_key(point)).collect();
+        let fit = |&point: &u32| {
+            let normals = neighbors.normals(point, &FIT_KS);
+            (point, std::array::from_fn(|i| normals[i].as_vec3()))
+        };
         let found: Vec<_> = missing.par_iter().map(fit).collect();
-        for (point, normals) in found {
-            self.found[point as usize] = Some(std::array::from_fn(|i| normals[i]));
-        }
+        self.found.extend(found);
 
         let which = FIT_KS.iter().position(|&number| number == k).expect("one of the numbers");
         let mut normals = Normals {
@@ -145,10 +146,9 @@ impl Fits {
             radius: vec![f32::NAN; cloud.len()],
         };
         for surfel in drawn {
-            let point = surfel.point as usize;
-            if let Some(found) = &self.found[point] {
-                normals.normals[point] = found[which].as_vec3().to_array();
-                normals.radius[point] = surfel.radius;
+            if let Some(found) = self.found.get(&surfel.point) {
+                normals.normals[surfel.point as usize] = found[which].to_array();
+                normals.radius[surfel.point as usize] = surfel.radius;
             }
         }
         normals

@@ -1,9 +1,12 @@
 //! Contact sheets: what the methods make of a subject, side by side.
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use font8x8::legacy::BASIC_LEGACY;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
 
 use crate::case::Case;
@@ -13,8 +16,12 @@ use crate::method::Method;
 use crate::run::Pictures;
 use crate::verdict::Verdict;
 
-/// Width of a picture on a sheet.
-const WIDTH: usize = 320;
+/// Widest and highest that a picture on a sheet is.
+const MOST_SIZE: [usize; 2] = [260, 210];
+/// Narrowest that a column is: its title has to fit.
+const LEAST_WIDTH: usize = 110;
+/// What is left around a subject, as a share of its height and width.
+const MARGIN: f64 = 0.06;
 /// Pixels between pictures, and for a line of words above them.
 const GAP: usize = 4;
 const LINE: usize = 14;
@@ -22,9 +29,14 @@ const LINE: usize = 14;
 const MOST_DEGREES: f64 = 30.0;
 const PAPER_COLOR: [u8; 3] = [250, 250, 250];
 const INK: [u8; 3] = [40, 40, 40];
+/// Where nothing is in either picture, in the truth alone, in ours alone.
+const NOTHING: [u8; 3] = [205, 210, 215];
+const MISSING: [u8; 3] = [0, 170, 60];
+const EXTRA: [u8; 3] = [60, 130, 255];
 
 /// Columns of a sheet: the truth, these methods, and the error of ours.
 const METHODS: [Method; 3] = [Method::Dots, Method::Paper, Method::Ours];
+const TITLES: [&str; 5] = ["truth", "dots", "paper", "ours", "error of ours"];
 
 /// One row of a sheet: five small pictures.
 #[derive(Debug)]
@@ -68,46 +80,75 @@ pub fn error_color(degrees: f64) -> [u8; 3] {
 }
 
 impl Row {
-    /// A row for the pictures of a case.
+    /// A row for the pictures of a case, cut to where the subject is.
     pub fn new(case: &Case, pictures: &Pictures) -> Self {
+        let exact = &pictures.truth.exact;
+        let part = Part::around(&pictures.truth.lit);
+        let small_lit = |lit: &Lit| part.small(lit.width, |pixel| lit.over_background(pixel).map(|c| 255.0 * c));
         let mut small = vec![small_lit(&pictures.truth.lit)];
         for method in METHODS {
             small.extend(pictures.drawn.iter().find(|(drawn, ..)| *drawn == method).map(|(.., lit)| small_lit(lit)));
         }
         let ours = pictures.drawn.iter().find(|(drawn, ..)| *drawn == Method::Ours);
         small.extend(ours.map(|(_, picture, _)| {
-            let exact = &pictures.truth.exact;
-            let color = |pixel: usize| {
+            part.small(exact.width, |pixel| {
                 let color = match (exact.seen[pixel].is_some(), picture.shown[pixel].is_some()) {
-                    (false, false) => [205, 210, 215],
-                    (true, false) => [0, 170, 60],
-                    (false, true) => [60, 130, 255],
+                    (false, false) => NOTHING,
+                    (true, false) => MISSING,
+                    (false, true) => EXTRA,
                     (true, true) => error_color(angle(exact, picture, pixel).unwrap_or(180.0)),
                 };
                 color.map(f64::from)
-            };
-            small_picture(exact.width, &(0..exact.seen.len()).map(color).collect::<Vec<_>>())
+            })
         }));
         Self { sheet: case.recipe.surface_name(), title: case.name(), pictures: small }
     }
 }
 
-fn small_lit(lit: &Lit) -> Small {
-    let pixels: Vec<_> = (0..lit.pixels.len()).map(|pixel| lit.over_background(pixel).map(|c| 255.0 * c)).collect();
-    small_picture(lit.width, &pixels)
+/// A part of a picture.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    low: [usize; 2],
+    size: [usize; 2],
+    /// Pixels of it for one on the sheet.
+    scale: f64,
 }
 
-/// Means over squares of pixels.
-fn small_picture(width: usize, pixels: &[[f64; 3]]) -> Small {
-    let side = width.div_ceil(WIDTH).max(1);
-    let [columns, rows] = [width / side, pixels.len() / width / side];
-    let mean = |at: usize| {
-        let [x, y] = [at % columns * side, at / columns * side];
-        let square = (0..side * side).map(|i| pixels[(y + i / side) * width + x + i % side]);
-        let sum = square.fold([0.0; 3], |sum: [f64; 3], pixel| [0, 1, 2].map(|i| sum[i] + pixel[i]));
-        sum.map(|channel| (channel / (side * side) as f64).round() as u8)
-    };
-    Small { width: columns, pixels: (0..columns * rows).map(mean).collect() }
+impl Part {
+    /// The part that is covered, and a margin.
+    fn around(lit: &Lit) -> Self {
+        let sides = [lit.width, lit.pixels.len() / lit.width];
+        let mut low = sides;
+        let mut high = [0, 0];
+        for pixel in (0..lit.pixels.len()).filter(|&pixel| lit.pixels[pixel].is_some()) {
+            let at = [pixel % lit.width, pixel / lit.width];
+            low = [0, 1].map(|i| low[i].min(at[i]));
+            high = [0, 1].map(|i| high[i].max(at[i] + 1));
+        }
+        let margin = [0, 1].map(|i| 2 + (MARGIN * high[i].saturating_sub(low[i]) as f64) as usize);
+        let low = [0, 1].map(|i| low[i].saturating_sub(margin[i]));
+        let size = [0, 1].map(|i| (high[i] + margin[i]).min(sides[i]).max(low[i] + 1) - low[i]);
+        let scale = [0, 1].map(|i| size[i] as f64 / MOST_SIZE[i] as f64);
+        Self { low, size, scale: scale[0].max(scale[1]) }
+    }
+
+    /// This part of a picture of rows of `width` pixels, each pixel a mean of those it stands for.
+    fn small(&self, width: usize, color: impl Fn(usize) -> [f64; 3]) -> Small {
+        let [columns, rows] = self.size.map(|side| ((side as f64 / self.scale) as usize).max(1));
+        let range = |at: usize, i: usize| {
+            let first = ((at as f64 * self.scale) as usize).min(self.size[i] - 1);
+            let end = (((at + 1) as f64 * self.scale) as usize).clamp(first + 1, self.size[i]);
+            self.low[i] + first..self.low[i] + end
+        };
+        let mean = |at: usize| {
+            let (xs, ys) = (range(at % columns, 0), range(at / columns, 1));
+            let count = (xs.len() * ys.len()) as f64;
+            let pixels = ys.flat_map(|y| xs.clone().map(move |x| y * width + x));
+            let sum = pixels.map(&color).fold([0.0; 3], |sum: [f64; 3], color| [0, 1, 2].map(|i| sum[i] + color[i]));
+            sum.map(|channel| (channel / count).round() as u8)
+        };
+        Small { width: columns, pixels: (0..columns * rows).map(mean).collect() }
+    }
 }
 
 /// Writes a sheet for each surface into `folder` and returns their names.
@@ -131,40 +172,41 @@ pub fn write_all(folder: &Path, rows: &[Row]) -> Result<Vec<String>> {
 
 /// Writes rows below each other, with a title for each column and a legend.
 fn write(path: &Path, rows: &[&Row]) -> Result<()> {
-    let first = rows.first().and_then(|row| row.pictures.first()).context("a sheet without pictures")?;
     let height = |row: &Row| row.pictures.first().map_or(0, |small| small.pixels.len() / small.width);
-    let columns = METHODS.len() + 2;
-    let width = columns * (first.width + GAP) + GAP;
+    let widest = rows.iter().flat_map(|row| &row.pictures).map(|small| small.width).max();
+    let column = widest.context("a sheet without pictures")?.max(LEAST_WIDTH) + GAP;
+    let width = TITLES.len() * column + GAP;
     let total = 2 * LINE + rows.iter().map(|row| height(row) + LINE + GAP).sum::<usize>();
     let mut image = RgbImage::from_pixel(width as u32, total as u32, Rgb(PAPER_COLOR));
-    let names = ["truth", "dots", "paper", "ours", "ours: error of normals"];
-    for (column, name) in names.iter().enumerate() {
-        say(&mut image, GAP + column * (first.width + GAP), 3, name);
+    for (i, title) in TITLES.iter().enumerate() {
+        say(&mut image, GAP + i * column, 3, title);
     }
     let mut y = LINE;
     for row in rows {
         say(&mut image, GAP, y + 3, &row.title);
         y += LINE;
-        for (column, small) in row.pictures.iter().enumerate() {
-            let x = GAP + column * (first.width + GAP);
+        for (i, small) in row.pictures.iter().enumerate() {
             for (at, &pixel) in small.pixels.iter().enumerate() {
-                image.put_pixel((x + at % small.width) as u32, (y + at / small.width) as u32, Rgb(pixel));
+                let x = GAP + i * column + at % small.width;
+                image.put_pixel(x as u32, (y + at / small.width) as u32, Rgb(pixel));
             }
         }
         y += height(row) + GAP;
     }
-    legend(&mut image, GAP + (columns - 1) * (first.width + GAP), y);
-    image.save(path).with_context(|| path.display().to_string())
+    legend(&mut image, GAP, y);
+    let file = File::create(path).with_context(|| path.display().to_string())?;
+    let encoder = PngEncoder::new_with_quality(BufWriter::new(file), CompressionType::Best, FilterType::Adaptive);
+    image.write_with_encoder(encoder).with_context(|| path.display().to_string())
 }
 
 fn legend(image: &mut RgbImage, x: usize, y: usize) {
-    say(image, x, y + 3, "0");
+    say(image, x, y + 3, "error: 0");
     for i in 0..80 {
         let color = Rgb(error_color(MOST_DEGREES * i as f64 / 79.0));
-        (0..10).for_each(|j| image.put_pixel((x + 12 + i) as u32, (y + 1 + j) as u32, color));
+        (0..10).for_each(|j| image.put_pixel((x + 68 + i) as u32, (y + 1 + j) as u32, color));
     }
-    say(image, x + 96, y + 3, "30 deg");
-    for (at, color, name) in [(160, [0, 170, 60], "missing"), (240, [60, 130, 255], "extra")] {
+    say(image, x + 152, y + 3, "30 degrees and more");
+    for (at, color, name) in [(320, MISSING, "missing"), (400, EXTRA, "too much")] {
         (0..100).for_each(|i| image.put_pixel((x + at + i % 10) as u32, (y + 1 + i / 10) as u32, Rgb(color)));
         say(image, x + at + 14, y + 3, name);
     }
