@@ -90,3 +90,56 @@ fn change(outcome: &Outcome, value: fn(&Change) -> f64) -> Option<f64> {
     let ours = motion.methods.iter().find(|(method, _)| *method == Method::Ours)?;
     Some(value(&ours.1) / value(&motion.truth))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::quick;
+    use crate::page::page;
+    use crate::run::Motion;
+    use crate::verdict::Cover;
+
+    /// A case that we measured like this, the paper and dots worse, and plane fits like this.
+    fn outcome(ours: f64, fit: f64, psnr: f64) -> Outcome {
+        let cover =
+            Cover { spacing_px: 1.0, sampled: 1.0, iou: 0.999, wider_px: 0.0, holes: 0.0, leaks: 0.0, before: 0.0 };
+        let measures = |mean: f64, psnr| {
+            let angles =
+                Angles { mean, median: mean, rms: mean, below_5: 1.0, below_10: 1.0, flipped: 0.0, band: mean };
+            Measures { cover, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
+        };
+        let dots = Measures { angles: None, ..measures(0.0, 20.0) };
+        let methods = vec![
+            (Method::Ours, measures(ours, psnr)),
+            (Method::Paper, measures(9.0, 28.0)),
+            (Method::Dots, dots),
+            (Method::Fit(10), measures(2.0 * fit, 28.0)),
+            (Method::Fit(40), measures(fit, 28.0)),
+        ];
+        let change = |degrees| Change { degrees, lightness: 1.0 };
+        let motion = Motion { truth: change(1.0), methods: vec![(Method::Ours, change(ours))] };
+        Outcome { case: quick()[0], measures: methods, motion: Some(motion) }
+    }
+
+    fn missed(outcome: &Outcome) -> Vec<&'static str> {
+        let is_missed = |target: &&Target| (target.value)(outcome).is_some_and(|value| !target.is_met(value));
+        TARGETS.iter().filter(is_missed).map(|target| target.what).collect()
+    }
+
+    #[test]
+    fn good_meets_all_and_bad_misses() {
+        assert_eq!(missed(&outcome(1.0, 1.0, 30.0)), [""; 0], "as good as the best plane fits");
+        let wrong = missed(&outcome(1.3, 1.0, 30.0));
+        assert_eq!(wrong, [TARGETS[0].what, TARGETS[1].what, TARGETS[9].what], "normals, and how they turn");
+        let dark = missed(&outcome(1.0, 1.0, 22.0));
+        assert_eq!(dark, ["PSNR ≥ dots + 4 dB", "PSNR ≥ paper + 1 dB without noise"], "colours");
+    }
+
+    #[test]
+    fn the_page_says_the_worst() {
+        let page = page(&[outcome(1.0, 1.0, 30.0), outcome(2.0, 1.0, 30.0)], &["figure".into()]);
+        let line = page.lines().find(|line| line.contains(TARGETS[0].what)).expect("a line for each target");
+        assert!(line.contains("| 1 of 2 | 2.000 |") && line.ends_with("missed |"), "{line}");
+        assert!(page.contains("![figure](quality/figure.png)") && !page.contains("NaN"), "{page}");
+    }
+}
