@@ -9,8 +9,8 @@ use crate::target::{TARGETS, ratio};
 const INTRODUCTION: &str = "\
 # Quality: pictures against the exact surface
 
-Written by `cargo xtask quality`; every number is computed. It is about pictures, not about time, and the same on every \
-machine.
+Written by `cargo xtask quality`; every number is computed. It is about pictures, not about time: for that there is \
+[PERFORMANCE.md](PERFORMANCE.md).
 
 ## What is measured
 
@@ -64,7 +64,8 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         &normals(outcomes),
         "## Surface\n\nPercent of pixels; p is the paper's.\n\n",
         &cover(outcomes),
-        "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels.\n\n",
+        "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels. The best fit is the one with the best \
+         normals.\n\n",
         &lit(outcomes),
         "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in \
          255ths.\n\n",

@@ -26,7 +26,10 @@ impl Table {
 
 /// A number with so many decimals; a dash for what is none.
 pub fn number(value: f64, decimals: usize) -> String {
-    if value.is_finite() { format!("{value:.decimals$}") } else { "–".into() }
+    let text = if value.is_finite() { format!("{value:.decimals$}") } else { return "–".into() };
+    // What rounds to nothing has no sign.
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').into() } else { text }
 }
 
 /// A share in percent.
@@ -40,4 +43,5 @@ fn tables_are_markdown() {
     table.row(&["one".into(), number(1.26, 1)]);
     table.row(&["none".into(), percent(f64::NAN, 1)]);
     assert_eq!(table.finish(), "| name | value |\n|---|--:|\n| one | 1.3 |\n| none | – |\n\n", "a table");
+    assert_eq!([number(-0.004, 2), number(-0.006, 2), percent(0.5, 0)], ["0.00", "-0.01", "50"], "numbers");
 }

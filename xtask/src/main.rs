@@ -10,13 +10,13 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
-usage: cargo xtask test            format, lints, build, tests, documentation, the rules between crates and stages,
-                               and a minute of broken files
-       cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options
-       cargo xtask quality [OPTIONS]  pictures against the exact surface, and docs/QUALITY.md of them, in ten minutes or
-                               so; --quick, --only NAME and --out DIR make less of it, --help tells more
-       cargo xtask formats         docs/FORMATS.md, from what the program says of its formats and of the test data;
-                               with --check only whether it is what this build makes";
+usage: cargo xtask test               format, lints, build, tests, documentation, the rules between crates and stages,
+                                  and a minute of broken files
+       cargo xtask fuzz [OPTIONS]     broken files for every reader, as long as wanted; --help tells the options
+       cargo xtask quality [OPTIONS]  docs/QUALITY.md, from pictures held against the exact surface, in some ten minutes;
+                                  --quick and --only NAME take some of them, --out DIR writes elsewhere
+       cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
+                                  with --check only whether it is what this build makes";
 
 /// Seconds that the tests feed broken files to the readers.
 const FUZZ_SECONDS: &str = "60";
