@@ -10,11 +10,13 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
-usage: cargo xtask test            format, lints, build, tests, documentation, the rules between crates and stages,
-                               and a minute of broken files
-       cargo xtask fuzz [OPTIONS]  broken files for every reader, as long as wanted; --help tells the options
-       cargo xtask formats         docs/FORMATS.md, from what the program says of its formats and of the test data;
-                               with --check only whether it is what this build makes";
+usage: cargo xtask test               format, lints, build, tests, documentation, the rules between crates and stages,
+                                  and a minute of broken files
+       cargo xtask fuzz [OPTIONS]     broken files for every reader, as long as wanted; --help tells the options
+       cargo xtask quality [OPTIONS]  docs/QUALITY.md, from pictures held against the exact surface, in some ten minutes;
+                                  --quick and --only NAME take some of them, --out DIR writes elsewhere
+       cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
+                                  with --check only whether it is what this build makes";
 
 /// Seconds that the tests feed broken files to the readers.
 const FUZZ_SECONDS: &str = "60";
@@ -24,6 +26,7 @@ fn main() -> ExitCode {
     let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["test"] => root().and_then(test),
         ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
+        ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::run(root, false)),
         ["formats", "--check"] => root().and_then(|root| formats::run(root, true)),
         [] | ["help" | "-h" | "--help"] => {
@@ -48,6 +51,11 @@ fn root() -> Result<&'static Path> {
 /// Broken files for every reader. Built like the tests, so that overflows are found too.
 fn fuzz(root: &Path, options: &[&str]) -> Result<()> {
     cargo(root, &[&["run", "--locked", "--quiet", "-p", "autosplats-fuzz", "--"], options].concat())
+}
+
+/// Pictures against the exact surface. Its tests measure the small cases; this is built for speed, to measure all.
+fn quality(root: &Path, options: &[&str]) -> Result<()> {
+    cargo(root, &[&["run", "--locked", "--quiet", "--release", "-p", "autosplats-quality", "--"], options].concat())
 }
 
 /// Everything a change has to pass, cheapest first.

@@ -1,0 +1,106 @@
+//! The list of what is measured.
+
+use autosplats::ViewDirection::{Back, Front, Iso, Left, Top};
+
+use crate::subject::{BUNNY, DANCER, Density, HORSE, Recipe, Source};
+use crate::view::Shot;
+
+/// A subject and a view of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// What is drawn.
+    pub recipe: Recipe,
+    /// From where.
+    pub shot: Shot,
+    /// Of the picture, pixels.
+    pub size: [u32; 2],
+    /// Whether the camera moves as well.
+    pub motion: bool,
+    /// Whether it is a row of the contact sheets.
+    pub sheet: bool,
+}
+
+impl Case {
+    const fn new(recipe: Recipe, shot: Shot, size: [u32; 2]) -> Self {
+        Self { recipe, shot, size, motion: false, sheet: false }
+    }
+
+    const fn moving(self) -> Self {
+        Self { motion: true, ..self }
+    }
+
+    const fn shown(self) -> Self {
+        Self { sheet: true, ..self }
+    }
+
+    /// A short name for subject and view.
+    pub fn name(&self) -> String {
+        format!("{} {}", self.recipe.name(), self.shot.name())
+    }
+}
+
+/// Everything, as `cargo xtask quality` measures it.
+pub fn full() -> Vec<Case> {
+    let scene = |name, count| Recipe::new(Source::Scene(name), count);
+    let [figure, two_scales, statue] =
+        [scene("figure", 300_000), scene("two-scales", 700_000), scene("statue", 800_000)];
+    let [herd, cathedral] = [scene("herd", 1_000_000), scene("cathedral", 3_000_000)];
+    let [bunny, dense_bunny] = [Recipe::new(BUNNY, 300_000), Recipe::new(BUNNY, 1_000_000)];
+    let [horse, dancer] = [Recipe::new(HORSE, 300_000), Recipe::new(DANCER, 150_000)];
+    let bumpy = Recipe::new(Source::Bumpy(7), 800_000);
+    let noisy = bunny.noise(0.003);
+    let ear = [0.40, 0.30];
+    let case = |recipe, shot| Case::new(recipe, shot, [960, 600]);
+    vec![
+        case(figure, Shot::Own).shown().moving(),
+        case(figure, Shot::Near(Front, [0.5, 0.2], 5.0)),
+        case(figure, Shot::Far(Iso, 5.0)),
+        case(two_scales, Shot::Own).shown(),
+        case(two_scales, Shot::Parallel(Front)),
+        case(statue, Shot::Own).shown().moving(),
+        case(statue, Shot::Near(Front, [0.5, 0.25], 4.0)),
+        case(statue, Shot::Parallel(Back)),
+        case(herd, Shot::Own).shown(),
+        case(herd, Shot::Parallel(Top)),
+        case(cathedral, Shot::Own).shown(),
+        case(cathedral, Shot::From([-3.0, 7.0, 2.0], [14.0, 6.5, 4.0], 60.0)),
+        case(bumpy, Shot::Whole(Front)).shown(),
+        case(bumpy.noise(0.003), Shot::Whole(Front)).shown().moving(),
+        case(bunny, Shot::Whole(Front)).shown().moving(),
+        case(bunny, Shot::Near(Front, ear, 5.0)),
+        case(bunny, Shot::Far(Front, 5.0)),
+        case(dense_bunny, Shot::Near(Front, ear, 3.0)),
+        case(bunny.density(Density::Uneven), Shot::Whole(Front)),
+        case(bunny.density(Density::Striped), Shot::Whole(Front)),
+        case(bunny.density(Density::Gradient), Shot::Whole(Front)),
+        case(bunny.noise(0.001), Shot::Whole(Front)).shown().moving(),
+        case(noisy, Shot::Whole(Front)).shown().moving(),
+        case(noisy, Shot::Near(Front, ear, 5.0)),
+        case(noisy, Shot::Far(Front, 5.0)),
+        case(bunny.noise(0.01), Shot::Whole(Front)).shown(),
+        case(bunny.outliers(0.02), Shot::Whole(Front)).shown(),
+        case(bunny.misregistration(0.0015), Shot::Whole(Front)).shown(),
+        case(bunny.noise(0.001).density(Density::Striped).outliers(0.005), Shot::Whole(Front)),
+        case(horse, Shot::Whole(Left)).shown(),
+        case(horse.noise(0.003), Shot::Whole(Left)),
+        case(dancer, Shot::Whole(Front)).shown(),
+        case(dancer.noise(0.001).density(Density::Uneven), Shot::Whole(Front)).shown(),
+    ]
+}
+
+/// Small cases that need nothing but the repository.
+pub fn quick() -> Vec<Case> {
+    let scene = |name, count| Recipe::new(Source::Scene(name), count);
+    let bumpy = Recipe::new(Source::Bumpy(6), 200_000);
+    let case = |recipe, shot| Case::new(recipe, shot, [480, 300]);
+    vec![
+        case(scene("figure", 60_000), Shot::Own).shown().moving(),
+        case(scene("two-scales", 150_000), Shot::Own),
+        case(scene("statue", 150_000), Shot::Own),
+        case(scene("statue", 150_000), Shot::Near(Front, [0.5, 0.25], 4.0)),
+        case(bumpy, Shot::Whole(Front)),
+        case(bumpy.density(Density::Uneven), Shot::Whole(Front)),
+        case(bumpy.noise(0.003), Shot::Whole(Front)).shown().moving(),
+        case(bumpy.outliers(0.02), Shot::Whole(Front)).shown(),
+    ]
+}

@@ -1,0 +1,142 @@
+//! The numbers of one picture.
+
+use crate::exact::Exact;
+use crate::flip::Flip;
+use crate::light::{Lit, either, psnr};
+use crate::picture::Picture;
+use crate::subject::Subject;
+use crate::verdict::{Cover, Verdicts};
+
+/// Angles in degrees between the normals shown and the true ones, 0 to 180, where both pictures show a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Angles {
+    /// Mean.
+    pub mean: f64,
+    /// Median.
+    pub median: f64,
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Share below 5°.
+    pub below_5: f64,
+    /// Share below 10°.
+    pub below_10: f64,
+    /// Share above 90°: surface lit from the wrong side.
+    pub flipped: f64,
+    /// Mean near silhouettes.
+    pub band: f64,
+}
+
+/// The numbers of one picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Measures {
+    /// How much is where it should be.
+    pub cover: Cover,
+    /// Errors of normals; nothing for a method that knows none.
+    pub angles: Option<Angles>,
+    /// Mean error in depth, in pixels at that depth, where both pictures show a surface.
+    pub depth_px: f64,
+    /// Of the lit picture with the lit truth, decibels, over the pixels that either covers.
+    pub psnr: f64,
+    /// Mean FLIP error of the same over the same.
+    pub flip: f64,
+}
+
+/// The truth of a case, ready to be compared with.
+#[derive(Debug)]
+pub struct Truth {
+    /// What is there.
+    pub exact: Exact,
+    /// That, lit.
+    pub lit: Lit,
+    band: Vec<bool>,
+    flip: Flip,
+}
+
+impl Truth {
+    /// Lights what is there.
+    pub fn new(exact: Exact) -> Self {
+        let lit = Lit::new(&Picture::truth(&exact), &exact.rays);
+        Self { band: exact.band(), flip: Flip::new(&lit.flat(), lit.width), lit, exact }
+    }
+
+    /// Measures `picture`, and `lit`, what it looks like.
+    pub fn measure(&self, picture: &Picture, lit: &Lit, subject: &Subject) -> Measures {
+        Measures {
+            cover: Verdicts::new(&self.exact, picture, subject).cover(),
+            angles: angles(&self.exact, &self.band, picture),
+            depth_px: depth_px(&self.exact, picture),
+            psnr: psnr(lit, &self.lit),
+            flip: self.flip(lit),
+        }
+    }
+
+    /// Mean FLIP error over the pixels that either picture covers.
+    fn flip(&self, lit: &Lit) -> f64 {
+        let errors = self.flip.errors(&lit.flat());
+        let mut mean = Mean::default();
+        either(lit, &self.lit).for_each(|pixel| mean.add(errors[pixel]));
+        mean.value()
+    }
+}
+
+/// Degrees between the normal shown at a pixel and the true one, if there are both.
+pub fn angle(exact: &Exact, picture: &Picture, pixel: usize) -> Option<f64> {
+    let (seen, shown) = (exact.seen[pixel]?, picture.shown[pixel]?);
+    // The angle's sine is exact where its cosine is not.
+    let sine = shown.normal.cross(seen.normal).length();
+    (shown.normal.length_squared() > 0.0).then(|| sine.atan2(shown.normal.dot(seen.normal)).to_degrees())
+}
+
+fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
+    let each = (0..band.len()).filter_map(|pixel| Some((angle(exact, picture, pixel)?, band[pixel])));
+    let mut near = Mean::default();
+    let mut all: Vec<f64> = Vec::new();
+    for (angle, in_band) in each {
+        all.push(angle);
+        if in_band {
+            near.add(angle);
+        }
+    }
+    all.sort_unstable_by(f64::total_cmp);
+    let count = all.len() as f64;
+    let below = |limit: f64| all.partition_point(|&angle| angle < limit) as f64 / count;
+    Some(Angles {
+        mean: all.iter().sum::<f64>() / count,
+        median: *all.get(all.len() / 2)?,
+        rms: (all.iter().map(|angle| angle * angle).sum::<f64>() / count).sqrt(),
+        below_5: below(5.0),
+        below_10: below(10.0),
+        flipped: 1.0 - below(90.0),
+        band: near.value(),
+    })
+}
+
+fn depth_px(exact: &Exact, picture: &Picture) -> f64 {
+    let mut mean = Mean::default();
+    for (seen, shown) in exact.seen.iter().zip(&picture.shown) {
+        if let (Some(seen), Some(shown)) = (seen, shown) {
+            mean.add((shown.depth - seen.depth).abs() / exact.rays.pixel_size(seen.depth));
+        }
+    }
+    mean.value()
+}
+
+/// A mean in the making; no number if there is nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mean {
+    sum: f64,
+    count: f64,
+}
+
+impl Mean {
+    /// Takes another value.
+    pub fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1.0;
+    }
+
+    /// The mean.
+    pub fn value(&self) -> f64 {
+        self.sum / self.count
+    }
+}

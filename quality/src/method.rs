@@ -1,0 +1,180 @@
+//! The ways to draw points that are compared.
+
+use std::collections::HashMap;
+use std::num::NonZero;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use anyhow::Result;
+use autosplats::cloud::glam::{DVec3, Vec3};
+use autosplats::{Camera, ColorMode, Normals, PointSurfel, Reconstruction, Renderer, SearchEngine, Settings, Shading};
+use rayon::prelude::*;
+
+use crate::neighbors::Neighbors;
+use crate::picture::{Picture, Shown};
+use crate::subject::Subject;
+use crate::view::Rays;
+
+/// Numbers of neighbours that plane fits have.
+pub const FIT_KS: [usize; 4] = [10, 40, 160, 640];
+/// Side of a dot in pixels.
+const DOT_PX: isize = 3;
+
+/// A way to draw points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// This project's default.
+    Ours,
+    /// The paper's settings.
+    Paper,
+    /// Squares of a fixed size in pixels, the nearest in front.
+    Dots,
+    /// The paper's splats with normals of plane fits to the exact nearest neighbours in the whole cloud, so many of them.
+    Fit(usize),
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Ours, Self::Paper, Self::Dots, Self::Fit(10), Self::Fit(40), Self::Fit(160), Self::Fit(640)];
+
+    /// A short name.
+    pub fn name(self) -> String {
+        match self {
+            Self::Ours => "ours".into(),
+            Self::Paper => "paper".into(),
+            Self::Dots => "dots".into(),
+            Self::Fit(k) => format!("fit {k}"),
+        }
+    }
+}
+
+/// The paper's settings, whatever the defaults are.
+pub fn paper() -> Reconstruction {
+    Reconstruction {
+        k: 10,
+        engine: SearchEngine::default(),
+        outlier_expansions: Some(1),
+        gap_factor: Some(4.0),
+        splat_scale: 1.0,
+        ellipses: false,
+        grid_culling: true,
+        depth_refinement: true,
+    }
+}
+
+/// Settings to look at shapes with.
+pub fn plain(reconstruction: Reconstruction) -> Settings {
+    let shading = Shading { color: ColorMode::Plain, ..Shading::default() };
+    Settings { reconstruction, shading, all_layers: true }
+}
+
+/// Draws one subject, and keeps what helps to draw it again.
+#[derive(Debug)]
+pub struct Painter<'a> {
+    subject: &'a Subject,
+    renderer: Renderer,
+    fits: Fits,
+}
+
+impl<'a> Painter<'a> {
+    /// A painter of `subject`.
+    pub fn new(subject: &'a Subject) -> Self {
+        Self { subject, renderer: Renderer::new(), fits: Fits::default() }
+    }
+
+    /// A picture of `size` pixels.
+    ///
+    /// # Errors
+    /// What the renderer refuses.
+    pub fn paint(&mut self, method: Method, camera: &Camera, size: [u32; 2]) -> Result<Picture> {
+        match method {
+            Method::Ours => self.render(Reconstruction::default(), camera, size),
+            Method::Paper => self.render(paper(), camera, size),
+            Method::Dots => Ok(dots(self.subject, &Rays::new(camera, size)?, size)),
+            Method::Fit(k) => {
+                // Without culling every visible point has a surfel, and its radius.
+                let all = plain(Reconstruction { grid_culling: false, ..paper() });
+                self.renderer.render(&self.subject.cloud, camera, size, &all)?;
+                let normals = self.fits.normals(self.subject, &self.renderer.surfels()?, k);
+                let cloud = &self.subject.cloud;
+                let frame = self.renderer.render_with_normals(cloud, &normals, camera, size, &plain(paper()))?;
+                Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
+            }
+        }
+    }
+
+    /// A picture with the renderer's own way to find normals.
+    ///
+    /// # Errors
+    /// What the renderer refuses.
+    pub fn render(&mut self, reconstruction: Reconstruction, camera: &Camera, size: [u32; 2]) -> Result<Picture> {
+        let frame = self.renderer.render(&self.subject.cloud, camera, size, &plain(reconstruction))?;
+        Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
+    }
+}
+
+/// Plane fits of the points that were needed so far.
+#[derive(Debug, Default)]
+struct Fits {
+    neighbors: Option<Neighbors>,
+    /// Normals for each of [`FIT_KS`].
+    found: HashMap<u32, [Vec3; FIT_KS.len()]>,
+}
+
+impl Fits {
+    /// Normals of the points of `surfels` and of no others, with the radii that they have there, so that nothing but normals
+    /// is another than in the paper's picture.
+    fn normals(&mut self, subject: &Subject, surfels: &[PointSurfel], k: usize) -> Normals {
+        let cloud = &subject.cloud;
+        let first = NonZero::new(FIT_KS[0]).expect("above 0");
+        let neighbors = self.neighbors.get_or_insert_with(|| Neighbors::new(cloud, first));
+        // Who has the whole cloud knows its outliers, and draws none.
+        let drawn = surfels.iter().filter(|surfel| surfel.radius > 0.0 && !subject.is_outlier(surfel.point));
+        let missing: Vec<u32> =
+            drawn.clone().map(|surfel| surfel.point).filter(|point| !self.found.contains_key(point)).collect();
+        let fit = |&point: &u32| {
+            let normals = neighbors.normals(point, &FIT_KS);
+            (point, std::array::from_fn(|i| normals[i].as_vec3()))
+        };
+        let found: Vec<_> = missing.par_iter().map(fit).collect();
+        self.found.extend(found);
+
+        let which = FIT_KS.iter().position(|&number| number == k).expect("one of the numbers");
+        let mut normals = Normals {
+            normals: vec![[f32::NAN; 3]; cloud.len()],
+            curvature: vec![0.0; cloud.len()],
+            radius: vec![f32::NAN; cloud.len()],
+        };
+        for surfel in drawn {
+            if let Some(found) = self.found.get(&surfel.point) {
+                normals.normals[surfel.point as usize] = found[which].to_array();
+                normals.radius[surfel.point as usize] = surfel.radius;
+            }
+        }
+        normals
+    }
+}
+
+/// Each point as a square of [`DOT_PX`] pixels.
+fn dots(subject: &Subject, rays: &Rays, [width, height]: [u32; 2]) -> Picture {
+    let [width, height] = [width, height].map(|side| side as isize);
+    // Depths above 0 have the order of their bits.
+    let pixels: Vec<AtomicU64> = (0..width * height).map(|_| AtomicU64::new(u64::MAX)).collect();
+    let cloud = &subject.cloud;
+    (0..cloud.len()).into_par_iter().for_each(|point| {
+        let Some((at, depth)) = rays.project(cloud.world_position(point)) else { return };
+        let key = u64::from((depth as f32).to_bits()) << 32 | point as u64;
+        let [x, y] = at.map(|at| at.floor().clamp(-1e9, 1e9) as isize - DOT_PX / 2);
+        for y in y.max(0)..(y + DOT_PX).min(height) {
+            for x in x.max(0)..(x + DOT_PX).min(width) {
+                pixels[(y * width + x) as usize].fetch_min(key, Relaxed);
+            }
+        }
+    });
+    let show = |pixel: &AtomicU64| {
+        let key = pixel.load(Relaxed);
+        let depth = f64::from(f32::from_bits((key >> 32) as u32));
+        (key != u64::MAX).then_some(Shown { depth, normal: DVec3::ZERO, point: key as u32 })
+    };
+    Picture { width: width as usize, shown: pixels.iter().map(show).collect() }
+}

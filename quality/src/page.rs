@@ -1,0 +1,281 @@
+//! `docs/QUALITY.md`, from outcomes alone.
+
+use crate::measure::Measures;
+use crate::method::{FIT_KS, Method};
+use crate::run::Outcome;
+use crate::table::{Table, number, percent};
+use crate::target::{TARGETS, ratio};
+
+const INTRODUCTION: &str = "\
+# Quality: pictures against the exact surface
+
+Written by `cargo xtask quality`; every number is computed. It is about pictures, not about time: for that there is \
+[PERFORMANCE.md](PERFORMANCE.md).
+
+## What is measured
+
+A case is a subject and a view of it. A subject is a surface that is known exactly, and points on it: the built-in scenes, \
+a sphere with bumps (`bumpy`), and meshes made smooth by Loop subdivision, with points strewn evenly by area. `noise` is \
+Gaussian, the same in all directions; its standard deviation is given in percent of the diagonal of the points' box. \
+`outliers` lie anywhere in the box, as many percent of the points. `scans` are two, every other point belongs to the \
+second, which is shifted by so many percent of the diagonal and turned by 0.1°. `uneven` has dense and sparse patches, \
+`striped` dense and sparse stripes, `gradient` a density that falls to a twentieth.
+
+One ray through the centre of each pixel tells what is truly there. Five ways to draw the points are compared:
+
+- **ours**: this project with its default settings.
+- **paper**: the paper's, k = 10.
+- **dots**: squares of 3×3 pixels, the nearest in front, without normals; shaded as if they faced the eye, with eye-dome \
+lighting.
+- **fit k**: the paper's splats, but with normals of plane fits to the k exact nearest neighbours in the whole cloud, \
+outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
+
+Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \
+pixels of a silhouette, *flipped* the share above 90°. *Holes* are empty pixels at least two pixels inside the true \
+silhouette, *leaks* pixels that show something behind the surface and all that is seen beside it, *before* the same in \
+front of it, *IoU* is the covered pixels' intersection over union, *wider* the pixels by which the silhouette is too wide: \
+all five only where points lie at most 1.5 pixels apart (*sampled*), and left out if that is hardly anywhere. *Depth* is \
+the mean error in depth in pixels. PSNR and FLIP compare pictures lit by the same lights in plain clay, over the pixels \
+that either covers. A moving camera goes around the subject in six steps of 0.7°; *change* is the mean difference of one \
+surface point between two pictures after one another, which in the true ones comes from light that goes with the camera, \
+and from pixels.
+
+";
+
+const CREDITS: &str = "\
+The bunny is from the Stanford 3D Scanning Repository, the horse by Sumner and Popović, the dancer by Vlasic et al. FLIP is \
+that of Andersson et al. 2020, at 67 pixels per degree.
+";
+
+/// The whole page. `sheets` are the names of pictures beside it.
+pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
+    let pictures: String = sheets.iter().map(|name| format!("![{name}](quality/{name}.png)\n")).collect();
+    [
+        INTRODUCTION,
+        "## Targets\n\n",
+        &targets(outcomes),
+        "## Summary\n\nMeans over the cases of a surface, without and with noise (or outliers, or scans that do not \
+         fit).\n\n",
+        &summary(outcomes),
+        "## Pictures\n\nWhere the error of normals is green, our picture is empty; where it is blue, it shows what is not \
+         there.\n\n",
+        &pictures,
+        "\n## Normals\n\nDegrees, and percent of pixels.\n\n",
+        &normals(outcomes),
+        "## Surface\n\nPercent of pixels; p is the paper's.\n\n",
+        &cover(outcomes),
+        "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels. The best fit is the one with the best \
+         normals.\n\n",
+        &lit(outcomes),
+        "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in \
+         255ths.\n\n",
+        &motion(outcomes),
+        CREDITS,
+    ]
+    .concat()
+}
+
+fn targets(outcomes: &[Outcome]) -> String {
+    let mut table = Table::new(&["target", "met", "worst", "where", ""]);
+    for target in TARGETS {
+        let values = outcomes.iter().filter_map(|outcome| Some((outcome, (target.value)(outcome)?)));
+        let values: Vec<_> = values.filter(|(_, value)| value.is_finite()).collect();
+        let met = values.iter().filter(|(_, value)| target.is_met(*value)).count();
+        let worst =
+            values.iter().copied().reduce(|one, other| if target.is_worse(other.1, one.1) { other } else { one });
+        let Some((outcome, worst)) = worst else { continue };
+        let verdict = if met == values.len() { "met" } else { "missed" };
+        table.row(&[
+            target.what.into(),
+            format!("{met} of {}", values.len()),
+            number(worst, target.decimals),
+            outcome.case.name(),
+            verdict.into(),
+        ]);
+    }
+    table.finish()
+}
+
+/// What a table shows of one method.
+fn of(outcome: &Outcome, method: Method, value: impl Fn(&Measures) -> f64) -> f64 {
+    outcome.of(method).map_or(f64::NAN, value)
+}
+
+fn mean(measures: &Measures) -> f64 {
+    measures.angles.map_or(f64::NAN, |angles| angles.mean)
+}
+
+fn band(measures: &Measures) -> f64 {
+    measures.angles.map_or(f64::NAN, |angles| angles.band)
+}
+
+fn summary(outcomes: &[Outcome]) -> String {
+    let mut table = Table::new(&[
+        "surface",
+        "cases",
+        "normals °: ours",
+        "paper",
+        "best fit",
+        "band °: ours",
+        "paper",
+        "best fit",
+        "PSNR: ours",
+        "paper",
+        "dots",
+        "FLIP: ours",
+        "paper",
+        "dots",
+    ]);
+    let group = |outcome: &Outcome| (outcome.case.recipe.surface_name(), outcome.case.recipe.is_noisy());
+    let mut groups: Vec<_> = Vec::new();
+    for outcome in outcomes {
+        if !groups.contains(&group(outcome)) {
+            groups.push(group(outcome));
+        }
+    }
+    for (name, noisy) in groups {
+        let members: Vec<_> = outcomes.iter().filter(|outcome| group(outcome) == (name, noisy)).collect();
+        let average = |value: &dyn Fn(&Outcome) -> f64, decimals| {
+            number(members.iter().map(|outcome| value(outcome)).sum::<f64>() / members.len() as f64, decimals)
+        };
+        let [ours, paper, dots] = [Method::Ours, Method::Paper, Method::Dots];
+        table.row(&[
+            if noisy { format!("{name}, noisy") } else { name.into() },
+            members.len().to_string(),
+            average(&|o| of(o, ours, mean), 2),
+            average(&|o| of(o, paper, mean), 2),
+            average(&|o| o.best_fit(|angles| angles.mean).map_or(f64::NAN, |best| best.1), 2),
+            average(&|o| of(o, ours, band), 2),
+            average(&|o| of(o, paper, band), 2),
+            average(&|o| o.best_fit(|angles| angles.band).map_or(f64::NAN, |best| best.1), 2),
+            average(&|o| of(o, ours, |m| m.psnr), 2),
+            average(&|o| of(o, paper, |m| m.psnr), 2),
+            average(&|o| of(o, dots, |m| m.psnr), 2),
+            average(&|o| of(o, ours, |m| m.flip), 3),
+            average(&|o| of(o, paper, |m| m.flip), 3),
+            average(&|o| of(o, dots, |m| m.flip), 3),
+        ]);
+    }
+    table.finish()
+}
+
+fn normals(outcomes: &[Outcome]) -> String {
+    let fits = FIT_KS.map(|k| format!("fit {k}"));
+    let mut columns = vec![
+        "case",
+        "ours: mean",
+        "median",
+        "RMS",
+        "< 5°",
+        "< 10°",
+        "flipped",
+        "band",
+        "paper: mean",
+        "flipped",
+        "band",
+    ];
+    columns.extend(fits.iter().map(String::as_str));
+    columns.extend(["best k", "ours / best", "best k, band", "ours / best, band"]);
+    let mut table = Table::new(&columns);
+    for outcome in outcomes {
+        let (Some(ours), Some(paper)) = (outcome.of(Method::Ours), outcome.of(Method::Paper)) else { continue };
+        let (Some(ours), Some(paper)) = (ours.angles, paper.angles) else { continue };
+        let mut cells = vec![
+            outcome.case.name(),
+            number(ours.mean, 2),
+            number(ours.median, 2),
+            number(ours.rms, 2),
+            percent(ours.below_5, 1),
+            percent(ours.below_10, 1),
+            percent(ours.flipped, 2),
+            number(ours.band, 2),
+            number(paper.mean, 2),
+            percent(paper.flipped, 2),
+            number(paper.band, 2),
+        ];
+        cells.extend(FIT_KS.map(|k| number(of(outcome, Method::Fit(k), mean), 2)));
+        let best = |value: fn(&crate::measure::Angles) -> f64| {
+            let k = outcome.best_fit(value).map_or("–".into(), |best| best.0.to_string());
+            [k, number(ratio(outcome, value).unwrap_or(f64::NAN), 2)]
+        };
+        cells.extend(best(|angles| angles.mean));
+        cells.extend(best(|angles| angles.band));
+        table.row(&cells);
+    }
+    table.finish()
+}
+
+fn cover(outcomes: &[Outcome]) -> String {
+    let mut table = Table::new(&[
+        "case",
+        "spacing px",
+        "sampled",
+        "holes",
+        "leaks",
+        "before",
+        "IoU",
+        "wider px",
+        "p: holes",
+        "leaks",
+        "before",
+        "IoU",
+        "wider px",
+        "dots: IoU",
+    ]);
+    for outcome in outcomes {
+        let Some(first) = outcome.of(Method::Ours) else { continue };
+        let mut cells = vec![outcome.case.name(), number(first.cover.spacing_px, 2), percent(first.cover.sampled, 1)];
+        for measures in [Method::Ours, Method::Paper].into_iter().filter_map(|method| outcome.of(method)) {
+            let cover = measures.cover;
+            cells.extend([percent(cover.holes, 3), percent(cover.leaks, 3), percent(cover.before, 3)]);
+            cells.extend([number(cover.iou, 4), number(cover.wider_px, 2)]);
+        }
+        cells.push(number(of(outcome, Method::Dots, |measures| measures.cover.iou), 4));
+        table.row(&cells);
+    }
+    table.finish()
+}
+
+fn lit(outcomes: &[Outcome]) -> String {
+    let mut table = Table::new(&[
+        "case",
+        "PSNR: ours",
+        "paper",
+        "dots",
+        "best fit",
+        "FLIP: ours",
+        "paper",
+        "dots",
+        "best fit",
+        "depth: ours",
+        "paper",
+        "dots",
+    ]);
+    let methods = [Method::Ours, Method::Paper, Method::Dots];
+    for outcome in outcomes {
+        // The best plane fits are those with the best normals.
+        let best = outcome.best_fit(|angles| angles.mean).map(|(k, _)| Method::Fit(k));
+        let with_best = || methods.into_iter().chain(best);
+        let mut cells = vec![outcome.case.name()];
+        cells.extend(with_best().map(|method| number(of(outcome, method, |measures| measures.psnr), 2)));
+        cells.extend(with_best().map(|method| number(of(outcome, method, |measures| measures.flip), 3)));
+        cells.extend(methods.map(|method| number(of(outcome, method, |measures| measures.depth_px), 2)));
+        table.row(&cells);
+    }
+    table.finish()
+}
+
+fn motion(outcomes: &[Outcome]) -> String {
+    let mut table =
+        Table::new(&["case", "normals °: truth", "ours", "paper", "lightness: truth", "ours", "paper", "dots"]);
+    for outcome in outcomes {
+        let Some(motion) = &outcome.motion else { continue };
+        let of = |method| motion.methods.iter().find(|(other, _)| *other == method).map(|(_, change)| *change);
+        let [ours, paper, dots] = [Method::Ours, Method::Paper, Method::Dots].map(of);
+        let mut cells = vec![outcome.case.name()];
+        cells.extend([Some(motion.truth), ours, paper].map(|c| number(c.map_or(f64::NAN, |c| c.degrees), 2)));
+        cells.extend([Some(motion.truth), ours, paper, dots].map(|c| number(c.map_or(f64::NAN, |c| c.lightness), 2)));
+        table.row(&cells);
+    }
+    table.finish()
+}

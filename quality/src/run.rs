@@ -1,0 +1,109 @@
+//! Measures one case.
+
+use anyhow::{Context as _, Result};
+
+use crate::case::Case;
+use crate::exact::Exact;
+use crate::light::Lit;
+use crate::measure::{Angles, Measures, Truth};
+use crate::method::{Method, Painter};
+use crate::motion::{Change, Changes, STEP_DEGREES, STEPS, same};
+use crate::picture::Picture;
+use crate::subject::Subject;
+use crate::view::orbit;
+
+/// A case with what was measured.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The case.
+    pub case: Case,
+    /// For each of [`Method::ALL`].
+    pub measures: Vec<(Method, Measures)>,
+    /// What changed while the camera moved, if it did.
+    pub motion: Option<Motion>,
+}
+
+/// What changed while the camera moved.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// In the true pictures: what light and pixels do.
+    pub truth: Change,
+    /// In those of each method.
+    pub methods: Vec<(Method, Change)>,
+}
+
+/// The pictures of a case.
+#[derive(Debug)]
+pub struct Pictures {
+    /// What is truly there.
+    pub truth: Truth,
+    /// What each method drew, and that lit.
+    pub drawn: Vec<(Method, Picture, Lit)>,
+}
+
+/// Draws a case with each of `methods` and measures the pictures.
+///
+/// # Errors
+/// What the renderer refuses.
+pub fn measure(
+    case: &Case,
+    subject: &Subject,
+    painter: &mut Painter<'_>,
+    methods: &[Method],
+) -> Result<(Outcome, Pictures)> {
+    let camera = case.shot.camera(subject, case.size).with_context(|| case.name())?;
+    let truth = Truth::new(Exact::trace(subject, &camera, case.size)?);
+    let mut measures = Vec::new();
+    let mut drawn = Vec::new();
+    for &method in methods {
+        let picture = painter.paint(method, &camera, case.size).with_context(|| case.name())?;
+        let lit = Lit::new(&picture, &truth.exact.rays);
+        measures.push((method, truth.measure(&picture, &lit, subject)));
+        drawn.push((method, picture, lit));
+    }
+    let motion = if case.motion { Some(movement(case, subject, painter, methods)?) } else { None };
+    Ok((Outcome { case: *case, measures, motion }, Pictures { truth, drawn }))
+}
+
+/// Moves the camera of a case around its subject and follows what changes.
+fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: &[Method]) -> Result<Motion> {
+    let camera = case.shot.camera(subject, case.size)?;
+    let methods: Vec<_> = methods.iter().copied().filter(|method| !matches!(method, Method::Fit(_))).collect();
+    let mut truth = Changes::default();
+    let mut changes = vec![Changes::default(); methods.len()];
+    let mut before: Option<(Exact, Vec<(Picture, Lit)>)> = None;
+    for step in 0..=STEPS {
+        let camera = orbit(&camera, step as f64 * STEP_DEGREES)?;
+        let exact = Exact::trace_alone(subject, &camera, case.size)?;
+        let mut pictures = vec![Picture::truth(&exact)];
+        for &method in &methods {
+            pictures.push(painter.paint(method, &camera, case.size)?);
+        }
+        let lit: Vec<_> = pictures.iter().map(|picture| Lit::new(picture, &exact.rays)).collect();
+        let pictures: Vec<_> = pictures.into_iter().zip(lit).collect();
+        if let Some((exact_before, before)) = &before {
+            let same = same(exact_before, &exact);
+            let both = before.iter().zip(&pictures).map(|(one, other)| [(&one.0, &one.1), (&other.0, &other.1)]);
+            std::iter::once(&mut truth).chain(&mut changes).zip(both).for_each(|(sums, both)| sums.add(&same, both));
+        }
+        before = Some((exact, pictures));
+    }
+    let changes = methods.into_iter().zip(changes.iter().map(Changes::mean)).collect();
+    Ok(Motion { truth: truth.mean(), methods: changes })
+}
+
+impl Outcome {
+    /// What a method measured, if it was asked to.
+    pub fn of(&self, method: Method) -> Option<&Measures> {
+        self.measures.iter().find(|(other, _)| *other == method).map(|(_, measures)| measures)
+    }
+
+    /// The least of a value over the plane fits, and the number of neighbours that has it.
+    pub fn best_fit(&self, value: impl Fn(&Angles) -> f64) -> Option<(usize, f64)> {
+        let fits = self.measures.iter().filter_map(|(method, measures)| match method {
+            Method::Fit(k) => Some((*k, value(measures.angles.as_ref()?))),
+            _ => None,
+        });
+        fits.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}

@@ -1,0 +1,275 @@
+//! What pictures are taken of: a surface, and points on it as good or as bad as scanners make them.
+//!
+//! # How it works
+//! Meshes get points strewn evenly over their area. A density other than even strews more, and drops each with a
+//! probability that depends on its place. Then come, in this order: the misregistration of every other point, noise, and
+//! outliers behind all others. The points without the last three say where the surface counts as sampled.
+
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use autosplats::cloud::glam::{DQuat, DVec3};
+use autosplats::cloud::{Axes, PointCloud, Scene, sample_surface};
+
+use crate::mesh::Mesh;
+use crate::neighbors::Neighbors;
+use crate::random::Random;
+use crate::surface::Surface;
+
+/// Neighbours that say how densely a surface is sampled.
+const SPACING_K: NonZero<usize> = NonZero::new(10).expect("above 0");
+/// Standard deviations within which nearly all noise is.
+const NEARLY_ALL: f64 = 4.0;
+/// Axis of the turn and direction of the shift of a scan that is badly registered.
+const TURN_AXIS: DVec3 = DVec3::new(0.48, 0.6, 0.64);
+const SHIFT: DVec3 = DVec3::new(0.64, -0.48, 0.6);
+
+/// Where the surface comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A built-in scene, by name.
+    Scene(&'static str),
+    /// A sphere with bumps, of 20·4^n triangles.
+    Bumpy(usize),
+    /// A mesh in the folder of test data, and how many times it is subdivided.
+    Mesh {
+        /// What it is called.
+        name: &'static str,
+        /// Where in the folder it is.
+        path: &'static str,
+        /// Loop subdivisions.
+        levels: usize,
+    },
+}
+
+/// The Stanford bunny.
+pub const BUNNY: Source = Source::Mesh { name: "bunny", path: "models/bunny.ply", levels: 1 };
+/// The galloping horse of Sumner and Popović.
+pub const HORSE: Source = Source::Mesh { name: "horse", path: "animation/horse_gallop/frame_000.ply", levels: 2 };
+/// The samba dancer of Vlasic et al.
+pub const DANCER: Source = Source::Mesh { name: "dancer", path: "animation/samba/frame_000.ply", levels: 2 };
+
+/// How densely points lie, over place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Density {
+    /// The same everywhere.
+    #[default]
+    Even,
+    /// Dense and sparse patches, up to 12 times apart.
+    Uneven,
+    /// Stripes across, six times as dense as what lies between them.
+    Striped,
+    /// Falling from one end to the other, to a twentieth.
+    Gradient,
+}
+
+/// How to make a subject. Lengths are shares of the diagonal of the points' box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recipe {
+    /// The surface.
+    pub source: Source,
+    /// Points on the surface, nearly; outliers come on top.
+    pub count: usize,
+    /// How densely they lie.
+    pub density: Density,
+    /// Standard deviation of noise, the same in each of three directions.
+    pub noise: f64,
+    /// Outliers, as a share of the points, evenly in the box.
+    pub outliers: f64,
+    /// Every other point belongs to a second scan, shifted by this and turned by 0.1°.
+    pub misregistration: f64,
+}
+
+impl Recipe {
+    /// Clean, even points.
+    pub const fn new(source: Source, count: usize) -> Self {
+        Self { source, count, density: Density::Even, noise: 0.0, outliers: 0.0, misregistration: 0.0 }
+    }
+
+    /// The same with another density.
+    pub const fn density(self, density: Density) -> Self {
+        Self { density, ..self }
+    }
+
+    /// The same with noise.
+    pub const fn noise(self, noise: f64) -> Self {
+        Self { noise, ..self }
+    }
+
+    /// The same with outliers.
+    pub const fn outliers(self, outliers: f64) -> Self {
+        Self { outliers, ..self }
+    }
+
+    /// The same as two scans that do not quite fit.
+    pub const fn misregistration(self, misregistration: f64) -> Self {
+        Self { misregistration, ..self }
+    }
+
+    /// Whether points lie elsewhere than on the surface.
+    pub fn is_noisy(&self) -> bool {
+        self.noise > 0.0 || self.outliers > 0.0 || self.misregistration > 0.0
+    }
+
+    /// What the surface is called.
+    pub fn surface_name(&self) -> &'static str {
+        match self.source {
+            Source::Scene(name) | Source::Mesh { name, .. } => name,
+            Source::Bumpy(_) => "bumpy",
+        }
+    }
+
+    /// A short name for everything.
+    pub fn name(&self) -> String {
+        let thousands = self.count / 1000;
+        let count =
+            if thousands.is_multiple_of(1000) { format!("{}M", thousands / 1000) } else { format!("{thousands}K") };
+        let mut name = format!("{}:{count}", self.surface_name());
+        if self.density != Density::Even {
+            name += &format!("-{:?}", self.density).to_lowercase();
+        }
+        let percent = |share: f64| (share * 1e4).round() / 100.0;
+        for (what, share) in [("noise", self.noise), ("outliers", self.outliers), ("scans", self.misregistration)] {
+            if share > 0.0 {
+                name += &format!("-{what}{}%", percent(share));
+            }
+        }
+        name
+    }
+
+    /// Whether what it takes is there: meshes are not part of the repository.
+    pub fn is_available(&self) -> bool {
+        match self.source {
+            Source::Mesh { path, .. } => data_folder().join(path).is_file(),
+            Source::Scene(_) | Source::Bumpy(_) => true,
+        }
+    }
+}
+
+/// Where real scans and models are: the folder that `AUTOSPLATS_DATA` names, else one beside the repository.
+pub fn data_folder() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from)
+}
+
+/// A surface with its points.
+#[derive(Debug)]
+pub struct Subject {
+    /// What it was made from.
+    pub recipe: Recipe,
+    /// What the points lie on.
+    pub surface: Surface,
+    /// What is rendered.
+    pub cloud: PointCloud,
+    /// The points where they would be without noise, misregistration and outliers, in the same order.
+    pub clean: Neighbors,
+    /// How far points may lie off the surface, in its unit.
+    pub blur: f64,
+    /// Diagonal of the clean points' box.
+    pub diagonal: f64,
+}
+
+impl Subject {
+    /// Makes the points. The same recipe gives the same bytes.
+    ///
+    /// # Errors
+    /// A mesh that cannot be read.
+    pub fn new(recipe: Recipe) -> Result<Self> {
+        let (surface, even) = strew(&recipe)?;
+        let axes = even.axes();
+        let (low, high) = bounds(even.positions());
+        let diagonal = (high - low).length();
+        let clean: Vec<DVec3> = even.positions().iter().map(|&p| DVec3::from(p.map(f64::from))).collect();
+        let turn = DQuat::from_axis_angle(TURN_AXIS.normalize(), 0.1_f64.to_radians());
+        let shift = SHIFT.normalize() * (recipe.misregistration * diagonal);
+        let middle = 0.5 * (low + high);
+        let place = |(i, &point): (usize, &DVec3)| {
+            let is_second = recipe.misregistration > 0.0 && i % 2 == 1;
+            let point = if is_second { middle + turn * (point - middle) + shift } else { point };
+            let noise = if recipe.noise > 0.0 { Random::new(1, i).gauss3() } else { DVec3::ZERO };
+            (point + noise * (recipe.noise * diagonal)).as_vec3().to_array()
+        };
+        let mut positions: Vec<_> = clean.iter().enumerate().map(place).collect();
+        let outliers = (recipe.outliers * clean.len() as f64) as usize;
+        positions.extend((0..outliers).map(|i| {
+            let mut random = Random::new(2, i);
+            (low + (high - low) * DVec3::from([(); 3].map(|()| random.unit()))).as_vec3().to_array()
+        }));
+        let with_axes = |cloud: PointCloud| if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud };
+        let misplaced = if recipe.misregistration > 0.0 {
+            recipe.misregistration * diagonal + 0.5 * diagonal * 0.1_f64.to_radians()
+        } else {
+            0.0
+        };
+        Ok(Self {
+            recipe,
+            surface,
+            cloud: with_axes(PointCloud::new(even.origin(), positions)),
+            clean: Neighbors::new(&even, SPACING_K),
+            blur: NEARLY_ALL * recipe.noise * diagonal + misplaced,
+            diagonal,
+        })
+    }
+
+    /// Whether a point is one of the outliers.
+    pub fn is_outlier(&self, point: u32) -> bool {
+        point as usize >= self.clean.len()
+    }
+}
+
+/// The surface and clean points on it.
+fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
+    let mesh = match recipe.source {
+        Source::Scene(name) => {
+            let (scene, _) = Scene::parse(name)?;
+            let cloud = scene.sample(recipe.count, &|_| true)?;
+            // Without colours: light shows the shape.
+            let plain = PointCloud::new(cloud.origin(), cloud.positions().to_vec()).with_axes(Axes::ZUp);
+            return Ok((Surface::Scene(scene), plain));
+        }
+        Source::Bumpy(levels) => Mesh::bumpy_sphere(levels),
+        Source::Mesh { path, levels, .. } => Mesh::read(&data_folder().join(path), levels)?,
+    };
+    let contents = mesh.contents();
+    let (low, high) = bounds(contents.cloud.positions());
+    let keep = |p: &[f32; 3]| kept(recipe.density, (DVec3::from(p.map(f64::from)) - low) / (high - low));
+    let axes = if matches!(recipe.source, Source::Bumpy(_)) { Axes::ZUp } else { Axes::YUp };
+    let sample = |count, seed| sample_surface(&contents, count, seed, &()).context("strewing points");
+    let cloud = if recipe.density == Density::Even {
+        sample(recipe.count, 1)?
+    } else {
+        let few = sample(20_000, 2)?;
+        let share = few.positions().iter().map(keep).sum::<f64>() / few.len() as f64;
+        let many = sample((recipe.count as f64 / share) as usize, 1)?;
+        let lots = many.positions().iter().enumerate();
+        let left = lots.filter(|&(i, p)| Random::new(3, i).unit() < keep(p)).map(|(_, &p)| p);
+        PointCloud::new(many.origin(), left.collect())
+    };
+    Ok((Surface::Mesh(Arc::new(mesh)), cloud.with_axes(axes)))
+}
+
+/// Probability that a point at `at`, 0 to 1 along each side of the box, is kept.
+fn kept(density: Density, at: DVec3) -> f64 {
+    match density {
+        Density::Even => 1.0,
+        Density::Uneven => {
+            let waves = (9.0 * at.x + 1.0).sin() + (11.0 * at.y + 2.0).sin() + (10.0 * at.z).sin();
+            (0.5 + waves / 3.0).clamp(1.0 / 12.0, 1.0)
+        }
+        Density::Striped => {
+            if (30.0 * (at.y + 0.3 * at.x)).rem_euclid(1.0) < 0.4 {
+                1.0
+            } else {
+                1.0 / 6.0
+            }
+        }
+        Density::Gradient => 0.05 + 0.95 * at.x.clamp(0.0, 1.0),
+    }
+}
+
+fn bounds(positions: &[[f32; 3]]) -> (DVec3, DVec3) {
+    let points = positions.iter().map(|point| DVec3::from(point.map(f64::from)));
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| (low.min(point), high.max(point)))
+}

@@ -1,0 +1,145 @@
+//! What the project wants of its pictures.
+
+use crate::measure::{Angles, Measures};
+use crate::method::Method;
+use crate::motion::Change;
+use crate::run::Outcome;
+
+/// Share of the surface that must be sampled for its silhouette to count.
+const SAMPLED: f64 = 0.85;
+
+/// A limit, and how to tell on which side of it a case is.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    /// What is asked for, with the limit.
+    pub what: &'static str,
+    limit: f64,
+    /// Whether more is better.
+    more: bool,
+    /// Decimals worth showing.
+    pub decimals: usize,
+    /// The value of a case, if it has one.
+    pub value: fn(&Outcome) -> Option<f64>,
+}
+
+impl Target {
+    const fn most(what: &'static str, limit: f64, decimals: usize, value: fn(&Outcome) -> Option<f64>) -> Self {
+        Self { what, limit, more: false, decimals, value }
+    }
+
+    const fn least(what: &'static str, limit: f64, decimals: usize, value: fn(&Outcome) -> Option<f64>) -> Self {
+        Self { what, limit, more: true, decimals, value }
+    }
+
+    /// Whether a value is within the limit.
+    pub fn is_met(&self, value: f64) -> bool {
+        if self.more { value >= self.limit } else { value <= self.limit }
+    }
+
+    /// The worse of two values.
+    pub fn is_worse(&self, value: f64, than: f64) -> bool {
+        if self.more { value < than } else { value > than }
+    }
+}
+
+/// All targets.
+pub const TARGETS: [Target; 11] = [
+    Target::most("mean error of normals ≤ 1.15 × best fixed k", 1.15, 3, |outcome| {
+        ratio(outcome, |angles| angles.mean)
+    }),
+    Target::most("the same near silhouettes ≤ 1.2 × best fixed k", 1.2, 3, |outcome| {
+        ratio(outcome, |angles| angles.band)
+    }),
+    Target::most("flipped normals < 0.1 % of pixels", 0.1, 3, |outcome| {
+        ours(outcome)?.angles.map(|a| 100.0 * a.flipped)
+    }),
+    Target::most("holes ≤ 0.1 %", 0.1, 3, |outcome| Some(100.0 * ours(outcome)?.cover.holes)),
+    Target::most("leaks ≤ 0.1 %", 0.1, 3, |outcome| Some(100.0 * ours(outcome)?.cover.leaks)),
+    Target::least("silhouette IoU ≥ 0.995 where sampled", 0.995, 4, |outcome| {
+        let cover = ours(outcome)?.cover;
+        (cover.sampled >= SAMPLED).then_some(cover.iou)
+    }),
+    Target::least("PSNR ≥ dots + 4 dB", 4.0, 2, |outcome| gain(outcome, Method::Dots)),
+    Target::least("PSNR ≥ paper + 1 dB without noise", 1.0, 2, |outcome| {
+        if outcome.case.recipe.is_noisy() { None } else { gain(outcome, Method::Paper) }
+    }),
+    Target::least("PSNR ≥ paper + 6 dB with noise", 6.0, 2, |outcome| {
+        if outcome.case.recipe.is_noisy() { gain(outcome, Method::Paper) } else { None }
+    }),
+    Target::most("change of normals in motion ≤ truth + 10 %", 1.1, 3, |outcome| change(outcome, |c| c.degrees)),
+    Target::most("change of lightness in motion ≤ truth + 10 %", 1.1, 3, |outcome| change(outcome, |c| c.lightness)),
+];
+
+fn ours(outcome: &Outcome) -> Option<&Measures> {
+    outcome.of(Method::Ours)
+}
+
+/// An error of our normals over that of the best plane fits.
+pub fn ratio(outcome: &Outcome, value: fn(&Angles) -> f64) -> Option<f64> {
+    Some(value(ours(outcome)?.angles.as_ref()?) / outcome.best_fit(value)?.1)
+}
+
+/// Decibels that we are ahead of a method.
+fn gain(outcome: &Outcome, method: Method) -> Option<f64> {
+    Some(ours(outcome)?.psnr - outcome.of(method)?.psnr)
+}
+
+/// A change in our pictures over that in the true ones.
+fn change(outcome: &Outcome, value: fn(&Change) -> f64) -> Option<f64> {
+    let motion = outcome.motion.as_ref()?;
+    let ours = motion.methods.iter().find(|(method, _)| *method == Method::Ours)?;
+    Some(value(&ours.1) / value(&motion.truth))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::quick;
+    use crate::page::page;
+    use crate::run::Motion;
+    use crate::verdict::Cover;
+
+    /// A case that we measured like this, the paper and dots worse, and plane fits like this.
+    fn outcome(ours: f64, fit: f64, psnr: f64) -> Outcome {
+        let cover =
+            Cover { spacing_px: 1.0, sampled: 1.0, iou: 0.999, wider_px: 0.0, holes: 0.0, leaks: 0.0, before: 0.0 };
+        let measures = |mean: f64, psnr| {
+            let angles =
+                Angles { mean, median: mean, rms: mean, below_5: 1.0, below_10: 1.0, flipped: 0.0, band: mean };
+            Measures { cover, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
+        };
+        let dots = Measures { angles: None, ..measures(0.0, 20.0) };
+        let methods = vec![
+            (Method::Ours, measures(ours, psnr)),
+            (Method::Paper, measures(9.0, 28.0)),
+            (Method::Dots, dots),
+            (Method::Fit(10), measures(2.0 * fit, 28.0)),
+            (Method::Fit(40), measures(fit, 28.0)),
+        ];
+        let change = |degrees| Change { degrees, lightness: 1.0 };
+        let motion = Motion { truth: change(1.0), methods: vec![(Method::Ours, change(ours))] };
+        Outcome { case: quick()[0], measures: methods, motion: Some(motion) }
+    }
+
+    fn missed(outcome: &Outcome) -> Vec<&'static str> {
+        let is_missed = |target: &&Target| (target.value)(outcome).is_some_and(|value| !target.is_met(value));
+        TARGETS.iter().filter(is_missed).map(|target| target.what).collect()
+    }
+
+    #[test]
+    fn good_meets_all_and_bad_misses() {
+        assert_eq!(missed(&outcome(1.0, 1.0, 30.0)), [""; 0], "as good as the best plane fits");
+        let wrong = missed(&outcome(1.3, 1.0, 30.0));
+        assert_eq!(wrong, [TARGETS[0].what, TARGETS[1].what, TARGETS[9].what], "normals, and how they turn");
+        let dark = missed(&outcome(1.0, 1.0, 22.0));
+        assert_eq!(dark, ["PSNR ≥ dots + 4 dB", "PSNR ≥ paper + 1 dB without noise"], "colours");
+    }
+
+    #[test]
+    fn the_page_says_the_worst() {
+        let page = page(&[outcome(1.0, 1.0, 30.0), outcome(2.0, 1.0, 30.0)], &["figure".into()]);
+        let line = page.lines().find(|line| line.contains(TARGETS[0].what)).expect("a line for each target");
+        assert!(line.contains("| 1 of 2 | 2.000 |") && line.ends_with("missed |"), "{line}");
+        assert!(page.contains("![figure](quality/figure.png)") && !page.contains("NaN"), "{page}");
+    }
+}

@@ -1,0 +1,308 @@
+//! The small cases, held to what was measured when the limits were last set: pictures may get better, not worse.
+//!
+//! `cargo test -p autosplats-quality --test limits -- --nocapture` prints what was measured. The last tests spoil pictures,
+//! each in a way that one of the measures is for, which then has to notice.
+
+use std::f64::consts::TAU;
+use std::sync::OnceLock;
+
+use autosplats::cloud::glam::{DQuat, DVec3};
+use autosplats_quality::case::{Case, quick};
+use autosplats_quality::light::Lit;
+use autosplats_quality::measure::Measures;
+use autosplats_quality::method::{Method, Painter};
+use autosplats_quality::motion::{Change, Changes, same};
+use autosplats_quality::picture::{Picture, Shown};
+use autosplats_quality::random::Random;
+use autosplats_quality::run::{Pictures, measure};
+use autosplats_quality::subject::Subject;
+use autosplats_quality::target::ratio;
+
+/// What a case has to keep. Angles in degrees, shares in percent; what has no number is not looked at.
+struct Limits {
+    case: &'static str,
+    /// Mean error of normals, all and near silhouettes.
+    normals: [f64; 2],
+    /// The same over those of the best plane fits.
+    ratios: [f64; 2],
+    flipped: f64,
+    holes: f64,
+    leaks: f64,
+    before: f64,
+    /// At least.
+    iou: f64,
+    depth_px: f64,
+    /// At least.
+    psnr: f64,
+    flip: f64,
+    /// Changes of normals and lightness in motion, over those in the true pictures.
+    motion: [f64; 2],
+}
+
+const NONE: f64 = f64::NAN;
+
+/// One line for each case. Set anew when pictures got better: what was measured, with a few percent to spare.
+#[rustfmt::skip]
+const LIMITS: [Limits; 8] = [
+    Limits { case: "figure:60K own", normals: [7.4, 9.4], ratios: [1.24, 1.25], flipped: 0.53, holes: 0.02, leaks: 0.02, before: 0.55, iou: 0.948, depth_px: 0.55, psnr: 20.5, flip: 0.103, motion: [1.40, 1.60] },
+    Limits { case: "two-scales:150K own", normals: [5.7, 10.2], ratios: [1.23, 1.25], flipped: 0.53, holes: 0.02, leaks: 0.02, before: 1.15, iou: 0.961, depth_px: 0.41, psnr: 22.2, flip: 0.069, motion: [NONE; 2] },
+    Limits { case: "statue:150K own", normals: [21.0, 22.3], ratios: [1.07, 1.05], flipped: 0.63, holes: 0.02, leaks: 0.02, before: 1.31, iou: 0.951, depth_px: 0.96, psnr: 18.7, flip: 0.183, motion: [NONE; 2] },
+    Limits { case: "statue:150K near", normals: [16.2, 22.7], ratios: [1.04, 1.04], flipped: 1.28, holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 1.76, psnr: 20.4, flip: 0.160, motion: [NONE; 2] },
+    Limits { case: "bumpy:200K front", normals: [0.52, 1.56], ratios: [1.15, 1.25], flipped: 0.02, holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.996, depth_px: 0.14, psnr: 34.3, flip: 0.012, motion: [NONE; 2] },
+    Limits { case: "bumpy:200K-uneven front", normals: [0.78, 2.02], ratios: [1.07, 1.14], flipped: 0.02, holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.996, depth_px: 0.19, psnr: 34.7, flip: 0.016, motion: [NONE; 2] },
+    Limits { case: "bumpy:200K-noise0.3% front", normals: [28.8, 37.8], ratios: [5.60, 3.93], flipped: 3.1, holes: 0.19, leaks: 0.02, before: 4.7, iou: 0.947, depth_px: 5.8, psnr: 17.5, flip: 0.280, motion: [44.0, 25.2] },
+    Limits { case: "bumpy:200K-outliers2% front", normals: [15.1, 57.2], ratios: [26.6, 41.1], flipped: 5.2, holes: 0.11, leaks: 0.04, before: 20.6, iou: 0.444, depth_px: 9.4, psnr: 9.7, flip: 0.546, motion: [NONE; 2] },
+];
+
+/// What of a picture is beyond its limits.
+fn misses(measures: &Measures, limits: &Limits) -> Vec<String> {
+    let angles = measures.angles.expect("a method that knows normals");
+    let cover = measures.cover;
+    let most = [
+        ("normals", angles.mean, limits.normals[0]),
+        ("normals near silhouettes", angles.band, limits.normals[1]),
+        ("flipped", 100.0 * angles.flipped, limits.flipped),
+        ("holes", 100.0 * cover.holes, limits.holes),
+        ("leaks", 100.0 * cover.leaks, limits.leaks),
+        ("before", 100.0 * cover.before, limits.before),
+        // Turned round, at least is at most.
+        ("IoU", -cover.iou, -limits.iou),
+        ("depth", measures.depth_px, limits.depth_px),
+        ("PSNR", -measures.psnr, -limits.psnr),
+        ("FLIP", measures.flip, limits.flip),
+    ];
+    beyond(&most)
+}
+
+/// Those of some values that are above their limit, or no number though there is a limit.
+fn beyond(values: &[(&str, f64, f64)]) -> Vec<String> {
+    let is_beyond = |(_, value, limit): &&(&str, f64, f64)| !limit.is_nan() && !(value <= limit);
+    values.iter().filter(is_beyond).map(|(what, value, limit)| format!("{what}: {value:.4}, limit {limit}")).collect()
+}
+
+/// A change in motion that is beyond its limits.
+fn motion_misses(ours: Change, truth: Change, limits: &Limits) -> Vec<String> {
+    beyond(&[
+        ("turning", ours.degrees / truth.degrees, limits.motion[0]),
+        ("flicker", ours.lightness / truth.lightness, limits.motion[1]),
+    ])
+}
+
+fn limits_of(case: &Case) -> &'static Limits {
+    LIMITS.iter().find(|limits| limits.case == case.name()).expect("limits for each case")
+}
+
+/// Measures a case and holds it to its limits.
+fn hold(name: &str) {
+    let case = quick().into_iter().find(|case| case.name() == name).expect("a case of this name");
+    let limits = limits_of(&case);
+    let subject = Subject::new(case.recipe).expect("a subject");
+    let mut painter = Painter::new(&subject);
+    let methods: Vec<_> =
+        Method::ALL.into_iter().filter(|method| !matches!(method, Method::Paper | Method::Dots)).collect();
+    let (outcome, _) = measure(&case, &subject, &mut painter, &methods).expect("a measured case");
+    let measures = outcome.of(Method::Ours).expect("our picture");
+    let ratios = [ratio(&outcome, |angles| angles.mean), ratio(&outcome, |angles| angles.band)];
+    let ratios = ratios.map(|ratio| ratio.expect("plane fits"));
+    println!("{name}: {measures:.3?}\n{ratios:.3?}\n{:.3?}", outcome.motion);
+    let mut found = misses(measures, limits);
+    let pairs = [("normals over best fits", 0), ("the same near silhouettes", 1)];
+    found.extend(beyond(&pairs.map(|(what, i)| (what, ratios[i], limits.ratios[i]))));
+    if let Some(motion) = &outcome.motion {
+        found.extend(motion_misses(motion.methods[0].1, motion.truth, limits));
+    }
+    assert!(found.is_empty(), "{name}: limits missed:\n{}", found.join("\n"));
+}
+
+#[test]
+fn figure() {
+    hold("figure:60K own");
+}
+
+#[test]
+fn two_scales() {
+    hold("two-scales:150K own");
+}
+
+#[test]
+fn statue() {
+    hold("statue:150K own");
+}
+
+#[test]
+fn statue_near() {
+    hold("statue:150K near");
+}
+
+#[test]
+fn bumpy() {
+    hold("bumpy:200K front");
+}
+
+#[test]
+fn bumpy_uneven() {
+    hold("bumpy:200K-uneven front");
+}
+
+#[test]
+fn bumpy_with_noise() {
+    hold("bumpy:200K-noise0.3% front");
+}
+
+#[test]
+fn bumpy_with_outliers() {
+    hold("bumpy:200K-outliers2% front");
+}
+
+#[test]
+fn every_case_has_its_line() {
+    let names: Vec<_> = quick().iter().map(Case::name).collect();
+    assert_eq!(names, LIMITS.map(|limits| limits.case), "a line for each case, and no other");
+}
+
+/// A good picture to be spoilt.
+struct Sample {
+    subject: Subject,
+    limits: &'static Limits,
+    pictures: Pictures,
+}
+
+fn sample() -> &'static Sample {
+    static SAMPLE: OnceLock<Sample> = OnceLock::new();
+    SAMPLE.get_or_init(|| {
+        let case = quick().into_iter().find(|case| case.name() == "bumpy:200K front").expect("this case");
+        let subject = Subject::new(case.recipe).expect("a subject");
+        let mut painter = Painter::new(&subject);
+        let (_, pictures) = measure(&case, &subject, &mut painter, &[Method::Ours]).expect("a measured case");
+        Sample { subject, limits: limits_of(&case), pictures }
+    })
+}
+
+impl Sample {
+    fn picture(&self) -> &Picture {
+        &self.pictures.drawn[0].1
+    }
+
+    /// What is beyond the limits of a picture.
+    fn misses(&self, picture: &Picture) -> String {
+        let lit = Lit::new(picture, &self.pictures.truth.exact.rays);
+        self.lit_misses(picture, &lit)
+    }
+
+    fn lit_misses(&self, picture: &Picture, lit: &Lit) -> String {
+        misses(&self.pictures.truth.measure(picture, lit, &self.subject), self.limits).join("\n")
+    }
+
+    /// The picture with one in so many of its pixels changed.
+    fn spoilt(&self, one_in: usize, change: impl Fn(Shown) -> Option<Shown>) -> String {
+        let is_chosen = |pixel| Random::new(5, pixel).unit() < 1.0 / one_in as f64;
+        self.misses(&self.picture().changed(|pixel, shown| if is_chosen(pixel) { change(shown) } else { Some(shown) }))
+    }
+}
+
+#[track_caller]
+fn notices(misses: &str, what: &[&str]) {
+    println!("{misses}\n");
+    for what in what {
+        assert!(misses.contains(what), "{what} should be noticed, not only:\n{misses}");
+    }
+}
+
+#[test]
+fn a_good_picture_misses_nothing() {
+    let sample = sample();
+    assert_eq!(sample.misses(sample.picture()), "", "else the next tests would say nothing");
+    let truth = Picture::truth(&sample.pictures.truth.exact);
+    let lit = Lit::new(&truth, &sample.pictures.truth.exact.rays);
+    // Of the truth nobody knows the points, so its cover is judged where it covers, which is everywhere.
+    let measures = sample.pictures.truth.measure(&truth, &lit, &sample.subject);
+    let angles = measures.angles.expect("normals");
+    assert!(angles.rms < 1e-9 && measures.depth_px == 0.0 && measures.flip < 1e-6, "the truth is true: {measures:?}");
+    assert!(measures.psnr.is_infinite() && measures.cover.iou == 1.0, "the truth is true: {measures:?}");
+}
+
+#[test]
+fn a_shifted_picture_is_noticed() {
+    let sample = sample();
+    notices(&sample.misses(&sample.picture().shifted(4)), &["IoU", "normals", "PSNR", "FLIP"]);
+}
+
+#[test]
+fn flipped_normals_are_noticed() {
+    let flipped = |shown: Shown| Some(Shown { normal: -shown.normal, ..shown });
+    notices(&sample().spoilt(200, flipped), &["flipped", "normals:", "PSNR"]);
+}
+
+#[test]
+fn tilted_normals_are_noticed() {
+    let tilt = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0_f64.to_radians());
+    notices(&sample().spoilt(2, |shown| Some(Shown { normal: tilt * shown.normal, ..shown })), &["normals:"]);
+}
+
+#[test]
+fn holes_are_noticed() {
+    notices(&sample().spoilt(300, |_| None), &["holes"]);
+}
+
+#[test]
+fn leaks_are_noticed() {
+    let sample = sample();
+    let back = |shown: Shown| Some(Shown { depth: shown.depth + 0.3 * sample.subject.diagonal, ..shown });
+    notices(&sample.spoilt(300, back), &["leaks", "depth"]);
+}
+
+#[test]
+fn what_floats_in_front_is_noticed() {
+    let sample = sample();
+    let front = |shown: Shown| Some(Shown { depth: shown.depth - 0.3 * sample.subject.diagonal, ..shown });
+    notices(&sample.spoilt(300, front), &["before", "depth"]);
+}
+
+#[test]
+fn noise_in_colors_is_noticed() {
+    let sample = sample();
+    let lit = &sample.pictures.drawn[0].2;
+    let noisy = lit.changed(|pixel, color| {
+        let noise = 0.05 * Random::new(6, pixel).gauss();
+        color.map(|channel| (channel + noise).clamp(0.0, 1.0))
+    });
+    let misses = sample.lit_misses(sample.picture(), &noisy);
+    notices(&misses, &["PSNR", "FLIP"]);
+    assert!(!misses.contains("normals"), "only colours are wrong: {misses}");
+}
+
+#[test]
+fn a_jittering_picture_is_noticed() {
+    let sample = sample();
+    let exact = &sample.pictures.truth.exact;
+    let limits = Limits { motion: [1.1, 1.1], ..*limits_of_first() };
+    // The camera stands still, so each pixel shows what it showed; normals wobble by two degrees.
+    let pairs = same(exact, exact);
+    assert!(pairs.len() > 10_000 && pairs.iter().all(|(from, to)| from == to), "nothing moves");
+    let wobbling = |step: usize| {
+        sample.picture().changed(|pixel, shown| {
+            let turn = TAU * Random::new(7 + step as u64, pixel).unit();
+            let axis = DVec3::new(turn.cos(), turn.sin(), 0.0);
+            Some(Shown { normal: DQuat::from_axis_angle(axis, 2.0_f64.to_radians()) * shown.normal, ..shown })
+        })
+    };
+    let change = |pictures: &[Picture]| {
+        let lit: Vec<_> = pictures.iter().map(|picture| Lit::new(picture, &exact.rays)).collect();
+        let mut changes = Changes::default();
+        for step in 1..pictures.len() {
+            changes.add(&pairs, [(&pictures[step - 1], &lit[step - 1]), (&pictures[step], &lit[step])]);
+        }
+        changes.mean()
+    };
+    let still = change(&[sample.picture().clone(), sample.picture().clone()]);
+    assert_eq!(still, Change { degrees: 0.0, lightness: 0.0 }, "a picture does not differ from itself");
+    let wobble = change(&[wobbling(0), wobbling(1), wobbling(2)]);
+    // What the truth of a moving camera changes by, about.
+    let truth = Change { degrees: 0.5, lightness: 0.5 };
+    notices(&motion_misses(wobble, truth, &limits).join("\n"), &["turning", "flicker"]);
+    assert!(motion_misses(truth, truth, &limits).is_empty(), "what changes like the truth is right");
+}
+
+fn limits_of_first() -> &'static Limits {
+    &LIMITS[0]
+}

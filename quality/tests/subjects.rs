@@ -1,0 +1,114 @@
+//! Points are as good or as bad as a recipe says, and the same each time.
+
+use autosplats::cloud::glam::DVec3;
+use autosplats_quality::exact::Exact;
+use autosplats_quality::subject::{Density, Recipe, Source, Subject};
+use autosplats_quality::view::Shot;
+
+const COUNT: usize = 40_000;
+const RECIPE: Recipe = Recipe::new(Source::Bumpy(5), COUNT);
+
+fn subject(recipe: Recipe) -> Subject {
+    Subject::new(recipe).expect("a subject")
+}
+
+/// From where each point should be to where it is.
+fn offsets(subject: &Subject) -> Vec<DVec3> {
+    let clean = |point: usize| subject.clean.position(point as u32);
+    (0..subject.clean.len()).map(|point| subject.cloud.world_position(point) - clean(point)).collect()
+}
+
+#[test]
+fn the_same_recipe_gives_the_same_points() {
+    let recipe = RECIPE.density(Density::Uneven).noise(0.002).outliers(0.01).misregistration(0.001);
+    let [one, other] = [subject(recipe), subject(recipe)];
+    assert_eq!(one.cloud.positions(), other.cloud.positions(), "nothing is left to chance");
+    assert_eq!(recipe.name(), "bumpy:40K-uneven-noise0.2%-outliers1%-scans0.1%", "a name says all");
+}
+
+#[test]
+fn clean_points_lie_on_the_surface() {
+    let subject = subject(RECIPE);
+    assert_eq!(subject.cloud.len(), COUNT, "as many as asked for");
+    assert!(offsets(&subject).iter().all(|offset| *offset == DVec3::ZERO), "where they should be");
+    for point in (0..COUNT as u32).step_by(97) {
+        let place = subject.clean.position(point);
+        let outward = place.normalize();
+        let hit = subject.surface.trace(place + outward, -outward).expect("the surface is below");
+        assert!((hit.distance - 1.0).abs() < 1e-5, "point {point} is {} off", hit.distance - 1.0);
+    }
+}
+
+#[test]
+fn noise_has_its_deviation() {
+    let subject = subject(RECIPE.noise(0.003));
+    let offsets = offsets(&subject);
+    let square = offsets.iter().map(|offset| offset.length_squared()).sum::<f64>() / offsets.len() as f64;
+    let deviation = (square / 3.0).sqrt() / subject.diagonal;
+    assert!((deviation - 0.003).abs() < 0.00005, "{deviation} in each direction");
+}
+
+#[test]
+fn outliers_come_on_top() {
+    let subject = subject(RECIPE.outliers(0.02));
+    assert_eq!(subject.cloud.len(), COUNT + COUNT / 50, "two percent more");
+    assert!(!subject.is_outlier(COUNT as u32 - 1) && subject.is_outlier(COUNT as u32), "behind all others");
+    let far = (COUNT..subject.cloud.len()).filter(|&i| (subject.cloud.world_position(i).length() - 1.0).abs() > 0.3);
+    assert!(far.count() > COUNT / 200, "many are nowhere near the surface");
+}
+
+#[test]
+fn every_other_point_is_of_a_second_scan() {
+    let subject = subject(RECIPE.misregistration(0.0015));
+    let lengths: Vec<_> = offsets(&subject).iter().map(|offset| offset.length() / subject.diagonal).collect();
+    assert!(lengths.iter().step_by(2).all(|length| *length == 0.0), "the first stays");
+    let second: Vec<_> = lengths.iter().skip(1).step_by(2).collect();
+    let mean = second.iter().copied().sum::<f64>() / second.len() as f64;
+    assert!((0.0015..0.002).contains(&mean), "shifted, and turned a little: {mean}");
+    assert!(subject.blur > 0.0015 * subject.diagonal, "which is allowed for");
+}
+
+#[test]
+fn densities_differ_and_counts_do_not() {
+    for (density, least) in [(Density::Uneven, 5.0), (Density::Striped, 2.5), (Density::Gradient, 4.0)] {
+        let subject = subject(RECIPE.density(density));
+        let count = subject.cloud.len() as f64;
+        assert!((count / COUNT as f64 - 1.0).abs() < 0.03, "{density:?}: {count} points");
+        // The ball of ten points has an area as large as points are few.
+        let mut areas: Vec<_> = (0..subject.clean.len() as u32)
+            .step_by(37)
+            .map(|point| subject.clean.around(subject.clean.position(point)).last().map_or(0.0, |d| d.length_squared()))
+            .collect();
+        areas.sort_unstable_by(f64::total_cmp);
+        let spread = areas[areas.len() * 97 / 100] / areas[areas.len() * 3 / 100];
+        assert!(spread > least, "{density:?}: {spread} times as dense in one place as in another");
+    }
+}
+
+#[test]
+fn near_and_far_are_near_and_far() {
+    use autosplats::ViewDirection::Front;
+    let subject = subject(RECIPE);
+    let size = [120, 90];
+    let exact = |shot: Shot| {
+        let camera = shot.camera(&subject, size).expect("a camera");
+        Exact::trace(&subject, &camera, size).expect("a camera that can see")
+    };
+    let [whole, near, far] =
+        [exact(Shot::Whole(Front)), exact(Shot::Near(Front, [0.5, 0.5], 5.0)), exact(Shot::Far(Front, 5.0))];
+    let spacing = |exact: &Exact| {
+        let spacings = exact.seen.iter().flatten().map(|seen| seen.spacing_px);
+        spacings.clone().sum::<f64>() / spacings.count() as f64
+    };
+    let [whole_px, near_px, far_px] = [spacing(&whole), spacing(&near), spacing(&far)];
+    assert!((3.0..7.0).contains(&(near_px / whole_px)), "near: {near_px} and {whole_px}");
+    assert!((3.0..7.0).contains(&(whole_px / far_px)), "far: {far_px} and {whole_px}");
+
+    // The band goes around the outline and is a few pixels wide.
+    let band = whole.band();
+    let inside = whole.seen.iter().flatten().count();
+    let near_border = band.iter().filter(|in_band| **in_band).count();
+    let outline = std::f64::consts::TAU * (inside as f64 / std::f64::consts::PI).sqrt();
+    let width = near_border as f64 / outline;
+    assert!((3.0..8.0).contains(&width), "the band is {width} pixels wide");
+}
