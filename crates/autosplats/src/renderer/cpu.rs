@@ -9,6 +9,7 @@ use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
+use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{Projector, ScreenPoints};
 use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
@@ -21,6 +22,8 @@ pub(super) struct CpuRenderer {
     projector: Projector,
     neighborhoods: Neighborhoods,
     surfels: Surfels,
+    /// Of the cloud of this identity.
+    sensors: (Option<u64>, Sensors),
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -36,6 +39,7 @@ impl Default for CpuRenderer {
             projector: Projector::default(),
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
+            sensors: (None, Sensors::default()),
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -83,17 +87,21 @@ impl CpuRenderer {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
             scalar: wanted.scalar(cloud),
             measures: wanted.measures,
+            backs: wanted.backs,
         };
         let settings_splat = &settings.reconstruction;
-        let Self { projector, neighborhoods, surfels, recovered, splatter, image, .. } = self;
+        let Self { projector, neighborhoods, surfels, sensors: (known, sensors), recovered, splatter, image, .. } = self;
         let mut clock = Clock::start();
+        if known.replace(cloud.identity()) != Some(cloud.identity()) {
+            *sensors = Sensors::new(cloud);
+        }
 
         let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
         clock.lap(|timings| &mut timings.project);
 
         surfels.clear();
         splatter.begin(&view);
-        let reconstruct = Reconstruct { screen, view: &view, settings, given };
+        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
@@ -144,6 +152,7 @@ struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     settings: &'a Settings,
+    sensors: &'a Sensors,
     given: Option<GivenPlanes<'a>>,
 }
 
@@ -157,7 +166,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
-        let Self { screen, view, settings, given } = *self;
+        let Self { screen, view, settings, sensors, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -187,6 +196,7 @@ impl Reconstruct<'_> {
             keep_outliers: settings.outlier_expansions.is_none(),
         };
         fit(screen, queries, neighborhoods, view, &rules, surfels);
+        sensors.orient(&mut surfels[first..], view);
         clock.lap(|timings| &mut timings.fit);
 
         splatter.add(surfels, first, view);
