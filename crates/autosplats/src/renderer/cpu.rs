@@ -90,7 +90,8 @@ impl CpuRenderer {
             backs: wanted.backs,
         };
         let settings_splat = &settings.reconstruction;
-        let Self { projector, neighborhoods, surfels, sensors: (known, sensors), recovered, splatter, image, .. } = self;
+        let Self { projector, neighborhoods, surfels, sensors: (known, sensors), recovered, splatter, image, .. } =
+            self;
         let mut clock = Clock::start();
         if known.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);

@@ -121,12 +121,8 @@ struct ColoringPasses {
 impl ColoringPasses {
     fn new(gpu: &Gpu, shown: Shown, backs: bool) -> Result<Self, Error> {
         let shown = ("SHOWN", f64::from(shown as u32));
-        let shade = [
-            shown,
-            ("BACKS", backs.into()),
-            ("BACK_LIGHT", BACK_LIGHT.into()),
-            ("BACK_COLOR", BACK_COLOR.into()),
-        ];
+        let shade =
+            [shown, ("BACKS", backs.into()), ("BACK_LIGHT", BACK_LIGHT.into()), ("BACK_COLOR", BACK_COLOR.into())];
         Ok(Self { range_values: Pass::new(gpu, &RANGE_VALUES, &[shown])?, shade: Pass::new(gpu, &SHADE, &shade)? })
     }
 }

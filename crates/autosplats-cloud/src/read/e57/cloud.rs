@@ -9,6 +9,7 @@ use super::{
     super::{
         Job,
         placed::{fill, place},
+        sensor::may_be_seen_from,
         table::{MAX_COLUMNS, Part},
     },
     colors::{Colors, color_fields},
@@ -233,21 +234,25 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], done: f32) -> Result<
     let scans = sources.iter().filter_map(|source| {
         let points = start..start + source.len();
         start = points.end;
-        let scan = Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
-        // Programs that merge clouds write them without a pose, too; no scanner stood at their origin.
-        is_of_scanner(source.header).then_some(scan)
+        // Programs that merge clouds write them without a pose, or with one that changes nothing; no scanner stood at their
+        // origin.
+        let known = stands_at_its_origin(source.header)
+            || is_of_scanner(source.header)
+                && (source.pose != DMat4::IDENTITY || may_be_seen_from(&cloud, points.clone(), DVec3::ZERO));
+        known.then(|| Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points })
     });
-    let scans = scans.collect();
+    let scans: Vec<Scan> = scans.collect();
     Ok(cloud.with_scans(scans))
 }
 
 /// Whether points come from a scanner, which stands upright, and are not a model that was saved like a scan.
 pub(super) fn is_of_scanner(header: &ScanHeader) -> bool {
-    header.pose.is_some()
-        || header.indices.is_some()
-        || header.sensor.is_some()
-        || header.element("rowIndex").is_some()
-        || header.element("sphericalRange").is_some()
+    header.pose.is_some() || header.sensor.is_some() || stands_at_its_origin(header)
+}
+
+/// Whether points are as a scanner has them that stands at the origin of their frame.
+fn stands_at_its_origin(header: &ScanHeader) -> bool {
+    header.indices.is_some() || header.element("rowIndex").is_some() || header.element("sphericalRange").is_some()
 }
 
 /// A field of the cloud, and the scans that have it.

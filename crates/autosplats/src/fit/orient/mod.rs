@@ -3,7 +3,8 @@
 //! # How it works
 //! A point was seen from where its sensor stood, so the surface there has its outside on that side. Surfels face the eye,
 //! whatever the stages after the fit do with them; this marks those whose sensor was on the other side. Where the sensor
-//! looked along the surface, or the eye does, noise decides on which side of the plane they are, and no back is claimed.
+//! looked along the surface, or the eye does, noise decides on which side of the plane they are, all the more so the
+//! thicker the neighbourhood is: there no back is claimed.
 
 pub(crate) mod gpu;
 #[cfg(test)]
@@ -115,5 +116,8 @@ fn shows_back(surfel: &Surfel, sensor: Vec3, view: &View) -> bool {
     let [center, normal] = [surfel.center, surfel.normal].map(Vec3::from);
     let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
     let to_sensor = sensor - center;
-    normal.dot(to_sensor) < -SURE * to_sensor.length() && normal.dot(to_eye) > SEEN * to_eye.length()
+    // How thick the neighbourhood is for its width: about the tangent of the angle that its normal may be off by.
+    let rough = (2.0 * surfel.curvature).sqrt();
+    normal.dot(to_sensor) < -rough.max(SURE) * to_sensor.length()
+        && normal.dot(to_eye) > rough.max(SEEN) * to_eye.length()
 }

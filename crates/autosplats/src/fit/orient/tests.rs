@@ -43,8 +43,7 @@ fn each_point_has_its_own_sensor() {
     ];
     let cloud = cloud(12, scans);
     let one = |x: f32| Some(x);
-    let expected =
-        [None, one(1.0), one(1.0), one(1.0), one(2.0), None, one(3.0), one(3.0), one(3.0), None, None, None];
+    let expected = [None, one(1.0), one(1.0), one(1.0), one(2.0), None, one(3.0), one(3.0), one(3.0), None, None, None];
     assert_eq!(of_points(&cloud), expected);
     assert_eq!(Sensors::new(&cloud).len(), 6, "neighbours of one sensor are one run");
 }
@@ -99,6 +98,12 @@ fn only_what_is_sure_is_a_back() {
         let left = (-3.0 * right).as_dvec3();
         assert_eq!(backs(left, &normals), [false, true, true, false], "beside: the eye must see it surely, too");
         assert_eq!(backs(DVec3::ZERO, &normals), [false; 4], "at the point itself");
+        let behind = Sensors::new(&cloud(1, vec![scan(ORIGIN + 3.0 * DVec3::Z, 0..1)]));
+        let mut rough = at_the_origin(&normals[..2]);
+        rough.iter_mut().for_each(|surfel| surfel.curvature = 0.3);
+        behind.orient(&mut rough, &view);
+        let found = [&rough[0], &rough[1]].map(Surfel::shows_back);
+        assert_eq!(found, [true, false], "what is thick has a side only straight on");
     }
 }
 
@@ -111,7 +116,8 @@ fn the_device_marks_what_the_host_marks() {
     for scans in [1, 2, 3, 1000] {
         for projection in PROJECTIONS {
             let view = view(projection);
-            let mut vector = || Vec3::from(random.direction());
+            let mut turn = Random::new(92);
+            let mut vector = || Vec3::from(turn.direction());
             let count = 3000;
             // Some of no scan, some of a sensor that is unknown.
             let position = |i: usize, at: Vec3| if i % 7 == 3 { DVec3::INFINITY } else { ORIGIN + 4.0 * at.as_dvec3() };
@@ -121,6 +127,7 @@ fn the_device_marks_what_the_host_marks() {
             let mut surfels = at_the_origin(&(0..count).map(|_| vector()).collect::<Vec<_>>());
             for (index, surfel) in surfels.iter_mut().enumerate() {
                 surfel.source = index as u32;
+                surfel.curvature = if index % 3 == 0 { 0.1 * random.unit() } else { 0.0 };
                 surfel.center = (vector() + 10.0 * Vec3::Z).to_array();
                 let to_eye = if view.perspective { -Vec3::from(surfel.center) } else { Vec3::NEG_Z };
                 let normal = Vec3::from(surfel.normal);

@@ -220,7 +220,8 @@ fn every_setting_makes_the_same_picture() {
         for projection in PROJECTIONS {
             let view = view(size, projection, DVec3::ZERO);
             let scene = Scene { view: &view, up: DVec3::new(0.6, 0.0, 0.8), origin: DVec3::ZERO };
-            for layers in [blocks(5, size), colored(6, size), with_backs(blocks(5, size)), with_backs(colored(6, size))] {
+            for layers in [blocks(5, size), colored(6, size), with_backs(blocks(5, size)), with_backs(colored(6, size))]
+            {
                 for color in modes() {
                     for [lighting, eye_dome, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
                         // The settings without influence on each other go round.

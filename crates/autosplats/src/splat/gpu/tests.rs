@@ -146,9 +146,8 @@ fn other_depths(splatter: &Splatter, depth: &[f32], view: &View) -> usize {
 /// Pixels at which any layer differs.
 fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
     let [width, height] = [host.width as usize, host.height as usize];
-    let sizes = |l: &GBuffer| {
-        [l.weight.len(), l.color.len(), l.scalar.len(), l.radius.len(), l.curvature.len(), l.back.len()]
-    };
+    let sizes =
+        |l: &GBuffer| [l.weight.len(), l.color.len(), l.scalar.len(), l.radius.len(), l.curvature.len(), l.back.len()];
     assert_eq!(sizes(device), sizes(host), "sizes of layers");
     // f32 rounding of gradients, which the kernel's eighth power and sums that cancel make greater: some 1e-5.
     let near = |a: f32, b: f32, scale: f32| {
@@ -253,7 +252,8 @@ fn layers_that_are_not_wanted_change_no_other() {
         let again = scene.device(&gpu, &passes, channels);
         let bits = |layers: &GBuffer| -> Vec<u32> {
             let vectors = layers.normal.iter().chain(&layers.color).flatten();
-            let scalars = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
+            let scalars =
+                [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
             vectors
                 .chain(scalars.into_iter().flatten())
                 .map(|value| value.to_bits())
