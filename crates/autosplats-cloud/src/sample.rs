@@ -463,7 +463,7 @@ impl Random {
 const HILBERT_BITS: u32 = 16;
 
 /// How far along a Hilbert curve through a cube a cell lies (Skilling, "Programming the Hilbert curve", 2004).
-pub(crate) fn hilbert(mut cell: [u32; 3]) -> u64 {
+fn hilbert(mut cell: [u32; 3]) -> u64 {
     let mut bit = 1 << (HILBERT_BITS - 1);
     while bit > 1 {
         let below = bit - 1;

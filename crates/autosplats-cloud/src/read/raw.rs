@@ -4,11 +4,10 @@
 //! Nothing says how many numbers a point has, so a sample of records is looked at: read at the wrong width, coordinates
 //! turn up where intensities or rings have to be, and these are never negative.
 
-use glam::{DMat4, DVec3};
+use glam::DMat4;
 
 use super::{
     Contents, Description, Format, Job, columns,
-    sensor::may_be_seen_from,
     table::{Column, Scalar, Table},
 };
 use crate::{Axes, Error, Scan};
@@ -149,12 +148,11 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let table =
         Table { bytes: job.bytes, count, big_endian: false, columns: layout.columns(), packed_rgb: false, done: 0.0 };
     table.preview(job, "columns")?;
-    let cloud = table.into_cloud(job, "columns")?.with_axes(Axes::ZUp);
-    let is_sweep = may_be_seen_from(&cloud, 0..count, DVec3::ZERO);
-    Ok(if is_sweep { cloud.with_scans(vec![at_the_origin(count)]) } else { cloud }.into())
+    let cloud = table.into_cloud(job, "columns")?;
+    Ok(cloud.with_axes(Axes::ZUp).with_scans(vec![at_the_origin(count)]).into())
 }
 
-/// Sweeps are in the sensor's own frame; other points that the caller has named the columns of may not be.
+/// Sweeps are in the sensor's own frame.
 fn at_the_origin(points: usize) -> Scan {
     Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..points }
 }

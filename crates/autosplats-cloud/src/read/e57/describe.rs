@@ -31,7 +31,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
         start = end;
         let scan_of =
             || Scan { name: scan.name.clone(), world_from_sensor: scan.pose.unwrap_or(DMat4::IDENTITY), points };
-        is_of_scanner(scan).then(scan_of)
+        is_of_scanner(scan, root.is_ours()).then(scan_of)
     });
     let scans = scans.collect();
     let mut notes = root.notes.clone();

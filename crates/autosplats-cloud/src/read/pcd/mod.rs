@@ -7,9 +7,7 @@ use glam::{DMat4, DVec3};
 
 use self::header::{Encoding, Header, Viewpoint};
 use super::{
-    Attribute, Contents, Description, Format, Job,
-    sensor::may_be_seen_from,
-    shown,
+    Attribute, Contents, Description, Format, Job, shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
     xyz,
@@ -118,6 +116,9 @@ const LISTED: usize = 10;
 /// Values that a field may have for each of them to become one of its own. Descriptors have more.
 const MAX_COUNT: usize = 16;
 
+/// Neighbours looked at to find out from where an image of points was taken.
+const RAYS: usize = 1 << 14;
+
 /// Where the sensor stood, if the file says more than the default, or is of our own and says that it was there.
 ///
 /// The points are not moved by it: the format calls VIEWPOINT the place that the points were acquired from, not a
@@ -135,9 +136,22 @@ fn at_the_origin(points: usize) -> Scan {
 }
 
 /// An image of points was taken by a sensor. Where the file says no more than the default that was its origin, unless the
-/// points were moved since.
+/// points were moved since: seen from there, neighbours in a row are about the same angle apart, near or far.
 fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
-    header.viewpoint == Viewpoint::Identity && header.height > 1 && may_be_seen_from(cloud, 0..cloud.len(), DVec3::ZERO)
+    let Some(width) = header.width.filter(|_| header.viewpoint == Viewpoint::Identity && header.height > 1) else {
+        return false;
+    };
+    let ray = |i: usize| cloud.world_position(i).try_normalize().filter(|ray| ray.is_finite());
+    let step = cloud.len().div_ceil(RAYS).max(1);
+    let starts = (0..cloud.len().saturating_sub(1)).step_by(step).filter(|i| (i + 1) % width != 0);
+    let mut angles: Vec<f64> = starts.filter_map(|i| Some(ray(i)?.cross(ray(i + 1)?).length())).collect();
+    if angles.is_empty() {
+        return false;
+    }
+    angles.sort_unstable_by(f64::total_cmp);
+    let middle = angles[angles.len() / 2];
+    let even = angles.iter().filter(|&&angle| (0.3 * middle..=3.0 * middle).contains(&angle)).count();
+    middle > 0.0 && even * 10 >= angles.len() * 9
 }
 
 /// Names of the columns that a field is read as: none for padding and for fields of too many values.
