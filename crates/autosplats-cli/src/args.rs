@@ -7,7 +7,7 @@ use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{DepthCamera, written_formats};
 use clap::{Args, Parser, Subcommand};
 
-use crate::choices::{AxesChoice, Backend, Engine, Map, OrientChoice, Side};
+use crate::choices::{AxesChoice, Backend, BacksChoice, Engine, Map, OrientChoice, Side};
 use crate::exit::EXIT_CODES;
 use crate::first_radius::FirstRadius;
 use crate::values::{self, Neighbors, Ortho};
@@ -230,6 +230,9 @@ pub(crate) struct LookArgs {
     /// Strength of eye-dome lighting, the darkening at depth steps, 0 to 10
     #[arg(long, value_name = "STRENGTH", default_value_t = Shading::default().eye_dome, allow_negative_numbers = true)]
     pub(crate) eye_dome: f32,
+    /// How the side of a surface is shown that its sensor did not see, where the file says where that stood
+    #[arg(long, value_enum, default_value_t = BacksChoice::Toned)]
+    pub(crate) backs: BacksChoice,
     /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
     #[arg(long, value_name = "COLOR", value_parser = values::background)]
     pub(crate) background: Option<Background>,

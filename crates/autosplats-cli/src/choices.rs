@@ -1,5 +1,6 @@
 //! The names that options take.
 
+use autosplats::Backs;
 use clap::ValueEnum;
 
 use crate::first_radius::FirstRadius;
@@ -84,6 +85,24 @@ impl From<Backend> for autosplats::Backend {
             Backend::Auto => Self::Auto,
             Backend::Cpu => Self::Cpu,
             Backend::Gpu => Self::Gpu,
+        }
+    }
+}
+
+/// How the backs of surfaces are shown.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum BacksChoice {
+    /// Darker and with less colour
+    Toned,
+    /// Like the front
+    Same,
+}
+
+impl From<BacksChoice> for Backs {
+    fn from(choice: BacksChoice) -> Self {
+        match choice {
+            BacksChoice::Toned => Self::Toned,
+            BacksChoice::Same => Self::Same,
         }
     }
 }

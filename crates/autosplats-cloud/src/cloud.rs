@@ -185,7 +185,8 @@ impl PointCloud {
         Ok(self)
     }
 
-    /// States which points were seen from where, replacing what was known.
+    /// States which points were seen from where, replacing what was known. Points of no scan were seen from nobody knows
+    /// where; one that several claim belongs to the first of them, by the places where they begin.
     ///
     /// # Panics
     /// If a scan's points are not among the cloud's.
@@ -195,6 +196,7 @@ impl PointCloud {
         for Scan { points, .. } in &scans {
             assert!(points.start <= points.end && points.end <= len, "points {points:?} of {len}");
         }
+        self.identity = Identity::default();
         self.scans = scans;
         self
     }
@@ -316,10 +318,11 @@ mod tests {
         assert_eq!(cloud.clone().identity(), cloud.identity(), "a clone is the same cloud");
         assert_eq!(new(), cloud, "identities do not matter to equality");
         type Change = fn(&mut PointCloud);
-        let changes: [Change; 7] = [
+        let changes: [Change; 8] = [
             |cloud| *cloud = PointCloud::new(DVec3::ZERO, cloud.positions.clone()),
             |cloud| *cloud = cloud.clone().with_colors(vec![[1, 2, 3]; 2]).expect("a colour each"),
             |cloud| *cloud = cloud.clone().with_field("A", FieldValues::U8(vec![1, 2])).expect("a value each"),
+            |cloud| *cloud = cloud.clone().with_scans(Vec::new()),
             |cloud| cloud.retain(|index| index == 1),
             |cloud| cloud.crop(DVec3::ZERO, DVec3::splat(3.5)),
             |cloud| cloud.add_noise(0.1, 1, &()).expect("noise"),

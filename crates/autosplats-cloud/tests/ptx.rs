@@ -77,6 +77,23 @@ fn scans_are_placed_turned_and_coloured() {
 }
 
 #[test]
+fn nobody_stands_where_no_number_reaches() {
+    let points = "1 0 0\n2 0 1\n";
+    for (x, known) in [("5", true), ("1e300", false), ("-3e19", false)] {
+        // The points are told in world coordinates, the place apart.
+        let (cloud, told) = load(&format!("1\n2\n{}{points}", PLAIN.replacen('1', x, 1)), &ReadOptions::default());
+        assert_eq!((cloud.len(), cloud.scans().len()), (2, usize::from(known)), "{x}");
+        assert_eq!(told.notes.lock().unwrap().is_empty(), known, "{x}: told");
+    }
+    let huge = PLAIN.replace("0 0 0 1\n", "1e300 0 0 1\n");
+    let (cloud, _) = load(&format!("1\n2\n{huge}{points}"), &ReadOptions::default());
+    let places: Vec<_> = cloud.scans().iter().map(|scan| scan.position() - cloud.origin()).collect();
+    assert!(places.iter().all(|place| place.abs().max_element() <= 1e18), "computed with: {places:?}");
+    let broken = format!("1\n2\n{}{points}", PLAIN.replacen('1', "nan", 1));
+    assert!(read_bytes(Path::new("a.ptx"), broken.as_bytes(), &ReadOptions::default(), &()).is_err(), "no number");
+}
+
+#[test]
 fn scans_of_unlike_lines() {
     let text =
         format!("1\n2\n{PLAIN}1 0 0\n2 0 0\n\n1\n1\n{PLAIN}3 0 0 0.5 9 8 7\n1\n1\n{PLAIN}4 0 0 1 2 3\n0\n5\n{PLAIN}");

@@ -246,3 +246,37 @@ fn malformed_files_are_told_or_read() {
     }
     assert_eq!(checked, expected.len(), "all files are there");
 }
+
+#[test]
+fn sensors_stand_where_it_is_sure() {
+    let Some(folder) = data() else { return };
+    let at_the_origin = [
+        "scans/pump_room.e57",
+        "scans/spherical.e57",
+        "scans/five_people.pcd",
+        "scans/kitti_000008_fov.bin",
+        "scans/nuscenes_n015.pcd.bin",
+        "sequences/rgbd_kinect/depth_1.pgm",
+    ];
+    for file in at_the_origin {
+        let cloud = load(&folder, file);
+        let found: Vec<_> = cloud.scans().iter().map(|scan| (scan.position(), scan.points.clone())).collect();
+        assert_eq!(found, [(DVec3::ZERO, 0..cloud.len())], "{file}");
+    }
+    // Models, merged clouds, and points that were moved into the coordinates of a survey.
+    let unknown = [
+        "scans/bunny_float.e57",
+        "scans/rgb_float.e57",
+        "scans/two_scans.e57",
+        "scans/color.ptx",
+        "scans/two_scans.ptx",
+        "scans/livingroom_fragment.pcd",
+        "scans/autzen_utm_f64.pcd",
+        "scans/autzen_trim.laz",
+        "sequences/kitti_drive_pcd/000000.pcd",
+        "models/bunny.ply",
+    ];
+    for file in unknown {
+        assert_eq!(load(&folder, file).scans(), [], "{file}");
+    }
+}

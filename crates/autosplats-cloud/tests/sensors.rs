@@ -336,6 +336,57 @@ fn pcd_viewpoints_are_places_of_the_sensor() {
     assert!(notes[0].contains("i has 33 values"), "{notes:?}");
 }
 
+/// A text PCD of this width with these points.
+fn pcd_image(width: usize, points: &[DVec3], viewpoint: &str) -> Vec<u8> {
+    let (count, height) = (points.len(), points.len() / width);
+    let mut text = format!(
+        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {width}\nHEIGHT {height}\n\
+         VIEWPOINT {viewpoint}\nPOINTS {count}\nDATA ascii\n"
+    );
+    points.iter().for_each(|point| text += &format!("{} {} {}\n", point.x, point.y, point.z));
+    text.into_bytes()
+}
+
+#[test]
+fn images_of_points_are_seen_from_the_origin_unless_they_were_moved() {
+    // A wall with a box before it, and holes.
+    let pixel = |i: usize| {
+        let (u, v) = ((i % 40) as f64 - 19.5, (i / 40) as f64 - 14.5);
+        let depth = if u.abs() < 8.0 && v.abs() < 8.0 { 2.0 } else { 5.0 + 0.1 * u };
+        if i % 11 == 3 { DVec3::NAN } else { depth * DVec3::new(u / 40.0, v / 40.0, 1.0) }
+    };
+    let points: Vec<DVec3> = (0..40 * 30).map(pixel).collect();
+    let scans =
+        |width, points: &[DVec3], viewpoint| load("a.pcd", &pcd_image(width, points, viewpoint)).scans().to_vec();
+    let identity = "0 0 0 1 0 0 0";
+    let seen = [Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..1200 }];
+    assert_eq!(scans(40, &points, identity), seen, "as the camera has them");
+    let turned: Vec<DVec3> = points.iter().map(|point| DVec3::new(point.z, -point.x, -point.y)).collect();
+    assert_eq!(scans(40, &turned, identity), seen, "turned about it");
+    let moved: Vec<DVec3> = points.iter().map(|point| *point + DVec3::new(3.0, 0.0, -3.0)).collect();
+    assert_eq!(scans(40, &moved, identity), [], "moved away from it");
+    assert_eq!(scans(40, &moved, "3 0 -3 1 0 0 0")[0].position(), DVec3::new(3.0, 0.0, -3.0), "and said so");
+    assert_eq!(scans(1200, &points, identity), [], "no image");
+    assert_eq!(scans(40, &vec![DVec3::NAN; 1200], identity), [], "nothing was seen");
+    assert_eq!(scans(40, &points, "1e300 0 0 1 0 0 0"), [], "nobody stands there");
+}
+
+#[test]
+fn a_sensor_at_the_origin_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..50 };
+    for name in ["a.pcd", "a.e57"] {
+        let path = folder.path().join(name);
+        for scans in [vec![scan.clone()], Vec::new()] {
+            write(&rich_cloud(50).with_scans(scans.clone()), &path, &()).unwrap();
+            let back = read_with(&path, &ReadOptions::default(), &()).unwrap();
+            assert_eq!(back.scans(), scans, "{name}: the one that was written, if any");
+            let described = autosplats_cloud::describe(&path, &ReadOptions::default()).unwrap();
+            assert_eq!(described.scans, scans, "{name}: described alike");
+        }
+    }
+}
+
 #[test]
 fn written_pcd_reads_back() {
     let folder = tempfile::tempdir().unwrap();

@@ -4,8 +4,8 @@
 
 mod common;
 
-use autosplats_cloud::{PointCloud, Scan, glam::DMat4, glam::DVec3};
-use common::{positions, rich_cloud};
+use autosplats_cloud::{FieldValues, PointCloud, Scan, glam::DMat4, glam::DVec3};
+use common::{Random, positions, rich_cloud};
 
 #[test]
 fn attributes_and_scans_go_with_their_points() {
@@ -23,6 +23,87 @@ fn attributes_and_scans_go_with_their_points() {
             assert_eq!(field.values.get(kept), before.values.get(old), "{} of {old}", field.name);
         }
     }
+}
+
+/// The sensor of each point, by where it stood; none for points of no scan.
+fn sensors(cloud: &PointCloud) -> Vec<Option<DVec3>> {
+    let of = |i: usize| cloud.scans().iter().find(|scan| scan.points.contains(&i)).map(Scan::position);
+    (0..cloud.len()).map(of).collect()
+}
+
+/// Some scans, with gaps between them, and a field that numbers the sensors as the points have them.
+fn scanned(random: &mut Random, count: usize) -> PointCloud {
+    let mut scans = Vec::new();
+    let mut start = 0;
+    while start < count {
+        let end = count.min(start + random.below(count / 2));
+        let place = DVec3::from([0; 3].map(|_| (10.0 * random.unit()).floor()));
+        if random.below(3) > 0 {
+            scans.push(Scan { name: None, world_from_sensor: DMat4::from_translation(place), points: start..end });
+        }
+        start = end + random.below(5);
+    }
+    let cloud = PointCloud::new(DVec3::new(4e5, 5e6, 0.0), positions(count)).with_scans(scans);
+    let number = |sensor: &Option<DVec3>| sensor.map_or(f64::NAN, |at| at.dot(DVec3::new(1.0, 10.0, 100.0)));
+    let values = sensors(&cloud).iter().map(number).collect();
+    cloud.with_field("Sensor", FieldValues::F64(values)).unwrap()
+}
+
+/// Whether the sensor of each point is still its own, moved by `moved`.
+fn keep_their_own(cloud: &PointCloud, moved: impl Fn(DVec3) -> DVec3) -> bool {
+    let own = cloud.field("Sensor").unwrap();
+    let back = |number: f64| moved(DVec3::new(number % 10.0, number / 10.0 % 10.0, number / 100.0).floor());
+    sensors(cloud).iter().enumerate().all(|(i, sensor)| match (sensor, own.values.get(i)) {
+        (None, number) => number.is_nan(),
+        (Some(sensor), number) => !number.is_nan() && sensor.distance(back(number)) < 1e-6,
+    })
+}
+
+#[test]
+fn whatever_is_done_to_points_their_sensors_stay_their_own() {
+    let mut random = Random(17);
+    let mut operations = [0; 6];
+    for round in 0..200 {
+        let count = 20 + random.below(100);
+        let mut cloud = scanned(&mut random, count);
+        let mut shift = DVec3::ZERO;
+        for _ in 0..4 {
+            let operation = random.below(operations.len());
+            operations[operation] += 1;
+            match operation {
+                0 => {
+                    let step = 1 + random.below(3);
+                    cloud.keep_every(step);
+                }
+                1 => {
+                    let kept: Vec<bool> = (0..cloud.len()).map(|_| random.below(4) > 0).collect();
+                    cloud.retain(|i| kept[i]);
+                }
+                2 => cloud.thin_by_voxel(0.3 + random.unit(), &()).unwrap(),
+                3 => cloud.crop(cloud.origin() + shift - 9.0, cloud.origin() + shift + 9.0),
+                4 => cloud.add_noise(0.1, 3, &()).unwrap(),
+                _ => {
+                    // With others before and behind it, some of which know no sensor.
+                    let pose = DMat4::from_translation(DVec3::new(1.0, 2.0, 3.0));
+                    let none = PointCloud::new(cloud.origin(), positions(7));
+                    let none = none.with_field("Sensor", FieldValues::F64(vec![f64::NAN; 7])).unwrap();
+                    let parts = vec![(none.clone(), DMat4::IDENTITY), (cloud, pose), (none, pose)];
+                    cloud = PointCloud::merge(parts);
+                    shift += DVec3::new(1.0, 2.0, 3.0);
+                }
+            }
+            assert!(keep_their_own(&cloud, |at| at + shift), "round {round}: operation {operation}");
+        }
+        let known = sensors(&cloud).iter().position(Option::is_some);
+        if let Some(known) = known {
+            let mut wrong = cloud.clone();
+            wrong =
+                wrong.with_scans(cloud.scans().iter().filter(|scan| !scan.points.contains(&known)).cloned().collect());
+            assert!(!keep_their_own(&wrong, |at| at + shift), "not noticed: a sensor that is lost");
+            assert!(!keep_their_own(&cloud, |at| at + shift + 1.0), "not noticed: one that stands elsewhere");
+        }
+    }
+    assert!(operations.iter().all(|&count| count > 50), "every operation has its turns: {operations:?}");
 }
 
 #[test]

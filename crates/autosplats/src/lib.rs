@@ -50,6 +50,6 @@ pub use renderer::{
     best_first_radius,
 };
 pub use search::SearchEngine;
-pub use shade::{Background, ColorMap, ColorMode, Image, Shading};
+pub use shade::{Background, Backs, ColorMap, ColorMode, Image, Shading};
 pub use splat::{GBuffer, TILE};
 pub use wgpu;

@@ -46,7 +46,7 @@ pub(super) const WORDS: &[Words] = &[
     Words {
         name: "PCD",
         kept: "text, binary and compressed; fields of up to 16 values, colours packed into `rgb` or `rgba` or apart, the \
-               viewpoint as the sensor's place",
+               viewpoint as the sensor's place, the origin for organised clouds whose rays meet there",
         not_kept: "the grid of organised clouds",
     },
     Words {

@@ -169,9 +169,8 @@ impl Report {
             self.crs = CrsFound::from(cloud.crs());
         }
         self.resolution = cloud.resolution().map(Into::into).or(self.resolution);
-        if !cloud.scans().is_empty() {
-            self.scans = cloud.scans().iter().map(ScanFound::from).collect();
-        }
+        // Those that cannot be right are left out there.
+        self.scans = cloud.scans().iter().map(ScanFound::from).collect();
         self.attributes = values_of(cloud, attributes);
         self.tidy();
         self.compare(header_bounds);

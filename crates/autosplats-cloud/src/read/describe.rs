@@ -19,7 +19,8 @@ pub struct Description {
     pub attributes: Vec<Attribute>,
     /// Coordinate system and units.
     pub crs: Crs,
-    /// Where the sensors stood; the ranges are those of the points in the file.
+    /// Where the sensors stood, as far as the header says; the ranges are those of the points in the file. Reading the points
+    /// may show that some cannot have stood there, or that others have.
     pub scans: Vec<Scan>,
     /// The step of which coordinates are multiples.
     pub resolution: Option<DVec3>,

@@ -27,6 +27,7 @@ mod placed;
 mod ply;
 mod ptx;
 mod raw;
+mod sensor;
 mod stl;
 mod table;
 mod text;
@@ -43,7 +44,7 @@ pub use self::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{Error, PointCloud, Progress, Scan, error::message, memory::check_memory, progress::tick};
+use crate::{Error, PointCloud, Progress, error::message, memory::check_memory, progress::tick};
 
 /// A kind of file: how to tell it from others, and what to do with it.
 struct Format {
@@ -209,7 +210,7 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
-    drop_far_sensors(job, &mut contents.cloud);
+    sensor::drop_far(job, &mut contents.cloud);
     job.tick(1.0)?;
     Ok(contents)
 }
@@ -218,31 +219,6 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
 fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
     [xyz::FORMAT.name, raw::FORMAT.name].contains(&format.name)
         || format.name == pcd::FORMAT.name && pcd::without_header(job)
-}
-
-/// Sensors stand this many times the size of what they saw away from it at most.
-const FAR: f64 = 20.0;
-
-/// Poses are often left out where points were moved into a survey's coordinates; the origin is then no place of a sensor.
-fn drop_far_sensors(job: &Job<'_>, cloud: &mut PointCloud) {
-    let far = |scan: &Scan| {
-        let step = scan.points.len().div_ceil(1000).max(1);
-        let sample = scan.points.clone().step_by(step).map(|i| cloud.world_position(i));
-        let sample = sample.filter(|point| point.is_finite());
-        let bounds = sample.fold(None, |bounds: Option<[DVec3; 2]>, point| {
-            Some(bounds.map_or([point; 2], |[min, max]| [min.min(point), max.max(point)]))
-        });
-        bounds.is_some_and(|[min, max]| {
-            let size = min.distance(max);
-            size > 0.0 && scan.position().distance(0.5 * (min + max)) > FAR * size
-        })
-    };
-    let kept: Vec<Scan> = cloud.scans.iter().filter(|scan| !far(scan)).cloned().collect();
-    let count = cloud.scans.len() - kept.len();
-    if count > 0 {
-        job.note(format!("{count} of the sensors' places are far from all that was seen; taken for unknown"));
-        cloud.scans = kept;
-    }
 }
 
 /// Scanners write (0, 0, 0) where nothing came back. One such point alone may be a real one, unless a sensor stands there.

@@ -88,10 +88,12 @@ impl Layout {
             Some(Axes::Camera) => "# axes camera\n",
             None => "",
         };
+        // The default does not tell a sensor at the origin from none.
+        let sensor = if only_pose(cloud).is_some() { "# sensor at VIEWPOINT\n" } else { "" };
         let words =
             |word: &dyn Fn(&(&str, char, usize)) -> String| fields.iter().map(word).collect::<Vec<_>>().join(" ");
         format!(
-            "# .PCD v0.7 - Point Cloud Data file format\n{axes}VERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+            "# .PCD v0.7 - Point Cloud Data file format\n{axes}{sensor}VERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
              WIDTH {len}\nHEIGHT 1\nVIEWPOINT {}\nPOINTS {len}\nDATA binary\n",
             words(&|field| field.0.into()),
             words(&|field| field.2.to_string()),

@@ -4,12 +4,14 @@
 //! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, a SIMD vector of matrices at a time:
 //! a fixed number of additions, multiplications and square roots without branches, which converges from any start and
 //! keeps the axes orthogonal. The axis of the least eigenvalue is the normal, turned towards the eye. The splat radius is
-//! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average.
+//! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average. If it is known from where a point was
+//! scanned, its surfel is then marked if that was on the other side (`orient/`).
 
 mod cpu;
 mod eigen;
 mod given;
 pub(crate) mod gpu;
+pub(crate) mod orient;
 #[cfg(test)]
 pub(crate) mod tests;
 
@@ -39,8 +41,19 @@ pub(crate) struct Surfel {
     pub(crate) pixel: u32,
     /// Index in the cloud.
     pub(crate) source: u32,
-    /// Index among the screen points.
+    /// Index among the screen points; [`BACK`](Self::BACK) is set if the surface shows its back.
     pub(crate) screen: u32,
+}
+
+impl Surfel {
+    /// Beyond all indices of screen points, of which there are no more than pixels.
+    pub(crate) const BACK: u32 = 1 << 31;
+
+    /// Whether the eye sees the side that the point's sensor did not see.
+    #[inline(always)]
+    pub(crate) fn shows_back(&self) -> bool {
+        self.screen & Self::BACK != 0
+    }
 }
 
 /// The surfels of a list of screen points, in that list's order.

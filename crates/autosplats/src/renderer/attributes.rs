@@ -4,6 +4,7 @@ use autosplats_cloud::{Field, FieldValues, PointCloud};
 
 use super::Settings;
 use crate::Error;
+use crate::fit::orient::has_sensors;
 use crate::shade::{ColorMode, class_colors};
 
 /// Where the colours of points come from.
@@ -23,6 +24,8 @@ pub(super) struct Wanted {
     pub(super) scalar: Option<String>,
     /// Splat radius, k-radius and curvature.
     pub(super) measures: bool,
+    /// Whether the surface shows its back.
+    pub(super) backs: bool,
 }
 
 impl Wanted {
@@ -45,7 +48,8 @@ impl Wanted {
             _ => None,
         };
         let measured = matches!(mode, ColorMode::Curvature | ColorMode::Radius | ColorMode::KRadius);
-        Ok(Self { colors, scalar, measures: settings.all_layers || measured })
+        let backs = (settings.all_layers || settings.shading.tones_backs()) && has_sensors(cloud);
+        Ok(Self { colors, scalar, measures: settings.all_layers || measured, backs })
     }
 
     /// The colours of the points, made where they are not the cloud's own.

@@ -10,6 +10,7 @@ use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::Adapter;
 use crate::camera::{Camera, View, guess_axes, up};
+use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{Projector, ScreenPoints};
 use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
@@ -23,6 +24,8 @@ pub(super) struct CpuRenderer {
     neighborhoods: Neighborhoods,
     surfels: Surfels,
     adapter: Adapter,
+    /// Of the cloud of this identity.
+    sensors: (Option<u64>, Sensors),
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -39,6 +42,7 @@ impl Default for CpuRenderer {
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
             adapter: Adapter::default(),
+            sensors: (None, Sensors::default()),
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -86,10 +90,15 @@ impl CpuRenderer {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
             scalar: wanted.scalar(cloud),
             measures: wanted.measures,
+            backs: wanted.backs,
         };
         let settings_splat = &settings.reconstruction;
-        let Self { projector, neighborhoods, surfels, adapter, recovered, splatter, image, .. } = self;
+        let Self { projector, neighborhoods, surfels, adapter, sensors, recovered, splatter, image, .. } = self;
+        let (known, sensors) = sensors;
         let mut clock = Clock::start();
+        if known.replace(cloud.identity()) != Some(cloud.identity()) {
+            *sensors = Sensors::new(cloud);
+        }
 
         let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
         clock.lap(|timings| &mut timings.project);
@@ -100,7 +109,7 @@ impl CpuRenderer {
         }
         surfels.clear();
         splatter.begin(&view);
-        let reconstruct = Reconstruct { screen, view: &view, settings, given };
+        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
@@ -152,6 +161,7 @@ struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     settings: &'a Settings,
+    sensors: &'a Sensors,
     given: Option<GivenPlanes<'a>>,
 }
 
@@ -166,7 +176,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
-        let Self { screen, view, settings, given } = *self;
+        let Self { screen, view, settings, sensors, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -202,6 +212,9 @@ impl Reconstruct<'_> {
             adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k);
             clock.lap(|timings| &mut timings.adapt);
         }
+        sensors.orient(&mut surfels[first..], view);
+        clock.lap(|timings| &mut timings.fit);
+
         splatter.add(surfels, first, view);
         clock.lap(|timings| &mut timings.splat);
         neighborhoods.counts

@@ -12,6 +12,8 @@ use crate::Error;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
+use crate::fit::orient::Sensors;
+use crate::fit::orient::gpu::{OrientPasses, sensor_buffer, write_sensors};
 use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step, stage_ms};
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
@@ -31,6 +33,8 @@ pub(super) struct GpuRenderer {
     clock: Clock,
     uploader: Uploader,
     cloud: DeviceCloud,
+    /// Where the sensors of its points stood, and the number of runs of points.
+    sensors: Option<(wgpu::Buffer, usize)>,
     resident: Resident,
     /// [`FrameUniform`].
     frame: wgpu::Buffer,
@@ -60,6 +64,8 @@ struct Passes {
     project: ProjectPasses,
     search: Option<(SearchKind, Box<dyn EnginePasses>)>,
     fit: FitPasses,
+    /// Once there was a cloud with sensors.
+    orient: Option<OrientPasses>,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
 }
@@ -71,6 +77,9 @@ struct Shape {
     search: SearchKind,
     depth_refinement: bool,
     channels: Channels,
+    /// Runs of points by their sensors.
+    sensors: Option<usize>,
+    tone_backs: bool,
     find_range: bool,
     keep_linear: bool,
     color: ColorMode,
@@ -98,12 +107,14 @@ impl GpuRenderer {
             clock: Clock::new(&gpu),
             uploader: Uploader::new(),
             cloud: DeviceCloud::default(),
+            sensors: None,
             resident: Resident::default(),
             frame: gpu.uniform::<FrameUniform>("frame")?,
             passes: Passes {
                 project: ProjectPasses::new(&gpu, gpu.int64_atomics())?,
                 search: None,
                 fit: FitPasses::new(&gpu)?,
+                orient: None,
                 splat: None,
                 shade: ShadePasses::new(&gpu)?,
             },
@@ -166,11 +177,27 @@ impl GpuRenderer {
             self.resident.points = None;
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
+            self.upload_sensors(&Sensors::new(cloud))?;
             self.resident.points = points;
         }
         self.cloud.resize_values(&self.gpu, carried.words())?;
         self.uploader.values(&self.gpu, &carried, &self.cloud, &|done| report(1.0 - part + part * done))?;
         self.resident.values = values;
+        Ok(())
+    }
+
+    /// Tells the device where the sensors of its points stood.
+    fn upload_sensors(&mut self, sensors: &Sensors) -> Result<(), Error> {
+        let len = Some(sensors.len()).filter(|&len| len > 0);
+        if self.sensors.as_ref().map(|(_, len)| *len) != len {
+            // Steps hold on to the buffer before.
+            self.prepared = None;
+            self.sensors = None;
+            self.sensors = len.map(|len| Ok::<_, Error>((sensor_buffer(&self.gpu, len)?, len))).transpose()?;
+        }
+        if let Some((buffer, _)) = &self.sensors {
+            write_sensors(&self.gpu, sensors, buffer);
+        }
         Ok(())
     }
 
@@ -328,7 +355,10 @@ impl GpuRenderer {
                 color: wanted.colors.is_some(),
                 scalar: wanted.scalar.is_some(),
                 measures: wanted.measures,
+                backs: wanted.backs,
             },
+            sensors: self.sensors.as_ref().map(|(_, len)| *len),
+            tone_backs: wanted.backs && settings.shading.tones_backs(),
             find_range: finds_range(&settings.shading),
             keep_linear: settings.all_layers,
             color: settings.shading.color.clone(),
@@ -338,8 +368,11 @@ impl GpuRenderer {
         }
         // The old buffers go before the new ones come.
         self.prepared = None;
-        let Self { gpu, cloud, frame, passes, .. } = self;
-        let Passes { project, search, fit, splat, shade } = passes;
+        let Self { gpu, cloud, sensors, frame, passes, .. } = self;
+        let Passes { project, search, fit, orient, splat, shade } = passes;
+        if sensors.is_some() && orient.is_none() {
+            *orient = Some(OrientPasses::new(gpu)?);
+        }
         if search.as_ref().is_none_or(|(of, _)| *of != shape.search) {
             let Reconstruction { engine, k, .. } = settings.reconstruction;
             *search = Some((shape.search, compile(gpu, engine, k)?));
@@ -364,6 +397,9 @@ impl GpuRenderer {
                 }
                 steps.extend(search);
                 steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
+                if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
+                    steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
+                }
                 steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
             }
             let refine = shape.depth_refinement;

@@ -10,7 +10,9 @@ use crate::fit::Surfel;
 pub struct PointSurfel {
     /// Index of the point in the cloud.
     pub point: u32,
-    /// Unit normal towards the eye, in the cloud's axes.
+    /// Unit normal in the cloud's axes: towards the sensor where the cloud says from where the point was
+    /// [scanned](autosplats_cloud::PointCloud::scans), unless the sensor or the eye looks along the surface; otherwise, and
+    /// with normals found beforehand, towards the eye.
     pub normal: [f32; 3],
     /// Semi-minor axis in the cloud's unit; 0 if the point was discarded as an outlier.
     pub radius: f32,
@@ -25,7 +27,10 @@ pub(super) fn point_surfels(surfels: &[Surfel], view: &View) -> Vec<PointSurfel>
     let world_from_view = Mat3A::from(view.view_from_world).transpose();
     let surfel = |surfel: &Surfel| PointSurfel {
         point: surfel.source,
-        normal: (world_from_view * Vec3A::from(surfel.normal)).to_array(),
+        normal: {
+            let towards_eye = world_from_view * Vec3A::from(surfel.normal);
+            if surfel.shows_back() { -towards_eye } else { towards_eye }.to_array()
+        },
         radius: surfel.radius,
         k_radius: surfel.k_radius,
         curvature: surfel.curvature,

@@ -23,6 +23,11 @@ pub(super) const SKY: [f32; 2] = [0.05, 0.18];
 /// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
 /// the lights above, so that a surface seen straight on keeps its colour.
 pub(super) const SCANNED_LIGHT: [f32; 2] = [0.45, 0.75];
+/// Light and colour left on the backs of surfaces.
+pub(super) const BACK_LIGHT: f32 = 0.5;
+pub(super) const BACK_COLOR: f32 = 0.4;
+/// Weights of red, green and blue in how bright a linear colour is.
+pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 /// Neighbours looked at by eye-dome lighting, in pixels.
 pub(super) const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 /// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
@@ -115,7 +120,19 @@ impl<'a> Shader<'a> {
         }
         let light = if self.shading.lighting { self.light(index) } else { 1.0 };
         let light = light * self.eye_dome(x, y, index);
-        Some(self.base_color(x, y, index).map(|channel| channel * light))
+        Some(self.tone_back(self.base_color(x, y, index), index).map(|channel| channel * light))
+    }
+
+    /// The colour of a surface that shows its back as far as the pixel says.
+    fn tone_back(&self, color: [f32; 3], index: usize) -> [f32; 3] {
+        match self.layers.back.get(index) {
+            Some(&share) if self.shading.tones_backs() => {
+                let color = Vec3::from(color);
+                let back = BACK_LIGHT * Vec3::splat(color.dot(LUMINANCE)).lerp(color, BACK_COLOR);
+                color.lerp(back, share).to_array()
+            }
+            _ => color,
+        }
     }
 
     fn base_color(&self, x: usize, y: usize, index: usize) -> [f32; 3] {

@@ -9,7 +9,7 @@ pub(crate) use texture::check_texture;
 pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
 
 use super::color_map::{self, table};
-use super::cpu::{ENCODE_STEPS, background, encode_table, sample_step, usual_map};
+use super::cpu::{BACK_COLOR, BACK_LIGHT, ENCODE_STEPS, background, encode_table, sample_step, usual_map};
 use super::{Background, ColorMap, Shading};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -107,7 +107,7 @@ impl ShadeBuffers {
 #[derive(Debug)]
 pub(crate) struct ShadePasses {
     range: Pass,
-    /// By [`Shown`].
+    /// By [`Shown`], without and with backs told apart.
     coloring: Vec<Option<ColoringPasses>>,
 }
 
@@ -119,9 +119,11 @@ struct ColoringPasses {
 }
 
 impl ColoringPasses {
-    fn new(gpu: &Gpu, shown: Shown) -> Result<Self, Error> {
-        let pass = |source: &PassSource| Pass::new(gpu, source, &[("SHOWN", f64::from(shown as u32))]);
-        Ok(Self { range_values: pass(&RANGE_VALUES)?, shade: pass(&SHADE)? })
+    fn new(gpu: &Gpu, shown: Shown, backs: bool) -> Result<Self, Error> {
+        let shown = ("SHOWN", f64::from(shown as u32));
+        let shade =
+            [shown, ("BACKS", backs.into()), ("BACK_LIGHT", BACK_LIGHT.into()), ("BACK_COLOR", BACK_COLOR.into())];
+        Ok(Self { range_values: Pass::new(gpu, &RANGE_VALUES, &[shown])?, shade: Pass::new(gpu, &SHADE, &shade)? })
     }
 }
 
@@ -152,13 +154,14 @@ impl ShadePasses {
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let ShadeBuffers { uniform, keys, color_map, tables, image, linear, .. } = buffers;
         let shown = Shown::new(&shading.color, layers.channels);
-        let at = shown as usize;
+        let backs = layers.channels.backs && shading.tones_backs();
+        let at = 2 * shown as usize + usize::from(backs);
         if self.coloring.len() <= at {
             self.coloring.resize_with(at + 1, || None);
         }
         let passes = match &mut self.coloring[at] {
             Some(passes) => passes,
-            none => none.insert(ColoringPasses::new(gpu, shown)?),
+            none => none.insert(ColoringPasses::new(gpu, shown, backs)?),
         };
         let mut steps = Vec::new();
         if finds_range(shading) {

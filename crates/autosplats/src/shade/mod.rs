@@ -4,7 +4,8 @@
 //! Each covered pixel has a base colour: that of the points, one tone, or a value (height, depth, a scalar field …) looked
 //! up in a colour map over its range. It is multiplied by the light that its normal catches from a key light over the
 //! viewer's left shoulder, a weak fill light from the right and a sky brighter above than below; since normals face the
-//! eye, both sides of a surface are lit alike. Eye-dome lighting darkens pixels beside nearer ones. Colours are linear
+//! eye, both sides of a surface are lit alike; where it is known from where points were scanned, the side not seen from
+//! there is darker and has less colour. Eye-dome lighting darkens pixels beside nearer ones. Colours are linear
 //! until the last step, which encodes them as sRGB.
 //!
 //! The range of a value, if none is given, reaches from the 1st to the 99th percentile of those in the picture, of 50,000
@@ -22,7 +23,7 @@ mod tests;
 
 pub(crate) use classes::class_colors;
 pub(crate) use cpu::{Scene, shade};
-pub use settings::{Background, ColorMap, ColorMode, Shading};
+pub use settings::{Background, Backs, ColorMap, ColorMode, Shading};
 
 /// An image, rows from the top.
 #[derive(Clone, Debug, Default, PartialEq)]

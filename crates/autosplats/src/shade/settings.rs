@@ -15,8 +15,28 @@ pub struct Shading {
     pub lighting: bool,
     /// Strength of eye-dome lighting, the darkening at depth steps; 0 (off) to 10.
     pub eye_dome: f32,
+    /// How the side of a surface is shown that its sensor did not see.
+    pub backs: Backs,
     /// What is seen where no surface is.
     pub background: Background,
+}
+
+impl Shading {
+    /// Whether backs are told apart where they are known: light does it, as it does all shading.
+    pub(crate) fn tones_backs(&self) -> bool {
+        self.lighting && self.backs == Backs::Toned
+    }
+}
+
+/// How the back of a surface is shown: the side that its sensor did not see. It is known where the cloud says from where it
+/// was [scanned](autosplats_cloud::PointCloud::scans).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backs {
+    /// Darker and with less colour than the front; only with [lighting](Shading::lighting).
+    #[default]
+    Toned,
+    /// Like the front.
+    Same,
 }
 
 /// What the surface is coloured by.
@@ -84,6 +104,7 @@ impl Default for Shading {
             legend: false,
             lighting: true,
             eye_dome: 1.0,
+            backs: Backs::default(),
             background: Background::Gradient([0x3a, 0x41, 0x4b], [0x17, 0x1a, 0x1f]),
         }
     }

@@ -20,6 +20,14 @@
 @group(0) @binding(8) var<storage, read_write> image: array<u32>;
 @group(0) @binding(9) var<storage, read_write> linear: array<vec4f>;
 
+// Whether backs are told apart; light and colour left on them.
+override BACKS: bool;
+override BACK_LIGHT: f32;
+override BACK_COLOR: f32;
+
+// Weights of red, green and blue in how bright a linear colour is.
+const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
+
 // The colour of a value; one that is unknown gets the lower end's, and a range of no width is all middle.
 fn map_color(value: f32) -> vec3f {
     var range = shading.range;
@@ -54,6 +62,15 @@ fn base_color(pixel: vec2u, index: u32, surface_here: vec4f) -> vec3f {
         return extras[index].rgb;
     }
     return shading.clay;
+}
+
+// The colour of a surface that shows its back as far as the pixel says.
+fn tone_back(color: vec3f, index: u32) -> vec3f {
+    if !BACKS {
+        return color;
+    }
+    let back = BACK_LIGHT * mix(vec3f(dot(color, LUMINANCE)), color, BACK_COLOR);
+    return mix(color, back, extras[index].w);
 }
 
 fn light(normal: vec3f) -> f32 {
@@ -131,7 +148,7 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
         covered &= covered - 1u;
         let index = pixel.y * frame.size.x + pixel.x;
         let surface_here = surface[index];
-        var color = base_color(pixel, index, surface_here);
+        var color = tone_back(base_color(pixel, index, surface_here), index);
         var lit = 1.0;
         if shading.lighting == 1u {
             lit = light(surface_here.xyz);

@@ -139,6 +139,28 @@ fn light_shows_shape_and_keeps_within_range() {
 }
 
 #[test]
+fn backs_are_darker_and_greyer_if_asked_for_and_known() {
+    let mut layers = half_a_wall([8, 4]);
+    layers.color = vec![[0.6, 0.3, 0.1]; layers.weight.len()];
+    let lit = Shading { eye_dome: 0.0, background: Background::Transparent, ..Shading::default() };
+    let front = shaded(&layers, &lit).linear[0];
+    layers.back = vec![0.0; layers.weight.len()];
+    let [whole, half] = [layers.index(1, 0), layers.index(2, 0)];
+    (layers.back[whole], layers.back[half]) = (1.0, 0.5);
+    let toned = shaded(&layers, &lit);
+    let ratio = |[r, _, b]: [f32; 3]| r / b;
+    assert_eq!(toned.linear[0], front, "a front stays");
+    let [back, both] = [toned.linear[1], toned.linear[2]];
+    assert!(back[0] < 0.6 * front[0] && back[0] > 0.2 * front[0], "darker, not black: {back:?} of {front:?}");
+    assert!(ratio(back) < 0.8 * ratio(front) && ratio(back) > 1.2, "greyer, not grey: {back:?} of {front:?}");
+    assert!((both[1] - 0.5 * (front[1] + back[1])).abs() < 1e-6, "in between: {both:?}");
+    let same = shaded(&layers, &Shading { backs: Backs::Same, ..lit.clone() });
+    assert_eq!(same.linear[1], front, "not asked for");
+    let dark = Shading { lighting: false, ..lit };
+    assert_eq!(shaded(&layers, &dark).linear[1], [0.6, 0.3, 0.1], "no light, no shading");
+}
+
+#[test]
 fn eye_dome_darkens_behind_a_step_only() {
     let mut layers = half_a_wall([8, 4]);
     for y in 0..4 {

@@ -34,6 +34,9 @@ struct Surfel {
     pixel: u32,
     // Index in the cloud.
     source: u32,
-    // Index among the screen points.
+    // Index among the screen points; BACK is set if the surface shows its back.
     screen: u32,
 }
+
+// Set if the eye sees the side that the point's sensor did not see.
+const BACK = 0x80000000u;

@@ -6,8 +6,8 @@ use super::{GBuffer, TILE_AREA};
 use crate::camera::View;
 use crate::fit::Surfel;
 
-/// Most channels a splat can carry: normal, colour, scalar with its weight, radius, k-radius, curvature.
-pub(super) const CHANNELS: usize = 11;
+/// Most channels a splat can carry: normal, colour, scalar with its weight, radius, k-radius, curvature, back.
+pub(super) const CHANNELS: usize = 12;
 
 /// What is averaged over the splats of a pixel, beside depth and normal.
 #[derive(Clone, Copy, Debug, Default)]
@@ -16,6 +16,8 @@ pub(crate) struct Attributes<'a> {
     pub(crate) scalar: Option<&'a FieldValues>,
     /// Splat radius, k-radius and curvature.
     pub(crate) measures: bool,
+    /// Whether the surface shows its back.
+    pub(crate) backs: bool,
 }
 
 /// Colours by point, and the linear value of each of their steps.
@@ -30,6 +32,7 @@ impl Attributes<'_> {
         3 + if self.color.is_some() { 3 } else { 0 }
             + if self.scalar.is_some() { 2 } else { 0 }
             + if self.measures { 3 } else { 0 }
+            + usize::from(self.backs)
     }
 
     /// Lists what `surfel` carries and returns the number of channels.
@@ -53,6 +56,10 @@ impl Attributes<'_> {
         if self.measures {
             values[next..next + 3].copy_from_slice(&[surfel.radius, surfel.k_radius, surfel.curvature]);
             next += 3;
+        }
+        if self.backs {
+            values[next] = f32::from(surfel.shows_back());
+            next += 1;
         }
         next
     }
@@ -121,6 +128,10 @@ impl TileSums {
                 layer.iter_mut().enumerate().for_each(|(i, value)| *value = mean(sum, &self.weight, i));
             }
         }
+        if attributes.backs {
+            let sum = channel();
+            layers.back.iter_mut().enumerate().for_each(|(i, back)| *back = mean(sum, &self.weight, i));
+        }
     }
 }
 
@@ -142,7 +153,7 @@ impl TileLayers<'_> {
         if let Some(scalar) = self.scalar.get_mut(at) {
             *scalar = f32::NAN;
         }
-        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature] {
+        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature, &mut self.back] {
             if let Some(value) = measure.get_mut(at) {
                 *value = 0.0;
             }
@@ -162,6 +173,7 @@ pub(super) struct TileLayers<'a> {
     radius: &'a mut [f32],
     k_radius: &'a mut [f32],
     curvature: &'a mut [f32],
+    back: &'a mut [f32],
 }
 
 impl GBuffer {
@@ -179,6 +191,7 @@ impl GBuffer {
         self.radius.resize(wanted(attributes.measures), 0.0);
         self.k_radius.resize(wanted(attributes.measures), 0.0);
         self.curvature.resize(wanted(attributes.measures), 0.0);
+        self.back.resize(wanted(attributes.backs), 0.0);
     }
 
     /// Cuts all layers into tiles.
@@ -196,6 +209,7 @@ impl GBuffer {
         let mut radius = self.radius.as_mut_slice();
         let mut k_radius = self.k_radius.as_mut_slice();
         let mut curvature = self.curvature.as_mut_slice();
+        let mut back = self.back.as_mut_slice();
         let tile = |_| TileLayers {
             weight: cut(&mut weight),
             depth: cut(&mut depth),
@@ -206,6 +220,7 @@ impl GBuffer {
             radius: cut(&mut radius),
             k_radius: cut(&mut k_radius),
             curvature: cut(&mut curvature),
+            back: cut(&mut back),
         };
         (0..tiles).map(tile).collect()
     }

@@ -26,10 +26,12 @@
 override COLOR: bool;
 override SCALAR: bool;
 override MEASURES: bool;
+override BACKS: bool;
 // Slots for that, 64 or, where it is not carried, 1.
 override COLOR_SLOTS: u32;
 override SCALAR_SLOTS: u32;
 override MEASURE_SLOTS: u32;
+override BACK_SLOTS: u32;
 // How steeply the kernel falls.
 override KERNEL_SLOPE: f32;
 override CORE_WEIGHT: f32;
@@ -43,6 +45,8 @@ var<workgroup> colors: array<vec3f, COLOR_SLOTS>;
 var<workgroup> scalars: array<vec2f, SCALAR_SLOTS>;
 // Splat radius, k-radius and curvature.
 var<workgroup> measures: array<vec3f, MEASURE_SLOTS>;
+// 1 if the surface shows its back, else 0.
+var<workgroup> backs: array<f32, BACK_SLOTS>;
 
 // What four pixels below each other, the components of vectors, show.
 struct Sums {
@@ -55,6 +59,7 @@ struct Sums {
     // Sum of the values, and of the weights of those known.
     scalar: mat2x4f,
     measures: mat3x4f,
+    back: vec4f,
     // Weight of the heaviest splat, its point and its reach.
     heaviest: vec4f,
     point: vec4u,
@@ -73,6 +78,7 @@ struct Carried {
     color: vec3f,
     scalar: vec2f,
     measures: vec3f,
+    back: f32,
     source: u32,
     reach: f32,
 }
@@ -86,18 +92,22 @@ fn load(slot: u32, index: u32) {
     // About how far it reaches from its centre, in pixels.
     reaches[slot] = 0.5 * max(span.x, span.y) + 0.5;
     let words = u32(COLOR) + u32(SCALAR);
+    let screen = surfel.screen & ~BACK;
     if COLOR {
-        let srgb = values[words * surfel.screen];
+        let srgb = values[words * screen];
         colors[slot] = vec3f(to_linear(srgb), to_linear(srgb >> 8u), to_linear(srgb >> 16u));
     }
     if SCALAR {
-        let bits = values[words * surfel.screen + words - 1u];
+        let bits = values[words * screen + words - 1u];
         let value = bitcast<f32>(bits);
         let known = (bits & 0x7f800000u) != 0x7f800000u;
         scalars[slot] = select(vec2f(0.0), vec2f(value, 1.0), known);
     }
     if MEASURES {
         measures[slot] = vec3f(surfel.radius, surfel.k_radius, surfel.curvature);
+    }
+    if BACKS {
+        backs[slot] = f32(surfel.screen >= BACK);
     }
 }
 
@@ -120,6 +130,9 @@ fn draw(slot: u32) {
     }
     if MEASURES {
         carried.measures = measures[slot];
+    }
+    if BACKS {
+        carried.back = backs[slot];
     }
     add(&upper, fragments(brush, own_x, own_y), carried);
     add(&lower, fragments(brush, own_x, own_y + 4.0), carried);
@@ -146,6 +159,9 @@ fn add(sums: ptr<private, Sums>, hit: Fragments, carried: Carried) {
     if MEASURES {
         let m = carried.measures;
         (*sums).measures += mat3x4f(weight * m.x, weight * m.y, weight * m.z);
+    }
+    if BACKS {
+        (*sums).back += weight * carried.back;
     }
     let heavier = (*sums).heaviest < weight;
     (*sums).heaviest = select((*sums).heaviest, weight, heavier);
@@ -227,10 +243,13 @@ fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
     // Sums are zero where nothing is.
     if COLOR {
         let c = (*sums).color;
-        extras[at] = vec4f(c[0][i], c[1][i], c[2][i], 0.0) / divisor;
+        extras[at] = vec4f(c[0][i], c[1][i], c[2][i], (*sums).back[i]) / divisor;
     }
     if MEASURES {
         let m = (*sums).measures;
-        extras[at + u32(COLOR) * frame.size.x * frame.size.y] = vec4f(m[0][i], m[1][i], m[2][i], 0.0) / divisor;
+        extras[at + u32(COLOR) * frame.size.x * frame.size.y] = vec4f(m[0][i], m[1][i], m[2][i], (*sums).back[i]) / divisor;
+    }
+    if BACKS && !COLOR && !MEASURES {
+        extras[at] = vec4f(0.0, 0.0, 0.0, (*sums).back[i] / divisor);
     }
 }

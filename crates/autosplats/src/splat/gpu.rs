@@ -149,16 +149,18 @@ impl SplatPasses {
             let constants = [("RECOVERED_ONLY", recovered), ("REDRAWN_ONLY", redrawn), dot_radius];
             Pass::new(gpu, &DEPTH_LARGE, &constants)
         };
-        let Channels { color, scalar, measures } = channels;
+        let Channels { color, scalar, measures, backs } = channels;
         let slots = |carried: bool| if carried { f64::from(BATCH) } else { 1.0 };
         let attributes = [
             dot_radius,
             ("COLOR", color.into()),
             ("SCALAR", scalar.into()),
             ("MEASURES", measures.into()),
+            ("BACKS", backs.into()),
             ("COLOR_SLOTS", slots(color)),
             ("SCALAR_SLOTS", slots(scalar)),
             ("MEASURE_SLOTS", slots(measures)),
+            ("BACK_SLOTS", slots(backs)),
             ("KERNEL_SLOPE", KERNEL_SLOPE.into()),
             ("CORE_WEIGHT", CORE_WEIGHT.into()),
             ("INNER_WEIGHT", INNER_WEIGHT.into()),

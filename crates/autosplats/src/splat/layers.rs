@@ -11,6 +11,8 @@ pub(crate) struct Channels {
     pub(crate) scalar: bool,
     /// Splat radius, k-radius and curvature.
     pub(crate) measures: bool,
+    /// Whether the surface shows its back.
+    pub(crate) backs: bool,
 }
 
 /// [`GBuffer`] on the device, row by row.
@@ -23,7 +25,8 @@ pub(crate) struct LayerBuffers {
     /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`.
     pub(crate) cover: wgpu::Buffer,
     /// A plane per channel, one after the other, four `f32` per pixel: if there are colours, linear RGB; if there are
-    /// measures, splat radius, k-radius and curvature. One element if there are neither.
+    /// measures, splat radius, k-radius and curvature; an empty one if there are but backs. The last number of the first
+    /// plane is the share of the back. One element if there is nothing of that.
     pub(crate) extras: wgpu::Buffer,
 }
 
@@ -49,6 +52,7 @@ impl LayerBuffers {
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], channels: Channels) -> Result<Self, Error> {
         let pixels = size[0] as usize * size[1] as usize;
         let planes = usize::from(channels.color) + usize::from(channels.measures);
+        let planes = planes.max(channels.backs.into());
         Ok(Self {
             size,
             channels,
@@ -61,7 +65,7 @@ impl LayerBuffers {
     /// The host's form of the layers: what was read back of `surface`, `cover` and `extras`.
     pub(crate) fn to_host(&self, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
         let [width, height] = self.size.map(|side| side as usize);
-        let Channels { color, scalar, measures } = self.channels;
+        let Channels { color, scalar, measures, backs } = self.channels;
         let area = tile_columns(width) * tile_columns(height) * TILE_AREA;
         let wanted = |wanted: bool| if wanted { area } else { 0 };
         let mut layers = GBuffer {
@@ -76,12 +80,13 @@ impl LayerBuffers {
             radius: vec![0.0; wanted(measures)],
             k_radius: vec![0.0; wanted(measures)],
             curvature: vec![0.0; wanted(measures)],
+            back: vec![0.0; wanted(backs)],
         };
         let surface: &[[f32; 4]] = bytemuck::cast_slice(surface);
         let cover: &[Cover] = bytemuck::cast_slice(cover);
         let extras: &[[f32; 4]] = bytemuck::cast_slice(extras);
         let pixels = width * height;
-        let (colors, extras) = extras.split_at(if color { pixels } else { 0 });
+        let (colors, measured) = extras.split_at(if color { pixels } else { 0 });
         for (pixel, (&[x, y, z, depth], cover)) in surface[..pixels].iter().zip(cover).enumerate() {
             let at = tiled_index(width, pixel % width, pixel / width);
             layers.weight[at] = cover.weight;
@@ -96,7 +101,10 @@ impl LayerBuffers {
                 layers.scalar[at] = cover.scalar;
             }
             if measures {
-                [layers.radius[at], layers.k_radius[at], layers.curvature[at], _] = extras[pixel];
+                [layers.radius[at], layers.k_radius[at], layers.curvature[at], _] = measured[pixel];
+            }
+            if backs {
+                layers.back[at] = extras[pixel][3];
             }
         }
         layers
@@ -110,6 +118,7 @@ pub(crate) fn upload_layers(gpu: &Gpu, layers: &GBuffer) -> LayerBuffers {
         color: !layers.color.is_empty(),
         scalar: !layers.scalar.is_empty(),
         measures: !layers.radius.is_empty(),
+        backs: !layers.back.is_empty(),
     };
     let size = [layers.width, layers.height];
     let buffers = LayerBuffers::new(gpu, size, channels).expect("room");
@@ -137,6 +146,10 @@ pub(crate) fn upload_layers(gpu: &Gpu, layers: &GBuffer) -> LayerBuffers {
     }
     if channels.measures {
         extras.extend(pixels().map(|at| [layers.radius[at], layers.k_radius[at], layers.curvature[at], 0.0]));
+    }
+    if channels.backs {
+        extras.resize(extras.len().max(width * height), [0.0; 4]);
+        extras.iter_mut().zip(pixels()).for_each(|(extra, at)| extra[3] = layers.back[at]);
     }
     gpu.queue.write_buffer(&buffers.surface, 0, bytemuck::cast_slice(&surface));
     gpu.queue.write_buffer(&buffers.cover, 0, bytemuck::cast_slice(&cover));

@@ -47,7 +47,8 @@ pub struct GBuffer {
     pub weight: Vec<f32>,
     /// Depth along the viewing axis in world units; infinite where no surface is.
     pub depth: Vec<f32>,
-    /// Unit normal towards the eye, view space (x right, y down, z forward); zero where no surface is.
+    /// Unit normal towards the eye, whichever side the sensor saw, view space (x right, y down, z forward); zero where no
+    /// surface is.
     pub normal: Vec<[f32; 3]>,
     /// Index of the source point of the heaviest splat; `u32::MAX` where no surface is.
     pub point: Vec<u32>,
@@ -61,6 +62,9 @@ pub struct GBuffer {
     pub k_radius: Vec<f32>,
     /// Surface variation, 0 to 1/3.
     pub curvature: Vec<f32>,
+    /// How much of what is seen is the back of a surface, the side that the sensor did not see, 0 to 1. Empty if the cloud
+    /// does not say where its sensors stood.
+    pub back: Vec<f32>,
 }
 
 impl GBuffer {

@@ -260,7 +260,7 @@ mod tests {
     fn vectors_of_any_width_give_the_same_bits() {
         let data = Data::new(500);
         let color = PointColors { srgb: &data.colors, linear: &data.linear };
-        let attributes = Attributes { color: Some(color), scalar: None, measures: true };
+        let attributes = Attributes { color: Some(color), scalar: None, measures: true, backs: true };
         for view in views([70, 50]) {
             for discs in ALL_DISCS {
                 let surfels = surfels(35, 400, discs, &view);

@@ -79,6 +79,7 @@ struct Means {
     scalar: f64,
     scalar_weight: f64,
     measures: DVec3,
+    back: f64,
     /// Source of the heaviest splat, if it is heavier than the next by more than rounding.
     heaviest: Option<u32>,
 }
@@ -138,6 +139,7 @@ fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> V
                 means.scalar_weight += w;
             }
             means.measures += w * vector([surfel.radius, surfel.k_radius, surfel.curvature]);
+            means.back += if shows_back(source) { w } else { 0.0 };
             if w > heaviest[0] {
                 heaviest = [w, heaviest[0]];
                 means.heaviest = Some(surfel.source);
@@ -150,6 +152,11 @@ fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> V
         Some(means)
     };
     depth_map.into_iter().zip(&hits).map(means).collect()
+}
+
+/// Whether the surfel of a point shows its back.
+fn shows_back(source: usize) -> bool {
+    source % 5 == 2
 }
 
 /// Attributes by point.
@@ -178,7 +185,7 @@ fn draw(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> GBu
     (0..refinements).for_each(|_| splatter.refine(surfels, view));
     let scalars = FieldValues::F32(data.scalars.clone());
     let color = PointColors { srgb: &data.colors, linear: &data.linear };
-    let attributes = Attributes { color: Some(color), scalar: Some(&scalars), measures: true };
+    let attributes = Attributes { color: Some(color), scalar: Some(&scalars), measures: true, backs: true };
     splatter.attributes(surfels, view, &attributes).clone()
 }
 
@@ -224,6 +231,7 @@ fn compare(layers: &GBuffer, oracle: &[Option<Means>]) -> Result<usize, String> 
         near("radius", layers.radius[i], measures.x, 0.0)?;
         near("k-radius", layers.k_radius[i], measures.y, 0.0)?;
         near("curvature", layers.curvature[i], measures.z, 0.0)?;
+        near("back", layers.back[i], means.back / means.weight, 1.0)?;
         if means.heaviest.is_some_and(|source| source != layers.point[i]) {
             return Err(format!("point at {x}, {y} is {}, not {:?}", layers.point[i], means.heaviest));
         }
@@ -288,7 +296,7 @@ pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec
             curvature: 0.3 * random.unit(),
             pixel: (px[1] as u32) << 16 | px[0] as u32,
             source: source as u32,
-            screen: source as u32,
+            screen: source as u32 | if shows_back(source) { Surfel::BACK } else { 0 },
         }
     };
     (0..count).map(&mut one).collect()
@@ -333,13 +341,14 @@ fn comparison_sees_each_kind_of_error() {
     let (pixel, at) = covered.max_by(|a, b| right.weight[a.1].total_cmp(&right.weight[b.1])).expect("a covered pixel");
     assert!(oracle[pixel].as_ref().is_some_and(|means| means.heaviest.is_some()), "one splat is the heaviest");
     type Spoil = fn(&mut GBuffer, usize);
-    let spoils: [(&str, Spoil); 7] = [
+    let spoils: [(&str, Spoil); 8] = [
         ("weight", |l, i| l.weight[i] *= 1.01),
         ("depth", |l, i| l.depth[i] *= 1.01),
         ("normal", |l, i| l.normal[i][0] += 0.01),
         ("colour", |l, i| l.color[i][1] += 0.01),
         ("scalar", |l, i| l.scalar[i] += 1.0),
         ("radius", |l, i| l.radius[i] *= 1.01),
+        ("back", |l, i| l.back[i] = 1.01 - l.back[i]),
         ("point", |l, i| l.point[i] += 1),
     ];
     for (name, spoil) in spoils {
@@ -358,7 +367,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     let bits = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
         let layers = pool.install(|| draw(&surfels, &view, 2, &data));
-        let floats = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius];
+        let floats = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
         let vectors = layers.normal.iter().chain(&layers.color).flatten();
         let bits: Vec<u32> = floats.into_iter().flatten().chain(vectors).map(|value| value.to_bits()).collect();
         (bits, layers.point)

@@ -190,8 +190,9 @@ pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Makes the cloud of all scans; `done` is the part of the work that was done before.
-pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], done: f32) -> Result<PointCloud, Error> {
+/// Makes the cloud of all scans; `done` is the part of the work that was done before. For `trusted` see
+/// [`is_of_scanner`].
+pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: f32) -> Result<PointCloud, Error> {
     let lens: Vec<usize> = sources.iter().map(Source::len).collect();
     let total: usize = lens.iter().sum();
     let fields = fields(job, sources);
@@ -233,17 +234,20 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], done: f32) -> Result<
     let scans = sources.iter().filter_map(|source| {
         let points = start..start + source.len();
         start = points.end;
-        let scan = Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
-        // Programs that merge clouds write them without a pose, too; no scanner stood at their origin.
-        is_of_scanner(source.header).then_some(scan)
+        let scan = || Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
+        is_of_scanner(source.header, trusted).then(scan)
     });
     let scans = scans.collect();
     Ok(cloud.with_scans(scans))
 }
 
-/// Whether points come from a scanner, which stands upright, and are not a model that was saved like a scan.
-pub(super) fn is_of_scanner(header: &ScanHeader) -> bool {
-    header.pose.is_some()
+/// Whether points come from a scanner, and are not a model or a merged cloud that was saved like a scan. Programs that know
+/// of no scanner leave out the pose or write one that changes nothing; `trusted` ones write a pose for scanners alone.
+pub(super) fn is_of_scanner(header: &ScanHeader, trusted: bool) -> bool {
+    if trusted {
+        return header.pose.is_some();
+    }
+    header.pose.is_some_and(|pose| pose != DMat4::IDENTITY)
         || header.indices.is_some()
         || header.sensor.is_some()
         || header.element("rowIndex").is_some()

@@ -4,6 +4,7 @@ use glam::{DMat4, DVec3};
 
 use super::{
     super::{Attribute, Description, Job, shown},
+    cloud::is_of_scanner,
     open,
     xml::{Root, ScanHeader},
 };
@@ -24,11 +25,13 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
         }
     }
     let mut start = 0;
-    let scans = root.scans.iter().map(|scan| {
+    let scans = root.scans.iter().filter_map(|scan| {
         let end = usize::try_from(scan.points).unwrap_or(usize::MAX).saturating_add(start);
         let points = start..end;
         start = end;
-        Scan { name: scan.name.clone(), world_from_sensor: scan.pose.unwrap_or(DMat4::IDENTITY), points }
+        let scan_of =
+            || Scan { name: scan.name.clone(), world_from_sensor: scan.pose.unwrap_or(DMat4::IDENTITY), points };
+        is_of_scanner(scan, root.is_ours()).then(scan_of)
     });
     let scans = scans.collect();
     let mut notes = root.notes.clone();

@@ -84,7 +84,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         job.note(format!("{} more losses in scans", told.len() - TOLD));
     }
     dropped.note(job);
-    Ok(cloud::cloud(job, &sources, GATHERING)?.with_crs(root.crs).into())
+    Ok(cloud::cloud(job, &sources, root.is_ours(), GATHERING)?.with_crs(root.crs).into())
 }
 
 /// The values of one scan.

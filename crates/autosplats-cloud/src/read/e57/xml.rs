@@ -31,6 +31,13 @@ pub(super) struct Root {
     pub(super) notes: Vec<String>,
 }
 
+impl Root {
+    /// Whether this library wrote the file.
+    pub(super) fn is_ours(&self) -> bool {
+        self.library.as_ref().is_some_and(|library| library.starts_with("autosplats "))
+    }
+}
+
 /// One scan, an entry of `data3D`.
 pub(super) struct ScanHeader {
     pub(super) name: Option<String>,

@@ -74,6 +74,8 @@ pub(super) struct Header {
     pub(super) viewpoint: Viewpoint,
     /// What our own files say in a comment.
     pub(super) axes: Option<Axes>,
+    /// They also say if a viewpoint that looks like the default is where the sensor stood.
+    pub(super) knows_sensor: bool,
     /// First byte after the header.
     pub(super) end: usize,
 }
@@ -91,7 +93,7 @@ impl Header {
         let (mut names, mut sizes, mut types, mut counts) = (None, None, None, None);
         let (mut width, mut height, mut points) = (None, None, None);
         let mut viewpoint = Viewpoint::Identity;
-        let mut axes = None;
+        let (mut axes, mut knows_sensor) = (None, false);
         let (mut at, mut line) = (0, 0);
         let (encoding, line) = loop {
             line += 1;
@@ -132,6 +134,7 @@ impl Header {
                 "#" if values.first().is_some_and(|word| word == "axes") => {
                     axes = values.get(1).and_then(|word| axes_of(word)).or(axes);
                 }
+                "#" if values == ["sensor", "at", "VIEWPOINT"] => knows_sensor = true,
                 word if word.starts_with('#') => {}
                 word => {
                     let word = shown(word.as_bytes());
@@ -162,7 +165,7 @@ impl Header {
         let points = points
             .or_else(|| width?.checked_mul(height))
             .ok_or_else(|| fail("the header lacks POINTS, or WIDTH and HEIGHT".into()))?;
-        Ok(Self { fields, width, height, points, encoding, viewpoint, axes, end: at })
+        Ok(Self { fields, width, height, points, encoding, viewpoint, axes, knows_sensor, end: at })
     }
 
     /// Bytes of a point.

@@ -3,7 +3,7 @@
 mod header;
 mod lzf;
 
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 
 use self::header::{Encoding, Header, Viewpoint};
 use super::{
@@ -101,7 +101,10 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
             table.into_cloud(job, "header")?
         }
     };
-    let scans = scans(&header, cloud.len());
+    let mut scans = scans(&header, cloud.len());
+    if scans.is_empty() && image_from_origin(&header, &cloud) {
+        scans.push(at_the_origin(cloud.len()));
+    }
     let axes = header.axes.or_else(|| seen_from_origin(&header, &cloud).then_some(Axes::Camera));
     let cloud = cloud.with_scans(scans);
     Ok(if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud }.into())
@@ -113,15 +116,42 @@ const LISTED: usize = 10;
 /// Values that a field may have for each of them to become one of its own. Descriptors have more.
 const MAX_COUNT: usize = 16;
 
-/// Where the sensor stood, if the file says more than the default.
+/// Neighbours looked at to find out from where an image of points was taken.
+const RAYS: usize = 1 << 14;
+
+/// Where the sensor stood, if the file says more than the default, or is of our own and says that it was there.
 ///
 /// The points are not moved by it: the format calls VIEWPOINT the place that the points were acquired from, not a
 /// transformation to apply, and the programs that write and read PCD leave points alone.
 fn scans(header: &Header, points: usize) -> Vec<Scan> {
     match header.viewpoint {
         Viewpoint::At(world_from_sensor) => vec![Scan { name: None, world_from_sensor, points: 0..points }],
+        Viewpoint::Identity if header.knows_sensor => vec![at_the_origin(points)],
         Viewpoint::Identity | Viewpoint::Broken => Vec::new(),
     }
+}
+
+fn at_the_origin(points: usize) -> Scan {
+    Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..points }
+}
+
+/// An image of points was taken by a sensor. Where the file says no more than the default that was its origin, unless the
+/// points were moved since: seen from there, neighbours in a row are about the same angle apart, near or far.
+fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
+    let Some(width) = header.width.filter(|_| header.viewpoint == Viewpoint::Identity && header.height > 1) else {
+        return false;
+    };
+    let ray = |i: usize| cloud.world_position(i).try_normalize().filter(|ray| ray.is_finite());
+    let step = cloud.len().div_ceil(RAYS).max(1);
+    let starts = (0..cloud.len().saturating_sub(1)).step_by(step).filter(|i| (i + 1) % width != 0);
+    let mut angles: Vec<f64> = starts.filter_map(|i| Some(ray(i)?.cross(ray(i + 1)?).length())).collect();
+    if angles.is_empty() {
+        return false;
+    }
+    angles.sort_unstable_by(f64::total_cmp);
+    let middle = angles[angles.len() / 2];
+    let even = angles.iter().filter(|&&angle| (0.3 * middle..=3.0 * middle).contains(&angle)).count();
+    middle > 0.0 && even * 10 >= angles.len() * 9
 }
 
 /// Names of the columns that a field is read as: none for padding and for fields of too many values.

@@ -6,7 +6,7 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
 use super::super::cpu::{Scene, Shader, shade};
-use super::super::{Background, ColorMap, ColorMode, Image, Shading};
+use super::super::{Background, Backs, ColorMap, ColorMode, Image, Shading};
 use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
@@ -171,6 +171,18 @@ fn colored(seed: u64, size: [u32; 2]) -> GBuffer {
     layers
 }
 
+/// The same with any shares of backs.
+fn with_backs(layers: GBuffer) -> GBuffer {
+    let mut random = Random::new(78);
+    let back = layers.weight.iter().map(|_| (2.0 * random.unit() - 0.5).clamp(0.0, 1.0)).collect();
+    GBuffer { back, ..layers }
+}
+
+/// Colours and backs alone.
+fn without_measures(layers: GBuffer) -> GBuffer {
+    GBuffer { radius: Vec::new(), k_radius: Vec::new(), curvature: Vec::new(), ..layers }
+}
+
 const MODES: usize = 11;
 
 fn modes() -> [ColorMode; MODES] {
@@ -208,7 +220,8 @@ fn every_setting_makes_the_same_picture() {
         for projection in PROJECTIONS {
             let view = view(size, projection, DVec3::ZERO);
             let scene = Scene { view: &view, up: DVec3::new(0.6, 0.0, 0.8), origin: DVec3::ZERO };
-            for layers in [blocks(5, size), colored(6, size)] {
+            for layers in [blocks(5, size), colored(6, size), with_backs(blocks(5, size)), with_backs(colored(6, size))]
+            {
                 for color in modes() {
                     for [lighting, eye_dome, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
                         // The settings without influence on each other go round.
@@ -220,6 +233,7 @@ fn every_setting_makes_the_same_picture() {
                             legend: seed.is_multiple_of(2),
                             lighting: lighting == 1,
                             eye_dome: [0.0, 1.5][eye_dome],
+                            backs: if seed.is_multiple_of(3) { Backs::Same } else { Backs::Toned },
                             background: BACKGROUNDS[seed % BACKGROUNDS.len()],
                         };
                         let keep_linear = seed.is_multiple_of(5);
@@ -270,6 +284,26 @@ fn a_difference_is_found() {
     let other = Shading { eye_dome: 2.0, ..Shading::default() };
     let found = difference(&host, &device.shade(&layers, &scene, &other, true).image);
     assert!(found.worst > 2 && found.share > 0.05 && found.linear > 0.02, "{found:?}");
+    let layers = with_backs(layers);
+    let same = Shading { backs: Backs::Same, ..Shading::default() };
+    let found = difference(
+        &on_host(&layers, &scene, &Shading::default(), true),
+        &device.shade(&layers, &scene, &same, true).image,
+    );
+    assert!(found.worst > 2 && found.share > 0.05 && found.linear > 0.02, "backs: {found:?}");
+}
+
+#[test]
+fn backs_are_toned_whatever_else_splats_carry() {
+    let Some(device) = Device::new() else { return };
+    let size = [97, 61];
+    let view = view(size, PROJECTIONS[0], DVec3::ZERO);
+    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO };
+    for layers in [blocks(7, size), colored(8, size)].map(with_backs).map(without_measures) {
+        let shading = Shading::default();
+        let host = on_host(&layers, &scene, &shading, true);
+        assert_same(&host, &device.shade(&layers, &scene, &shading, true).image, &shading, "without measures");
+    }
 }
 
 #[test]

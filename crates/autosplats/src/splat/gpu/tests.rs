@@ -16,7 +16,7 @@ use crate::test_clouds::Random;
 
 /// One pixel, patches and tiles that are cut off, several tiles.
 const SIZES: [[u32; 2]; 4] = [[1, 1], [71, 50], [64, 65], [133, 9]];
-const ALL: Channels = Channels { color: true, scalar: true, measures: true };
+const ALL: Channels = Channels { color: true, scalar: true, measures: true, backs: true };
 
 /// What is drawn, and in how many rounds.
 struct Scene<'a> {
@@ -106,6 +106,7 @@ impl Scene<'_> {
             color: channels.color.then_some(color),
             scalar: channels.scalar.then_some(&scalars),
             measures: channels.measures,
+            backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
         let layers = splatter.trim(view).0.clone();
@@ -145,7 +146,8 @@ fn other_depths(splatter: &Splatter, depth: &[f32], view: &View) -> usize {
 /// Pixels at which any layer differs.
 fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
     let [width, height] = [host.width as usize, host.height as usize];
-    let sizes = |l: &GBuffer| [l.weight.len(), l.color.len(), l.scalar.len(), l.radius.len(), l.curvature.len()];
+    let sizes =
+        |l: &GBuffer| [l.weight.len(), l.color.len(), l.scalar.len(), l.radius.len(), l.curvature.len(), l.back.len()];
     assert_eq!(sizes(device), sizes(host), "sizes of layers");
     // f32 rounding of gradients, which the kernel's eighth power and sums that cancel make greater: some 1e-5.
     let near = |a: f32, b: f32, scale: f32| {
@@ -165,6 +167,7 @@ fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
             && scalar_of(&device.radius, &host.radius, 0.0)
             && scalar_of(&device.k_radius, &host.k_radius, 0.0)
             && scalar_of(&device.curvature, &host.curvature, 0.0)
+            && scalar_of(&device.back, &host.back, 1.0)
     };
     (0..width * height).filter(|pixel| !same(pixel % width, pixel / width)).count()
 }
@@ -240,15 +243,17 @@ fn layers_that_are_not_wanted_change_no_other() {
     let view = views([71, 50])[0];
     let surfels = surfels(44, 300, Discs::Ellipses, &view);
     let scene = Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data };
-    for bits in 0..8 {
-        let channels = Channels { color: bits & 1 != 0, scalar: bits & 2 != 0, measures: bits & 4 != 0 };
+    for bits in 0..16 {
+        let [color, scalar, measures, backs] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
+        let channels = Channels { color, scalar, measures, backs };
         let passes = SplatPasses::new(&gpu, channels, &data.linear).expect("passes");
         let drawn = scene.device(&gpu, &passes, channels);
         assert_few(other_layers(&drawn.layers, &scene.host(channels).1), 71 * 50, &format!("{channels:?}"));
         let again = scene.device(&gpu, &passes, channels);
         let bits = |layers: &GBuffer| -> Vec<u32> {
             let vectors = layers.normal.iter().chain(&layers.color).flatten();
-            let scalars = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius];
+            let scalars =
+                [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
             vectors
                 .chain(scalars.into_iter().flatten())
                 .map(|value| value.to_bits())
@@ -342,7 +347,7 @@ fn comparisons_see_each_kind_of_error() {
     let at =
         (0..TILE_AREA).find(|&at| right.weight[at] > 0.1 && right.scalar[at].is_finite()).expect("a covered pixel");
     type Spoil = fn(&mut GBuffer, usize);
-    let spoils: [(&str, Spoil); 9] = [
+    let spoils: [(&str, Spoil); 10] = [
         ("weight", |l, i| l.weight[i] *= 1.001),
         ("depth", |l, i| l.depth[i] *= 1.001),
         ("normal", |l, i| l.normal[i][0] += 0.001),
@@ -351,6 +356,7 @@ fn comparisons_see_each_kind_of_error() {
         ("radius", |l, i| l.radius[i] *= 1.001),
         ("k-radius", |l, i| l.k_radius[i] *= 1.001),
         ("curvature", |l, i| l.curvature[i] *= 1.001),
+        ("back", |l, i| l.back[i] += 0.001),
         ("point", |l, i| l.point[i] += 1),
     ];
     for (name, spoil) in spoils {

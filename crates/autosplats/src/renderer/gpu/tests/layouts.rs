@@ -6,6 +6,7 @@ use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 
 use super::passes;
 use crate::fit::Surfel;
+use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
 use crate::project::gpu::{BLOCK, COUNTERS, Counter, Work};
 use crate::project::{ChunkUniform, ScreenPoint};
@@ -40,7 +41,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 7] {
+fn mirrored() -> [Mirrored; 8] {
     [
         mirrored!(
             "Frame",
@@ -64,6 +65,7 @@ fn mirrored() -> [Mirrored; 7] {
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
         mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
+        mirrored!("Sensor", Sensor { position, first }),
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(
             "Surfel",

@@ -1,0 +1,66 @@
+// Marks the surfels that show the eye the side which their sensor did not see. The CPU form, `mod.rs`, says how.
+//
+// Reads: counters, sensors. Reads and writes: surfels.
+
+#import frame
+#import groups
+#import counters
+#import surfel
+
+// Where the sensor stood that saw the points from one index on.
+struct Sensor {
+    // About the cloud's origin; infinite if unknown.
+    position: vec3f,
+    // Index of the first point.
+    first: u32,
+}
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+// In the order of the points, the first from point 0 on.
+@group(0) @binding(2) var<storage, read> sensors: array<Sensor>;
+@group(0) @binding(3) var<storage, read_write> surfels: array<Surfel>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+override SURE: f32;
+override SEEN: f32;
+
+// The sensor of a point.
+fn sensor_of(point: u32) -> vec3f {
+    var low = 0u;
+    var high = arrayLength(&sensors);
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if sensors[middle].first <= point {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return sensors[low].position;
+}
+
+fn shows_back(surfel: Surfel, sensor: vec3f) -> bool {
+    let to_eye = select(vec3f(0.0, 0.0, -1.0), -surfel.center, frame.perspective == 1u);
+    let to_sensor = to_view(sensor) - surfel.center;
+    // How thick the neighbourhood is for its width: about the tangent of the angle that its normal may be off by.
+    let rough = sqrt(2.0 * surfel.curvature);
+    return dot(surfel.normal, to_sensor) < -max(rough, SURE) * length(to_sensor)
+        && dot(surfel.normal, to_eye) > max(rough, SEEN) * length(to_eye);
+}
+
+@compute @workgroup_size(64)
+fn orient(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let active_points = counters[ACTIVE];
+    let first = select(0u, active_points, ROUND == 1u);
+    let len = select(active_points, counters[RECOVERED], ROUND == 1u);
+    let index = group_index(workgroup) * 64u + local;
+    if index >= len {
+        return;
+    }
+    let place = first + index;
+    let sensor = sensor_of(surfels[place].source);
+    if is_finite(sensor.x) && shows_back(surfels[place], sensor) {
+        surfels[place].screen |= BACK;
+    }
+}
