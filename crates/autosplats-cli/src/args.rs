@@ -62,7 +62,7 @@ Examples:
   autosplats render scan.laz -o scan.png --view top --color height --legend
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
-  autosplats render scene:cathedral:10M -o cathedral.png --eye-dome 2 --json
+  autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
 
 #[derive(Args, Debug)]
@@ -226,9 +226,9 @@ pub(crate) struct LookArgs {
     /// Show colours as they are, without light
     #[arg(long)]
     pub(crate) no_lighting: bool,
-    /// Strength of eye-dome lighting, the darkening at depth steps, 0 to 10
-    #[arg(long, value_name = "STRENGTH", default_value_t = Shading::default().eye_dome, allow_negative_numbers = true)]
-    pub(crate) eye_dome: f32,
+    /// Strength of occlusion, the darkening of creases and of what lies behind something, 0 (off) to 10
+    #[arg(long, alias = "eye-dome", value_name = "STRENGTH", default_value_t = Shading::default().occlusion, allow_negative_numbers = true)]
+    pub(crate) occlusion: f32,
     /// '#rrggbb', '#top,#bottom' or transparent [default: dark grey gradient]
     #[arg(long, value_name = "COLOR", value_parser = values::background)]
     pub(crate) background: Option<Background>,

@@ -132,7 +132,7 @@ fn every_look_changes_the_picture() {
         &["--range", "-5..5"],
         &["--color-map", "inferno"],
         &["--no-lighting"],
-        &["--eye-dome", "3"],
+        &["--occlusion", "3"],
         &["--background", "#ffffff"],
         &["--splat-scale", "2"],
         &["-k", "30"],
@@ -229,7 +229,7 @@ fn quiet_says_nothing() {
 #[test]
 fn runs_and_threads_do_not_change_a_byte() {
     let folder = Folder::with_sphere();
-    let options = ["-o", "a.png", "-o", "a.exr", "--ellipses", "--eye-dome", "1"];
+    let options = ["-o", "a.png", "-o", "a.exr", "--ellipses", "--occlusion", "1"];
     let mut results = Vec::new();
     for threads in ["1", "2", "2", "3"] {
         render(&folder, &[&options[..], &["--threads", threads]].concat());

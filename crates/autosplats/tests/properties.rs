@@ -39,7 +39,7 @@ fn cloud(positions: &[[f32; 3]]) -> PointCloud {
 
 /// Every layer filled, values shown as they are.
 fn settings() -> Settings {
-    let shading = Shading { color: ColorMode::Plain, lighting: true, eye_dome: 0.0, ..Shading::default() };
+    let shading = Shading { color: ColorMode::Plain, lighting: true, occlusion: 0.0, ..Shading::default() };
     Settings { shading, all_layers: true, ..Settings::default() }
 }
 
@@ -262,7 +262,7 @@ fn one_color_stays_that_color() {
         for (name, positions) in test_clouds::all(4000) {
             let cloud = cloud(&positions).with_colors(vec![COLOR; positions.len()]).expect("a colour for each point");
             let shading =
-                Shading { lighting: false, eye_dome: 0.0, background: Background::Transparent, ..Shading::default() };
+                Shading { lighting: false, occlusion: 0.0, background: Background::Transparent, ..Shading::default() };
             let picture = render(&cloud, &camera, SIZE, &Settings { shading, ..Settings::default() });
             let [r, g, b] = COLOR;
             for (pixel, color) in picture.image.pixels.iter().enumerate() {

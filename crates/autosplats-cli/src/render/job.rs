@@ -125,7 +125,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         }),
         legend: look.legend,
         lighting: !look.no_lighting,
-        eye_dome: look.eye_dome,
+        occlusion: look.occlusion,
         background: look.background.unwrap_or(Shading::default().background),
     };
     Settings { reconstruction, shading, all_layers }

@@ -14,8 +14,12 @@
 mod classes;
 mod color_map;
 mod cpu;
+mod depths;
+mod edges;
 pub(crate) mod gpu;
 mod legend;
+mod light;
+mod occlusion;
 mod settings;
 #[cfg(test)]
 mod tests;

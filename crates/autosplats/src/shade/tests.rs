@@ -52,7 +52,7 @@ fn shaded(layers: &GBuffer, shading: &Shading) -> Image {
 
 /// Without light, so that colours are what they are.
 fn flat(color: ColorMode) -> Shading {
-    Shading { color, lighting: false, eye_dome: 0.0, background: Background::Transparent, ..Shading::default() }
+    Shading { color, lighting: false, occlusion: 0.0, background: Background::Transparent, ..Shading::default() }
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn light_shows_shape_and_keeps_within_range() {
     let mut layers = half_a_wall([8, 4]);
     let mut brightness = |normal: [f32; 3]| {
         layers.normal[0] = normal;
-        shaded(&layers, &Shading { eye_dome: 0.0, ..Shading::default() }).linear[0].iter().sum::<f32>() / 3.0
+        shaded(&layers, &Shading { occlusion: 0.0, ..Shading::default() }).linear[0].iter().sum::<f32>() / 3.0
     };
     let [towards, up_left, down_right] =
         [[0.0, 0.0, -1.0], [-0.6, -0.6, -0.529], [0.6, 0.6, -0.529]].map(&mut brightness);
@@ -139,7 +139,7 @@ fn light_shows_shape_and_keeps_within_range() {
 }
 
 #[test]
-fn eye_dome_darkens_behind_a_step_only() {
+fn occlusion_darkens_behind_a_step_only() {
     let mut layers = half_a_wall([8, 4]);
     for y in 0..4 {
         // The two leftmost columns stand well before the others.
@@ -148,7 +148,7 @@ fn eye_dome_darkens_behind_a_step_only() {
             layers.depth[index] = 1.0;
         }
     }
-    let image = shaded(&layers, &Shading { eye_dome: 1.0, ..flat(ColorMode::Plain) });
+    let image = shaded(&layers, &Shading { occlusion: 1.0, ..flat(ColorMode::Plain) });
     let without = shaded(&layers, &flat(ColorMode::Plain));
     assert_eq!(image.pixels[0], without.pixels[0], "before the step");
     assert!(image.pixels[2][0] < without.pixels[2][0], "behind the step");

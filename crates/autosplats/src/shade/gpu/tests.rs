@@ -210,7 +210,7 @@ fn every_setting_makes_the_same_picture() {
             let scene = Scene { view: &view, up: DVec3::new(0.6, 0.0, 0.8), origin: DVec3::ZERO };
             for layers in [blocks(5, size), colored(6, size)] {
                 for color in modes() {
-                    for [lighting, eye_dome, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
+                    for [lighting, occlusion, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
                         // The settings without influence on each other go round.
                         seed += 1;
                         let shading = Shading {
@@ -219,7 +219,7 @@ fn every_setting_makes_the_same_picture() {
                             color_map: MAPS[seed % MAPS.len()],
                             legend: seed.is_multiple_of(2),
                             lighting: lighting == 1,
-                            eye_dome: [0.0, 1.5][eye_dome],
+                            occlusion: [0.0, 1.5][occlusion],
                             background: BACKGROUNDS[seed % BACKGROUNDS.len()],
                         };
                         let keep_linear = seed.is_multiple_of(5);
@@ -267,7 +267,7 @@ fn a_difference_is_found() {
     let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO };
     let layers = blocks(1, size);
     let host = on_host(&layers, &scene, &Shading::default(), true);
-    let other = Shading { eye_dome: 2.0, ..Shading::default() };
+    let other = Shading { occlusion: 2.0, ..Shading::default() };
     let found = difference(&host, &device.shade(&layers, &scene, &other, true).image);
     assert!(found.worst > 2 && found.share > 0.05 && found.linear > 0.02, "{found:?}");
 }
