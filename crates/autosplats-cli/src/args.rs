@@ -60,6 +60,7 @@ const RENDER_EXAMPLES: &str = "\
 Examples:
   autosplats render scan.laz -o scan.png
   autosplats render scan.laz -o scan.png --view top --color height --legend
+  autosplats render scan.laz -o print.png --supersample 2
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
   autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
@@ -79,6 +80,9 @@ pub(crate) struct RenderArgs {
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],
+    /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures
+    #[arg(long, value_name = "FACTOR", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub(crate) supersample: u32,
     #[command(flatten)]
     pub(crate) camera: CameraArgs,
     #[command(flatten)]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::color_map::Scale;
 use super::depths::{Depths, LANES};
 use super::edges::{Edges, SEARCH};
-use super::light::{CLAY, light, tone};
+use super::light::{CLAY, EDGE_ON, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
 use super::{Background, ColorMap, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
@@ -139,7 +139,7 @@ impl Band {
             let background = background(shader.shading.background, (y as f32 + 0.5) / height as f32);
             shader.edges.mark(depths, y as isize, edges);
             for (x, (out, &edge)) in out.iter_mut().zip(&*edges).enumerate() {
-                let color = shader.pixel(x, y, left(x, y));
+                let color = shader.pixel(depths, x, y, left(x, y));
                 *out = color.map_or(background, |color| inks.encode(color));
                 if let (Some(color), Some(linear)) = (color, linear.get_mut(row * width + x)) {
                     *linear = color;
@@ -148,7 +148,7 @@ impl Band {
                     continue;
                 }
                 let Some(blend) = shader.edges.blend(depths, [width, height], x, y) else { continue };
-                let other = shader.pixel(blend.x, blend.y, left(blend.x, blend.y));
+                let other = shader.pixel(depths, blend.x, blend.y, left(blend.x, blend.y));
                 *out = match (color, other) {
                     (Some(color), Some(other)) => inks.encode(mix(color, other, blend.part)),
                     (Some(color), None) => inks.over(color, 1.0 - blend.part, background),
@@ -185,7 +185,7 @@ impl<'a> Shader<'a> {
     }
 
     /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion.
-    fn pixel(&self, x: usize, y: usize, left: f32) -> Option<[f32; 3]> {
+    fn pixel(&self, depths: &Depths, x: usize, y: usize, left: f32) -> Option<[f32; 3]> {
         let index = self.layers.index(x, y);
         if !(self.layers.weight[index] > 0.0) {
             return None;
@@ -194,8 +194,20 @@ impl<'a> Shader<'a> {
         if !self.shading.lighting {
             return Some(base.map(|channel| channel * left));
         }
-        let light = light(Vec3::from(self.layers.normal[index]), self.colored);
+        let light = light(self.outward_normal(depths, x, y, index), self.colored);
         Some(std::array::from_fn(|i| tone(base[i] * light[i] * left)))
+    }
+
+    /// The normal that light falls on. Normals face the eye; one that is seen nearly edge on, at a border, and points
+    /// away from it, was turned round by a hair's breadth too much, and would catch the light of the other side.
+    fn outward_normal(&self, depths: &Depths, x: usize, y: usize, index: usize) -> Vec3 {
+        let normal = Vec3::from(self.layers.normal[index]);
+        if normal.z < -EDGE_ON {
+            return normal;
+        }
+        let [out_x, out_y] =
+            self.edges.outward(depths, [self.layers.width as usize, self.layers.height as usize], x, y);
+        if normal.x * out_x + normal.y * out_y < 0.0 { Vec3::new(-normal.x, -normal.y, normal.z) } else { normal }
     }
 
     fn base_color(&self, x: usize, y: usize, index: usize) -> [f32; 3] {

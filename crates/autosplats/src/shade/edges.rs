@@ -71,15 +71,27 @@ impl Edges {
         }
     }
 
+    /// Where, seen from a pixel, its surface ends before something behind: the sum of the steps to those neighbours.
+    pub(super) fn outward(&self, depths: &Depths, size: [usize; 2], x: usize, y: usize) -> [f32; 2] {
+        let [x, y] = [x as isize, y as isize];
+        let mut sum = [0.0; 2];
+        for [dx, dy] in SIDES {
+            if is_inside(size, x + dx, y + dy) && self.step(depths.at(x, y), depths.at(x + dx, y + dy)) == 1 {
+                sum = [sum[0] + dx as f32, sum[1] + dy as f32];
+            }
+        }
+        sum
+    }
+
     /// The neighbour that takes the largest part of pixel (x, y), if any does.
-    pub(super) fn blend(&self, depths: &Depths, [width, height]: [usize; 2], x: usize, y: usize) -> Option<Blend> {
+    pub(super) fn blend(&self, depths: &Depths, size: [usize; 2], x: usize, y: usize) -> Option<Blend> {
+        let [x, y] = [x as isize, y as isize];
         let mut best: Option<Blend> = None;
         for [dx, dy] in SIDES {
-            let (Some(side_x), Some(side_y)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else { continue };
-            if side_x < width && side_y < height {
-                let part = self.part(depths, [x as isize, y as isize], [dx, dy]);
+            if is_inside(size, x + dx, y + dy) {
+                let part = self.part(depths, size, [x, y], [dx, dy]);
                 if part > best.map_or(0.0, |best| best.part) {
-                    best = Some(Blend { x: side_x, y: side_y, part });
+                    best = Some(Blend { x: (x + dx) as usize, y: (y + dy) as usize, part });
                 }
             }
         }
@@ -87,7 +99,7 @@ impl Edges {
     }
 
     /// How much of a pixel its neighbour at [dx, dy] takes.
-    fn part(&self, depths: &Depths, [x, y]: [isize; 2], [dx, dy]: [isize; 2]) -> f32 {
+    fn part(&self, depths: &Depths, size: [usize; 2], [x, y]: [isize; 2], [dx, dy]: [isize; 2]) -> f32 {
         let kind = self.step(depths.at(x, y), depths.at(x + dx, y + dy));
         if kind == 0 {
             return 0.0;
@@ -96,6 +108,10 @@ impl Edges {
             let mut last = [depths.at(x, y), depths.at(x + dx, y + dy)];
             for distance in 1..=SEARCH {
                 let [x, y] = [x + dy * along * distance, y + dx * along * distance];
+                if !is_inside(size, x, y) {
+                    // Beyond the picture the edge goes on.
+                    break;
+                }
                 let next = [depths.at(x, y), depths.at(x + dx, y + dy)];
                 let [here, there] = [self.step(last[0], next[0]), self.step(next[1], last[1])];
                 if here != 0 || there != 0 || self.step(next[0], next[1]) != kind {
@@ -123,5 +139,118 @@ impl Edges {
             }
         }
         part
+    }
+}
+
+fn is_inside([width, height]: [usize; 2], x: isize, y: isize) -> bool {
+    (0..width as isize).contains(&x) && (0..height as isize).contains(&y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, Projection};
+    use crate::splat::{GBuffer, TILE};
+    use glam::DVec3;
+
+    const SIZE: usize = 48;
+
+    fn view(projection: Projection) -> View {
+        let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
+        camera.view(DVec3::ZERO, [SIZE as u32; 2]).expect("a view")
+    }
+
+    /// Depths of a picture, by the middle of each pixel.
+    fn depths(of: impl Fn(f32, f32) -> f32) -> Depths {
+        let area = TILE * TILE;
+        let mut layers =
+            GBuffer { width: SIZE as u32, height: SIZE as u32, depth: vec![f32::INFINITY; area], ..GBuffer::default() };
+        for pixel in 0..SIZE * SIZE {
+            let [x, y] = [pixel % SIZE, pixel / SIZE];
+            let at = layers.index(x, y);
+            layers.depth[at] = of(x as f32 + 0.5, y as f32 + 0.5);
+        }
+        let mut depths = Depths::default();
+        depths.fill(&layers, 0, SIZE, SEARCH as usize + 1);
+        depths
+    }
+
+    /// Mean squared error of how much of each pixel a shape covers, without and with blending. Pixels near the border of
+    /// the picture, where edges end, do not count.
+    fn errors(view: &View, inside: impl Fn(f32, f32) -> bool, behind: f32) -> [f64; 2] {
+        let depths = depths(|x, y| if inside(x, y) { 2.0 } else { behind });
+        let edges = Edges::new(view);
+        let mut sums = [0.0; 2];
+        for y in 14..SIZE - 14 {
+            for x in 14..SIZE - 14 {
+                let true_part = covered_part(&inside, x, y);
+                let is_inside = |x: usize, y: usize| f64::from(inside(x as f32 + 0.5, y as f32 + 0.5));
+                let own = is_inside(x, y);
+                let shown = edges
+                    .blend(&depths, [SIZE; 2], x, y)
+                    .map_or(own, |blend| own + (is_inside(blend.x, blend.y) - own) * f64::from(blend.part));
+                sums[0] += (own - true_part).powi(2);
+                sums[1] += (shown - true_part).powi(2);
+            }
+        }
+        sums
+    }
+
+    #[test]
+    fn borders_are_shown_as_they_cut_pixels() {
+        let views = [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(2.0)].map(view);
+        for view in &views {
+            for behind in [3.0, f32::INFINITY] {
+                for slope in [-3.0, -1.0, -0.45, -0.2, 0.08, 0.13, 0.3, 0.7, 1.0, 2.2, 9.0] {
+                    let line = |x: f32, y: f32| y - 24.2 < slope * (x - 24.1);
+                    let [plain, blended] = errors(view, line, behind);
+                    // Exactly diagonal steps are all alike, and do not tell where between them the border is.
+                    let limit = if slope.abs() == 1.0 { 0.5 } else { 0.25 };
+                    assert!(blended < limit * plain, "slope {slope}, behind {behind}: {plain} becomes {blended}");
+                }
+                let disc = |x: f32, y: f32| (x - 24.3).hypot(y - 23.8) < 8.0;
+                let [plain, blended] = errors(view, disc, behind);
+                assert!(blended < 0.5 * plain, "a disc: {plain} becomes {blended}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_blend_is_found() {
+        // The measure above must not be content with anything: blending as if the border were the other way round.
+        let view = view(Projection::PerspectiveFovDeg(40.0));
+        let line = |x: f32, y: f32| y - 24.2 < 0.2 * (x - 24.1);
+        let depths = depths(|x, y| if line(x, y) { 2.0 } else { 3.0 });
+        let edges = Edges::new(&view);
+        let mirrored = |x: usize| SIZE - 1 - x;
+        let mut sums = [0.0; 2];
+        for (y, x) in (14..34).flat_map(|y| (14..34).map(move |x| (y, x))) {
+            let part = |x: usize| edges.blend(&depths, [SIZE; 2], x, y).map_or(0.0, |blend| f64::from(blend.part));
+            let true_part = (covered_part(&line, x, y) - f64::from(line(x as f32 + 0.5, y as f32 + 0.5))).abs();
+            sums[0] += (part(x) - true_part).powi(2);
+            sums[1] += (part(mirrored(x)) - true_part).powi(2);
+        }
+        assert!(sums[1] > 4.0 * sums[0], "the right blend {} and a wrong one {}", sums[0], sums[1]);
+    }
+
+    /// How much of a pixel a shape covers, by 256 samples.
+    fn covered_part(inside: impl Fn(f32, f32) -> bool, x: usize, y: usize) -> f64 {
+        let steps = (0..256).map(|step| [step % 16, step / 16].map(|step| (step as f32 + 0.5) / 16.0));
+        steps.filter(|[dx, dy]| inside(x as f32 + dx, y as f32 + dy)).count() as f64 / 256.0
+    }
+
+    #[test]
+    fn surfaces_have_no_edges() {
+        let view = view(Projection::PerspectiveFovDeg(40.0));
+        let unit = view.pixel_size(2.0);
+        for slope in [0.0, 1.0, 3.0] {
+            let depths = depths(|x, y| 2.0 + unit * slope * (0.3 * x + 0.7 * y));
+            let mut marks = [true; SIZE];
+            // But for the first and last row and column, which have nothing beside them.
+            for y in 1..SIZE - 1 {
+                Edges::new(&view).mark(&depths, y as isize, &mut marks);
+                assert_eq!(marks[1..SIZE - 1], [false; SIZE - 2], "slope {slope}, row {y}");
+            }
+        }
     }
 }

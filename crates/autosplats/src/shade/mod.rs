@@ -23,6 +23,8 @@ mod occlusion;
 mod settings;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod truth;
 
 pub(crate) use classes::class_colors;
 pub(crate) use cpu::{Scene, shade};

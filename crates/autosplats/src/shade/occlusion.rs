@@ -116,3 +116,113 @@ fn rise<S: Simd>(simd: S, depth: F32s<S>, there: F32s<S>, scale: F32s<S>) -> F32
     let rise = ((depth - there) * scale).max(splat(-STEEPEST));
     rise.min((splat(STEEPEST * STEEPEST) / rise.max(splat(LEAST_RISE))).max(splat(FURTHEST)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::depths::LANES;
+    use super::*;
+    use crate::camera::{Camera, Projection};
+    use crate::splat::{GBuffer, TILE_AREA};
+    use crate::test_clouds::Random;
+    use glam::DVec3;
+
+    const SIZE: usize = 60;
+    const MIDDLE: usize = SIZE / 2;
+
+    /// The light left at the pixels of row [`MIDDLE`], of depths in pixel sizes beyond a base, by the pixel's place from
+    /// the middle of the picture.
+    fn left(of: impl FnMut(f32, f32) -> f32) -> Vec<f32> {
+        left_under(Projection::OrthographicHeight(SIZE as f64), of)
+    }
+
+    fn left_under(projection: Projection, mut of: impl FnMut(f32, f32) -> f32) -> Vec<f32> {
+        let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
+        let view = camera.view(DVec3::ZERO, [SIZE as u32; 2]).expect("a view");
+        let side = SIZE as u32;
+        let mut layers =
+            GBuffer { width: side, height: side, depth: vec![f32::INFINITY; TILE_AREA], ..GBuffer::default() };
+        for pixel in 0..SIZE * SIZE {
+            let [x, y] = [pixel % SIZE, pixel / SIZE];
+            let at = layers.index(x, y);
+            layers.depth[at] = 1000.0 + of(x as f32 - MIDDLE as f32, y as f32 - MIDDLE as f32);
+        }
+        // As in a picture 900 pixels high.
+        let pairs = pairs(HEIGHT as u32);
+        let mut depths = Depths::default();
+        depths.fill(&layers, 0, SIZE, reach(&pairs) + 1);
+        let mut left = vec![f32::NAN; SIZE.next_multiple_of(LANES)];
+        light_left(&depths, MIDDLE as isize, &pairs, &view, DARKENING[0], &mut left);
+        left.truncate(SIZE);
+        // Where no surface is, anything may stand.
+        for (x, left) in left.iter_mut().enumerate() {
+            if layers.depth[layers.index(x, MIDDLE)] == f32::INFINITY {
+                *left = 1.0;
+            }
+        }
+        left
+    }
+
+    fn least(left: &[f32]) -> f32 {
+        left.iter().copied().fold(1.0, f32::min)
+    }
+
+    #[test]
+    fn planes_keep_their_light_however_they_lie() {
+        for [a, b] in [[0.0, 0.0], [1.0, 0.0], [0.0, -2.0], [0.7, 0.7], [5.0, 3.0]] {
+            let plane = left(|x, y| a * x + b * y);
+            assert!(least(&plane) > 0.999, "slopes {a} and {b}: {}", least(&plane));
+            let perspective = Projection::PerspectiveFovDeg(40.0);
+            let pixel = 1000.0 * 2.0 * 20f32.to_radians().tan() / SIZE as f32;
+            let plane = left_under(perspective, |x, y| {
+                // The true plane: 1 / depth is linear in the picture.
+                let tilt = (a * x + b * y) * pixel / 1000.0;
+                if tilt < 0.5 { 1000.0 / (1.0 - tilt) - 1000.0 } else { f32::INFINITY }
+            });
+            assert!(least(&plane) > 0.999, "slopes {a} and {b}, seen in perspective: {}", least(&plane));
+        }
+    }
+
+    #[test]
+    fn noise_keeps_nearly_all_light() {
+        let mut random = Random::new(8);
+        let noisy = left(|x, _| 0.5 * x + 0.5 * random.signed());
+        assert!(least(&noisy) > 0.9, "noise of half a pixel: {}", least(&noisy));
+        // A depth camera's steps.
+        let stairs = left(|x, _| (x / 12.0).round() * 1.5);
+        assert!(least(&stairs) > 0.9, "steps of 1.5 pixels: {}", least(&stairs));
+    }
+
+    #[test]
+    fn creases_and_steps_are_darker_and_ridges_are_not() {
+        let crease = left(|x, _| -x.abs());
+        assert!(crease[MIDDLE] < 0.6, "in a crease of 90°: {}", crease[MIDDLE]);
+        assert!(
+            crease[MIDDLE] < crease[MIDDLE - 10] && crease[MIDDLE - 10] < crease[MIDDLE - 25],
+            "darkest at the bottom"
+        );
+        let ridge = left(|x, _| x.abs());
+        assert!(ridge[MIDDLE] > 0.999, "on a ridge: {}", ridge[MIDDLE]);
+        let step = left(|x, _| if x < 0.0 { -15.0 } else { 0.0 });
+        assert!(
+            step[MIDDLE] < 0.8 && step[MIDDLE - 1] > 0.999,
+            "at the foot of a step: {}, on it: {}",
+            step[MIDDLE],
+            step[MIDDLE - 1]
+        );
+    }
+
+    #[test]
+    fn what_is_far_before_a_surface_leaves_no_black_border() {
+        let before = |height: f32| left(|x, _| if x < 0.0 { -height } else { 0.0 })[MIDDLE];
+        let (near, far) = (before(20.0), before(900.0));
+        assert!(near < far, "20 pixels: {near}, 900 pixels: {far}");
+        assert!(far > 0.8 && far < 0.99, "what is far before is told apart, and no more: {far}");
+    }
+
+    #[test]
+    fn gaps_and_borders_do_not_darken() {
+        let mut random = Random::new(4);
+        let gaps = left(|_, _| if random.unit() < 0.2 { f32::INFINITY } else { 0.0 });
+        assert!(least(&gaps) > 0.999, "a plane with gaps: {}", least(&gaps));
+    }
+}

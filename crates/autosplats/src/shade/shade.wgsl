@@ -74,13 +74,17 @@ fn tone(color: vec3f) -> vec3f {
 // Deeper than any surface: a number, because devices need not know infinity.
 const NOTHING = 1e30;
 
-// The depth at a pixel, which may lie beyond the picture.
-fn depth_at(pixel: vec2i) -> f32 {
+fn is_inside(pixel: vec2i) -> bool {
     // Beyond the left and upper edges it wraps around, to beyond the others.
     let at = vec2u(pixel);
-    let is_inside = at.x < frame.size.x && at.y < frame.size.y;
-    let depth = surface[select(0u, at.y * frame.size.x + at.x, is_inside)].w;
-    return select(NOTHING, depth, is_inside && is_covered(depth));
+    return at.x < frame.size.x && at.y < frame.size.y;
+}
+
+// The depth at a pixel, which may lie beyond the picture.
+fn depth_at(pixel: vec2i) -> f32 {
+    let inside = is_inside(pixel);
+    let depth = surface[select(0u, u32(pixel.y) * frame.size.x + u32(pixel.x), inside)].w;
+    return select(NOTHING, depth, inside && is_covered(depth));
 }
 
 // How steeply the surface rises towards the eye, from a depth to one beside it.
@@ -118,6 +122,31 @@ fn light_left(pixel: vec2i, depth: f32) -> f32 {
     return 1.0 / (1.0 + shadow + 0.5 * shadow * shadow);
 }
 
+// 1 if depth b lies behind a, -1 if before it, 0 if both may be one surface.
+fn edge_step(a: f32, b: f32) -> i32 {
+    let behind = b > a * shading.edge_factor + shading.edge_offset;
+    let before = a > b * shading.edge_factor + shading.edge_offset;
+    return select(0, 1, behind) - select(0, 1, before);
+}
+
+fn side_of(index: u32) -> vec2i {
+    let step = select(-1, 1, (index & 1u) == 1u);
+    return select(vec2i(0, step), vec2i(step, 0), index >= 2u);
+}
+
+// The normal that light falls on: one seen nearly edge on, at a border, and pointing away from it, was turned round.
+fn outward_normal(pixel: vec2i, surface_here: vec4f) -> vec3f {
+    let normal = surface_here.xyz;
+    var outward = vec2f(0.0);
+    for (var index = select(0u, 4u, normal.z < -shading.edge_on); index < 4u; index++) {
+        let side = side_of(index);
+        if is_inside(pixel + side) && edge_step(surface_here.w, depth_at(pixel + side)) == 1 {
+            outward += vec2f(side);
+        }
+    }
+    return select(normal, vec3f(-normal.xy, normal.z), normal.x * outward.x + normal.y * outward.y < 0.0);
+}
+
 // The colour of the surface at a pixel.
 fn surface_color(pixel: vec2u) -> vec3f {
     let index = pixel.y * frame.size.x + pixel.x;
@@ -127,16 +156,9 @@ fn surface_color(pixel: vec2u) -> vec3f {
         color *= light_left(vec2i(pixel), surface_here.w);
     }
     if shading.lighting == 1u {
-        color = tone(color * light(surface_here.xyz));
+        color = tone(color * light(outward_normal(vec2i(pixel), surface_here)));
     }
     return color;
-}
-
-// 1 if depth b lies behind a, -1 if before it, 0 if both may be one surface.
-fn edge_step(a: f32, b: f32) -> i32 {
-    let behind = b > a * shading.edge_factor + shading.edge_offset;
-    let before = a > b * shading.edge_factor + shading.edge_offset;
-    return select(0, 1, behind) - select(0, 1, before);
 }
 
 // How far along a row of edges its end is, and 1 if it turns into the row of the pixel that asks.
@@ -144,6 +166,10 @@ fn edge_end(pixel: vec2i, side: vec2i, kind: i32, along: vec2i) -> vec2i {
     var last = vec2f(depth_at(pixel), depth_at(pixel + side));
     for (var distance = 1; distance <= shading.edge_search; distance++) {
         let at = pixel + along * distance;
+        if !is_inside(at) {
+            // Beyond the picture the edge goes on.
+            break;
+        }
         let next = vec2f(depth_at(at), depth_at(at + side));
         let here = edge_step(last.x, next.x);
         let there = edge_step(next.y, last.y);
@@ -166,20 +192,14 @@ fn part_beside(end: vec2i, length: f32) -> f32 {
 // How much of a pixel its neighbour takes.
 fn part_of(side: vec2i, pixel: vec2i) -> f32 {
     let kind = edge_step(depth_at(pixel), depth_at(pixel + side));
-    let at = vec2u(pixel + side);
     var part = 0.0;
-    if kind != 0 && at.x < frame.size.x && at.y < frame.size.y {
+    if kind != 0 && is_inside(pixel + side) {
         let back = edge_end(pixel, side, kind, -side.yx);
         let ahead = edge_end(pixel, side, kind, side.yx);
         let length = f32(back.x + ahead.x - 1);
         part = part_beside(back, length) + part_beside(ahead, length);
     }
     return part;
-}
-
-fn side_of(index: u32) -> vec2i {
-    let step = select(-1, 1, (index & 1u) == 1u);
-    return select(vec2i(0, step), vec2i(step, 0), index >= 2u);
 }
 
 fn encode(channel: f32) -> u32 {

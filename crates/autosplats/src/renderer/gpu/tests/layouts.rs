@@ -101,7 +101,7 @@ fn mirrored() -> [Mirrored; 7] {
                 backgrounds,
                 measures,
                 edge_search,
-                padding,
+                edge_on,
                 pairs,
             }
         ),
