@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::color_map::Scale;
 use super::depths::{Depths, LANES};
-use super::edges::{Edges, SEARCH};
+use super::edges::{Edges, INWARD, SEARCH};
 use super::light::{CLAY, EDGE_ON, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
 use super::{Background, ColorMap, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
@@ -198,16 +198,20 @@ impl<'a> Shader<'a> {
         Some(std::array::from_fn(|i| tone(base[i] * light[i] * left)))
     }
 
-    /// The normal that light falls on. Normals face the eye; one that is seen nearly edge on, at a border, and points
-    /// away from it, was turned round by a hair's breadth too much, and would catch the light of the other side.
+    /// The normal that light falls on. Normals face the eye; one seen nearly edge on, at a border, may have been turned
+    /// round for it by a hair's breadth, and would catch the light of the other side. There the surface falls back
+    /// towards the border though the normal says that it rises.
     fn outward_normal(&self, depths: &Depths, x: usize, y: usize, index: usize) -> Vec3 {
         let normal = Vec3::from(self.layers.normal[index]);
         if normal.z < -EDGE_ON {
             return normal;
         }
-        let [out_x, out_y] =
-            self.edges.outward(depths, [self.layers.width as usize, self.layers.height as usize], x, y);
-        if normal.x * out_x + normal.y * out_y < 0.0 { Vec3::new(-normal.x, -normal.y, normal.z) } else { normal }
+        let size = [self.layers.width as usize, self.layers.height as usize];
+        let [out_x, out_y] = self.edges.outward(depths, size, x, y);
+        let inner = depths.at(x as isize - INWARD * out_x, y as isize - INWARD * out_y);
+        let rises = normal.x * (out_x as f32) + normal.y * (out_y as f32) < 0.0;
+        let turned = rises && inner < self.layers.depth[index];
+        if turned { Vec3::new(-normal.x, -normal.y, normal.z) } else { normal }
     }
 
     fn base_color(&self, x: usize, y: usize, index: usize) -> [f32; 3] {

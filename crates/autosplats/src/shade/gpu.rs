@@ -10,6 +10,7 @@ pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
 
 use super::color_map::{self, table};
 use super::cpu::{ENCODE_STEPS, background, encode_table, sample_step, usual_map};
+use super::edges::INWARD;
 use super::{Background, ColorMap, Shading};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -120,8 +121,9 @@ struct ColoringPasses {
 
 impl ColoringPasses {
     fn new(gpu: &Gpu, shown: Shown) -> Result<Self, Error> {
-        let pass = |source: &PassSource| Pass::new(gpu, source, &[("SHOWN", f64::from(shown as u32))]);
-        Ok(Self { range_values: pass(&RANGE_VALUES)?, shade: pass(&SHADE)? })
+        let shown = ("SHOWN", f64::from(shown as u32));
+        let range_values = Pass::new(gpu, &RANGE_VALUES, &[shown])?;
+        Ok(Self { range_values, shade: Pass::new(gpu, &SHADE, &[shown, ("INWARD", INWARD as f64)])? })
     }
 }
 

@@ -12,15 +12,15 @@ pub(super) const KEY_LIGHT: [f32; 3] = [0.95, 0.90, 0.83];
 pub(super) const KEY_WRAP: f32 = 0.08;
 /// Direction to the fill light.
 pub(super) const FILL: Vec3 = Vec3::new(0.82, 0.10, -0.56);
-pub(super) const FILL_LIGHT: [f32; 3] = [0.08, 0.09, 0.11];
+pub(super) const FILL_LIGHT: [f32; 3] = [0.145, 0.16, 0.185];
 /// Light of the ground and of the sky, on surfaces that face down and up.
 pub(super) const GROUND: [f32; 3] = [0.050, 0.047, 0.042];
 pub(super) const SKY: [f32; 3] = [0.125, 0.142, 0.165];
 /// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
 /// the lights above, so that a surface seen straight on keeps its colour.
-pub(super) const SCANNED_LIGHT: [f32; 2] = [0.50, 0.70];
+pub(super) const SCANNED_LIGHT: [f32; 2] = [0.42, 0.74];
 /// Cosine between the line of sight and a normal up to which a surface is seen nearly edge on.
-pub(super) const EDGE_ON: f32 = 0.3;
+pub(super) const EDGE_ON: f32 = 0.6;
 /// Brightness from which a lit colour rises less, so that it nears white and never reaches it.
 pub(super) const SHOULDER: f32 = 0.8;
 

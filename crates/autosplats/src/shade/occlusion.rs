@@ -43,7 +43,7 @@ pub(super) const FURTHEST: f32 = 0.4;
 /// What a rise is divided by at least: below it nothing is far.
 pub(super) const LEAST_RISE: f32 = 1e-3;
 /// Darkening at strength 1: of one tone, and of the points' own colours, which show shadows themselves.
-pub(super) const DARKENING: [f32; 2] = [4.5, 3.0];
+pub(super) const DARKENING: [f32; 2] = [4.5, 3.3];
 
 /// One pair: the step to the second pixel, from which the first lies opposite.
 #[derive(Clone, Copy, Debug)]

@@ -21,6 +21,9 @@
 @group(0) @binding(8) var<storage, read_write> image: array<u32>;
 @group(0) @binding(9) var<storage, read_write> linear: array<vec4f>;
 
+// How far from a border it is seen where the surface comes from, in pixels.
+override INWARD: i32;
+
 // The colour of a value; one that is unknown gets the lower end's, and a range of no width is all middle.
 fn map_color(value: f32) -> vec3f {
     var range = shading.range;
@@ -134,17 +137,19 @@ fn side_of(index: u32) -> vec2i {
     return select(vec2i(0, step), vec2i(step, 0), index >= 2u);
 }
 
-// The normal that light falls on: one seen nearly edge on, at a border, and pointing away from it, was turned round.
+// The normal that light falls on: one seen nearly edge on, at a border, was turned round if the surface falls back towards
+// the border though the normal says that it rises.
 fn outward_normal(pixel: vec2i, surface_here: vec4f) -> vec3f {
     let normal = surface_here.xyz;
-    var outward = vec2f(0.0);
+    var outward = vec2i(0);
     for (var index = select(0u, 4u, normal.z < -shading.edge_on); index < 4u; index++) {
         let side = side_of(index);
         if is_inside(pixel + side) && edge_step(surface_here.w, depth_at(pixel + side)) == 1 {
-            outward += vec2f(side);
+            outward += side;
         }
     }
-    return select(normal, vec3f(-normal.xy, normal.z), normal.x * outward.x + normal.y * outward.y < 0.0);
+    let rises = normal.x * f32(outward.x) + normal.y * f32(outward.y) < 0.0;
+    return select(normal, vec3f(-normal.xy, normal.z), rises && depth_at(pixel - INWARD * outward) < surface_here.w);
 }
 
 // The colour of the surface at a pixel.
