@@ -62,6 +62,20 @@ fn pictures_have_the_surface_in_the_middle_and_the_background_around() {
 }
 
 #[test]
+fn supersampled_pictures_are_the_same_but_smoother() {
+    let folder = Folder::with_sphere();
+    let soft = |supersample: &str| {
+        let options = ["-o", "clear.png", "--background", "transparent", "--supersample", supersample];
+        render(&folder, &[&FRONT[..], &options].concat());
+        let image = png(&folder, "clear.png").into_rgba8();
+        assert_eq!([image.get_pixel(0, 0).0[3], image.get_pixel(80, 60).0[3]], [0, 255], "surface and nothing");
+        image.pixels().filter(|pixel| (1..255).contains(&pixel.0[3])).count()
+    };
+    let [plain, fine] = ["1", "3"].map(soft);
+    assert!(plain > 0 && fine > plain, "pixels covered in part: {plain}, supersampled {fine}");
+}
+
+#[test]
 fn layers_hold_the_geometry() {
     let folder = Folder::with_sphere();
     render(&folder, &[&FRONT[..], &["-o", "layers.exr", "-o", "picture.png"]].concat());

@@ -228,7 +228,7 @@ mod tests {
         let mut sums = [0.0; 2];
         for (y, x) in (14..34).flat_map(|y| (14..34).map(move |x| (y, x))) {
             let part = |x: usize| edges.blend(&depths, [SIZE; 2], x, y).map_or(0.0, |blend| f64::from(blend.part));
-            let true_part = (covered_part(&line, x, y) - f64::from(line(x as f32 + 0.5, y as f32 + 0.5))).abs();
+            let true_part = (covered_part(line, x, y) - f64::from(line(x as f32 + 0.5, y as f32 + 0.5))).abs();
             sums[0] += (part(x) - true_part).powi(2);
             sums[1] += (part(mirrored(x)) - true_part).powi(2);
         }

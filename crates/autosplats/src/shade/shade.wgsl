@@ -87,7 +87,7 @@ fn is_inside(pixel: vec2i) -> bool {
 fn depth_at(pixel: vec2i) -> f32 {
     let inside = is_inside(pixel);
     let depth = surface[select(0u, u32(pixel.y) * frame.size.x + u32(pixel.x), inside)].w;
-    return select(NOTHING, depth, inside && is_covered(depth));
+    return select(NOTHING, min(depth, NOTHING), inside);
 }
 
 // How steeply the surface rises towards the eye, from a depth to one beside it.
@@ -278,20 +278,23 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
             }
         }
         // The pixel's own colour, then that of its neighbour.
-        let at = array(vec2i(pixel), vec2i(pixel) + side);
-        let is_surface = array(depth_at(at[0]) != NOTHING, part > 0.0 && depth_at(at[1]) != NOTHING);
-        var colors = array(vec3f(0.0), vec3f(0.0));
-        for (var index = select(1u, 0u, is_surface[0]); index < select(1u, 2u, is_surface[1]); index++) {
-            colors[index] = surface_color(vec2u(at[index]));
+        let is_surface = depth_at(vec2i(pixel)) != NOTHING;
+        let beside_is_surface = part > 0.0 && depth_at(vec2i(pixel) + side) != NOTHING;
+        var own = vec3f(0.0);
+        var beside = vec3f(0.0);
+        for (var index = select(1u, 0u, is_surface); index < select(1u, 2u, beside_is_surface); index++) {
+            let color = surface_color(vec2u(vec2i(pixel) + select(vec2i(0), side, index == 1u)));
+            own = select(own, color, index == 0u);
+            beside = select(beside, color, index == 1u);
         }
         var rgba = tables[shading.backgrounds + pixel.y];
-        if is_surface[0] && (is_surface[1] || part == 0.0) {
-            rgba = encode_color(colors[0] + (colors[1] - colors[0]) * part) | 0xff000000u;
-        } else if is_surface[0] {
-            rgba = over(colors[0], 1.0 - part, rgba);
-        } else if is_surface[1] {
-            rgba = over(colors[1], part, rgba);
+        if is_surface && (beside_is_surface || part == 0.0) {
+            rgba = encode_color(own + (beside - own) * part) | 0xff000000u;
+        } else if is_surface {
+            rgba = over(own, 1.0 - part, rgba);
+        } else if beside_is_surface {
+            rgba = over(beside, part, rgba);
         }
-        put(pixel, colors[0], rgba);
+        put(pixel, own, rgba);
     }
 }
