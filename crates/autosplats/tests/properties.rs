@@ -267,8 +267,11 @@ fn one_color_stays_that_color() {
             let [r, g, b] = COLOR;
             for (pixel, color) in picture.image.pixels.iter().enumerate() {
                 let index = picture.layers.index(pixel % SIZE[0] as usize, pixel / SIZE[0] as usize);
-                let expected = if picture.layers.weight[index] > 0.0 { [r, g, b, 255] } else { [0; 4] };
+                let alpha = color[3];
+                let expected = if alpha > 0 { [r, g, b, alpha] } else { [0; 4] };
                 assert_eq!(*color, expected, "{name}: pixel {pixel}");
+                // At edges alpha is the part that is covered.
+                assert_eq!(alpha >= 128, picture.layers.weight[index] > 0.0, "{name}: pixel {pixel}, alpha {alpha}");
             }
         }
     }
