@@ -52,6 +52,7 @@ impl Method {
 pub fn paper() -> Reconstruction {
     Reconstruction {
         k: 10,
+        adaptive: false,
         engine: SearchEngine::default(),
         outlier_expansions: Some(1),
         gap_factor: Some(4.0),

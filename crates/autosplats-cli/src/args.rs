@@ -60,9 +60,10 @@ const RENDER_EXAMPLES: &str = "\
 Examples:
   autosplats render scan.laz -o scan.png
   autosplats render scan.laz -o scan.png --view top --color height --legend
+  autosplats render scan.laz -o print.png --supersample 2
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
-  autosplats render scene:cathedral:10M -o cathedral.png --eye-dome 2 --json
+  autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
 
 #[derive(Args, Debug)]
@@ -79,6 +80,9 @@ pub(crate) struct RenderArgs {
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],
+    /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures
+    #[arg(long, value_name = "FACTOR", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub(crate) supersample: u32,
     #[command(flatten)]
     pub(crate) camera: CameraArgs,
     #[command(flatten)]
@@ -227,9 +231,9 @@ pub(crate) struct LookArgs {
     /// Show colours as they are, without light
     #[arg(long)]
     pub(crate) no_lighting: bool,
-    /// Strength of eye-dome lighting, the darkening at depth steps, 0 to 10
-    #[arg(long, value_name = "STRENGTH", default_value_t = Shading::default().eye_dome, allow_negative_numbers = true)]
-    pub(crate) eye_dome: f32,
+    /// Strength of occlusion, the darkening of creases and of what lies behind something, 0 (off) to 10
+    #[arg(long, alias = "eye-dome", value_name = "STRENGTH", default_value_t = Shading::default().occlusion, allow_negative_numbers = true)]
+    pub(crate) occlusion: f32,
     /// How the side of a surface is shown that its sensor did not see, where the file says where that stood
     #[arg(long, value_enum, default_value_t = BacksChoice::Toned)]
     pub(crate) backs: BacksChoice,

@@ -60,7 +60,7 @@ fn completions_know_all_commands() {
         for command in COMMANDS {
             assert!(script.contains(command), "{shell}: {command} is missing");
         }
-        assert!(script.contains("eye-dome") && script.contains("autosplats"), "{shell}: options of this program");
+        assert!(script.contains("occlusion") && script.contains("autosplats"), "{shell}: options of this program");
     }
     folder.fail(&["completions", "tcsh"], 2, &["bash", "zsh", "fish"]);
     let help = folder.succeed(&["completions", "--help"]).stdout;

@@ -62,6 +62,20 @@ fn pictures_have_the_surface_in_the_middle_and_the_background_around() {
 }
 
 #[test]
+fn supersampled_pictures_are_the_same_but_smoother() {
+    let folder = Folder::with_sphere();
+    let soft = |supersample: &str| {
+        let options = ["-o", "clear.png", "--background", "transparent", "--supersample", supersample];
+        render(&folder, &[&FRONT[..], &options].concat());
+        let image = png(&folder, "clear.png").into_rgba8();
+        assert_eq!([image.get_pixel(0, 0).0[3], image.get_pixel(80, 60).0[3]], [0, 255], "surface and nothing");
+        image.pixels().filter(|pixel| (1..255).contains(&pixel.0[3])).count()
+    };
+    let [plain, fine] = ["1", "3"].map(soft);
+    assert!(plain > 0 && fine > plain, "pixels covered in part: {plain}, supersampled {fine}");
+}
+
+#[test]
 fn layers_hold_the_geometry() {
     let folder = Folder::with_sphere();
     render(&folder, &[&FRONT[..], &["-o", "layers.exr", "-o", "picture.png"]].concat());
@@ -132,7 +146,7 @@ fn every_look_changes_the_picture() {
         &["--range", "-5..5"],
         &["--color-map", "inferno"],
         &["--no-lighting"],
-        &["--eye-dome", "3"],
+        &["--occlusion", "3"],
         &["--background", "#ffffff"],
         &["--splat-scale", "2"],
         &["-k", "30"],
@@ -229,7 +243,7 @@ fn quiet_says_nothing() {
 #[test]
 fn runs_and_threads_do_not_change_a_byte() {
     let folder = Folder::with_sphere();
-    let options = ["-o", "a.png", "-o", "a.exr", "--ellipses", "--eye-dome", "1"];
+    let options = ["-o", "a.png", "-o", "a.exr", "--ellipses", "--occlusion", "1"];
     let mut results = Vec::new();
     for threads in ["1", "2", "2", "3"] {
         render(&folder, &[&options[..], &["--threads", threads]].concat());

@@ -201,7 +201,7 @@ fn every_colour() {
     let backgrounds = [Background::Transparent, Background::Color([10, 200, 30]), Shading::default().background];
     for background in backgrounds {
         let shading =
-            Shading { background, lighting: false, eye_dome: 0.0, range: Some([0.0, 1.0]), ..Shading::default() };
+            Shading { background, lighting: false, occlusion: 0.0, range: Some([0.0, 1.0]), ..Shading::default() };
         let settings = Settings { shading, ..Settings::default() };
         compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("{background:?}"));
     }

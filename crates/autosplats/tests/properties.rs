@@ -39,7 +39,7 @@ fn cloud(positions: &[[f32; 3]]) -> PointCloud {
 
 /// Every layer filled, values shown as they are.
 fn settings() -> Settings {
-    let shading = Shading { color: ColorMode::Plain, lighting: true, eye_dome: 0.0, ..Shading::default() };
+    let shading = Shading { color: ColorMode::Plain, lighting: true, occlusion: 0.0, ..Shading::default() };
     Settings { shading, all_layers: true, ..Settings::default() }
 }
 
@@ -262,13 +262,16 @@ fn one_color_stays_that_color() {
         for (name, positions) in test_clouds::all(4000) {
             let cloud = cloud(&positions).with_colors(vec![COLOR; positions.len()]).expect("a colour for each point");
             let shading =
-                Shading { lighting: false, eye_dome: 0.0, background: Background::Transparent, ..Shading::default() };
+                Shading { lighting: false, occlusion: 0.0, background: Background::Transparent, ..Shading::default() };
             let picture = render(&cloud, &camera, SIZE, &Settings { shading, ..Settings::default() });
             let [r, g, b] = COLOR;
             for (pixel, color) in picture.image.pixels.iter().enumerate() {
                 let index = picture.layers.index(pixel % SIZE[0] as usize, pixel / SIZE[0] as usize);
-                let expected = if picture.layers.weight[index] > 0.0 { [r, g, b, 255] } else { [0; 4] };
+                let alpha = color[3];
+                let expected = if alpha > 0 { [r, g, b, alpha] } else { [0; 4] };
                 assert_eq!(*color, expected, "{name}: pixel {pixel}");
+                // At edges alpha is the part that is covered.
+                assert_eq!(alpha >= 128, picture.layers.weight[index] > 0.0, "{name}: pixel {pixel}, alpha {alpha}");
             }
         }
     }

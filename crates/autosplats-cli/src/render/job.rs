@@ -26,7 +26,10 @@ pub(super) struct Job {
     pub(super) inputs: Inputs,
     pub(super) pictures: Vec<Picture>,
     pub(super) save_camera: Option<PathBuf>,
+    /// Of the pictures that are written.
     pub(super) size: [u32; 2],
+    /// How many times as wide and high they are rendered.
+    pub(super) supersample: u32,
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
@@ -38,10 +41,15 @@ pub(super) struct Job {
 impl Job {
     /// Checks the flags, the inputs' existence and the outputs' places.
     pub(super) fn new(args: RenderArgs) -> Result<Self, Failure> {
-        let RenderArgs { inputs, input, outputs, size, camera, surface, look, run, json } = args;
+        let RenderArgs { inputs, input, outputs, size, supersample, camera, surface, look, run, json } = args;
         start_threads(&run)?;
         let pictures = outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?;
         let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
+        if needs_layers && supersample > 1 {
+            return Err(Failure::usage(
+                "--supersample: .exr layers are not averaged; write them in a run of their own",
+            ));
+        }
         let settings = settings(&surface, look, needs_layers);
         settings.check().map_err(render_failure)?;
 
@@ -56,12 +64,29 @@ impl Job {
             }
             check_target(target, inputs.files().chain(camera.file()))?;
         }
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        check_memory(&format!("a picture of {}x{}", size[0], size[1]), pixels * BYTES_PER_PIXEL)
+        let [width, height] = size.map(|side| u64::from(side) * u64::from(supersample));
+        check_memory(&format!("a picture of {width}x{height}"), width * height * BYTES_PER_PIXEL)
             .map_err(read_failure)?;
         let SurfaceArgs { backend, first_radius, .. } = surface;
         let (backend, quiet) = (backend.into(), run.quiet);
-        Ok(Self { inputs, pictures, save_camera, size, camera, settings, backend, first_radius, json, quiet })
+        Ok(Self {
+            inputs,
+            pictures,
+            save_camera,
+            size,
+            supersample,
+            camera,
+            settings,
+            backend,
+            first_radius,
+            json,
+            quiet,
+        })
+    }
+
+    /// Pixels of the picture that is rendered.
+    pub(super) fn rendered_size(&self) -> [u32; 2] {
+        self.size.map(|side| side * self.supersample)
     }
 
     /// Whether the picture has nothing behind the surface.
@@ -127,7 +152,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         }),
         legend: look.legend,
         lighting: !look.no_lighting,
-        eye_dome: look.eye_dome,
+        occlusion: look.occlusion,
         backs: look.backs.into(),
         background: look.background.unwrap_or(Shading::default().background),
     };

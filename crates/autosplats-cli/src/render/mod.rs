@@ -3,6 +3,7 @@
 mod camera;
 mod job;
 mod report;
+mod shrink;
 
 use std::time::Instant;
 
@@ -11,6 +12,7 @@ use autosplats::{Camera, Counts, Error, Frame, Renderer};
 pub(crate) use self::camera::scene_camera;
 use self::job::Job;
 use self::report::Report;
+use self::shrink::shrink;
 use crate::args::RenderArgs;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -36,9 +38,10 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
-    job.settings = job.first_radius.settle(&mut renderer, &cloud, &camera, job.size, &job.settings, job.quiet)?;
+    job.settings =
+        job.first_radius.settle(&mut renderer, &cloud, &camera, job.rendered_size(), &job.settings, job.quiet)?;
     let bar = Bar::spinner("rendering", job.quiet);
-    let frame = renderer.render(&cloud, &camera, job.size, &job.settings).map_err(render_failure)?;
+    let frame = renderer.render(&cloud, &camera, job.rendered_size(), &job.settings).map_err(render_failure)?;
     drop(bar);
     check_visible(&frame, &job.inputs)?;
     if !job.quiet {
@@ -54,7 +57,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let mut written = Vec::new();
     for picture in &job.pictures {
         let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), job.quiet);
-        written.push((picture.path.clone(), write_picture(picture, &frame, &camera, job.transparent())?));
+        written.push((picture.path.clone(), write_picture(picture, &frame, &camera, &job)?));
     }
     if let Some(path) = &job.save_camera {
         written.push((path.clone(), camera::save(path, &camera)?));
@@ -71,9 +74,12 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, alpha: bool) -> Result<u64, Failure> {
+fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Job) -> Result<u64, Failure> {
     write_file(&picture.path, |writer| match picture.format {
-        Format::Png => write_png(frame.image, alpha, writer),
+        Format::Png if job.supersample > 1 => {
+            write_png(&shrink(frame.image, job.supersample), job.transparent(), writer)
+        }
+        Format::Png => write_png(frame.image, job.transparent(), writer),
         Format::Exr => write_exr(frame, camera, writer),
     })
 }

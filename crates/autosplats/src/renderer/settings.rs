@@ -45,7 +45,7 @@ impl Default for Reconstruction {
     fn default() -> Self {
         Self {
             k: 10,
-            adaptive: false,
+            adaptive: true,
             engine: SearchEngine::default(),
             outlier_expansions: Some(1),
             gap_factor: Some(4.0),
@@ -76,7 +76,7 @@ impl Settings {
         let lambda = gap_factor.unwrap_or(4.0);
         within("gap_factor", lambda > 1.0 && lambda.is_finite(), lambda, "above 1")?;
         within("splat_scale", (0.01..=10.0).contains(&splat_scale), splat_scale, "within 0.01 to 10")?;
-        within("eye_dome", (0.0..=10.0).contains(&self.shading.eye_dome), self.shading.eye_dome, "within 0 to 10")?;
+        within("occlusion", (0.0..=10.0).contains(&self.shading.occlusion), self.shading.occlusion, "within 0 to 10")?;
         if let Some([low, high]) = self.shading.range {
             within(
                 "range",

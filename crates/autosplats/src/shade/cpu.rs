@@ -4,35 +4,24 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::color_map::Scale;
-use super::{Background, ColorMap, ColorMode, Image, Shading, legend, linear, srgb};
+use super::depths::{Depths, LANES};
+use super::edges::{Edges, INWARD, SEARCH};
+use super::light::{CLAY, EDGE_ON, light, tone};
+use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
+use super::{Background, ColorMap, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
 use crate::splat::GBuffer;
 
-/// One clay tone, linear.
-pub(super) const CLAY: [f32; 3] = [0.53, 0.50, 0.46];
-/// Direction to the key light in view space (x right, y down, z forward): over the left shoulder.
-pub(super) const KEY: Vec3 = Vec3::new(-0.47, -0.62, -0.63);
-pub(super) const KEY_LIGHT: f32 = 0.74;
-/// How far the key light reaches around to surfaces turned away from it.
-pub(super) const KEY_WRAP: f32 = 0.15;
-/// Direction to the fill light.
-pub(super) const FILL: Vec3 = Vec3::new(0.80, 0.05, -0.60);
-pub(super) const FILL_LIGHT: f32 = 0.13;
-/// Light of the sky on surfaces that face down and up.
-pub(super) const SKY: [f32; 2] = [0.05, 0.18];
-/// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
-/// the lights above, so that a surface seen straight on keeps its colour.
-pub(super) const SCANNED_LIGHT: [f32; 2] = [0.45, 0.75];
 /// Light and colour left on the backs of surfaces.
 pub(super) const BACK_LIGHT: f32 = 0.5;
 pub(super) const BACK_COLOR: f32 = 0.4;
 /// Weights of red, green and blue in how bright a linear colour is.
 pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-/// Neighbours looked at by eye-dome lighting, in pixels.
-pub(super) const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 /// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
 /// the 255.
 pub(super) const ENCODE_STEPS: usize = 1 << 13;
+/// Rows that a thread shades at a time.
+const BAND: usize = 32;
 /// Pixels looked at to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
 
@@ -66,28 +55,113 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep
     image.width = layers.width;
     image.height = layers.height;
     image.pixels.resize(width * height, [0; 4]);
-    let shader = Shader::new(layers, scene, shading);
-    let table = encode_table();
-    let encode = |channel| encode(&table, channel);
-    image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        let background = background(shading.background, (y as f32 + 0.5) / height as f32);
-        for (x, out) in row.iter_mut().enumerate() {
-            *out = match shader.pixel(x, y) {
-                Some(color) => {
-                    let [r, g, b] = color.map(encode);
-                    [r, g, b, 255]
-                }
-                None => background,
-            };
-        }
-    });
     image.linear.clear();
+    image.linear.resize(if keep_linear { width * height } else { 0 }, [0.0; 3]);
+    let shader = Shader::new(layers, scene, shading);
+    let inks = Inks { table: encode_table(), linear: linear_steps() };
+    let bands = image.pixels.par_chunks_mut(width * BAND).enumerate();
     if keep_linear {
-        let pixels = (0..width * height).into_par_iter();
-        pixels.map(|at| shader.pixel(at % width, at / width).unwrap_or_default()).collect_into_vec(&mut image.linear);
+        bands.zip(image.linear.par_chunks_mut(width * BAND)).for_each_init(
+            Band::default,
+            |band, ((i, pixels), linear)| {
+                band.shade(&shader, &inks, i * BAND, pixels, linear);
+            },
+        );
+    } else {
+        bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, &inks, i * BAND, pixels, &mut []));
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
-        legend::draw(image, &title(&shading.color), scale, scene.value_offset(&shading.color), encode);
+        let encode = |channel| encode(&inks.table, channel);
+        legend::draw(image, shading, scale, scene.value_offset(&shading.color), encode);
+    }
+}
+
+/// From linear light to 8-bit sRGB and back.
+struct Inks {
+    table: Vec<u8>,
+    linear: [f32; 256],
+}
+
+impl Inks {
+    fn encode(&self, color: [f32; 3]) -> [u8; 4] {
+        let [r, g, b] = color.map(|channel| encode(&self.table, channel));
+        [r, g, b, 255]
+    }
+
+    /// What a pixel shows of which `part` is covered in one colour and the rest is background.
+    fn over(&self, color: [f32; 3], part: f32, background: [u8; 4]) -> [u8; 4] {
+        if background[3] == 0 {
+            let [r, g, b, _] = self.encode(color);
+            return [r, g, b, (part * 255.0 + 0.5) as u8];
+        }
+        let behind = [0, 1, 2].map(|i| self.linear[background[i] as usize]);
+        self.encode(mix(behind, color, part))
+    }
+}
+
+/// From `a` to `b` by a part of the way.
+fn mix(a: [f32; 3], b: [f32; 3], part: f32) -> [f32; 3] {
+    std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
+}
+
+/// What shading some rows takes, kept from one to the next.
+#[derive(Default)]
+struct Band {
+    depths: Depths,
+    /// Light left by occlusion, from the row above the first to the one below the last.
+    left: Vec<f32>,
+    edges: Vec<bool>,
+}
+
+impl Band {
+    /// Shades the rows from `first` on.
+    fn shade(
+        &mut self,
+        shader: &Shader<'_>,
+        inks: &Inks,
+        first: usize,
+        pixels: &mut [[u8; 4]],
+        linear: &mut [[f32; 3]],
+    ) {
+        let Self { depths, left, edges } = self;
+        let layers = shader.layers;
+        let [width, height] = [layers.width as usize, layers.height as usize];
+        let rows = pixels.len() / width;
+        depths.fill(layers, first, rows, reach(&shader.pairs).max(SEARCH as usize) + 1);
+        let stride = width.next_multiple_of(LANES);
+        left.clear();
+        left.resize(stride * (rows + 2), 1.0);
+        let darkening = darkening(shader.shading, shader.colored);
+        if darkening > 0.0 {
+            for (row, left) in left.chunks_mut(stride).enumerate() {
+                light_left(depths, (first + row) as isize - 1, &shader.pairs, shader.scene.view, darkening, left);
+            }
+        }
+        let left = |x: usize, y: usize| left[(y + 1 - first) * stride + x];
+        edges.resize(width, false);
+        for (row, out) in pixels.chunks_mut(width).enumerate() {
+            let y = first + row;
+            let background = background(shader.shading.background, (y as f32 + 0.5) / height as f32);
+            shader.edges.mark(depths, y as isize, edges);
+            for (x, (out, &edge)) in out.iter_mut().zip(&*edges).enumerate() {
+                let color = shader.pixel(depths, x, y, left(x, y));
+                *out = color.map_or(background, |color| inks.encode(color));
+                if let (Some(color), Some(linear)) = (color, linear.get_mut(row * width + x)) {
+                    *linear = color;
+                }
+                if !edge {
+                    continue;
+                }
+                let Some(blend) = shader.edges.blend(depths, [width, height], x, y) else { continue };
+                let other = shader.pixel(depths, blend.x, blend.y, left(blend.x, blend.y));
+                *out = match (color, other) {
+                    (Some(color), Some(other)) => inks.encode(mix(color, other, blend.part)),
+                    (Some(color), None) => inks.over(color, 1.0 - blend.part, background),
+                    (None, Some(other)) => inks.over(other, blend.part, background),
+                    (None, None) => background,
+                };
+            }
+        }
     }
 }
 
@@ -97,6 +171,8 @@ pub(super) struct Shader<'a> {
     shading: &'a Shading,
     /// Whether the layer of colours is shown, which may be there though something else is.
     colored: bool,
+    pairs: [Pair; PAIR_COUNT],
+    edges: Edges,
     /// For colour modes that are a value.
     pub(super) scale: Option<Scale>,
 }
@@ -104,7 +180,8 @@ pub(super) struct Shader<'a> {
 impl<'a> Shader<'a> {
     pub(super) fn new(layers: &'a GBuffer, scene: &'a Scene<'a>, shading: &'a Shading) -> Self {
         let colored = shows_colors(&shading.color) && !layers.color.is_empty();
-        let mut shader = Self { layers, scene, shading, colored, scale: None };
+        let (pairs, edges) = (pairs(layers.height), Edges::new(scene.view));
+        let mut shader = Self { layers, scene, shading, colored, pairs, edges, scale: None };
         if let Some(map) = usual_map(&shading.color) {
             let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
             shader.scale = Some(Scale::new(shading.color_map.unwrap_or(map), range));
@@ -112,15 +189,18 @@ impl<'a> Shader<'a> {
         shader
     }
 
-    /// The linear colour of a pixel, if a surface covers it.
-    fn pixel(&self, x: usize, y: usize) -> Option<[f32; 3]> {
+    /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion.
+    fn pixel(&self, depths: &Depths, x: usize, y: usize, left: f32) -> Option<[f32; 3]> {
         let index = self.layers.index(x, y);
         if !(self.layers.weight[index] > 0.0) {
             return None;
         }
-        let light = if self.shading.lighting { self.light(index) } else { 1.0 };
-        let light = light * self.eye_dome(x, y, index);
-        Some(self.tone_back(self.base_color(x, y, index), index).map(|channel| channel * light))
+        let base = self.tone_back(self.base_color(x, y, index), index);
+        if !self.shading.lighting {
+            return Some(base.map(|channel| channel * left));
+        }
+        let light = light(self.outward_normal(depths, x, y, index), self.colored);
+        Some(std::array::from_fn(|i| tone(base[i] * light[i] * left)))
     }
 
     /// The colour of a surface that shows its back as far as the pixel says.
@@ -133,6 +213,22 @@ impl<'a> Shader<'a> {
             }
             _ => color,
         }
+    }
+
+    /// The normal that light falls on. Normals face the eye; one seen nearly edge on, at a border, may have been turned
+    /// round for it by a hair's breadth, and would catch the light of the other side. There the surface falls back
+    /// towards the border though the normal says that it rises.
+    fn outward_normal(&self, depths: &Depths, x: usize, y: usize, index: usize) -> Vec3 {
+        let normal = Vec3::from(self.layers.normal[index]);
+        if normal.z < -EDGE_ON {
+            return normal;
+        }
+        let size = [self.layers.width as usize, self.layers.height as usize];
+        let [out_x, out_y] = self.edges.outward(depths, size, x, y);
+        let inner = depths.at(x as isize - INWARD * out_x, y as isize - INWARD * out_y);
+        let rises = normal.x * (out_x as f32) + normal.y * (out_y as f32) < 0.0;
+        let turned = rises && inner < self.layers.depth[index];
+        if turned { Vec3::new(-normal.x, -normal.y, normal.z) } else { normal }
     }
 
     fn base_color(&self, x: usize, y: usize, index: usize) -> [f32; 3] {
@@ -184,39 +280,11 @@ impl<'a> Shader<'a> {
     fn world_normal(&self, index: usize) -> Vec3 {
         self.scene.view.view_from_world.transpose() * Vec3::from(self.layers.normal[index])
     }
+}
 
-    fn light(&self, index: usize) -> f32 {
-        let normal = Vec3::from(self.layers.normal[index]);
-        let key = ((normal.dot(KEY) + KEY_WRAP) / (1.0 + KEY_WRAP)).max(0.0);
-        let fill = normal.dot(FILL).max(0.0);
-        let sky = SKY[0] + (SKY[1] - SKY[0]) * (0.5 - 0.5 * normal.y);
-        let light = KEY_LIGHT * key + FILL_LIGHT * fill + sky;
-        let [base, share] = if self.colored { SCANNED_LIGHT } else { [0.0, 1.0] };
-        base + share * light
-    }
-
-    /// How much light is left beside nearer surfaces.
-    fn eye_dome(&self, x: usize, y: usize, index: usize) -> f32 {
-        if !(self.shading.eye_dome > 0.0) {
-            return 1.0;
-        }
-        let layers = self.layers;
-        let depth = layers.depth[index];
-        let unit = self.scene.view.pixel_size(depth);
-        let mut shadow = 0.0;
-        for [dx, dy] in EYE_DOME {
-            let (Some(nx), Some(ny)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else { continue };
-            if nx < layers.width as usize && ny < layers.height as usize {
-                let distance_px = ((dx * dx + dy * dy) as f32).sqrt();
-                // How steeply the nearer neighbour rises towards the eye; slopes up to 45° are surface, not a step.
-                let slope = (depth - layers.depth[layers.index(nx, ny)]) / (unit * distance_px);
-                shadow += if slope > 1.0 { (slope - 1.0) / (slope + 3.0) } else { 0.0 };
-            }
-        }
-        // Falls like the exponential at first, costs a division, and is the same on every processor.
-        let shadow = self.shading.eye_dome * shadow / EYE_DOME.len() as f32;
-        1.0 / (1.0 + shadow + 0.5 * shadow * shadow)
-    }
+/// How much occlusion darkens, on the points' own colours or on others.
+pub(super) fn darkening(shading: &Shading, colored: bool) -> f32 {
+    shading.occlusion * DARKENING[usize::from(colored)]
 }
 
 /// Every how many of a picture's pixels is looked at to find the usual range.

@@ -10,6 +10,7 @@ pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
 
 use super::color_map::{self, table};
 use super::cpu::{BACK_COLOR, BACK_LIGHT, ENCODE_STEPS, background, encode_table, sample_step, usual_map};
+use super::edges::INWARD;
 use super::{Background, ColorMap, Shading};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -121,8 +122,13 @@ struct ColoringPasses {
 impl ColoringPasses {
     fn new(gpu: &Gpu, shown: Shown, backs: bool) -> Result<Self, Error> {
         let shown = ("SHOWN", f64::from(shown as u32));
-        let shade =
-            [shown, ("BACKS", backs.into()), ("BACK_LIGHT", BACK_LIGHT.into()), ("BACK_COLOR", BACK_COLOR.into())];
+        let shade = [
+            shown,
+            ("BACKS", backs.into()),
+            ("BACK_LIGHT", BACK_LIGHT.into()),
+            ("BACK_COLOR", BACK_COLOR.into()),
+            ("INWARD", INWARD as f64),
+        ];
         Ok(Self { range_values: Pass::new(gpu, &RANGE_VALUES, &[shown])?, shade: Pass::new(gpu, &SHADE, &shade)? })
     }
 }

@@ -2,8 +2,9 @@
 
 use font8x8::UnicodeFonts as _;
 
-use super::Image;
 use super::color_map::Scale;
+use super::cpu::{background, title};
+use super::{Background, Image, Shading};
 
 /// Labels along the bar, both ends included.
 const LABELS: usize = 5;
@@ -12,8 +13,10 @@ const GLYPH: usize = 8;
 const INK: [u8; 4] = [240, 240, 240, 255];
 const SHADE: [u8; 4] = [24, 26, 30, 255];
 
-/// Draws the legend at the right edge; in a picture too small for one, nothing. `offset` is added to the values of the scale.
-pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
+/// Draws the legend where it hides the least, best in the middle of the right edge; in a picture too small for one,
+/// nothing. `offset` is added to the values of the scale.
+pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
+    let title = &title(&shading.color);
     let [width, height] = [image.width as usize, image.height as usize];
     // One font pixel is this many picture pixels.
     let unit = (height / 400).max(1);
@@ -29,7 +32,11 @@ pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, offset: f64, e
     if panel_width + line > width || panel_height + line > height || bar_height < LABELS * line {
         return;
     }
-    let [x0, y0] = [width - panel_width - line, (height - panel_height) / 2];
+    let [right, bottom] = [width - panel_width - line, height - panel_height - line / 2];
+    let places =
+        [right, line].into_iter().flat_map(|x| [(height - panel_height) / 2, line / 2, bottom].map(|y| [x, y]));
+    let hidden = |&place: &[usize; 2]| hidden(image, shading.background, place, [panel_width, panel_height]);
+    let [x0, y0] = places.min_by_key(hidden).unwrap_or_default();
     for y in y0..y0 + panel_height {
         for pixel in &mut image.pixels[y * width + x0..][..panel_width] {
             *pixel = if pixel[3] == 0 { [SHADE[0], SHADE[1], SHADE[2], 190] } else { blend(*pixel, SHADE) };
@@ -48,6 +55,15 @@ pub(super) fn draw(image: &mut Image, title: &str, scale: &Scale, offset: f64, e
         image.pixels[y * width + x + bar_width..][..3 * unit].fill(INK);
         text(image, label, [x + bar_width + 5 * unit, y - GLYPH * unit / 2], unit);
     }
+}
+
+/// Pixels of the surface in a part of the picture.
+fn hidden(image: &Image, behind: Background, [x0, y0]: [usize; 2], [width, height]: [usize; 2]) -> usize {
+    let count = |y: usize| {
+        let nothing = background(behind, (y as f32 + 0.5) / image.height as f32);
+        image.pixels[y * image.width as usize + x0..][..width].iter().filter(|pixel| **pixel != nothing).count()
+    };
+    (y0..y0 + height).map(count).sum()
 }
 
 /// A value with the digits that tell it apart within a range of this width.

@@ -2,11 +2,16 @@
 //!
 //! # How it works
 //! Each covered pixel has a base colour: that of the points, one tone, or a value (height, depth, a scalar field …) looked
-//! up in a colour map over its range. It is multiplied by the light that its normal catches from a key light over the
-//! viewer's left shoulder, a weak fill light from the right and a sky brighter above than below; since normals face the
-//! eye, both sides of a surface are lit alike; where it is known from where points were scanned, the side not seen from
-//! there is darker and has less colour. Eye-dome lighting darkens pixels beside nearer ones. Colours are linear
-//! until the last step, which encodes them as sRGB.
+//! up in a colour map over its range. It is multiplied by the light that its normal catches (`light.rs`) from a key light
+//! over the viewer's left shoulder, a weak fill light from the right and a sky brighter above than below; since normals
+//! face the eye, both sides of a surface are lit alike; where it is known from where points were scanned, the side not seen
+//! from there is darker and has less colour. Occlusion (`occlusion.rs`) takes light away in creases and from
+//! what lies behind something. What would become brighter than white is bent below it. Where surfaces end, pixels show a
+//! part of what is beside them (`edges.rs`); linear light, which is data, is kept without that. Colours are linear until
+//! the last step, which encodes them as sRGB.
+//!
+//! A thread shades a band of rows: the depths of the band and of a margin lie side by side then, and occlusion is found for
+//! a vector of pixels at a time.
 //!
 //! The range of a value, if none is given, reaches from the 1st to the 99th percentile of those in the picture, of 50,000
 //! of them at most; on the device it is found before shading, so that no frame waits for the host. The legend is drawn by
@@ -15,11 +20,17 @@
 mod classes;
 mod color_map;
 mod cpu;
+mod depths;
+mod edges;
 pub(crate) mod gpu;
 mod legend;
+mod light;
+mod occlusion;
 mod settings;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod truth;
 
 pub(crate) use classes::class_colors;
 pub(crate) use cpu::{Scene, shade};
@@ -32,10 +43,10 @@ pub struct Image {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// sRGB and straight alpha, 8 bits a channel.
+    /// sRGB and straight alpha, 8 bits a channel. At edges colours are mixed, and alpha is the part that is covered.
     pub pixels: Vec<[u8; 4]>,
-    /// The same in linear light before any rounding, without legend and background: zero where no surface is. Filled if
-    /// all layers are asked for, otherwise empty.
+    /// The same in linear light before any rounding, without legend and background and with nothing mixed at edges: zero
+    /// where no surface is. Filled if all layers are asked for, otherwise empty.
     pub linear: Vec<[f32; 3]>,
 }
 

@@ -13,8 +13,8 @@ pub struct Shading {
     pub legend: bool,
     /// Light the surface by its normals; otherwise colours are shown as they are.
     pub lighting: bool,
-    /// Strength of eye-dome lighting, the darkening at depth steps; 0 (off) to 10.
-    pub eye_dome: f32,
+    /// Strength of occlusion, the darkening of creases and of what lies behind something; 0 (off) to 10.
+    pub occlusion: f32,
     /// How the side of a surface is shown that its sensor did not see.
     pub backs: Backs,
     /// What is seen where no surface is.
@@ -103,9 +103,9 @@ impl Default for Shading {
             color_map: None,
             legend: false,
             lighting: true,
-            eye_dome: 1.0,
+            occlusion: 1.0,
             backs: Backs::default(),
-            background: Background::Gradient([0x3a, 0x41, 0x4b], [0x17, 0x1a, 0x1f]),
+            background: Background::Gradient([0x4a, 0x53, 0x5f], [0x1e, 0x22, 0x28]),
         }
     }
 }

@@ -1,4 +1,5 @@
-// Colours each pixel: base colour, light, eye-dome lighting; the background where no surface is [Paper, §7].
+// Colours each pixel: base colour, light, occlusion; the background where no surface is; at edges a part of the
+// neighbour's colour [Paper, §7]. `occlusion.rs` and `edges.rs` tell how.
 //
 // Reads: surface, cover, extras, counters, color_map, tables. Writes: image, linear.
 
@@ -27,6 +28,9 @@ override BACK_COLOR: f32;
 
 // Weights of red, green and blue in how bright a linear colour is.
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
+
+// How far from a border it is seen where the surface comes from, in pixels.
+override INWARD: i32;
 
 // The colour of a value; one that is unknown gets the lower end's, and a range of no width is all middle.
 fn map_color(value: f32) -> vec3f {
@@ -73,43 +77,170 @@ fn tone_back(color: vec3f, index: u32) -> vec3f {
     return mix(color, back, extras[index].w);
 }
 
-fn light(normal: vec3f) -> f32 {
+fn light(normal: vec3f) -> vec3f {
     let key = max((dot(normal, shading.key) + shading.key_wrap) / (1.0 + shading.key_wrap), 0.0);
     let fill = max(dot(normal, shading.fill), 0.0);
-    let sky = shading.sky.x + (shading.sky.y - shading.sky.x) * (0.5 - 0.5 * normal.y);
-    let sum = shading.key_light * key + shading.fill_light * fill + sky;
+    let around = shading.ground + (shading.sky - shading.ground) * (0.5 - 0.5 * normal.y);
+    let sum = shading.key_light * key + shading.fill_light * fill + around;
     return shading.scanned_light.x + shading.scanned_light.y * sum;
 }
 
-// How much a neighbour shades a pixel.
-fn shadow_of(side: u32, pixel: vec2u, index: u32, depth: f32) -> f32 {
-    let neighbor = shading.neighbors[side];
-    // Beyond the left and upper edges it wraps around, to beyond the others. What is outside shades as the pixel itself.
-    let at = vec2u(vec2i(pixel) + neighbor.xy);
-    let is_inside = at.x < frame.size.x && at.y < frame.size.y;
-    let nearer = surface[select(index, at.y * frame.size.x + at.x, is_inside)].w;
-    // How steeply the nearer neighbour rises towards the eye; slopes up to 45° are surface, not a step.
-    let slope = max((depth - nearer) / (pixel_size(depth) * bitcast<f32>(neighbor.z)), 1.0);
-    return (slope - 1.0) / (slope + 3.0);
+// A lit colour as it is shown.
+fn tone(color: vec3f) -> vec3f {
+    let above = max(color - shading.shoulder, vec3f(0.0)) / (1.0 - shading.shoulder);
+    return min(color, vec3f(shading.shoulder)) + (1.0 - shading.shoulder) * above / (1.0 + above);
 }
 
-// How much light is left beside nearer surfaces.
-fn eye_dome(pixel: vec2u, index: u32, depth: f32) -> f32 {
+// Deeper than any surface: a number, because devices need not know infinity.
+const NOTHING = 1e30;
+
+fn is_inside(pixel: vec2i) -> bool {
+    // Beyond the left and upper edges it wraps around, to beyond the others.
+    let at = vec2u(pixel);
+    return at.x < frame.size.x && at.y < frame.size.y;
+}
+
+// The depth at a pixel, which may lie beyond the picture.
+fn depth_at(pixel: vec2i) -> f32 {
+    let inside = is_inside(pixel);
+    let depth = surface[select(0u, u32(pixel.y) * frame.size.x + u32(pixel.x), inside)].w;
+    return select(NOTHING, min(depth, NOTHING), inside);
+}
+
+// How steeply the surface rises towards the eye, from a depth to one beside it.
+fn rise(depth: f32, there: f32, scale: f32) -> f32 {
+    let steepest = shading.steepest;
+    let slope = max((depth - there) * scale, -steepest);
+    return min(slope, max(steepest * steepest / max(slope, shading.least_rise), shading.furthest));
+}
+
+// What a pair of pixels takes away of the light.
+fn pair_occlusion(index: u32, pixel: vec2i, depth: f32, pixels_per_unit: f32) -> f32 {
+    let pair = shading.pairs[index];
+    let step = vec2i(pair.xy);
+    let scale = pixels_per_unit * pair.z;
+    let a = rise(depth, depth_at(pixel + step), scale);
+    let b = rise(depth, depth_at(pixel - step), scale);
+    let cosine = (1.0 - a * b) * inverseSqrt((1.0 + a * a) * (1.0 + b * b));
+    return select(0.0, (1.0 - cosine) * 0.5 * pair.w, a + b > 0.0);
+}
+
+// How much light is left beside a surface nearby.
+fn light_left(pixel: vec2i, depth: f32) -> f32 {
+    let scale = 1.0 / pixel_size(depth);
     // No loop, so that all are read at once.
-    var shadow = shadow_of(0u, pixel, index, depth) + shadow_of(1u, pixel, index, depth);
-    shadow += shadow_of(2u, pixel, index, depth);
-    shadow += shadow_of(3u, pixel, index, depth);
-    shadow += shadow_of(4u, pixel, index, depth);
-    shadow += shadow_of(5u, pixel, index, depth);
-    shadow += shadow_of(6u, pixel, index, depth);
-    shadow += shadow_of(7u, pixel, index, depth);
-    shadow = shading.eye_dome * shadow / 8.0;
+    var occlusion = pair_occlusion(0u, pixel, depth, scale) + pair_occlusion(1u, pixel, depth, scale);
+    occlusion += pair_occlusion(2u, pixel, depth, scale);
+    occlusion += pair_occlusion(3u, pixel, depth, scale);
+    occlusion += pair_occlusion(4u, pixel, depth, scale);
+    occlusion += pair_occlusion(5u, pixel, depth, scale);
+    occlusion += pair_occlusion(6u, pixel, depth, scale);
+    occlusion += pair_occlusion(7u, pixel, depth, scale);
+    occlusion += pair_occlusion(8u, pixel, depth, scale);
+    occlusion += pair_occlusion(9u, pixel, depth, scale);
+    let shadow = occlusion * shading.darkening;
     return 1.0 / (1.0 + shadow + 0.5 * shadow * shadow);
+}
+
+// 1 if depth b lies behind a, -1 if before it, 0 if both may be one surface.
+fn edge_step(a: f32, b: f32) -> i32 {
+    let behind = b > a * shading.edge_factor + shading.edge_offset;
+    let before = a > b * shading.edge_factor + shading.edge_offset;
+    return select(0, 1, behind) - select(0, 1, before);
+}
+
+fn side_of(index: u32) -> vec2i {
+    let step = select(-1, 1, (index & 1u) == 1u);
+    return select(vec2i(0, step), vec2i(step, 0), index >= 2u);
+}
+
+// The normal that light falls on: one seen nearly edge on, at a border, was turned round if the surface falls back towards
+// the border though the normal says that it rises.
+fn outward_normal(pixel: vec2i, surface_here: vec4f) -> vec3f {
+    let normal = surface_here.xyz;
+    var outward = vec2i(0);
+    for (var index = select(0u, 4u, normal.z < -shading.edge_on); index < 4u; index++) {
+        let side = side_of(index);
+        if is_inside(pixel + side) && edge_step(surface_here.w, depth_at(pixel + side)) == 1 {
+            outward += side;
+        }
+    }
+    let rises = normal.x * f32(outward.x) + normal.y * f32(outward.y) < 0.0;
+    return select(normal, vec3f(-normal.xy, normal.z), rises && depth_at(pixel - INWARD * outward) < surface_here.w);
+}
+
+// The colour of the surface at a pixel.
+fn surface_color(pixel: vec2u) -> vec3f {
+    let index = pixel.y * frame.size.x + pixel.x;
+    let surface_here = surface[index];
+    var color = tone_back(base_color(pixel, index, surface_here), index);
+    if shading.darkening > 0.0 {
+        color *= light_left(vec2i(pixel), surface_here.w);
+    }
+    if shading.lighting == 1u {
+        color = tone(color * light(outward_normal(vec2i(pixel), surface_here)));
+    }
+    return color;
+}
+
+// How far along a row of edges its end is, and 1 if it turns into the row of the pixel that asks.
+fn edge_end(pixel: vec2i, side: vec2i, kind: i32, along: vec2i) -> vec2i {
+    var last = vec2f(depth_at(pixel), depth_at(pixel + side));
+    for (var distance = 1; distance <= shading.edge_search; distance++) {
+        let at = pixel + along * distance;
+        if !is_inside(at) {
+            // Beyond the picture the edge goes on.
+            break;
+        }
+        let next = vec2f(depth_at(at), depth_at(at + side));
+        let here = edge_step(last.x, next.x);
+        let there = edge_step(next.y, last.y);
+        if here != 0 || there != 0 || edge_step(next.x, next.y) != kind {
+            return vec2i(distance, select(0, 1, here == kind && there == 0));
+        }
+        last = next;
+    }
+    return vec2i(shading.edge_search, 0);
+}
+
+// What the border takes of a pixel on the way to one of its ends.
+fn part_beside(end: vec2i, length: f32) -> f32 {
+    let high = 0.5 - f32(end.x - 1) / length;
+    let low = 0.5 - f32(end.x) / length;
+    let cut = select(select(0.0, 0.5 * high * high * length, high > 0.0), 0.5 * (high + low), low >= 0.0);
+    return select(0.0, cut, end.y == 1);
+}
+
+// How much of a pixel its neighbour takes.
+fn part_of(side: vec2i, pixel: vec2i) -> f32 {
+    let kind = edge_step(depth_at(pixel), depth_at(pixel + side));
+    var part = 0.0;
+    if kind != 0 && is_inside(pixel + side) {
+        let back = edge_end(pixel, side, kind, -side.yx);
+        let ahead = edge_end(pixel, side, kind, side.yx);
+        let length = f32(back.x + ahead.x - 1);
+        part = part_beside(back, length) + part_beside(ahead, length);
+    }
+    return part;
 }
 
 fn encode(channel: f32) -> u32 {
     let step = table_step(channel, shading.encode_steps);
     return (tables[step / 4u] >> (8u * (step % 4u))) & 255u;
+}
+
+fn encode_color(color: vec3f) -> u32 {
+    return encode(color.r) | (encode(color.g) << 8u) | (encode(color.b) << 16u);
+}
+
+// What a pixel shows of which a part is covered in one colour and the rest is background.
+fn over(color: vec3f, part: f32, background: u32) -> u32 {
+    if background == 0u {
+        return encode_color(color) | (u32(part * 255.0 + 0.5) << 24u);
+    }
+    let bytes = vec3f(vec3u(background, background >> 8u, background >> 16u) & vec3u(255u)) / 255.0;
+    let behind = vec3f(from_srgb(bytes.r), from_srgb(bytes.g), from_srgb(bytes.b));
+    return encode_color(behind + (color - behind) * part) | 0xff000000u;
 }
 
 fn put(pixel: vec2u, color: vec3f, rgba: u32) {
@@ -130,33 +261,57 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
     let columns = (frame.size.x + 31u) / 32u;
     let group = divide(group_index(workgroup), columns);
     let first = group.yx * vec2u(32u, 8u) + local.xy;
-    // Background first; which of the pixels are covered become bits. A software device runs both sides of a branch but a
+    // Background first; which of the pixels show more become bits. A software device runs both sides of a branch but a
     // loop only as often as it must: so where nothing is covered little is computed in vain.
-    var covered = 0u;
+    var shows = 0u;
+    var edges = 0u;
     for (var step = 0u; step < 4u; step++) {
         let pixel = first + vec2u(0u, 2u * step);
         if pixel.x < frame.size.x && pixel.y < frame.size.y {
-            if is_covered(surface[pixel.y * frame.size.x + pixel.x].w) {
-                covered |= 1u << step;
+            let depth = depth_at(vec2i(pixel));
+            var has_edge = false;
+            for (var side = 0u; side < 4u; side++) {
+                has_edge |= edge_step(depth, depth_at(vec2i(pixel) + side_of(side))) != 0;
+            }
+            if has_edge || depth != NOTHING {
+                shows |= 1u << step;
+                edges |= select(0u, 1u << step, has_edge);
             } else {
                 put(pixel, vec3f(0.0), tables[shading.backgrounds + pixel.y]);
             }
         }
     }
-    while covered != 0u {
-        let pixel = first + vec2u(0u, 2u * firstTrailingBit(covered));
-        covered &= covered - 1u;
-        let index = pixel.y * frame.size.x + pixel.x;
-        let surface_here = surface[index];
-        var color = tone_back(base_color(pixel, index, surface_here), index);
-        var lit = 1.0;
-        if shading.lighting == 1u {
-            lit = light(surface_here.xyz);
+    while shows != 0u {
+        let step = firstTrailingBit(shows);
+        shows &= shows - 1u;
+        let pixel = first + vec2u(0u, 2u * step);
+        var side = vec2i(0);
+        var part = 0.0;
+        for (var index = select(4u, 0u, (edges & (1u << step)) != 0u); index < 4u; index++) {
+            let side_part = part_of(side_of(index), vec2i(pixel));
+            if side_part > part {
+                side = side_of(index);
+                part = side_part;
+            }
         }
-        if shading.eye_dome > 0.0 {
-            lit *= eye_dome(pixel, index, surface_here.w);
+        // The pixel's own colour, then that of its neighbour.
+        let is_surface = depth_at(vec2i(pixel)) != NOTHING;
+        let beside_is_surface = part > 0.0 && depth_at(vec2i(pixel) + side) != NOTHING;
+        var own = vec3f(0.0);
+        var beside = vec3f(0.0);
+        for (var index = select(1u, 0u, is_surface); index < select(1u, 2u, beside_is_surface); index++) {
+            let color = surface_color(vec2u(vec2i(pixel) + select(vec2i(0), side, index == 1u)));
+            own = select(own, color, index == 0u);
+            beside = select(beside, color, index == 1u);
         }
-        color *= lit;
-        put(pixel, color, encode(color.r) | (encode(color.g) << 8u) | (encode(color.b) << 16u) | 0xff000000u);
+        var rgba = tables[shading.backgrounds + pixel.y];
+        if is_surface && (beside_is_surface || part == 0.0) {
+            rgba = encode_color(own + (beside - own) * part) | 0xff000000u;
+        } else if is_surface {
+            rgba = over(own, 1.0 - part, rgba);
+        } else if beside_is_surface {
+            rgba = over(beside, part, rgba);
+        }
+        put(pixel, own, rgba);
     }
 }

@@ -52,7 +52,7 @@ fn shaded(layers: &GBuffer, shading: &Shading) -> Image {
 
 /// Without light, so that colours are what they are.
 fn flat(color: ColorMode) -> Shading {
-    Shading { color, lighting: false, eye_dome: 0.0, background: Background::Transparent, ..Shading::default() }
+    Shading { color, lighting: false, occlusion: 0.0, background: Background::Transparent, ..Shading::default() }
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn light_shows_shape_and_keeps_within_range() {
     let mut layers = half_a_wall([8, 4]);
     let mut brightness = |normal: [f32; 3]| {
         layers.normal[0] = normal;
-        shaded(&layers, &Shading { eye_dome: 0.0, ..Shading::default() }).linear[0].iter().sum::<f32>() / 3.0
+        shaded(&layers, &Shading { occlusion: 0.0, ..Shading::default() }).linear[0].iter().sum::<f32>() / 3.0
     };
     let [towards, up_left, down_right] =
         [[0.0, 0.0, -1.0], [-0.6, -0.6, -0.529], [0.6, 0.6, -0.529]].map(&mut brightness);
@@ -142,7 +142,7 @@ fn light_shows_shape_and_keeps_within_range() {
 fn backs_are_darker_and_greyer_if_asked_for_and_known() {
     let mut layers = half_a_wall([8, 4]);
     layers.color = vec![[0.6, 0.3, 0.1]; layers.weight.len()];
-    let lit = Shading { eye_dome: 0.0, background: Background::Transparent, ..Shading::default() };
+    let lit = Shading { occlusion: 0.0, background: Background::Transparent, ..Shading::default() };
     let front = shaded(&layers, &lit).linear[0];
     layers.back = vec![0.0; layers.weight.len()];
     let [whole, half] = [layers.index(1, 0), layers.index(2, 0)];
@@ -153,7 +153,7 @@ fn backs_are_darker_and_greyer_if_asked_for_and_known() {
     let [back, both] = [toned.linear[1], toned.linear[2]];
     assert!(back[0] < 0.6 * front[0] && back[0] > 0.2 * front[0], "darker, not black: {back:?} of {front:?}");
     assert!(ratio(back) < 0.8 * ratio(front) && ratio(back) > 1.2, "greyer, not grey: {back:?} of {front:?}");
-    assert!((both[1] - 0.5 * (front[1] + back[1])).abs() < 1e-6, "in between: {both:?}");
+    assert!((both[1] - 0.5 * (front[1] + back[1])).abs() < 1e-3, "in between: {both:?}");
     let same = shaded(&layers, &Shading { backs: Backs::Same, ..lit.clone() });
     assert_eq!(same.linear[1], front, "not asked for");
     let dark = Shading { lighting: false, ..lit };
@@ -161,7 +161,7 @@ fn backs_are_darker_and_greyer_if_asked_for_and_known() {
 }
 
 #[test]
-fn eye_dome_darkens_behind_a_step_only() {
+fn occlusion_darkens_behind_a_step_only() {
     let mut layers = half_a_wall([8, 4]);
     for y in 0..4 {
         // The two leftmost columns stand well before the others.
@@ -170,7 +170,7 @@ fn eye_dome_darkens_behind_a_step_only() {
             layers.depth[index] = 1.0;
         }
     }
-    let image = shaded(&layers, &Shading { eye_dome: 1.0, ..flat(ColorMode::Plain) });
+    let image = shaded(&layers, &Shading { occlusion: 1.0, ..flat(ColorMode::Plain) });
     let without = shaded(&layers, &flat(ColorMode::Plain));
     assert_eq!(image.pixels[0], without.pixels[0], "before the step");
     assert!(image.pixels[2][0] < without.pixels[2][0], "behind the step");
@@ -197,4 +197,97 @@ fn legend_fits_or_is_left_out() {
         }
     }
     assert!(drawn >= 8, "large pictures have legends: {drawn}");
+}
+
+/// A surface at depth 2 that faces the eye, where `inside` says so of a pixel's middle.
+fn wall(size: [u32; 2], inside: impl Fn(f32, f32) -> bool) -> GBuffer {
+    let mut layers = half_a_wall(size);
+    for pixel in 0..(size[0] * size[1]) as usize {
+        let [x, y] = [pixel % size[0] as usize, pixel / size[0] as usize];
+        let index = layers.index(x, y);
+        let covered = inside(x as f32 + 0.5, y as f32 + 0.5);
+        layers.weight[index] = f32::from(u8::from(covered));
+        layers.depth[index] = if covered { 2.0 } else { f32::INFINITY };
+        layers.normal[index] = if covered { [0.0, 0.0, -1.0] } else { [0.0; 3] };
+    }
+    layers
+}
+
+#[test]
+fn silhouettes_are_smooth_and_data_is_not() {
+    let size = [48, 24];
+    let inside = |x: f32, y: f32| y > 4.0 + 0.25 * x;
+    let layers = wall(size, inside);
+    let clear = shaded(&layers, &flat(ColorMode::Plain));
+    let mut soft = 0;
+    for (at, pixel) in clear.pixels.iter().enumerate() {
+        let [x, y] = [at % 48, at / 48];
+        let covered = inside(x as f32 + 0.5, y as f32 + 0.5);
+        soft += usize::from((1..255).contains(&pixel[3]));
+        assert_eq!(pixel[3] >= 128, covered, "pixel ({x}, {y}) is covered for the larger part, or not: {pixel:?}");
+        assert_eq!(clear.linear[at] != [0.0; 3], covered, "linear light at ({x}, {y}) is not mixed");
+    }
+    assert!(soft > 24, "{soft} pixels are covered in part");
+    // The same over a colour, in linear light.
+    let over = shaded(&layers, &Shading { background: Background::Color([200, 20, 90]), ..flat(ColorMode::Plain) });
+    for (over, clear) in over.pixels.iter().zip(&clear.pixels) {
+        for (i, behind) in [200, 20, 90].into_iter().enumerate() {
+            let part = f32::from(clear[3]) / 255.0;
+            let [surface, behind] =
+                [if part > 0.0 { clear[i] } else { 0 }, behind].map(|step| linear(f32::from(step) / 255.0));
+            let expected = srgb(behind + (surface - behind) * part) * 255.0;
+            assert!((f32::from(over[i]) - expected).abs() < 1.5, "{over:?} is not {clear:?} over the background");
+        }
+    }
+}
+
+#[test]
+fn borders_do_not_catch_the_light_of_the_other_side() {
+    // A cylinder, upright, whose right border is turned away from the key light by a little.
+    let size = [40, 9];
+    let mut layers = wall(size, |x, _| (10.0..30.0).contains(&x));
+    let unit = view(size).pixel_size(2.0);
+    for (x, y) in (10..30).flat_map(|x| (0..9).map(move |y| (x, y))) {
+        let across: f32 = (x as f32 + 0.5 - 20.0) / 10.0;
+        let index = layers.index(x, y);
+        layers.depth[index] = 2.0 - 10.0 * unit * (1.0 - across * across).sqrt();
+        layers.normal[index] = [across, 0.0, -(1.0 - across * across).sqrt()];
+    }
+    let border = layers.index(29, 4);
+    let right = shaded(&layers, &Shading::default());
+    // Beyond edge on, normals that face the eye point the other way.
+    layers.normal[border] = [-0.98, 0.0, -0.2];
+    let turned = shaded(&layers, &Shading::default());
+    let at = 4 * 40 + 29;
+    let brightness = |image: &Image| image.linear[at].iter().sum::<f32>();
+    assert!(brightness(&turned) < 1.3 * brightness(&right), "{} and {}", brightness(&turned), brightness(&right));
+    // One that rises towards its border, as a sheet may, is left alone.
+    for x in 10..30 {
+        let index = layers.index(x, 4);
+        layers.depth[index] = 2.0 + unit * (30 - x) as f32;
+    }
+    assert!(brightness(&shaded(&layers, &Shading::default())) > 1.5 * brightness(&right), "a sheet's border is lit");
+}
+
+#[test]
+fn legends_go_where_nothing_is() {
+    let size = [600, 400];
+    for name in ["the right", "all but the lower left", "nothing"] {
+        let inside = |x: f32, y: f32| match name {
+            "the right" => x > 300.0,
+            "nothing" => false,
+            _ => x > 300.0 || y < 90.0,
+        };
+        let mut layers = wall(size, inside);
+        layers.scalar = vec![1.0; layers.weight.len()];
+        let plain = flat(ColorMode::Field("intensity".into()));
+        let with = shaded(&layers, &Shading { legend: true, ..plain.clone() });
+        let without = shaded(&layers, &plain);
+        let drawn: Vec<usize> = (0..with.pixels.len()).filter(|&i| with.pixels[i] != without.pixels[i]).collect();
+        assert!(!drawn.is_empty(), "{name} is covered: there is a legend");
+        let hidden = drawn.iter().filter(|&&at| inside((at % 600) as f32, (at / 600) as f32)).count();
+        assert!(hidden < drawn.len() / 20, "{name} is covered: the legend hides {hidden} pixels");
+        let left = drawn.iter().all(|at| at % 600 < 300);
+        assert_eq!(left, name != "nothing", "{name} is covered: the right is its usual place");
+    }
 }

@@ -2,21 +2,32 @@
 // binds `surface`, `cover` and `extras`.
 
 struct ShadeUniform {
-    // Directions to the lights in view space.
+    // Directions to the lights in view space, and their linear colours.
     key: vec3f,
-    key_light: f32,
-    fill: vec3f,
-    fill_light: f32,
-    // Linear colour of a surface without colours.
-    clay: vec3f,
     // How far the key light reaches around.
     key_wrap: f32,
+    key_light: vec3f,
+    // Brightness from which a lit colour rises less.
+    shoulder: f32,
+    fill: vec3f,
+    // How much occlusion darkens.
+    darkening: f32,
+    fill_light: vec3f,
+    // The steepest that something rises beside a pixel, and what the furthest counts for.
+    steepest: f32,
+    // Light of the ground and of the sky, on surfaces that face down and up.
+    ground: vec3f,
+    furthest: f32,
+    sky: vec3f,
+    // What a rise is divided by at least.
+    least_rise: f32,
+    // Linear colour of a surface without colours.
+    clay: vec3f,
+    // What is deeper than this factor times a pixel's depth, plus the offset, is not the same surface.
+    edge_factor: f32,
     // Direction of rising height, world space.
     up: vec3f,
-    // Strength of eye-dome lighting.
-    eye_dome: f32,
-    // Light of the sky on surfaces that face down, and on those that face up.
-    sky: vec2f,
+    edge_offset: f32,
     // Light whatever the normal, and the share of the lights above.
     scanned_light: vec2f,
     // Ends of the colour map, if they are not to be found.
@@ -37,8 +48,12 @@ struct ShadeUniform {
     backgrounds: u32,
     // Where among the extras the measures begin.
     measures: u32,
-    // Neighbours for eye-dome lighting: steps in x and y, and the bits of the distance in pixels.
-    neighbors: array<vec4i, 8>,
+    // How far the ends of a row of edges are looked for, in pixels.
+    edge_search: i32,
+    // Cosine up to which a surface is seen nearly edge on.
+    edge_on: f32,
+    // Pairs of pixels for occlusion: the step to the second one, one by its length in pixels, and the pair's part.
+    pairs: array<vec4f, 10>,
 }
 
 @group(0) @binding(1) var<uniform> shading: ShadeUniform;

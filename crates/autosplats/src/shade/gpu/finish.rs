@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::color_map::Scale;
-use super::super::cpu::{Scene, encode, encode_table, title, usual_map};
+use super::super::cpu::{Scene, encode, encode_table, usual_map};
 use super::super::{Image, Shading, legend};
 use super::pitch;
 
@@ -38,6 +38,6 @@ pub(crate) fn finish(read: &ReadPicture<'_>, scene: &Scene<'_>, shading: &Shadin
         let scale = Scale::new(shading.color_map.unwrap_or(map), range);
         let table = encode_table();
         let offset = scene.value_offset(&shading.color);
-        legend::draw(image, &title(&shading.color), &scale, offset, |channel| encode(&table, channel));
+        legend::draw(image, shading, &scale, offset, |channel| encode(&table, channel));
     }
 }

@@ -223,7 +223,7 @@ fn every_setting_makes_the_same_picture() {
             for layers in [blocks(5, size), colored(6, size), with_backs(blocks(5, size)), with_backs(colored(6, size))]
             {
                 for color in modes() {
-                    for [lighting, eye_dome, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
+                    for [lighting, occlusion, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
                         // The settings without influence on each other go round.
                         seed += 1;
                         let shading = Shading {
@@ -232,7 +232,7 @@ fn every_setting_makes_the_same_picture() {
                             color_map: MAPS[seed % MAPS.len()],
                             legend: seed.is_multiple_of(2),
                             lighting: lighting == 1,
-                            eye_dome: [0.0, 1.5][eye_dome],
+                            occlusion: [0.0, 1.5][occlusion],
                             backs: if seed.is_multiple_of(3) { Backs::Same } else { Backs::Toned },
                             background: BACKGROUNDS[seed % BACKGROUNDS.len()],
                         };
@@ -281,7 +281,7 @@ fn a_difference_is_found() {
     let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO };
     let layers = blocks(1, size);
     let host = on_host(&layers, &scene, &Shading::default(), true);
-    let other = Shading { eye_dome: 2.0, ..Shading::default() };
+    let other = Shading { occlusion: 2.0, ..Shading::default() };
     let found = difference(&host, &device.shade(&layers, &scene, &other, true).image);
     assert!(found.worst > 2 && found.share > 0.05 && found.linear > 0.02, "{found:?}");
     let layers = with_backs(layers);

@@ -2,10 +2,12 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::cpu::{
-    CLAY, ENCODE_STEPS, EYE_DOME, FILL, FILL_LIGHT, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SKY, Scene, sample_step,
-    shows_colors, usual_map,
+use super::super::cpu::{ENCODE_STEPS, Scene, darkening, sample_step, shows_colors, usual_map};
+use super::super::edges::{Edges, SEARCH};
+use super::super::light::{
+    CLAY, EDGE_ON, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SHOULDER, SKY,
 };
+use super::super::occlusion::{FURTHEST, LEAST_RISE, PAIR_COUNT, STEEPEST, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
 use crate::splat::{Channels, LayerBuffers};
@@ -46,14 +48,21 @@ impl Shown {
 #[repr(C)]
 pub(crate) struct ShadeUniform {
     pub(crate) key: [f32; 3],
-    pub(crate) key_light: f32,
-    pub(crate) fill: [f32; 3],
-    pub(crate) fill_light: f32,
-    pub(crate) clay: [f32; 3],
     pub(crate) key_wrap: f32,
+    pub(crate) key_light: [f32; 3],
+    pub(crate) shoulder: f32,
+    pub(crate) fill: [f32; 3],
+    pub(crate) darkening: f32,
+    pub(crate) fill_light: [f32; 3],
+    pub(crate) steepest: f32,
+    pub(crate) ground: [f32; 3],
+    pub(crate) furthest: f32,
+    pub(crate) sky: [f32; 3],
+    pub(crate) least_rise: f32,
+    pub(crate) clay: [f32; 3],
+    pub(crate) edge_factor: f32,
     pub(crate) up: [f32; 3],
-    pub(crate) eye_dome: f32,
-    pub(crate) sky: [f32; 2],
+    pub(crate) edge_offset: f32,
     pub(crate) scanned_light: [f32; 2],
     pub(crate) range: [f32; 2],
     pub(crate) find_range: u32,
@@ -66,7 +75,9 @@ pub(crate) struct ShadeUniform {
     pub(crate) encode_steps: u32,
     pub(crate) backgrounds: u32,
     pub(crate) measures: u32,
-    pub(crate) neighbors: [[i32; 4]; 8],
+    pub(crate) edge_search: i32,
+    pub(crate) edge_on: f32,
+    pub(crate) pairs: [[f32; 4]; PAIR_COUNT],
 }
 
 /// Whether the range of values is to be found among them.
@@ -81,16 +92,24 @@ impl ShadeUniform {
         let pixels = width as usize * height as usize;
         let step = sample_step(pixels);
         let colored = Shown::new(&shading.color, layers.channels) == Shown::Color;
+        let edges = Edges::new(scene.view);
         Self {
             key: KEY.to_array(),
-            key_light: KEY_LIGHT,
-            fill: FILL.to_array(),
-            fill_light: FILL_LIGHT,
-            clay: CLAY,
             key_wrap: KEY_WRAP,
-            up: scene.up.as_vec3().to_array(),
-            eye_dome: shading.eye_dome,
+            key_light: KEY_LIGHT,
+            shoulder: SHOULDER,
+            fill: FILL.to_array(),
+            darkening: darkening(shading, colored),
+            fill_light: FILL_LIGHT,
+            steepest: STEEPEST,
+            ground: GROUND,
+            furthest: FURTHEST,
             sky: SKY,
+            least_rise: LEAST_RISE,
+            clay: CLAY,
+            edge_factor: edges.factor,
+            up: scene.up.as_vec3().to_array(),
+            edge_offset: edges.offset,
             scanned_light: if colored { SCANNED_LIGHT } else { [0.0, 1.0] },
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
@@ -103,9 +122,11 @@ impl ShadeUniform {
             encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
             measures: if layers.channels.color { pixels as u32 } else { 0 },
-            neighbors: EYE_DOME.map(|[dx, dy]| {
-                let distance_px = ((dx * dx + dy * dy) as f32).sqrt();
-                [dx as i32, dy as i32, distance_px.to_bits() as i32, 0]
+            edge_search: SEARCH as i32,
+            edge_on: EDGE_ON,
+            pairs: pairs(height).map(|pair| {
+                let [dx, dy] = pair.step.map(|side| side as f32);
+                [dx, dy, pair.inverse_px, pair.part]
             }),
         }
     }

@@ -1,0 +1,69 @@
+//! Light: what a surface gets by its normal, and how brightness becomes what a screen can show.
+
+use glam::Vec3;
+
+/// One clay tone, linear.
+pub(super) const CLAY: [f32; 3] = [0.56, 0.53, 0.49];
+/// Direction to the key light in view space (x right, y down, z forward): over the left shoulder.
+pub(super) const KEY: Vec3 = Vec3::new(-0.60, -0.63, -0.49);
+/// The key light is a little warm and the sky a little cold, so that shadows differ from lit sides in more than brightness.
+pub(super) const KEY_LIGHT: [f32; 3] = [0.95, 0.90, 0.83];
+/// How far the key light reaches around to surfaces turned away from it.
+pub(super) const KEY_WRAP: f32 = 0.08;
+/// Direction to the fill light.
+pub(super) const FILL: Vec3 = Vec3::new(0.82, 0.10, -0.56);
+pub(super) const FILL_LIGHT: [f32; 3] = [0.145, 0.16, 0.185];
+/// Light of the ground and of the sky, on surfaces that face down and up.
+pub(super) const GROUND: [f32; 3] = [0.050, 0.047, 0.042];
+pub(super) const SKY: [f32; 3] = [0.125, 0.142, 0.165];
+/// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
+/// the lights above, so that a surface seen straight on keeps its colour.
+pub(super) const SCANNED_LIGHT: [f32; 2] = [0.42, 0.74];
+/// Cosine between the line of sight and a normal up to which a surface is seen nearly edge on.
+pub(super) const EDGE_ON: f32 = 0.6;
+/// Brightness from which a lit colour rises less, so that it nears white and never reaches it.
+pub(super) const SHOULDER: f32 = 0.8;
+
+/// The light on a surface with this normal, view space.
+pub(super) fn light(normal: Vec3, colored: bool) -> [f32; 3] {
+    let key = ((normal.dot(KEY) + KEY_WRAP) / (1.0 + KEY_WRAP)).max(0.0);
+    let fill = normal.dot(FILL).max(0.0);
+    let up = 0.5 - 0.5 * normal.y;
+    let [base, share] = if colored { SCANNED_LIGHT } else { [0.0, 1.0] };
+    std::array::from_fn(|i| {
+        let around = GROUND[i] + (SKY[i] - GROUND[i]) * up;
+        base + share * (KEY_LIGHT[i] * key + FILL_LIGHT[i] * fill + around)
+    })
+}
+
+/// A lit channel as it is shown: the same up to [`SHOULDER`], then less and less towards 1.
+pub(super) fn tone(channel: f32) -> f32 {
+    let above = (channel - SHOULDER).max(0.0) / (1.0 - SHOULDER);
+    channel.min(SHOULDER) + (1.0 - SHOULDER) * above / (1.0 + above)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brightness_stays_in_order_and_below_white() {
+        let mut last = -1.0;
+        for step in 0..400 {
+            let channel = step as f32 * 0.01;
+            let shown = tone(channel);
+            assert!(shown > last && shown < 1.0, "{channel} is shown as {shown}, after {last}");
+            assert!(channel > SHOULDER || shown == channel, "{channel} is below the shoulder, and shown as {shown}");
+            last = shown;
+        }
+    }
+
+    #[test]
+    fn colours_seen_straight_on_stay() {
+        let light = light(Vec3::NEG_Z, true);
+        assert!(
+            light.iter().all(|&channel| (0.85..1.05).contains(&channel)),
+            "a scan's colours are shown by {light:?}"
+        );
+    }
+}

@@ -1,0 +1,164 @@
+//! Pictures of scenes against the exact surface, sampled many times a pixel.
+
+use std::array::from_fn;
+
+use autosplats_cloud::Scene as ExactScene;
+use autosplats_cloud::glam::DVec3;
+use rayon::prelude::*;
+
+use super::*;
+use crate::camera::{Camera, Projection};
+use crate::splat::{GBuffer, TILE_AREA};
+use crate::{Renderer, Settings};
+
+/// Samples along each side of a pixel.
+const SAMPLES: u32 = 4;
+const BEHIND: [u8; 3] = [60, 66, 75];
+
+/// A picture in linear light.
+struct Picture(Vec<[f32; 3]>);
+
+impl Picture {
+    /// Those of a picture `factor` times as wide and high that make a pixel of one `width` wide.
+    fn samples(&self, pixel: usize, width: usize, factor: usize) -> impl Iterator<Item = [f32; 3]> + Clone {
+        let [x, y] = [pixel % width * factor, pixel / width * factor];
+        (0..factor * factor).map(move |i| self.0[(y + i / factor) * width * factor + x + i % factor])
+    }
+
+    /// The same picture, `width` wide, of means of `factor`² pixels each.
+    fn averaged(&self, width: usize, factor: usize) -> Self {
+        let count = factor * factor;
+        let channel = |pixel, i| self.samples(pixel, width, factor).map(|color| color[i]).sum::<f32>() / count as f32;
+        Self((0..self.0.len() / count).map(|pixel| from_fn(|i| channel(pixel, i))).collect())
+    }
+
+    /// In decibels, of a whole brightness of 1 in sRGB, which is about what the eye sees.
+    fn psnr(&self, truth: &Self, counts: &[bool]) -> f64 {
+        let error = |(a, b): (&[f32; 3], &[f32; 3])| -> f64 {
+            (0..3).map(|i| f64::from(srgb(a[i]) - srgb(b[i])).powi(2)).sum::<f64>() / 3.0
+        };
+        let pairs = self.0.iter().zip(&truth.0).zip(counts).filter(|(_, counts)| **counts);
+        let errors: Vec<f64> = pairs.map(|(pair, _)| error(pair)).collect();
+        -10.0 * (errors.iter().sum::<f64>() / errors.len() as f64).log10()
+    }
+}
+
+/// The exact surface at the middle of each pixel.
+fn traced(exact: &ExactScene, camera: &Camera, [width, height]: [u32; 2]) -> GBuffer {
+    let [right, down, forward] = camera.axes().expect("a camera that can see");
+    let Projection::PerspectiveFovDeg(fov) = camera.projection else { panic!("scenes are seen in perspective") };
+    let pixel = 2.0 * (0.5 * fov.to_radians()).tan() / f64::from(height);
+    let hits: Vec<_> = (0..width * height)
+        .into_par_iter()
+        .map(|index| {
+            let [x, y] = [f64::from(index % width) + 0.5, f64::from(index / width) + 0.5];
+            let [x, y] = [x - 0.5 * f64::from(width), y - 0.5 * f64::from(height)].map(|at| at * pixel);
+            let direction = (forward + right * x + down * y).normalize();
+            let hit = exact.trace(camera.eye, direction)?;
+            let towards = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
+            let normal = [right, down, forward].map(|axis| towards.dot(axis) as f32);
+            Some(((hit.distance * direction.dot(forward)) as f32, normal))
+        })
+        .collect();
+    let area = TILE_AREA * (width.div_ceil(64) * height.div_ceil(64)) as usize;
+    let mut layers = GBuffer {
+        width,
+        height,
+        weight: vec![0.0; area],
+        depth: vec![f32::INFINITY; area],
+        normal: vec![[0.0; 3]; area],
+        point: vec![u32::MAX; area],
+        ..GBuffer::default()
+    };
+    for (pixel, hit) in hits.into_iter().enumerate() {
+        let at = layers.index(pixel % width as usize, pixel / width as usize);
+        if let Some((depth, normal)) = hit {
+            (layers.weight[at], layers.depth[at], layers.normal[at]) = (1.0, depth, normal);
+        }
+    }
+    layers
+}
+
+/// The same picture with its edges blended and as it would be without.
+fn pictures(image: &Image, layers: &GBuffer) -> [Picture; 2] {
+    let steps = linear_steps();
+    let behind = BEHIND.map(|channel| steps[channel as usize]);
+    let width = image.width as usize;
+    let blended = image.pixels.iter().map(|pixel| from_fn(|i| steps[pixel[i] as usize])).collect();
+    let covered = |pixel: usize| layers.weight[layers.index(pixel % width, pixel / width)] > 0.0;
+    let plain = image.linear.iter().enumerate().map(|(at, color)| if covered(at) { *color } else { behind }).collect();
+    [Picture(blended), Picture(plain)]
+}
+
+struct Quality {
+    blended: f64,
+    plain: f64,
+}
+
+/// The quality of a scene's picture where there are silhouettes or steps, from points and from the exact surface.
+fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
+    let (exact, count) = ExactScene::parse(name).expect("a scene");
+    let seen = exact.view();
+    let projection = Projection::PerspectiveFovDeg(seen.fov_degrees);
+    let camera = Camera { eye: seen.eye, look_at: seen.look_at, up: seen.up, projection };
+    let cloud = exact.sample(count, &|_| true).expect("points");
+    let shading = Shading { color: ColorMode::Plain, background: Background::Color(BEHIND), ..Shading::default() };
+    let shaded = |layers: &GBuffer| {
+        let view = camera.view(DVec3::ZERO, [layers.width, layers.height]).expect("a view");
+        let mut image = Image::default();
+        shade(layers, &Scene { view: &view, up: DVec3::Z, origin: DVec3::ZERO }, &shading, true, &mut image);
+        image
+    };
+    let fine = traced(&exact, &camera, size.map(|side| side * SAMPLES));
+    let [_, fine] = pictures(&shaded(&fine), &fine);
+    let [width, height] = size.map(|side| side as usize);
+    let truth = fine.averaged(width, SAMPLES as usize);
+    // Where samples differ by much there is an edge.
+    let edges: Vec<bool> = (0..width * height)
+        .map(|pixel| {
+            let bright = fine.samples(pixel, width, SAMPLES as usize).map(|color| srgb(color[1]));
+            bright.clone().fold(0.0, f32::max) - bright.fold(1.0, f32::min) > 0.15
+        })
+        .collect();
+    let mut renderer = Renderer::new();
+    let settings = Settings { shading: shading.clone(), all_layers: true, ..Settings::default() };
+    let frame = renderer.render(&cloud, &camera, size, &settings).expect("a frame");
+    let coarse = traced(&exact, &camera, size);
+    let of = |image: &Image, layers: &GBuffer, counts: &[bool]| {
+        let [blended, plain] = pictures(image, layers).map(|picture| picture.psnr(&truth, counts));
+        Quality { blended, plain }
+    };
+    let all = vec![true; width * height];
+    let whole = of(frame.image, frame.layers, &all);
+    println!("{name} {size:?}: whole picture {:.2} dB, without blending {:.2}", whole.blended, whole.plain);
+    let found = [of(frame.image, frame.layers, &edges), of(&shaded(&coarse), &coarse, &edges)];
+    for (from, found) in ["points", "exact surface"].iter().zip(&found) {
+        println!("  at edges, from {from}: {:.2} dB, without blending {:.2}", found.blended, found.plain);
+    }
+    for factor in [2, 3] {
+        let frame = renderer.render(&cloud, &camera, size.map(|side| side * factor), &settings).expect("a frame");
+        let [blended, _] = pictures(frame.image, frame.layers).map(|picture| picture.averaged(width, factor as usize));
+        let [whole, edges] = [&all, &edges].map(|counts| blended.psnr(&truth, counts));
+        println!(
+            "  from points, {factor} times as wide and averaged: at edges {edges:.2} dB, whole picture {whole:.2}"
+        );
+    }
+    found
+}
+
+#[test]
+fn blended_edges_are_nearer_to_the_truth() {
+    for (name, size) in [("figure:300K", [240, 180]), ("statue:200K", [240, 180])] {
+        let [points, exact] = measure(name, size);
+        assert!(exact.blended > exact.plain + 0.5, "{name}, exact surface: {} and {}", exact.blended, exact.plain);
+        assert!(points.blended > points.plain + 0.2, "{name}, points: {} and {}", points.blended, points.plain);
+    }
+}
+
+#[test]
+#[ignore = "takes a while; prints figures"]
+fn figures() {
+    for name in ["figure:300K", "statue:800K"] {
+        measure(name, [880, 450]);
+    }
+}
