@@ -1,26 +1,13 @@
 //! The light that pictures are compared in: the renderer's own, over any depths and normals.
-//!
-//! The formula stands here once more, so that the truth can be lit without the renderer; a test holds it against the
-//! renderer's pictures.
 
 use autosplats::cloud::glam::DVec3;
-use rayon::prelude::*;
+use autosplats::{Background, ColorMode, GBuffer, Shading, shade_layers};
 
 use crate::picture::Picture;
 use crate::view::Rays;
 
-/// One clay tone, linear.
-const CLAY: [f64; 3] = [0.53, 0.50, 0.46];
-/// Key light: direction (right, down, forward), strength, and how far it reaches around.
-const KEY: (DVec3, f64, f64) = (DVec3::new(-0.47, -0.62, -0.63), 0.74, 0.15);
-/// Fill light.
-const FILL: (DVec3, f64) = (DVec3::new(0.80, 0.05, -0.60), 0.13);
-/// Light of the sky on surfaces that face down and up.
-const SKY: [f64; 2] = [0.05, 0.18];
-/// Neighbours looked at by eye-dome lighting, in pixels.
-const EYE_DOME: [[isize; 2]; 8] = [[-2, 0], [2, 0], [0, -2], [0, 2], [-1, -1], [1, -1], [-1, 1], [1, 1]];
 /// What is seen where no surface is, sRGB.
-pub const BACKGROUND: [f64; 3] = [0.14, 0.16, 0.19];
+pub const BACKGROUND: [u8; 3] = [36, 41, 48];
 
 /// A lit picture, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,21 +16,36 @@ pub struct Lit {
     pub width: usize,
     /// sRGB, 0 to 1; nothing where no surface is.
     pub pixels: Vec<Option<[f64; 3]>>,
+    /// What is seen where no surface is: the background, with a part of the surface beside it at edges.
+    around: Vec<[f64; 3]>,
 }
 
 impl Lit {
-    /// Lights `picture`. Pixels without a normal are lit as if they faced the eye, with eye-dome lighting to show the
-    /// shape, as viewers of dots do.
+    /// Lights `picture` in one clay tone. Pixels without a normal are lit as if they faced the eye, with occlusion to show
+    /// the shape, as viewers of dots do.
     pub fn new(picture: &Picture, rays: &Rays) -> Self {
-        let pixel = |index: usize| {
-            linear(picture, rays, index).map(|color| color.map(|channel| to_srgb(channel.clamp(0.0, 1.0))))
-        };
-        Self { width: picture.width, pixels: (0..picture.shown.len()).into_par_iter().map(pixel).collect() }
+        let [width, height] = [picture.width, picture.height()];
+        let mut layers = GBuffer::new(width as u32, height as u32);
+        for (pixel, shown) in picture.shown.iter().enumerate() {
+            let Some(shown) = shown else { continue };
+            let index = layers.index(pixel % width, pixel / width);
+            let normal = if shown.normal == DVec3::ZERO { DVec3::NEG_Z } else { rays.turned(shown.normal) };
+            layers.weight[index] = 1.0;
+            layers.depth[index] = shown.depth as f32;
+            layers.normal[index] = normal.as_vec3().to_array();
+        }
+        let background = Background::Color(BACKGROUND);
+        let shading = Shading { color: ColorMode::Plain, background, ..Shading::default() };
+        let image = shade_layers(&layers, &rays.camera, &shading).expect("layers of a picture that was rendered");
+        let around: Vec<[f64; 3]> =
+            image.pixels.iter().map(|&[r, g, b, _]| [r, g, b].map(|channel| f64::from(channel) / 255.0)).collect();
+        let pixels = picture.shown.iter().zip(&around).map(|(shown, &color)| shown.map(|_| color)).collect();
+        Self { width, pixels, around }
     }
 
     /// sRGB of a pixel, 0 to 1, over the background.
     pub fn over_background(&self, pixel: usize) -> [f64; 3] {
-        self.pixels[pixel].unwrap_or(BACKGROUND)
+        self.pixels[pixel].unwrap_or(self.around[pixel])
     }
 
     /// All pixels over the background.
@@ -51,47 +53,13 @@ impl Lit {
         (0..self.pixels.len()).map(|pixel| self.over_background(pixel)).collect()
     }
 
-    /// The picture with each pixel's colour changed.
+    /// The picture with each covered pixel's colour changed.
     #[must_use]
     pub fn changed(&self, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Self {
         let change = |(pixel, color): (usize, &Option<[f64; 3]>)| color.map(|color| change(pixel, color));
-        Self { width: self.width, pixels: self.pixels.iter().enumerate().map(change).collect() }
+        let pixels = self.pixels.iter().enumerate().map(change).collect();
+        Self { width: self.width, pixels, around: self.around.clone() }
     }
-}
-
-/// The linear colour of a pixel, if a surface covers it.
-pub fn linear(picture: &Picture, rays: &Rays, index: usize) -> Option<[f64; 3]> {
-    let shown = picture.shown[index]?;
-    let normal = if shown.normal == DVec3::ZERO { DVec3::NEG_Z } else { rays.turned(shown.normal) };
-    let light = light(normal) * eye_dome(picture, rays, index, shown.depth);
-    Some(CLAY.map(|channel| channel * light))
-}
-
-fn light(normal: DVec3) -> f64 {
-    let (key, key_light, wrap) = KEY;
-    let key = ((normal.dot(key) + wrap) / (1.0 + wrap)).max(0.0);
-    let (fill, fill_light) = FILL;
-    let fill = normal.dot(fill).max(0.0);
-    let sky = SKY[0] + (SKY[1] - SKY[0]) * (0.5 - 0.5 * normal.y);
-    key_light * key + fill_light * fill + sky
-}
-
-/// How much light is left beside nearer surfaces.
-fn eye_dome(picture: &Picture, rays: &Rays, index: usize, depth: f64) -> f64 {
-    let [x, y] = [index % picture.width, index / picture.width];
-    let unit = rays.pixel_size(depth);
-    let mut shadow = 0.0;
-    for [dx, dy] in EYE_DOME {
-        let (Some(nx), Some(ny)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else { continue };
-        if nx >= picture.width || ny >= picture.height() {
-            continue;
-        }
-        let Some(near) = picture.shown[ny * picture.width + nx] else { continue };
-        let slope = (depth - near.depth) / (unit * ((dx * dx + dy * dy) as f64).sqrt());
-        shadow += if slope > 1.0 { (slope - 1.0) / (slope + 3.0) } else { 0.0 };
-    }
-    let shadow = shadow / EYE_DOME.len() as f64;
-    1.0 / (1.0 + shadow + 0.5 * shadow * shadow)
 }
 
 /// sRGB value, 0 to 1, of a linear value 0 to 1.

@@ -102,7 +102,8 @@ pub fn orbit(camera: &Camera, degrees: f64) -> Result<Camera> {
 pub struct Rays {
     /// Right, down and forward.
     pub axes: [DVec3; 3],
-    eye: DVec3,
+    /// What they belong to.
+    pub camera: Camera,
     perspective: bool,
     /// Size of a pixel at depth 1, or anywhere in parallel projection.
     pixel: f64,
@@ -119,14 +120,18 @@ impl Rays {
             Projection::PerspectiveFovDeg(fov) => (true, (0.5 * fov.to_radians()).tan() / (0.5 * height)),
             Projection::OrthographicHeight(world) => (false, world / height),
         };
-        Ok(Self { axes, eye: camera.eye, perspective, pixel, middle: size.map(|side| 0.5 * f64::from(side)) })
+        Ok(Self { axes, camera: *camera, perspective, pixel, middle: size.map(|side| 0.5 * f64::from(side)) })
     }
 
     /// Origin and unit direction of the ray through a place in the picture, in pixels.
     pub fn through(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
         let [right, down, forward] = self.axes;
         let across = right * ((x - self.middle[0]) * self.pixel) + down * ((y - self.middle[1]) * self.pixel);
-        if self.perspective { (self.eye, (forward + across).normalize()) } else { (self.eye + across, forward) }
+        if self.perspective {
+            (self.camera.eye, (forward + across).normalize())
+        } else {
+            (self.camera.eye + across, forward)
+        }
     }
 
     /// Size of a pixel at `depth`.
@@ -136,7 +141,7 @@ impl Rays {
 
     /// Where a place is seen, in pixels, and its depth; nothing if it is not before the eye.
     pub fn project(&self, place: DVec3) -> Option<([f64; 2], f64)> {
-        let [x, y, depth] = self.axes.map(|axis| axis.dot(place - self.eye));
+        let [x, y, depth] = self.axes.map(|axis| axis.dot(place - self.camera.eye));
         let unit = self.pixel_size(depth);
         (depth > 0.0).then(|| ([self.middle[0] + x / unit, self.middle[1] + y / unit], depth))
     }

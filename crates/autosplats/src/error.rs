@@ -36,6 +36,16 @@ pub enum Error {
         /// What there is instead.
         has: String,
     },
+    /// A layer to be shaded has not one value for each pixel, tile by tile.
+    #[error("the {layer} layer has {values} values, not {wanted}; GBuffer::new sizes layers")]
+    Layers {
+        /// Which.
+        layer: &'static str,
+        /// Values that it has.
+        values: usize,
+        /// Values that it has to have.
+        wanted: usize,
+    },
     /// No surface would be seen: its message says why.
     #[error("nothing to show: {0}")]
     NothingVisible(String),

@@ -4,6 +4,7 @@ mod attributes;
 mod cpu;
 mod first_radius;
 mod gpu;
+mod layers;
 mod settings;
 mod surfels;
 
@@ -20,6 +21,7 @@ use crate::shade::Image;
 use crate::splat::GBuffer;
 
 pub use first_radius::{RadiusTrial, best_first_radius};
+pub use layers::shade_layers;
 pub use settings::{Reconstruction, Settings};
 pub use surfels::PointSurfel;
 

@@ -68,6 +68,22 @@ pub struct GBuffer {
 }
 
 impl GBuffer {
+    /// Layers of a picture that shows no surface yet; those that not every picture has are empty.
+    pub fn new(width: u32, height: u32) -> Self {
+        let mut layers = Self { width, height, ..Self::default() };
+        let area = layers.area();
+        layers.weight = vec![0.0; area];
+        layers.depth = vec![f32::INFINITY; area];
+        layers.normal = vec![[0.0; 3]; area];
+        layers.point = vec![u32::MAX; area];
+        layers
+    }
+
+    /// Values in a layer that is not empty.
+    pub(crate) fn area(&self) -> usize {
+        tile_columns(self.width as usize) * tile_columns(self.height as usize) * TILE_AREA
+    }
+
     /// Where pixel (x, y) lies in each layer.
     #[inline(always)]
     pub fn index(&self, x: usize, y: usize) -> usize {
