@@ -5,7 +5,7 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
-use super::noise::{Noise, measure_noise};
+use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
@@ -27,6 +27,14 @@ pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
 pub(super) const AGREE: f32 = 3.0;
 
+/// Points whose surface variation times k-radius, in usual k-radii, is above this are drawn as dots. At edges and corners
+/// it is up to 0.15 times as many usual k-radii as the points there are apart; in a cloud that fills space 0.2 times.
+pub(super) const STRAY_DOT: f32 = 0.4;
+/// And above this they are outliers.
+pub(super) const STRAY_DROPPED: f32 = 0.9;
+/// Radius of such a dot in pixels.
+pub(super) const DOT_PX: f32 = 1.0;
+
 /// What all surfels share.
 #[derive(Clone, Copy)]
 struct Task<'a> {
@@ -34,7 +42,8 @@ struct Task<'a> {
     density: &'a DensityGrid,
     view: &'a View,
     k: u32,
-    noise: Noise,
+    usual: Usual,
+    keep_outliers: bool,
 }
 
 /// Fits surfels anew where noise calls for it; keeps its buffers from frame to frame.
@@ -42,21 +51,28 @@ struct Task<'a> {
 pub(crate) struct Adapter {
     cells: Cells,
     /// Measured by the first surfels of a frame.
-    noise: Option<Noise>,
+    usual: Option<Usual>,
 }
 
 impl Adapter {
     /// Sums up the screen points of a new frame, whose cells in the density grid hold about `k` points.
     pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
         self.cells.fill(screen, view, k);
-        self.noise = None;
+        self.usual = None;
     }
 
     /// Fits each of `surfels` anew at the scale that the frame's noise calls for.
-    pub(crate) fn adapt(&mut self, surfels: &mut [Surfel], density: &DensityGrid, view: &View, k: u32) {
-        let Self { cells, noise } = self;
-        let noise = *noise.get_or_insert_with(|| measure_noise(surfels, cells, density, view, k));
-        let task = Task { cells, density, view, k, noise };
+    pub(crate) fn adapt(
+        &mut self,
+        surfels: &mut [Surfel],
+        density: &DensityGrid,
+        view: &View,
+        k: u32,
+        keep_outliers: bool,
+    ) {
+        let Self { cells, usual } = self;
+        let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
+        let task = Task { cells, density, view, k, usual, keep_outliers };
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
             adapt_all(surfels, &task, gathered);
         });
@@ -75,13 +91,15 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
 fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
     for surfel in surfels {
         // The first neighbourhood's error is about that of its k points over the k-radius.
-        let noise = task.noise.at(surfel.center[2]);
+        let noise = task.usual.noise.at(surfel.center[2]);
         let enough = noise <= ENOUGH * surfel.k_radius;
         if surfel.radius > 0.0
             && !enough
             && let Some(quadric) = choose(simd, surfel, noise, task, gathered)
         {
             place(surfel, &quadric, task.view);
+        } else {
+            shrink(surfel, task);
         }
     }
 }
@@ -138,6 +156,21 @@ fn choose<S: Simd>(simd: S, surfel: &Surfel, noise: f32, task: &Task, gathered: 
         }
     }
     if count == 0 { fallback } else { best }
+}
+
+/// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
+#[inline(always)]
+fn shrink(surfel: &mut Surfel, task: &Task) {
+    let stray = surfel.curvature * surfel.k_radius;
+    // A handful of points has nothing that is usual.
+    if task.usual.k_radius == 0.0 {
+        return;
+    }
+    if stray > STRAY_DROPPED * task.usual.k_radius && !task.keep_outliers {
+        surfel.radius = 0.0;
+    } else if stray > STRAY_DOT * task.usual.k_radius {
+        surfel.radius = surfel.radius.min(DOT_PX * task.view.pixel_size(surfel.center[2]));
+    }
 }
 
 /// Turns and moves a surfel onto a quadric.

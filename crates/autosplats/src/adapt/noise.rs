@@ -28,6 +28,14 @@ const THIN_SHARE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 const QUANTILE: f32 = 0.3;
 
+/// What a frame's surfels have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Usual {
+    pub(crate) noise: Noise,
+    /// Median k-radius, world units; 0 if there are too few surfels.
+    pub(crate) k_radius: f32,
+}
+
 /// Standard deviation of points from their surface: `factor`·depthᵖ, world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {
@@ -66,8 +74,8 @@ impl Noise {
     }
 }
 
-/// Measures the noise of a frame on a sample of `surfels`; none if there are too few.
-pub(crate) fn measure_noise(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> Noise {
+/// Measures what is usual in a frame on a sample of `surfels`.
+pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> Usual {
     let step = surfels.len().div_ceil(SAMPLE).max(1);
     // A discarded point has no ball.
     let kept = surfels.iter().step_by(step).filter(|surfel| surfel.radius > 0.0);
@@ -77,7 +85,10 @@ pub(crate) fn measure_noise(surfels: &[Surfel], cells: &Cells, density: &Density
         measure_scatter(sample, &Task { cells, density, view, k }, gathered);
     });
     sample.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-    Noise::of(&sample)
+    let noise = Noise::of(&sample);
+    sample.sort_by(|a, b| a.surfel.k_radius.total_cmp(&b.surfel.k_radius));
+    let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { sample[sample.len() / 2].surfel.k_radius };
+    Usual { noise, k_radius }
 }
 
 /// What all surfels of a sample share.

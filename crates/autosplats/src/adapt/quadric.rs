@@ -3,7 +3,7 @@
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{Cells, Cluster};
+use super::cells::{Cells, Cluster, SLABS};
 use crate::camera::View;
 use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
@@ -48,7 +48,6 @@ impl Gathered {
     /// Reads the clusters in the ball of `radius` around `center` (view space) and returns their number.
     #[inline(always)]
     pub(super) fn read(&mut self, cells: &Cells, center: [f32; 3], radius: f32, view: &View) -> usize {
-        self.lanes.clear();
         self.len = 0;
         let [px, py] = view.to_pixel(center.into());
         let radius_px = radius / view.pixel_size(center[2]);
@@ -67,45 +66,54 @@ impl Gathered {
         let [y0, y1] = range(py, level.rows);
         let [cx, cy, cz] = center;
         let per_radius = 1.0 / radius;
+        let [x0, y0] = [x0.min(x1), y0.min(y1)];
+        let most = (x1 - x0 + 1) * (y1 - y0 + 1) * SLABS;
+        // One more, that the last cluster is written to if it is outside.
+        self.lanes.resize((most + 1).div_ceil(LANES), [Lanes::default(); 4]);
+        let mut len = 0;
         for row in y0..=y1 {
-            for cell in &level.cells[row * level.columns..][..level.columns][x0.min(x1)..=x1] {
+            for cell in &level.cells[row * level.columns..][..level.columns][x0..=x1] {
                 for &Cluster { mean: [x, y, z], count } in cell {
                     if count == 0.0 {
                         break;
                     }
                     let [x, y, z] = [(x - cx) * per_radius, (y - cy) * per_radius, (z - cz) * per_radius];
                     let rest = 1.0 - (x * x + y * y + z * z);
-                    if rest > 0.0 {
-                        self.push([x, y, z, (rest * (1.0 / (1.0 - FULL))).min(1.0) * count]);
-                    }
+                    let weight = (rest * (1.0 / (1.0 - FULL))).min(1.0) * count;
+                    // Written in any case, and written over if it is outside: a branch would be guessed wrong too often.
+                    let [xs, ys, zs, weights] = &mut self.lanes[len / LANES];
+                    let lane = len % LANES;
+                    (xs.0[lane], ys.0[lane], zs.0[lane], weights.0[lane]) = (x, y, z, weight);
+                    len += usize::from(rest > 0.0);
                 }
             }
         }
-        self.len
-    }
-
-    #[inline(always)]
-    fn push(&mut self, values: [f32; 4]) {
-        let lane = self.len % LANES;
-        if lane == 0 {
+        self.lanes.truncate(len.div_ceil(LANES));
+        if let Some([.., weights]) = self.lanes.last_mut() {
             // Lanes without a cluster weigh nothing.
-            self.lanes.push([Lanes::default(); 4]);
+            weights.0[(len - 1) % LANES + 1..].fill(0.0);
         }
-        if let Some(last) = self.lanes.last_mut() {
-            for (lanes, value) in last.iter_mut().zip(values) {
-                lanes.0[lane] = value;
-            }
-        }
-        self.len += 1;
+        self.len = len;
+        len
     }
 
     /// Axis of least spread of the clusters, and their surface variation.
     #[inline(always)]
     pub(super) fn plane<S: Simd>(&self, simd: S) -> (Vec3, f32) {
-        let [w, x, y, z, xx, xy, xz, yy, yz, zz] = self.sums(simd, |[x, y, z, w]| {
-            let [wx, wy, wz] = [w * x, w * y, w * z];
-            [w, wx, wy, wz, wx * x, wx * y, wx * z, wy * y, wy * z, wz * z]
-        });
+        let mut total = [0.0; 10];
+        for vector in 0..LANES / S::F32_LANES {
+            let mut sums = [F32s::splat(simd, 0.0); 10];
+            for lanes in &self.lanes {
+                let [x, y, z, w] = load(simd, lanes, vector);
+                let (wx, wy, wz) = (w * x, w * y, w * z);
+                let terms = [w, wx, wy, wz, wx * x, wx * y, wx * z, wy * y, wy * z, wz * z];
+                for term in 0..10 {
+                    sums[term] += terms[term];
+                }
+            }
+            add_lanes(&sums, vector, &mut total);
+        }
+        let [w, x, y, z, xx, xy, xz, yy, yz, zz] = total;
         let share = 1.0 / w;
         let [x, y, z] = [x * share, y * share, z * share];
         let second = [xx * share - x * x, xy * share - x * y, xz * share - x * z, yy * share - y * y];
@@ -121,19 +129,34 @@ impl Gathered {
     pub(super) fn quadric<S: Simd>(&self, simd: S, radius: f32, axis: Vec3, curvature: f32) -> Quadric {
         let u = axis.any_orthonormal_vector();
         let v = axis.cross(u);
-        let frame = [u, v, axis].map(|axis| axis.to_array().map(|c| F32s::splat(simd, c)));
-        #[rustfmt::skip]
-        let [w, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy, h, hx, hy, hxx, hxy, hyy, hh] =
-            self.sums(simd, |[px, py, pz, w]| {
-                let [x, y, h] = frame.map(|axis| axis[0] * px + axis[1] * py + axis[2] * pz);
-                let [xx, xy, yy] = [x * x, x * y, y * y];
-                let [wx, wy, wxx, wxy, wyy, wh] = [w * x, w * y, w * xx, w * xy, w * yy, w * h];
-                [
+        let splat = |value: f32| F32s::splat(simd, value);
+        let (ux, uy, uz) = (splat(u.x), splat(u.y), splat(u.z));
+        let (vx, vy, vz) = (splat(v.x), splat(v.y), splat(v.z));
+        let (ax, ay, az) = (splat(axis.x), splat(axis.y), splat(axis.z));
+        let mut total = [0.0; 22];
+        for vector in 0..LANES / S::F32_LANES {
+            let mut sums = [splat(0.0); 22];
+            for lanes in &self.lanes {
+                let [px, py, pz, w] = load(simd, lanes, vector);
+                let x = ux * px + uy * py + uz * pz;
+                let y = vx * px + vy * py + vz * pz;
+                let h = ax * px + ay * py + az * pz;
+                let (xx, xy, yy) = (x * x, x * y, y * y);
+                let (wx, wy, wxx, wxy, wyy, wh) = (w * x, w * y, w * xx, w * xy, w * yy, w * h);
+                #[rustfmt::skip]
+                let terms = [
                     w, wx, wy, wxx, wxy, wyy, wxx * x, wxx * y, wxy * y, wyy * y,
                     wxx * xx, wxx * xy, wxx * yy, wxy * yy, wyy * yy,
                     wh, wh * x, wh * y, wh * xx, wh * xy, wh * yy, wh * h,
-                ]
-            });
+                ];
+                for term in 0..22 {
+                    sums[term] += terms[term];
+                }
+            }
+            add_lanes(&sums, vector, &mut total);
+        }
+        #[rustfmt::skip]
+        let [w, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy, h, hx, hy, hxx, hxy, hyy, hh] = total;
         let ridge = RIDGE * w;
         // Slopes last, so that what is left of their rows when the others are eliminated is their own.
         let mut rows = [
@@ -173,30 +196,28 @@ impl Gathered {
             curvature,
         }
     }
+}
 
-    /// Sums of `values` of position and weight over all clusters, each in sixteen lanes that are added up in order: the
-    /// same bits whatever the width of a vector.
-    #[inline(always)]
-    fn sums<S: Simd, const N: usize>(&self, simd: S, values: impl Fn([F32s<S>; 4]) -> [F32s<S>; N]) -> [f32; N] {
-        let mut out = [0.0; N];
-        let zero = F32s::splat(simd, 0.0);
-        let mut lanes = Lanes::default();
-        let vectors = LANES / S::F32_LANES;
-        for vector in 0..vectors {
-            let mut sums = [zero; N];
-            for four in &self.lanes {
-                let four = [0, 1, 2, 3].map(|i: usize| F32s::load(simd, &four[i].0, vector));
-                for (sum, value) in sums.iter_mut().zip(values(four)) {
-                    *sum += value;
-                }
-            }
-            for (out, sum) in out.iter_mut().zip(sums) {
-                sum.store(&mut lanes.0, vector);
-                for lane in vector * S::F32_LANES..(vector + 1) * S::F32_LANES {
-                    *out += lanes.0[lane];
-                }
-            }
+/// Positions and weights of the `vector`-th part of sixteen clusters.
+#[inline(always)]
+fn load<S: Simd>(simd: S, lanes: &[Lanes; 4], vector: usize) -> [F32s<S>; 4] {
+    let [x, y, z, w] = lanes;
+    [
+        F32s::load(simd, &x.0, vector),
+        F32s::load(simd, &y.0, vector),
+        F32s::load(simd, &z.0, vector),
+        F32s::load(simd, &w.0, vector),
+    ]
+}
+
+/// Adds the lanes of some sums up, those of the `vector`-th part, one after the other: the same bits for any width.
+#[inline(always)]
+fn add_lanes<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, total: &mut [f32; N]) {
+    let mut lanes = Lanes::default();
+    for index in 0..N {
+        sums[index].store(&mut lanes.0, vector);
+        for lane in vector * S::F32_LANES..(vector + 1) * S::F32_LANES {
+            total[index] += lanes.0[lane];
         }
-        out
     }
 }

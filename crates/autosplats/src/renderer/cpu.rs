@@ -209,7 +209,7 @@ impl Reconstruct<'_> {
         clock.lap(|timings| &mut timings.fit);
 
         if settings.adaptive {
-            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k);
+            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, rules.keep_outliers);
             clock.lap(|timings| &mut timings.adapt);
         }
         sensors.orient(&mut surfels[first..], view);
