@@ -25,8 +25,8 @@ One ray through the centre of each pixel tells what is truly there. Five ways to
 
 - **ours**: this project with its default settings.
 - **paper**: the paper's, k = 10.
-- **dots**: squares of 3×3 pixels, the nearest in front, without normals; shaded as if they faced the eye, with eye-dome \
-lighting.
+- **dots**: squares of 3×3 pixels, the nearest in front, without normals; shaded as if they faced the eye, with \
+occlusion to show the shape.
 - **fit k**: the paper's splats, but with normals of plane fits to the k exact nearest neighbours in the whole cloud, \
 outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
 
