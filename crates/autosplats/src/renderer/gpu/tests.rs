@@ -19,6 +19,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::search::splat_communication::gpu::RASTER_PASSES,
         crate::search::kd_tree::gpu::PASSES,
         crate::fit::gpu::PASSES,
+        crate::adapt::gpu::PASSES,
         crate::splat::gpu::PASSES,
         crate::shade::gpu::PASSES,
     ];
