@@ -29,6 +29,12 @@ impl Random {
         2.0 * self.unit() - 1.0
     }
 
+    /// Of the normal distribution with standard deviation 1.
+    pub(crate) fn gaussian(&mut self) -> f32 {
+        let [u, v] = [1.0 - self.unit(), self.unit()];
+        (-2.0 * u.ln()).sqrt() * (std::f32::consts::TAU * v).cos()
+    }
+
     pub(crate) fn below(&mut self, end: usize) -> usize {
         (self.bits() % end as u64) as usize
     }
@@ -125,6 +131,33 @@ pub(crate) fn outliers(count: usize) -> Positions {
     let mut point = || {
         let depth = 40.0 * random.unit();
         [random.signed() + depth * forward.x, random.signed() + depth * forward.y, depth]
+    };
+    (0..count).map(|_| point()).collect()
+}
+
+/// Moves points by chance, `sigma` in the mean square along each axis.
+pub(crate) fn noisy(mut points: Positions, sigma: f32) -> Positions {
+    let mut random = Random::new(10);
+    points.iter_mut().flatten().for_each(|c| *c += sigma * random.gaussian());
+    points
+}
+
+/// A surface of hills and hollows.
+pub(crate) fn bumpy(count: usize) -> Positions {
+    patch(11, count, |x, y| [x, y, 0.15 * (5.0 * x).sin() * (4.0 * y).cos()])
+}
+
+/// A floor that leads away from the eye to three times the depth of its near end, with noise that grows with the square of
+/// depth as that of depth cameras does: `sigma` at depth 1.
+pub(crate) fn receding(count: usize, sigma: f32) -> Positions {
+    let eye = EYE.as_vec3();
+    let forward = eye / eye.z;
+    let mut random = Random::new(12);
+    let mut point = || {
+        let depth = 4.0 + 8.0 * random.unit();
+        let [x, y] = [0.25 * depth * random.signed(), 0.8 - 0.4 * (depth - 4.0)];
+        let point = [eye.x + forward.x * depth + x, eye.y + forward.y * depth + y, eye.z + depth];
+        point.map(|c| c + sigma * depth * depth * random.gaussian())
     };
     (0..count).map(|_| point()).collect()
 }

@@ -166,6 +166,50 @@ fn every_setting() {
     }
 }
 
+/// A scene whose points are off by `sigma` in the mean square along each axis.
+fn noisy_scene(name: &str, count: usize, sigma: f32) -> (PointCloud, Camera) {
+    let (cloud, camera) = scene(name, count);
+    let moved = test_clouds::noisy(cloud.positions().to_vec(), sigma);
+    (PointCloud::new(cloud.origin(), moved), camera)
+}
+
+#[test]
+fn adapted_to_noise() {
+    let Some(mut gpu) = gpu() else { return };
+    for (name, count, sigma) in
+        [("statue", 60_000, 0.0), ("statue", 60_000, 0.01), ("cathedral", 60_000, 0.02), ("figure", 150_000, 0.01)]
+    {
+        let (cloud, camera) = noisy_scene(name, count, sigma);
+        for (k, grid_culling) in [(10, true), (16, false)] {
+            let reconstruction = Reconstruction { k, grid_culling, adaptive: true, ..Reconstruction::default() };
+            let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
+            let case = format!("{name} {count} {sigma} {k}");
+            compare(&mut gpu, &cloud, &camera, SIZE, &settings, &case);
+            // And as before once it is no longer asked for.
+            compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), &case);
+        }
+    }
+    // A device with nothing beyond WebGPU's core does it as well.
+    let (cloud, camera) = noisy_scene("statue", 60_000, 0.01);
+    let (device, queue) = own_device(128 << 20).expect("a device");
+    let mut own = Renderer::with_device(device, queue).expect("a renderer");
+    let reconstruction = Reconstruction { adaptive: true, ..Reconstruction::default() };
+    let settings = Settings { reconstruction, ..Settings::default() };
+    compare(&mut own, &cloud, &camera, SIZE, &settings, "the caller's own device");
+}
+
+#[test]
+fn adapted_or_not_is_seen_by_the_comparison() {
+    let (cloud, camera) = noisy_scene("statue", 60_000, 0.01);
+    let mut renderer = Renderer::new();
+    let mut image = |adaptive| {
+        let reconstruction = Reconstruction { adaptive, ..Reconstruction::default() };
+        let settings = Settings { reconstruction, ..Settings::default() };
+        renderer.render(&cloud, &camera, SIZE, &settings).expect("a picture").image.clone()
+    };
+    assert!(unlike(&image(false), &image(true)) > 10.0 * UNLIKE, "noise shows where nothing is adapted to it");
+}
+
 #[test]
 fn every_colour() {
     let Some(mut gpu) = gpu() else { return };

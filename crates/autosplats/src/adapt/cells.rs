@@ -9,7 +9,7 @@ use crate::project::ScreenPoints;
 /// more. A cell with more to hold has thicker ones.
 pub(crate) const SLABS: usize = 4;
 /// Coarser levels are of no use to any ball.
-const MOST_LEVELS: usize = 9;
+pub(super) const MOST_LEVELS: usize = 9;
 
 /// The mean of some screen points near each other, view space, and their number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

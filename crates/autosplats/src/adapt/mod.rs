@@ -17,9 +17,14 @@
 
 mod cells;
 mod cpu;
+pub(crate) mod gpu;
 mod noise;
 mod quadric;
+#[cfg(test)]
+mod tests;
 
+#[cfg(test)]
+pub(crate) use cells::SLABS;
 pub(crate) use cpu::Adapter;
 
 /// Balls tried around each point, beside the neighbourhood that the search found.

@@ -14,19 +14,19 @@ use crate::project::DensityGrid;
 /// Surfels looked at.
 pub(crate) const SAMPLE: usize = 2048;
 /// The nearest and the farthest third of a sample tell how noise grows with depth if they are this far apart, far over near.
-const APART: f32 = 1.2;
+pub(super) const APART: f32 = 1.2;
 /// Surfels per task.
 const TASK: usize = 32;
 /// Fewer that find anything in a ball say nothing.
-const LEAST_SAMPLE: usize = 64;
+pub(super) const LEAST_SAMPLE: usize = 64;
 /// So does less than one of this many.
-const LEAST_SHARE: usize = 5;
+pub(super) const LEAST_SHARE: usize = 5;
 /// A surface is thin in a ball if points scatter less than this part of the radius: of points that fill it, it is 0.4.
-const THIN: f32 = 0.2;
+pub(super) const THIN: f32 = 0.2;
 /// A scale tells the noise if this share of the sample finds a thin surface.
-const THIN_SHARE: f32 = 0.3;
+pub(super) const THIN_SHARE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
-const QUANTILE: f32 = 0.3;
+pub(super) const QUANTILE: f32 = 0.3;
 
 /// What a frame's surfels have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,9 @@ pub(crate) struct Usual {
     pub(crate) k_radius: f32,
 }
 
-/// Standard deviation of points from their surface: `factor`·depthᵖ, world units.
+/// Standard deviation of points from their surface: `factor`·depthᵖ, world units. Where it is more than half the distance of
+/// points it is measured too large, up to three times at two distances: clusters that noise puts into slabs of their own
+/// weigh like as many that it does not. Larger neighbourhoods than needed are the consequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {
     pub(crate) factor: f32,

@@ -10,15 +10,15 @@ use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
 /// Cells are at most this part of a ball's radius wide.
-const CELLS_PER_RADIUS: f32 = 2.0;
+pub(super) const CELLS_PER_RADIUS: f32 = 2.0;
 /// Fewer clusters than this tell too little of six coefficients.
 pub(super) const LEAST_CLUSTERS: usize = 12;
 /// Clusters count in full up to this part of the squared radius, and less and less beyond: none comes or goes at once.
-const FULL: f32 = 0.5;
+pub(super) const FULL: f32 = 0.5;
 /// Weight, as a share of all, that pulls curvatures to 0: a one-sided ball tells little of them.
-const RIDGE: f32 = 0.003;
+pub(super) const RIDGE: f32 = 0.003;
 /// Least pivot of the elimination, as a share of the weight.
-const LEAST_PIVOT: f32 = 1e-6;
+pub(super) const LEAST_PIVOT: f32 = 1e-6;
 
 /// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights.
 #[derive(Debug, Default)]

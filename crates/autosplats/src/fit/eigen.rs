@@ -5,7 +5,7 @@ use pulp::Simd;
 use crate::simd::F32s;
 
 /// Cyclic Jacobi converges quadratically: after four sweeps the off-diagonal of a 3×3 matrix is below f32's rounding.
-pub(super) const SWEEPS: usize = 4;
+pub(crate) const SWEEPS: usize = 4;
 
 /// Eigenvalues, ascending, and the unit eigenvectors that belong to them.
 pub(super) struct Eigen<S: Simd> {

@@ -9,6 +9,7 @@
 #import screen
 #import surfel
 #import eigen
+#import orthonormal
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -55,13 +56,6 @@ fn product(a: vec3f, b: vec3f) -> f32 {
 fn normalized_or(v: vec3f, otherwise: vec3f) -> vec3f {
     let scale = 1.0 / sqrt(product(v, v));
     return select(otherwise, v * scale, is_finite(scale) && scale > 0.0);
-}
-
-// Some unit vector at right angles to the unit vector `v`.
-fn any_orthonormal(v: vec3f) -> vec3f {
-    let side = select(1.0, -1.0, (bitcast<u32>(v.z) >> 31u) == 1u);
-    let a = -1.0 / (side + v.z);
-    return vec3f(v.x * v.y * a, side + v.y * v.y * a, -v.y);
 }
 
 // Eigenvectors of the covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2], in units of the squared

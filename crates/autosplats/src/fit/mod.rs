@@ -16,7 +16,7 @@ pub(crate) mod orient;
 pub(crate) mod tests;
 
 pub(crate) use cpu::{FitRules, Fitted, fit};
-pub(crate) use eigen::eigenvectors;
+pub(crate) use eigen::{SWEEPS, eigenvectors};
 pub(crate) use given::{GivenPlanes, place};
 
 /// An oriented disc in view space.

@@ -110,7 +110,8 @@ pub(crate) fn stage_ms(stage: &str, times: &[PassTime], spans: &[[f64; 2]]) -> f
     let stage_of = |time: &PassTime| time.pass.split('/').next();
     let passes: Vec<_> = times.iter().map(stage_of).zip(spans).collect();
     let runs = passes.chunk_by(|(before, _), (after, _)| before == after).filter(|run| run[0].0 == Some(stage));
-    runs.map(|run| run[run.len() - 1].1[1] - run[0].1[0]).sum()
+    // A sum of nothing would be -0.
+    runs.fold(0.0, |ms, run| ms + run[run.len() - 1].1[1] - run[0].1[0])
 }
 
 impl<'a> Recorder<'a> {

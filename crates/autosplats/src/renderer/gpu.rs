@@ -9,6 +9,7 @@ use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
 use crate::Error;
+use crate::adapt::gpu::{AdaptBuffers, AdaptPasses};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
@@ -66,6 +67,8 @@ struct Passes {
     fit: FitPasses,
     /// Once there was a cloud with sensors.
     orient: Option<OrientPasses>,
+    /// Compiled when first asked for.
+    adapt: Option<AdaptPasses>,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
 }
@@ -75,6 +78,7 @@ struct Passes {
 struct Shape {
     size: [u32; 2],
     search: SearchKind,
+    adaptive: bool,
     depth_refinement: bool,
     channels: Channels,
     /// Runs of points by their sensors.
@@ -115,6 +119,7 @@ impl GpuRenderer {
                 search: None,
                 fit: FitPasses::new(&gpu)?,
                 orient: None,
+                adapt: None,
                 splat: None,
                 shade: ShadePasses::new(&gpu)?,
             },
@@ -350,6 +355,7 @@ impl GpuRenderer {
         let shape = Shape {
             size,
             search: (discriminant(&settings.reconstruction.engine), settings.reconstruction.k),
+            adaptive: settings.reconstruction.adaptive,
             depth_refinement: settings.reconstruction.depth_refinement,
             channels: Channels {
                 color: wanted.colors.is_some(),
@@ -369,7 +375,7 @@ impl GpuRenderer {
         // The old buffers go before the new ones come.
         self.prepared = None;
         let Self { gpu, cloud, sensors, frame, passes, .. } = self;
-        let Passes { project, search, fit, orient, splat, shade } = passes;
+        let Passes { project, search, fit, orient, adapt, splat, shade } = passes;
         if sensors.is_some() && orient.is_none() {
             *orient = Some(OrientPasses::new(gpu)?);
         }
@@ -377,6 +383,10 @@ impl GpuRenderer {
             let Reconstruction { engine, k, .. } = settings.reconstruction;
             *search = Some((shape.search, compile(gpu, engine, k)?));
         }
+        if shape.adaptive && adapt.is_none() {
+            *adapt = Some(AdaptPasses::new(gpu)?);
+        }
+        let adapt = adapt.as_ref().filter(|_| shape.adaptive);
         if splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
             *splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
         }
@@ -384,11 +394,18 @@ impl GpuRenderer {
         let screen = ScreenBuffers::new(gpu, size, cloud.capacity(), cloud.words())?;
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
+        let adapt = match adapt {
+            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size)?)),
+            None => None,
+        };
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
         let layers = LayerBuffers::new(gpu, size, shape.channels)?;
         let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
         let (steps, convergence) = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
+            if let Some((passes, buffers)) = &adapt {
+                steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
+            }
             let buffers = SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods };
             let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
             for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
@@ -397,6 +414,9 @@ impl GpuRenderer {
                 }
                 steps.extend(search);
                 steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
+                if let Some((passes, buffers)) = &adapt {
+                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
+                }
                 if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
                     steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
                 }

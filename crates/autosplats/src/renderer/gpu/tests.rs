@@ -20,6 +20,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::search::kd_tree::gpu::PASSES,
         crate::fit::gpu::PASSES,
         crate::fit::orient::gpu::PASSES,
+        crate::adapt::gpu::PASSES,
         crate::splat::gpu::PASSES,
         crate::shade::gpu::PASSES,
     ];

@@ -5,6 +5,7 @@ use std::mem::offset_of;
 use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 
 use super::passes;
+use crate::adapt::{SCALES, SLABS};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
@@ -236,6 +237,9 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let in_wgsl: Vec<_> = constants(&pass).into_iter().filter(|entry| works.contains(entry)).collect();
     assert_eq!(in_wgsl, works, "work in WGSL, and in Rust");
 
+    assert_eq!(constant("#import levels\n", "SLABS"), SLABS as u32, "slabs of a cell");
+    let adapt = passes().find(|pass| pass.path == "adapt/adapt").expect("a pass");
+    assert_eq!(constant(adapt.source, "SCALES"), SCALES as u32, "balls around a point");
     assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, BLOCK, "flags that a workgroup ranks");
     assert_eq!(constant("#import groups\n", "GROUPS_PER_ROW"), GROUPS_PER_ROW, "workgroups in a row");
 }

@@ -1,0 +1,214 @@
+//! Neighbourhoods as large as the noise calls for, on the GPU: the CPU form's steps, a pass each.
+
+use super::cells::{MOST_LEVELS, SLABS};
+use super::cpu::{AGREE, DOT_PX, ENOUGH, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST};
+use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
+use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
+use super::{LEAST_REACH, SCALES, STEP};
+use crate::Error;
+use crate::fit::SWEEPS;
+use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
+use crate::project::gpu::{Round, ScreenBuffers};
+
+#[cfg(test)]
+pub(crate) const PASSES: &[PassSource] = &[ARRANGE, FILL, MERGE, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ADAPT];
+const ARRANGE: PassSource = PassSource::new("adapt/arrange", include_str!("arrange.wgsl"));
+const FILL: PassSource = PassSource::new("adapt/fill", include_str!("fill.wgsl"));
+const MERGE: PassSource = PassSource::new("adapt/merge", include_str!("merge.wgsl"));
+const SAMPLE_PASS: PassSource = PassSource::new("adapt/sample", include_str!("sample.wgsl"));
+const SCATTERS: PassSource = PassSource::new("adapt/scatter", include_str!("scatter.wgsl"));
+const QUANTILES: PassSource = PassSource::new("adapt/quantile", include_str!("quantile.wgsl"));
+const NOISE: PassSource = PassSource::new("adapt/noise", include_str!("noise.wgsl"));
+const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgsl"));
+
+/// Invocations in a workgroup of the passes.
+const GROUP: usize = 64;
+/// Quantiles: of scatters at each scale, of the nearest third of the sample, of the farthest, and of all; and of k-radii.
+const QUANTILES_TAKEN: usize = 3 * SCALES + 1;
+/// Bytes of the arguments of a dispatch.
+const WORK_BYTES: u64 = 12;
+/// Side of the smallest cells.
+const LEAST_SIDE_PX: u32 = 2;
+
+/// `Level` of `shared/levels.wgsl`: side, columns, rows and first cell.
+type Level = [u32; 4];
+/// Mean and count.
+type Cluster = [f32; 4];
+
+/// What the stage keeps on the device from pass to pass.
+#[derive(Debug)]
+pub(crate) struct AdaptBuffers {
+    levels: wgpu::Buffer,
+    /// Workgroups that fill each level, three `u32`.
+    arguments: wgpu::Buffer,
+    clusters: wgpu::Buffer,
+    /// Places of the surfels of the sample, and their number.
+    sampled: wgpu::Buffer,
+    scatters: wgpu::Buffer,
+    quantiles: wgpu::Buffer,
+    /// Factor and power of the noise, and the median k-radius.
+    measured: wgpu::Buffer,
+}
+
+impl AdaptBuffers {
+    /// Room for pictures of `size`.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self, Error> {
+        Ok(Self {
+            levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
+            arguments: gpu.buffer(
+                "arguments of levels",
+                MOST_LEVELS as u64 * WORK_BYTES,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
+            )?,
+            clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size))?,
+            sampled: gpu.storage::<u32>("sampled surfels", SAMPLE + 1)?,
+            scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
+            quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
+            measured: gpu.storage::<f32>("noise", 3)?,
+        })
+    }
+}
+
+/// Cells of all levels if they are as small as can be.
+fn most_cells(size: [u32; 2]) -> usize {
+    let mut sides = size.map(|side| side.div_ceil(LEAST_SIDE_PX) as usize);
+    let mut cells = 0;
+    for _ in 0..MOST_LEVELS {
+        cells += sides[0] * sides[1];
+        sides = sides.map(|side| side.div_ceil(2));
+    }
+    cells
+}
+
+/// The passes of the stage.
+#[derive(Debug)]
+pub(crate) struct AdaptPasses {
+    arrange: Pass,
+    fill: Pass,
+    merge: Pass,
+    /// What tells the pass before each level but the finest.
+    which: Vec<wgpu::Buffer>,
+    sample: Pass,
+    scatter: Pass,
+    quantile: Pass,
+    noise: Pass,
+    rounds: [Pass; 2],
+}
+
+impl AdaptPasses {
+    /// Compiles them.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        let quadric = [
+            ("SWEEPS", SWEEPS as f64),
+            ("MOST_LEVELS", MOST_LEVELS as f64),
+            ("LEAST_REACH", LEAST_REACH.into()),
+            ("CELLS_PER_RADIUS", CELLS_PER_RADIUS.into()),
+            ("LEAST_CLUSTERS", LEAST_CLUSTERS as f64),
+            ("FULL", FULL.into()),
+            ("RIDGE", RIDGE.into()),
+            ("LEAST_PIVOT", LEAST_PIVOT.into()),
+            ("STEP", STEP.into()),
+        ];
+        let sample = ("SAMPLE", SAMPLE as f64);
+        let scales = ("SCALES", SCALES as f64);
+        let round = |round: Round| {
+            let own = [
+                ("ROUND", f64::from(round as u32)),
+                ("ENOUGH", ENOUGH.into()),
+                ("RELIABLE", RELIABLE.into()),
+                ("THICKEST", THICKEST.into()),
+                ("THICKEST_FIRST", THICKEST_FIRST.into()),
+                ("SCATTER", SCATTER.into()),
+                ("AGREE", AGREE.into()),
+                ("STRAY_DOT", STRAY_DOT.into()),
+                ("STRAY_DROPPED", STRAY_DROPPED.into()),
+                ("DOT_PX", DOT_PX.into()),
+            ];
+            Pass::new(gpu, &ADAPT, &[&quadric[..], &own].concat())
+        };
+        let which = |level: usize| {
+            let told = gpu.uniform::<u32>("level")?;
+            gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
+            Ok::<_, Error>(told)
+        };
+        let quantile = [
+            scales,
+            sample,
+            ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
+            ("LEAST_SHARE", LEAST_SHARE as f64),
+            ("THIN_SHARE", THIN_SHARE.into()),
+            ("QUANTILE", QUANTILE.into()),
+        ];
+        Ok(Self {
+            arrange: Pass::new(gpu, &ARRANGE, &[("MOST_LEVELS", MOST_LEVELS as f64)])?,
+            fill: Pass::new(gpu, &FILL, &[])?,
+            merge: Pass::new(gpu, &MERGE, &[])?,
+            which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,
+            sample: Pass::new(gpu, &SAMPLE_PASS, &[sample])?,
+            scatter: Pass::new(gpu, &SCATTERS, &[&quadric[..], &[sample, ("THIN", THIN.into())]].concat())?,
+            quantile: Pass::new(gpu, &QUANTILES, &quantile)?,
+            noise: Pass::new(
+                gpu,
+                &NOISE,
+                &[scales, sample, ("LEAST_SAMPLE", LEAST_SAMPLE as f64), ("APART", APART.into())],
+            )?,
+            rounds: [round(Round::Active)?, round(Round::Recovered)?],
+        })
+    }
+
+    /// Sums up the screen points of a new frame.
+    pub(crate) fn steps_cells(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        buffers: &AdaptBuffers,
+    ) -> Vec<Step> {
+        let ScreenBuffers { counters, cell_start, points, .. } = screen;
+        let AdaptBuffers { levels, arguments, clusters, .. } = buffers;
+        let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * WORK_BYTES);
+        let mut steps = vec![
+            self.arrange.step(gpu, &[frame, counters, levels, arguments], 1),
+            self.fill.step(gpu, &[frame, counters, levels, cell_start, points, clusters], groups(0)),
+        ];
+        let merge = |(level, which)| self.merge.step(gpu, &[frame, levels, clusters, which], groups(level));
+        steps.extend((1..).zip(&self.which).map(merge));
+        steps
+    }
+
+    /// Measures the noise on the surfels of the active points, and fits those of `round` anew at the scale that it calls for.
+    pub(crate) fn steps(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        surfels: &wgpu::Buffer,
+        buffers: &AdaptBuffers,
+        round: Round,
+    ) -> Vec<Step> {
+        let ScreenBuffers { counters, density, .. } = screen;
+        let AdaptBuffers { levels, clusters, sampled, scatters, quantiles, measured, .. } = buffers;
+        let mut steps = Vec::new();
+        if round == Round::Active {
+            let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
+            steps.extend([
+                self.sample.step(gpu, &[frame, counters, surfels, sampled], SAMPLE.div_ceil(GROUP) as u32),
+                self.scatter.step(gpu, &balls, (SCALES * SAMPLE).div_ceil(GROUP) as u32),
+                self.quantile.step(gpu, &[frame, surfels, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
+                self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
+            ]);
+        }
+        let adapt = [frame, counters, density, levels, clusters, measured, surfels];
+        steps.push(self.rounds[round as usize].step(gpu, &adapt, screen.groups(round.work_64())));
+        steps
+    }
+}
+
+#[cfg(test)]
+mod tests;

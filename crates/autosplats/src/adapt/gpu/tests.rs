@@ -1,0 +1,253 @@
+//! The stage on the GPU against that on the CPU, fed with the same surfels.
+
+use super::super::cells::{Cell, Cells};
+use super::super::noise::{Noise, Usual};
+use super::super::tests::{Case, K, PROJECTIONS, angle};
+use super::*;
+use crate::fit::gpu::surfel_buffer;
+use crate::fit::{Surfel, Surfels};
+use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
+use crate::project::gpu::tests::upload_screen;
+use crate::test_clouds::{self, noisy};
+
+/// Cells that may differ: rounding puts a few means into the next slab.
+const UNLIKE_CELLS: f64 = 1e-3;
+/// Surfels that may differ: rounding decides which of two balls is taken.
+const UNLIKE_SURFELS: f64 = 1e-2;
+
+/// What the device makes of a case.
+struct Made {
+    /// Clusters of each cell, level by level.
+    cells: Cells,
+    usual: Usual,
+    /// Of both rounds.
+    surfels: Surfels,
+}
+
+fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
+    let screen = upload_screen(gpu, &case.screen, &case.view);
+    let buffers = AdaptBuffers::new(gpu, screen.size).expect("room");
+    let fitted = case.fitted.concat();
+    let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
+    gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
+    let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
+    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&case.view, K)));
+    let mut recorder = Recorder::new(gpu, &Clock::Off);
+    let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
+    for round in [Round::Active, Round::Recovered] {
+        steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, round));
+    }
+    steps.iter().for_each(|step| recorder.run(step));
+    recorder.finish();
+    let [factor, power, k_radius] = read_back::<[f32; 3]>(gpu, &buffers.measured, 1).expect("noise")[0];
+    Made {
+        cells: read_cells(gpu, &buffers, screen.size),
+        usual: Usual { noise: Noise { factor, power }, k_radius },
+        surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
+    }
+}
+
+fn read_cells(gpu: &Gpu, buffers: &AdaptBuffers, size: [u32; 2]) -> Cells {
+    use super::super::cells::{Cluster, Level};
+    let levels: Vec<[u32; 4]> = read_back(gpu, &buffers.levels, MOST_LEVELS).expect("levels");
+    let clusters: Vec<[[f32; 4]; SLABS]> = read_back(gpu, &buffers.clusters, most_cells(size)).expect("clusters");
+    let of_level = |&[side_px, columns, rows, first]: &[u32; 4]| {
+        let read = |clusters: &[[f32; 4]; SLABS]| {
+            let mut cell = Cell::default();
+            let filled = clusters.iter().take_while(|cluster| cluster[3] > 0.0);
+            for (out, &[x, y, z, count]) in cell.iter_mut().zip(filled) {
+                *out = Cluster { mean: [x, y, z], count };
+            }
+            cell
+        };
+        let cells = &clusters[first as usize..][..(columns * rows) as usize];
+        let [side_px, columns, rows] = [side_px, columns, rows].map(|count| count as usize);
+        Level { side_px, columns, rows, cells: cells.iter().map(read).collect() }
+    };
+    Cells { levels: levels.iter().filter(|level| level[0] > 0).map(of_level).collect() }
+}
+
+/// Filled cells that differ, and all of them.
+fn unlike_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
+    let layout = |cells: &Cells| -> Vec<_> {
+        cells.levels.iter().map(|level| [level.side_px, level.columns, level.rows]).collect()
+    };
+    let [a, b] = [layout(device), layout(host)];
+    if a != b {
+        return Err(format!("levels {a:?}, on the host {b:?}"));
+    }
+    let mut counts = [0, 0];
+    for (device, host) in device.levels.iter().zip(&host.levels) {
+        for (device, host) in device.cells.iter().zip(&host.cells) {
+            let points = |cell: &Cell| cell.iter().map(|cluster| cluster.count).sum::<f32>();
+            if points(device) != points(host) {
+                return Err(format!("points of a cell: {device:?}, {host:?}"));
+            }
+            // Sums of up to hundreds of terms as large as the depth.
+            let near = |a: f32, b: f32, depth: f32| (a - b).abs() <= 1e-5 * depth;
+            let same = device.iter().zip(host).all(|(a, b)| {
+                a.count == b.count && (0..3).all(|axis| near(a.mean[axis], b.mean[axis], b.mean[2].max(1.0)))
+            });
+            counts[0] += usize::from(!same);
+            counts[1] += usize::from(points(host) > 0.0);
+        }
+    }
+    Ok(counts)
+}
+
+fn compare_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
+    let [unlike, filled] = unlike_cells(device, host)?;
+    let is_enough = unlike as f64 <= UNLIKE_CELLS * filled as f64;
+    if is_enough { Ok([unlike, filled]) } else { Err(format!("{unlike} of {filled} cells differ")) }
+}
+
+fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
+    // Where nothing scatters, what is left is the rounding of positions a few units away.
+    let near = |a: f32, b: f32| (a - b).abs() <= 0.01 * b.abs() + 1e-6;
+    let same = near(device.noise.factor, host.noise.factor)
+        && near(device.noise.power, host.noise.power)
+        && device.k_radius == host.k_radius;
+    if same { Ok(()) } else { Err(format!("{device:?}, on the host {host:?}")) }
+}
+
+fn is_like(device: &Surfel, host: &Surfel) -> bool {
+    let apart = (0..3).map(|axis| (device.center[axis] - host.center[axis]).powi(2)).sum::<f32>().sqrt();
+    let of_fit = |surfel: &Surfel| (surfel.radius, surfel.k_radius, surfel.source, surfel.screen);
+    of_fit(device) == of_fit(host)
+        && angle(device.normal, host.normal) < 0.5
+        && angle(device.major_axis, host.major_axis) < 1.0
+        && apart <= 0.01 * host.k_radius
+        && (device.curvature - host.curvature).abs() < 1e-3
+        && device.major_ratio == host.major_ratio
+}
+
+/// Surfels that differ.
+fn compare_surfels(device: &[Surfel], host: &[Surfel]) -> Result<usize, String> {
+    let unlike = device.iter().zip(host).filter(|(device, host)| !is_like(device, host)).count();
+    let all = host.len();
+    if device.len() != all || unlike as f64 > UNLIKE_SURFELS * all as f64 {
+        let first = device.iter().zip(host).find(|(device, host)| !is_like(device, host));
+        return Err(format!("{unlike} of {all} surfels differ: {first:?}"));
+    }
+    Ok(unlike)
+}
+
+#[test]
+fn the_device_fills_the_cells_that_the_host_fills() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    let mut all = [0, 0];
+    for count in [300, 4000, 60_000] {
+        for (name, positions) in test_clouds::all(count) {
+            for projection in PROJECTIONS {
+                for size in [[1, 1], [300, 2], [121, 90], [330, 250]] {
+                    let case = Case::new(&positions, projection, size);
+                    let made = on_device(&gpu, &passes, &case);
+                    let found = compare_cells(&made.cells, &case.cells());
+                    let found = found.unwrap_or_else(|error| panic!("{name} {count} {projection:?} {size:?}: {error}"));
+                    all = [all[0] + found[0], all[1] + found[1]];
+                }
+            }
+        }
+    }
+    assert!(all[1] > 100_000, "there is something to compare: {all:?}");
+}
+
+/// Noisy and clean surfaces, and whether they are noisy.
+fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
+    vec![
+        ("noisy plane", true, noisy(test_clouds::plane(12_000), 0.02)),
+        ("noisy sphere", true, noisy(test_clouds::sphere(20_000), 0.02)),
+        ("very noisy sphere", true, noisy(test_clouds::sphere(20_000), 0.06)),
+        ("noisy bumps", true, noisy(test_clouds::bumpy(20_000), 0.015)),
+        ("noisy edge", true, noisy(test_clouds::edge(20_000), 0.01)),
+        ("receding", true, test_clouds::receding(30_000, 0.0008)),
+        ("clean sphere", false, test_clouds::sphere(20_000)),
+        ("clean bumps", false, test_clouds::bumpy(20_000)),
+    ]
+}
+
+#[test]
+fn the_device_adapts_as_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    for (name, is_noisy, positions) in surfaces() {
+        for projection in PROJECTIONS {
+            let case = Case::new(&positions, projection, [320, 240]);
+            let made = on_device(&gpu, &passes, &case);
+            let (host, fitted, usual) = (case.adapted(), case.fitted.concat(), case.usual());
+            let changed = host.iter().zip(&fitted).filter(|(a, b)| a != b).count();
+            compare_usual(made.usual, usual).unwrap_or_else(|error| panic!("{name} {projection:?}: {error}"));
+            compare_surfels(&made.surfels, &host).unwrap_or_else(|error| panic!("{name} {projection:?}: {error}"));
+            if is_noisy {
+                assert!(2 * changed > host.len(), "{name} {projection:?}: {changed} of {} adapted", host.len());
+            } else {
+                assert!(made.surfels == fitted, "{name} {projection:?}: stays as it is");
+            }
+        }
+    }
+}
+
+#[test]
+fn whatever_the_cloud_the_device_adapts_as_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    let (mut unlike, mut all) = (0, 0);
+    for (name, positions) in test_clouds::all(4000) {
+        for projection in PROJECTIONS {
+            for size in [[1, 1], [7, 300], [121, 90]] {
+                let case = Case::new(&positions, projection, size);
+                let made = on_device(&gpu, &passes, &case);
+                let host = case.adapted();
+                let different = made.surfels.iter().zip(&host).filter(|(a, b)| !is_like(a, b)).count();
+                compare_usual(made.usual, case.usual())
+                    .unwrap_or_else(|error| panic!("{name} {projection:?} {size:?}: {error}"));
+                unlike += different;
+                all += host.len();
+            }
+        }
+    }
+    assert!(unlike as f64 <= UNLIKE_SURFELS * all as f64, "{unlike} of {all} surfels differ");
+}
+
+#[test]
+fn comparison_sees_what_is_wrong() {
+    let case = Case::new(&noisy(test_clouds::sphere(20_000), 0.02), PROJECTIONS[0], [240, 180]);
+    let right = case.cells();
+    assert!(compare_cells(&right, &right).is_ok(), "nothing is wrong yet");
+    let mut moved = right.clone();
+    moved.levels[1].cells.iter_mut().flatten().for_each(|cluster| cluster.mean[0] *= 1.001);
+    assert!(compare_cells(&moved, &right).is_err(), "means that are off");
+    let mut fewer = right.clone();
+    let filled = fewer.levels[0].cells.iter_mut().find(|cell| cell[0].count > 0.0).expect("one");
+    filled[0].count += 1.0;
+    assert!(compare_cells(&fewer, &right).is_err(), "a point too many");
+    fewer.levels.pop();
+    assert!(compare_cells(&fewer, &right).is_err(), "a level too few");
+
+    let usual = case.usual();
+    assert!(compare_usual(usual, usual).is_ok(), "nothing is wrong yet");
+    let with = |factor: f32, power: f32, k_radius: f32| Usual { noise: Noise { factor, power }, k_radius };
+    let Usual { noise: Noise { factor, power }, k_radius } = usual;
+    assert!(compare_usual(with(1.02 * factor, power, k_radius), usual).is_err(), "more noise");
+    assert!(compare_usual(with(factor, 0.1, k_radius), usual).is_err(), "that grows with depth");
+    assert!(compare_usual(with(factor, power, 1.001 * k_radius), usual).is_err(), "points further apart");
+
+    let adapted = case.adapted();
+    assert!(compare_surfels(&adapted, &adapted).is_ok(), "nothing is wrong yet");
+    assert!(compare_surfels(&case.fitted.concat(), &adapted).is_err(), "surfels as the fit leaves them");
+    let changed = |change: fn(&mut Surfel)| {
+        let mut surfels = adapted.clone();
+        surfels.iter_mut().for_each(change);
+        surfels
+    };
+    let wrong = [
+        changed(|surfel| surfel.center[0] += 0.02 * surfel.k_radius),
+        changed(|surfel| surfel.normal = surfel.normal.map(|c| -c)),
+        changed(|surfel| surfel.curvature += 0.01),
+        changed(|surfel| surfel.radius *= 1.01),
+    ];
+    for surfels in wrong {
+        assert!(compare_surfels(&surfels, &adapted).is_err(), "not noticed: {:?}", surfels[0]);
+    }
+}

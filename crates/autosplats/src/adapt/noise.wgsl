@@ -1,0 +1,74 @@
+// How far points scatter about the surface: see the CPU form. One invocation.
+//
+// Reads: surfels, sampled, quantiles. Writes: measured: the factor, the power of depth, and the median k-radius.
+
+#import frame
+#import surfel
+#import quantiles
+
+@group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(2) var<storage, read> sampled: array<u32>;
+@group(0) @binding(3) var<storage, read> quantiles: array<vec2u>;
+@group(0) @binding(4) var<storage, read_write> measured: array<f32>;
+
+override SCALES: u32;
+override SAMPLE: u32;
+override LEAST_SAMPLE: u32;
+override APART: f32;
+
+// The noise of a part of the sample, whose points are at about the same depth; 0 if it is too small to tell.
+fn scatter_level(part: u32) -> f32 {
+    // Below 0: none.
+    var before = -1.0;
+    var least_growth = infinity();
+    var plateau = 0.0;
+    for (var scale = 0u; scale < SCALES; scale++) {
+        let found = quantiles[part * SCALES + scale];
+        let now = bitcast<f32>(found.y);
+        if found.x == THIN_TELL {
+            return now;
+        }
+        // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
+        // fill the ball or of structure.
+        if found.x == ALL_TELL && before >= 0.0 && now < least_growth * before {
+            least_growth = now / before;
+            plateau = before;
+        }
+        before = select(-1.0, now, found.x == ALL_TELL);
+    }
+    return plateau;
+}
+
+// Of the surfel at a place of the sample, nearest first.
+fn depth(rank: u32) -> f32 {
+    return surfels[sampled[rank]].center.z;
+}
+
+fn noise_of_sample() -> vec2f {
+    let len = sampled[SAMPLE];
+    let third = len / 3u;
+    if third > 0u && depth(len - third) > APART * depth(third - 1u) {
+        let near_depth = depth(third / 2u);
+        let far_depth = depth(len - third + third / 2u);
+        let near_noise = scatter_level(NEAR);
+        let far_noise = scatter_level(FAR);
+        if near_noise > 0.0 && far_noise > near_noise {
+            let growth = log(far_noise / near_noise) / log(far_depth / near_depth);
+            // Little growth is chance, or other things further away.
+            let power = clamp(2.0 * (growth - 0.5), 0.0, 2.0);
+            if power > 0.0 {
+                return vec2f(sqrt(near_noise * far_noise) / pow(sqrt(near_depth * far_depth), power), power);
+            }
+        }
+    }
+    return vec2f(scatter_level(ALL), 0.0);
+}
+
+@compute @workgroup_size(1)
+fn noise() {
+    let found = noise_of_sample();
+    measured[0] = found.x;
+    measured[1] = found.y;
+    let k_radius = bitcast<f32>(quantiles[K_RADII * SCALES].y);
+    measured[2] = select(0.0, k_radius, sampled[SAMPLE] >= LEAST_SAMPLE);
+}

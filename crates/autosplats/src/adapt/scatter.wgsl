@@ -1,0 +1,44 @@
+// How far points scatter about the quadrics of the balls around each surfel of the sample: an invocation per ball.
+//
+// Reads: counters, density, surfels, levels, clusters, sampled. Writes: scatters, ball size by ball size.
+
+#import frame
+#import groups
+#import counters
+#import quadric
+#import scatters
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(4) var<storage, read> levels: array<Level>;
+@group(0) @binding(5) var<storage, read> clusters: array<vec4f>;
+@group(0) @binding(6) var<storage, read> sampled: array<u32>;
+@group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
+
+override SAMPLE: u32;
+override STEP: f32;
+override THIN: f32;
+
+@compute @workgroup_size(64)
+fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 64u + local;
+    let scale = index / SAMPLE;
+    let rank = index % SAMPLE;
+    if scale >= SCALES || rank >= sampled[SAMPLE] {
+        return;
+    }
+    let surfel = surfels[sampled[rank]];
+    var radius = base_radius(surfel, counters[CELL_PX], counters[CELL_COLUMNS]) * STEP;
+    for (var smaller = 0u; smaller < scale; smaller++) {
+        radius *= STEP;
+    }
+    let ball = ball_around(surfel.center, radius);
+    let plane = plane_of(ball);
+    var found = TOO_FEW;
+    if plane.len >= LEAST_CLUSTERS {
+        let distance = quadric_of(ball, plane.axis, plane.curvature).scatter;
+        found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN * radius);
+    }
+    scatters[index] = found;
+}

@@ -1,0 +1,236 @@
+//! Adapted surfels against surfaces that are known.
+
+use autosplats_cloud::PointCloud;
+use autosplats_cloud::glam::DVec3;
+use glam::Vec3;
+
+use super::Adapter;
+use super::cells::{Cells, Cluster, Level};
+use super::noise::{Noise, Usual, measure};
+use super::quadric::{Gathered, Quadric};
+use crate::camera::{Camera, Projection, View};
+use crate::fit::{FitRules, Surfel, Surfels, fit};
+use crate::project::{Projector, ScreenPoints};
+use crate::search::{Neighborhoods, SearchRules, screen_grid};
+use crate::test_clouds::{self, EYE, noisy};
+
+pub(crate) const K: u32 = 10;
+
+/// The surfels of a cloud as the fit leaves them: of the active points, and of the passive ones.
+#[derive(Clone)]
+pub(crate) struct Case {
+    pub(crate) screen: ScreenPoints,
+    pub(crate) view: View,
+    pub(crate) fitted: [Surfels; 2],
+}
+
+impl Case {
+    pub(crate) fn new(positions: &[[f32; 3]], projection: Projection, size: [u32; 2]) -> Self {
+        Self::scaled(positions, projection, size, 1.0)
+    }
+
+    /// Seen from a place `scale` times as far away.
+    fn scaled(positions: &[[f32; 3]], projection: Projection, size: [u32; 2], scale: f64) -> Self {
+        let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+        let view = camera.view(DVec3::ZERO, size).expect("a view");
+        let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
+        let screen = Projector::default().project(&cloud, &view, K, true).clone();
+        let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0) };
+        let fit_rules = FitRules { k: K, splat_scale: 1.0, ellipses: false, keep_outliers: false };
+        let fitted = [&screen.active, &screen.passive].map(|queries| {
+            let mut neighborhoods = Neighborhoods::default();
+            screen_grid::search(&screen, queries, &view, &rules, &mut neighborhoods);
+            let mut surfels = Surfels::new();
+            fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels);
+            surfels
+        });
+        Self { screen, view, fitted }
+    }
+
+    pub(crate) fn cells(&self) -> Cells {
+        let mut cells = Cells::default();
+        cells.fill(&self.screen, &self.view, K);
+        cells
+    }
+
+    pub(crate) fn usual(&self) -> Usual {
+        measure(&self.fitted[0], &self.cells(), &self.screen.density, &self.view, K)
+    }
+
+    pub(crate) fn noise(&self) -> Noise {
+        self.usual().noise
+    }
+
+    /// Both rounds' surfels.
+    pub(crate) fn adapted(&self) -> Surfels {
+        let mut adapter = Adapter::default();
+        adapter.begin(&self.screen, &self.view, K);
+        let mut adapt = |fitted: &Surfels| {
+            let mut surfels = fitted.clone();
+            adapter.adapt(&mut surfels, &self.screen.density, &self.view, K, false);
+            surfels
+        };
+        let [mut active, passive] = self.fitted.each_ref().map(&mut adapt);
+        active.extend(passive);
+        active
+    }
+}
+
+pub(crate) const PROJECTIONS: [Projection; 2] =
+    [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)];
+
+/// Degrees between two unit vectors.
+pub(crate) fn angle(a: [f32; 3], b: [f32; 3]) -> f32 {
+    Vec3::from(a).angle_between(b.into()).to_degrees()
+}
+
+/// The quadric fitted about a point `above` the surface z = `depth`(x, y), a cluster in each of its cells.
+fn quadric_on(depth: impl Fn(f32, f32) -> f32, at: [f32; 2], above: f32, radius: f32) -> Quadric {
+    let projection = Projection::OrthographicHeight(2.0);
+    let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
+    let view = camera.view(DVec3::ZERO, [200, 200]).expect("a view");
+    let mut level = Level { side_px: 4, columns: 50, rows: 50, ..Level::default() };
+    for cell in 0..level.columns * level.rows {
+        let pixel = [cell % level.columns, cell / level.columns].map(|at| (4 * at + 2) as f32);
+        let [x, y, _] = view.unproject(pixel, 1.0).to_array();
+        let cluster = Cluster { mean: [x, y, depth(x, y)], count: 1.0 };
+        level.cells.push([cluster, Cluster::default(), Cluster::default(), Cluster::default()]);
+    }
+    let center = [at[0], at[1], depth(at[0], at[1]) - above];
+    let mut gathered = Gathered::default();
+    assert!(gathered.read(&Cells { levels: vec![level] }, center, radius, &view) > 100, "clusters in the ball");
+    let (_, curvature) = gathered.plane(pulp::Scalar);
+    gathered.quadric(pulp::Scalar, radius, Vec3::Z, curvature)
+}
+
+#[test]
+fn a_quadric_is_found_again() {
+    let radius = 0.4;
+    for at in [[0.0, 0.0], [0.113, -0.237]] {
+        for above in [0.0, 0.05] {
+            for bend in [0.0, 0.3] {
+                let depth = |x: f32, y: f32| 4.0 + 0.1 * x - 0.05 * y + bend * (x * x - 0.7 * x * y + 0.3 * y * y);
+                let [x, y] = at;
+                let slope = [0.1 + bend * (2.0 * x - 0.7 * y), -0.05 + bend * (0.6 * y - 0.7 * x)];
+                let found = quadric_on(depth, at, above, radius);
+                let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
+                let case = format!("{at:?} {above} {bend}: {found:?}");
+                // Curvatures are pulled towards 0 by some hundredths, which moves a bent surface.
+                let bent = bend * radius;
+                assert!(angle(found.normal.into(), normal.into()) < 0.05 + 4.0 * bent, "{case}");
+                assert!((found.height - above).abs() < radius * (1e-4 + 0.05 * bent), "{case}");
+                assert!(found.scatter < radius * (1e-3 + 0.1 * bent), "{case}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_noise_of_a_plane_is_measured() {
+    // Points are 0.022 apart.
+    for sigma in [0.005, 0.01] {
+        for projection in PROJECTIONS {
+            let case = Case::new(&noisy(test_clouds::plane(8000), sigma), projection, [240, 180]);
+            let Noise { factor, power } = case.noise();
+            // A quantile below the middle, of balls that hold few clusters, leans low.
+            let ratio = factor / sigma;
+            assert!(power == 0.0 && (0.75..1.1).contains(&ratio), "{sigma} {projection:?}: {factor}, {power}");
+        }
+    }
+}
+
+#[test]
+fn noise_that_grows_with_depth_is_measured() {
+    let sigma = 0.0008;
+    let case = Case::new(&test_clouds::receding(60_000, sigma), PROJECTIONS[0], [400, 300]);
+    let noise = case.noise();
+    assert!(noise.power > 1.5, "{noise:?}");
+    for depth in [5.0, 8.0, 11.0] {
+        let ratio = noise.at(depth) / (sigma * depth * depth);
+        // It is more than half a cell in the distance, where it is measured too large.
+        assert!((0.75..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
+    }
+}
+
+/// Mean angle in degrees between the normals of surfels and those of the surface at their points.
+fn mean_error<'a>(surfels: impl IntoIterator<Item = &'a Surfel>, normal_of: impl Fn(&Surfel) -> Option<Vec3>) -> f32 {
+    let of_one = |surfel: &Surfel| {
+        let error = angle(surfel.normal, normal_of(surfel)?.into());
+        Some(error.min(180.0 - error))
+    };
+    let errors: Vec<f32> = surfels.into_iter().filter(|surfel| surfel.radius > 0.0).filter_map(of_one).collect();
+    assert!(errors.len() > 100, "there are some: {}", errors.len());
+    errors.iter().sum::<f32>() / errors.len() as f32
+}
+
+#[test]
+fn normals_of_a_noisy_sphere_are_the_spheres() {
+    let case = Case::new(&noisy(test_clouds::sphere(20_000), 0.02), PROJECTIONS[0], [240, 180]);
+    let normal = |surfel: &Surfel| {
+        let of_eye = case.view.view_from_world.transpose() * Vec3::from(surfel.center);
+        Some(case.view.view_from_world * (of_eye + case.view.eye_local).normalize())
+    };
+    let before = mean_error(case.fitted.iter().flatten(), normal);
+    let after = mean_error(&case.adapted(), normal);
+    assert!(before > 15.0 && after < 5.0, "{before} degrees off, then {after}");
+}
+
+#[test]
+fn a_noisy_edge_stays_sharp() {
+    let points = noisy(test_clouds::edge(30_000), 0.01);
+    let case = Case::new(&points, PROJECTIONS[0], [400, 300]);
+    let beside = |from: f32, to: f32| {
+        let (points, view) = (&points, case.view);
+        move |surfel: &Surfel| {
+            let x = points[surfel.source as usize][0];
+            let face = Vec3::new(x.signum(), 0.0, -1.0).normalize();
+            (from..to).contains(&x.abs()).then(|| view.view_from_world * face)
+        }
+    };
+    let adapted = case.adapted();
+    let errors = [[0.02, 0.08], [0.08, 0.3], [0.3, 0.8]].map(|[from, to]| {
+        [mean_error(case.fitted.iter().flatten(), beside(from, to)), mean_error(&adapted, beside(from, to))]
+    });
+    // Blended over the edge they would be 45° off.
+    assert!(errors[0][1] < 12.0 && errors[1][1] < 6.0 && errors[2][1] < 3.0, "{errors:?}");
+}
+
+#[test]
+fn a_clean_cloud_stays_as_it_is() {
+    // Of curved ones, a few whose first neighbours are as near to each other as a quadric is to the surface.
+    for (name, changes, positions) in [
+        ("plane", 0.0, test_clouds::plane(20_000)),
+        ("edge", 0.0, test_clouds::edge(20_000)),
+        ("sphere", 1e-3, test_clouds::sphere(20_000)),
+        ("bumps", 1e-3, test_clouds::bumpy(20_000)),
+    ] {
+        for projection in PROJECTIONS {
+            let case = Case::new(&positions, projection, [240, 180]);
+            let fitted = case.fitted.concat();
+            let changed = case.adapted().iter().zip(&fitted).filter(|(a, b)| a != b).count();
+            let share = changed as f64 / fitted.len() as f64;
+            assert!(share <= changes, "{name} {projection:?}: {changed} changed, {:?}", case.noise());
+        }
+    }
+}
+
+#[test]
+fn a_cloud_of_another_scale_is_the_same_in_its_own_units() {
+    let scale = 1024.0;
+    let points = noisy(test_clouds::sphere(20_000), 0.02);
+    let large: Vec<_> = points.iter().map(|point| point.map(|c| scale * c)).collect();
+    for (projection, of_large) in
+        PROJECTIONS.into_iter().zip([PROJECTIONS[0], Projection::OrthographicHeight(2.1 * f64::from(scale))])
+    {
+        let small = Case::new(&points, projection, [240, 180]).adapted();
+        let large = Case::scaled(&large, of_large, [240, 180], scale.into()).adapted();
+        assert_eq!(small.len(), large.len(), "{projection:?}");
+        let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * b.abs();
+        for (small, large) in small.iter().zip(&large) {
+            let same = near(large.radius, scale * small.radius)
+                && near(large.center[2], scale * small.center[2])
+                && angle(large.normal, small.normal) < 0.1;
+            assert!(same, "{projection:?}: {small:?}, {large:?}");
+        }
+    }
+}

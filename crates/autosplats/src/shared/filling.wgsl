@@ -1,0 +1,86 @@
+// Fills a cell with points or with clusters: see the CPU form. Imports: frame, levels, divide. The including pass binds
+// `clusters` to be written.
+
+#import divide
+
+// How depth is cut into slabs about as thick as a cell is wide.
+struct Slabs {
+    // Perspective: low bits of a depth that do not count, so that slabs get thicker as cells get wider with depth.
+    shift: u32,
+    // Parallel: slabs per world unit.
+    per_unit: f32,
+}
+
+fn slabs_of(side_px: u32) -> Slabs {
+    let side = f32(side_px);
+    // Depths between two powers of two share 2²³ steps. The difference of bits is the logarithm rounded down, without a
+    // division that may be off.
+    let doublings = (bitcast<u32>(max(frame.focal_px, side)) - bitcast<u32>(side)) >> 23u;
+    return Slabs(23u - min(doublings, 23u), frame.focal_px / side);
+}
+
+// Slab of a depth above 0.
+fn slab_of(slabs: Slabs, depth: f32) -> u32 {
+    if frame.perspective == 1u {
+        return bitcast<u32>(depth) >> slabs.shift;
+    }
+    return u32(depth * slabs.per_unit);
+}
+
+// Of each cluster: sum of positions and number of points; slab of depth, in slabs of this cell.
+var<private> sums: array<vec4f, SLABS>;
+var<private> slab_at: array<u32, SLABS>;
+var<private> used: u32;
+// How often the thickness of this cell's slabs was doubled.
+var<private> doubled: u32;
+
+// Adds a sum to its slab, unless there is none and no room for one.
+fn put(sum: vec4f, slab: u32) -> bool {
+    var at = 0u;
+    while at < used && slab_at[at] != slab {
+        at++;
+    }
+    if at == SLABS {
+        return false;
+    }
+    used = max(used, at + 1u);
+    slab_at[at] = slab;
+    sums[at] += sum;
+    return true;
+}
+
+// Makes slabs twice as thick.
+fn double_thickness() {
+    let full_sums = sums;
+    let full_slabs = slab_at;
+    let full = used;
+    doubled++;
+    used = 0u;
+    sums = array<vec4f, SLABS>();
+    for (var at = 0u; at < full; at++) {
+        put(full_sums[at], full_slabs[at] >> 1u);
+    }
+}
+
+// Adds `count` points with this mean.
+fn add(mean: vec3f, count: f32, slab: u32) {
+    let sum = vec4f(mean * count, count);
+    while !put(sum, slab >> doubled) {
+        double_thickness();
+    }
+}
+
+fn finish(cell: u32) {
+    for (var index = 0u; index < used; index++) {
+        clusters[cell * SLABS + index] = vec4f(sums[index].xyz / sums[index].w, sums[index].w);
+    }
+    // Those after the last one are not read.
+    if used < SLABS {
+        clusters[cell * SLABS + used] = vec4f(0.0);
+    }
+}
+
+// Column and row of the cell of a level that an invocation fills.
+fn place_in(level: Level, index: u32) -> vec2u {
+    return divide(index, level.columns).yx;
+}

@@ -1,0 +1,243 @@
+// A height field with six coefficients over a ball's points: see the CPU form. Imports: frame, density, screen,
+// surfel, levels, eigen, orthonormal. The including pass binds `density`, `levels` and `clusters`.
+
+#import density
+#import screen
+#import surfel
+#import levels
+#import eigen
+#import orthonormal
+
+// Balls tried around each point.
+const SCALES = 6u;
+
+override MOST_LEVELS: u32;
+override LEAST_REACH: f32;
+override CELLS_PER_RADIUS: f32;
+override LEAST_CLUSTERS: u32;
+override FULL: f32;
+override RIDGE: f32;
+override LEAST_PIVOT: f32;
+
+struct Ball {
+    center: vec3f,
+    radius: f32,
+    level: Level,
+    // Cells that may reach into it, both included.
+    low: vec2u,
+    high: vec2u,
+}
+
+struct Plane {
+    // Axis of least spread of the clusters.
+    axis: vec3f,
+    // Surface variation.
+    curvature: f32,
+    // Clusters in the ball.
+    len: u32,
+}
+
+struct Quadric {
+    // Unit normal of the surface at the point's place; of either sign.
+    normal: vec3f,
+    // How far the surface is from the point along `axis`, world units.
+    height: f32,
+    // Unit direction of the heights.
+    axis: vec3f,
+    // Standard deviation of points from the surface, world units.
+    scatter: f32,
+    // Standard error of the normal's slope, in radians per world unit of scatter.
+    error: f32,
+    curvature: f32,
+    // Clusters in the ball.
+    len: u32,
+}
+
+// Radius that the balls around a surfel are multiples of.
+fn base_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
+    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, cell_columns)];
+    return max(surfel.k_radius, LEAST_REACH * first_radius(cell.x, cell_px, surfel.center.z));
+}
+
+fn ball_around(center: vec3f, radius: f32) -> Ball {
+    let at = to_pixel(center);
+    let radius_px = radius / pixel_size(center.z);
+    var level = levels[0];
+    for (var index = 1u; index < MOST_LEVELS; index++) {
+        let coarser = levels[index];
+        if coarser.side_px == 0u || !(f32(coarser.side_px) * CELLS_PER_RADIUS <= radius_px) {
+            break;
+        }
+        level = coarser;
+    }
+    let side = f32(level.side_px);
+    let last = vec2f(vec2u(level.columns, level.rows) - 1u);
+    let low = vec2u(clamp((at - radius_px) / side, vec2f(0.0), last));
+    let high = vec2u(clamp((at + radius_px) / side, vec2f(0.0), last));
+    return Ball(center, radius, level, low, high);
+}
+
+// Position of a cluster from the ball's centre in radii, and its weight; 0 if it is not within.
+fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
+    let offset = (cluster.xyz - ball.center) * per_radius;
+    let rest = 1.0 - (offset.x * offset.x + offset.y * offset.y + offset.z * offset.z);
+    let weight = min(rest * (1.0 / (1.0 - FULL)), 1.0) * cluster.w;
+    return vec4f(offset, select(0.0, weight, rest > 0.0));
+}
+
+// The plane through the clusters of a ball.
+fn plane_of(ball: Ball) -> Plane {
+    let per_radius = 1.0 / ball.radius;
+    // Sums of weights and positions; of squares xx, yy, zz, and of products yz, xz, xy.
+    var first = vec4f(0.0);
+    var squares = vec3f(0.0);
+    var products = vec3f(0.0);
+    var len = 0u;
+    for (var row = ball.low.y; row <= ball.high.y; row++) {
+        let cells = ball.level.first + row * ball.level.columns;
+        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
+            for (var slab = 0u; slab < SLABS; slab++) {
+                let cluster = clusters[cell * SLABS + slab];
+                if cluster.w == 0.0 {
+                    break;
+                }
+                let p = weighed(ball, per_radius, cluster);
+                if p.w > 0.0 {
+                    let wp = p.w * p.xyz;
+                    first += vec4f(wp, p.w);
+                    squares += wp * p.xyz;
+                    products += wp.yxx * p.zzy;
+                    len++;
+                }
+            }
+        }
+    }
+    if len < LEAST_CLUSTERS {
+        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, len);
+    }
+    let share = 1.0 / first.w;
+    let mean = first.xyz * share;
+    let found = eigen(squares * share - mean * mean, products * share - mean.yxx * mean.zzy);
+    let least = max(found.values.x, 0.0);
+    let sum = least + found.values.y + found.values.z;
+    return Plane(found.least, select(0.0, least / sum, sum > 0.0), len);
+}
+
+// A row of the equations: four columns, the two of the slopes, and the right-hand side.
+struct Row {
+    left: vec4f,
+    right: vec3f,
+}
+
+fn without(row: Row, pivot: Row, factor: f32) -> Row {
+    return Row(row.left - factor * pivot.left, row.right - factor * pivot.right);
+}
+
+// Fits heights along `axis` to the clusters of a ball.
+fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
+    let u = any_orthonormal(axis);
+    let v = cross(axis, u);
+    let per_radius = 1.0 / ball.radius;
+    // Sums of weight times: 1, x, y; xx, xy, yy; xxx, xxy, xyy, yyy; xxxx, xxxy, xxyy, xyyy; yyyy; h, hx, hy, hh; hxx, hxy, hyy.
+    var first = vec3f(0.0);
+    var second = vec3f(0.0);
+    var third = vec4f(0.0);
+    var fourth = vec4f(0.0);
+    var last = 0.0;
+    var heights = vec4f(0.0);
+    var curved = vec3f(0.0);
+    var len = 0u;
+    for (var row = ball.low.y; row <= ball.high.y; row++) {
+        let cells = ball.level.first + row * ball.level.columns;
+        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
+            for (var slab = 0u; slab < SLABS; slab++) {
+                let cluster = clusters[cell * SLABS + slab];
+                if cluster.w == 0.0 {
+                    break;
+                }
+                let p = weighed(ball, per_radius, cluster);
+                if p.w > 0.0 {
+                    let x = dot(u, p.xyz);
+                    let y = dot(v, p.xyz);
+                    let h = dot(axis, p.xyz);
+                    let squares = vec3f(x * x, x * y, y * y);
+                    let of_first = p.w * vec3f(1.0, x, y);
+                    let of_second = p.w * squares;
+                    first += of_first;
+                    second += of_second;
+                    third += of_second.xxyz * vec4f(x, y, y, y);
+                    fourth += of_second.xxxy * squares.xyzz;
+                    last += of_second.z * squares.z;
+                    heights += p.w * h * vec4f(1.0, x, y, h);
+                    curved += of_second * h;
+                    len++;
+                }
+            }
+        }
+    }
+    if len < LEAST_CLUSTERS {
+        return Quadric(axis, 0.0, axis, 0.0, 0.0, 0.0, len);
+    }
+    let w = first.x;
+    let ridge = RIDGE * w;
+    let least = LEAST_PIVOT * w;
+    // Slopes last, so that what is left of their rows when the others are eliminated is their own.
+    let r0 = Row(vec4f(fourth.x + ridge, fourth.y, fourth.z, second.x), vec3f(third.x, third.y, curved.x));
+    var r1 = Row(vec4f(fourth.y, fourth.z + ridge, fourth.w, second.y), vec3f(third.y, third.z, curved.y));
+    var r2 = Row(vec4f(fourth.z, fourth.w, last + ridge, second.z), vec3f(third.z, third.w, curved.z));
+    var r3 = Row(vec4f(second, w), vec3f(first.yz, heights.x));
+    var r4 = Row(vec4f(third.xyz, first.y), vec3f(second.xy, heights.y));
+    var r5 = Row(vec4f(third.yzw, first.z), vec3f(second.yz, heights.z));
+    var rest = heights.w;
+
+    // What rounding leaves of a row that others explain must not be divided by.
+    let i0 = 1.0 / max(r0.left.x, least);
+    rest -= r0.right.z * r0.right.z * i0;
+    r1 = without(r1, r0, r1.left.x * i0);
+    r2 = without(r2, r0, r2.left.x * i0);
+    r3 = without(r3, r0, r3.left.x * i0);
+    r4 = without(r4, r0, r4.left.x * i0);
+    r5 = without(r5, r0, r5.left.x * i0);
+
+    let i1 = 1.0 / max(r1.left.y, least);
+    rest -= r1.right.z * r1.right.z * i1;
+    r2 = without(r2, r1, r2.left.y * i1);
+    r3 = without(r3, r1, r3.left.y * i1);
+    r4 = without(r4, r1, r4.left.y * i1);
+    r5 = without(r5, r1, r5.left.y * i1);
+
+    let i2 = 1.0 / max(r2.left.z, least);
+    rest -= r2.right.z * r2.right.z * i2;
+    r3 = without(r3, r2, r3.left.z * i2);
+    r4 = without(r4, r2, r4.left.z * i2);
+    r5 = without(r5, r2, r5.left.z * i2);
+
+    let i3 = 1.0 / max(r3.left.w, least);
+    rest -= r3.right.z * r3.right.z * i3;
+    r4 = without(r4, r3, r4.left.w * i3);
+    r5 = without(r5, r3, r5.left.w * i3);
+
+    let i4 = 1.0 / max(r4.right.x, least);
+    rest -= r4.right.z * r4.right.z * i4;
+    r5 = without(r5, r4, r5.right.x * i4);
+
+    let i5 = 1.0 / max(r5.right.y, least);
+    rest -= r5.right.z * r5.right.z * i5;
+
+    let slope_y = r5.right.z * i5;
+    let slope_x = (r4.right.z - r4.right.y * slope_y) * i4;
+    let height = (r3.right.z - r3.right.x * slope_x - r3.right.y * slope_y) * i3;
+    // Trace of the inverse of the 2×2 matrix that is left for the slopes.
+    let tilt = r4.right.y * i4;
+    let trace = i4 + (1.0 + tilt * tilt) * i5;
+    let freedom = f32(len) - 6.0;
+    return Quadric(
+        normalize(axis - u * slope_x - v * slope_y),
+        height * ball.radius,
+        axis,
+        sqrt(select(0.0, rest, rest > 0.0) / freedom) * ball.radius,
+        sqrt(trace) / ball.radius,
+        curvature,
+        len,
+    );
+}
