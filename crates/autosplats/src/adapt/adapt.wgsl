@@ -18,6 +18,8 @@
 override ROUND: u32;
 override STEP: f32;
 override ENOUGH: f32;
+override TINY_PX: f32;
+override TINY_SLOPE: f32;
 override RELIABLE: f32;
 override THICKEST: f32;
 override THICKEST_FIRST: f32;
@@ -33,9 +35,14 @@ fn noise_at(depth: f32) -> f32 {
     return measured[0] * select(pow(depth, power), 1.0, power == 0.0);
 }
 
+// Standard error of a normal, radians, that no larger ball need better.
+fn good_enough(noise: f32, depth: f32) -> f32 {
+    return ENOUGH + TINY_SLOPE * max(TINY_PX - noise / pixel_size(depth), 0.0);
+}
+
 // The quadric of the largest ball that agrees with the smaller ones; of no clusters if none is better than the first
 // neighbours.
-fn choose(surfel: Surfel, noise: f32) -> Quadric {
+fn choose(surfel: Surfel, noise: f32, enough: f32) -> Quadric {
     let cell_px = atomicLoad(&counters[CELL_PX]);
     var radius = base_radius(surfel, cell_px, atomicLoad(&counters[CELL_COLUMNS]));
     // Normals to agree with, and their errors.
@@ -90,7 +97,7 @@ fn choose(surfel: Surfel, noise: f32) -> Quadric {
         plane.axis = quadric.normal;
         has_axis = true;
         best = quadric;
-        if error < ENOUGH {
+        if error < enough {
             break;
         }
     }
@@ -146,9 +153,10 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let surfel = surfels[first + index];
     // The first neighbourhood's error is about that of its k points over the k-radius.
     let noise = noise_at(surfel.center.z);
+    let enough = good_enough(noise, surfel.center.z);
     var quadric = Quadric();
-    if surfel.radius > 0.0 && noise > ENOUGH * surfel.k_radius {
-        quadric = choose(surfel, noise);
+    if surfel.radius > 0.0 && noise > enough * surfel.k_radius {
+        quadric = choose(surfel, noise, enough);
     }
     if quadric.len > 0u {
         move_onto(first + index, surfel, quadric);

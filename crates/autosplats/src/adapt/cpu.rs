@@ -14,8 +14,13 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 
 /// Surfels per task.
 const TASK: usize = 256;
-/// Standard error of a normal, radians, that no larger ball need better.
+/// Standard error of a normal, radians, that is good enough where noise is many pixels.
 pub(super) const ENOUGH: f32 = 0.025;
+/// Noise that is smaller than this, in pixels, may as well be detail too small for the pixels: the less there is, the larger
+/// an error is good enough.
+pub(super) const TINY_PX: f32 = 0.5;
+/// By how much, in radians a pixel.
+pub(super) const TINY_SLOPE: f32 = 0.5;
 /// Largest standard error of a normal that others are held against.
 pub(super) const RELIABLE: f32 = 0.12;
 /// Most noise, as a part of a ball's radius, with which its points are a surface at all.
@@ -92,10 +97,10 @@ fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Tas
     for surfel in surfels {
         // The first neighbourhood's error is about that of its k points over the k-radius.
         let noise = task.usual.noise.at(surfel.center[2]);
-        let enough = noise <= ENOUGH * surfel.k_radius;
+        let enough = good_enough(noise, surfel.center[2], task.view);
         if surfel.radius > 0.0
-            && !enough
-            && let Some(quadric) = choose(simd, surfel, noise, task, gathered)
+            && noise > enough * surfel.k_radius
+            && let Some(quadric) = choose(simd, surfel, [noise, enough], task, gathered)
         {
             place(surfel, &quadric, task.view);
         } else {
@@ -104,9 +109,21 @@ fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Tas
     }
 }
 
+/// Standard error of a normal, radians, that no larger ball need better.
+#[inline(always)]
+fn good_enough(noise: f32, depth: f32, view: &View) -> f32 {
+    ENOUGH + TINY_SLOPE * (TINY_PX - noise / view.pixel_size(depth)).max(0.0)
+}
+
 /// The quadric of the largest ball that agrees with the smaller ones; `None` if none is better than the first neighbours.
 #[inline(always)]
-fn choose<S: Simd>(simd: S, surfel: &Surfel, noise: f32, task: &Task, gathered: &mut Gathered) -> Option<Quadric> {
+fn choose<S: Simd>(
+    simd: S,
+    surfel: &Surfel,
+    [noise, enough]: [f32; 2],
+    task: &Task,
+    gathered: &mut Gathered,
+) -> Option<Quadric> {
     let Task { cells, density, view, k, .. } = *task;
     let mut radius = first_radius(surfel, density, view, k);
     // Normals to agree with, and their errors.
@@ -151,7 +168,7 @@ fn choose<S: Simd>(simd: S, surfel: &Surfel, noise: f32, task: &Task, gathered: 
         count += 1;
         axis = Some((quadric.normal, curvature));
         best = Some(quadric);
-        if error < ENOUGH {
+        if error < enough {
             break;
         }
     }

@@ -1,7 +1,9 @@
 //! Neighbourhoods as large as the noise calls for, on the GPU: the CPU form's steps, a pass each.
 
 use super::cells::{MOST_LEVELS, SLABS};
-use super::cpu::{AGREE, DOT_PX, ENOUGH, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST};
+use super::cpu::{
+    AGREE, DOT_PX, ENOUGH, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_SLOPE,
+};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
 use super::{LEAST_REACH, SCALES, STEP};
@@ -121,6 +123,8 @@ impl AdaptPasses {
             let own = [
                 ("ROUND", f64::from(round as u32)),
                 ("ENOUGH", ENOUGH.into()),
+                ("TINY_PX", TINY_PX.into()),
+                ("TINY_SLOPE", TINY_SLOPE.into()),
                 ("RELIABLE", RELIABLE.into()),
                 ("THICKEST", THICKEST.into()),
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
