@@ -1,5 +1,6 @@
 //! `autosplats bench`: how long each stage and pass of a frame takes, on each backend asked for.
 
+pub(crate) mod args;
 mod paper;
 
 use std::time::Instant;
@@ -8,7 +9,7 @@ use autosplats::{Counts, PassTime, Renderer, Settings, Timings};
 use autosplats_cloud::PointCloud;
 use serde::Serialize;
 
-use crate::args::{BenchArgs, Evaluation};
+use self::args::{BenchArgs, Evaluation};
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;

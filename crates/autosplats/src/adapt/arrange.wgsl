@@ -12,19 +12,29 @@
 @group(0) @binding(3) var<storage, read_write> arguments: array<u32>;
 
 override MOST_LEVELS: u32;
+override MOST_FINEST: u32;
 
-// Side of the finest cells: about the distance between screen points, at least two pixels.
+// Cells in a row and in a column of a picture.
+fn cells_across(side_px: u32) -> vec2u {
+    return (frame.size + side_px - 1u) / side_px;
+}
+
+// Side of the finest cells: about the distance between screen points, at least two pixels, more in a large picture.
 fn finest_side_px() -> u32 {
+    var least = 2u;
+    while cells_across(least).x * cells_across(least).y > MOST_FINEST {
+        least++;
+    }
     // A quotient of exactly a half more is rounded up, also where a division is off in the last place.
     let side = f32(counters[CELL_PX]) / sqrt(f32(frame.k)) * 1.000001;
-    return max(u32(floor(side + 0.5)), 2u);
+    return max(u32(floor(side + 0.5)), least);
 }
 
 @compute @workgroup_size(1)
 fn arrange() {
     var level = Level(finest_side_px(), 0u, 0u, 0u);
-    level.columns = (frame.size.x + level.side_px - 1u) / level.side_px;
-    level.rows = (frame.size.y + level.side_px - 1u) / level.side_px;
+    level.columns = cells_across(level.side_px).x;
+    level.rows = cells_across(level.side_px).y;
     let doublings = firstLeadingBit(max(max(level.columns, level.rows) / 4u, 1u));
     for (var index = 0u; index < MOST_LEVELS; index++) {
         let cells = select(0u, level.columns * level.rows, index <= doublings);

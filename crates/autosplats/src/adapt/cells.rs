@@ -8,6 +8,9 @@ use crate::project::ScreenPoints;
 /// Most slabs of depth in a cell, each as thick as a cell is wide: a surface seen at 76° or less from its normal fills no
 /// more. A cell with more to hold has thicker ones.
 pub(crate) const SLABS: usize = 4;
+/// Most finest cells: with the coarser ones they are just below the 128 MiB that every device binds at once. The pictures that
+/// have as many at two pixels are larger than 3200×1800.
+pub(crate) const MOST_FINEST: usize = 1_500_000;
 /// Coarser levels are of no use to any ball.
 pub(super) const MOST_LEVELS: usize = 9;
 
@@ -125,7 +128,7 @@ impl Slabs {
 impl Cells {
     /// Sums up the screen points of a frame whose cells in the density grid hold about `k` points.
     pub(crate) fn fill(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
-        let side_px = finest_side_px(screen.density.cell_px, k);
+        let side_px = finest_side_px(screen.density.cell_px, k, [view.width, view.height]);
         let [mut columns, mut rows] = [view.width, view.height].map(|side| (side as usize).div_ceil(side_px));
         let levels = 1 + (columns.max(rows) / 4).max(1).ilog2() as usize;
         self.levels.resize_with(levels.min(MOST_LEVELS), Level::default);
@@ -145,9 +148,19 @@ impl Cells {
     }
 }
 
-/// Side of the finest cells: about the distance between screen points, at least two pixels.
-pub(crate) fn finest_side_px(density_cell_px: usize, k: u32) -> usize {
-    ((density_cell_px as f32 / (k as f32).sqrt()).round() as usize).max(2)
+/// Side of the finest cells of a picture: about the distance between its screen points.
+pub(crate) fn finest_side_px(density_cell_px: usize, k: u32, size: [u32; 2]) -> usize {
+    ((density_cell_px as f32 / (k as f32).sqrt()).round() as usize).max(least_side_px(size))
+}
+
+/// Least side of the finest cells of a picture: two pixels, more if there would be more than [`MOST_FINEST`].
+pub(crate) fn least_side_px(size: [u32; 2]) -> usize {
+    let [width, height] = size.map(|side| side as usize);
+    let mut side_px = 2;
+    while width.div_ceil(side_px) * height.div_ceil(side_px) > MOST_FINEST {
+        side_px += 1;
+    }
+    side_px
 }
 
 /// Fills the finest cells with points.

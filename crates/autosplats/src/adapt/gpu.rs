@@ -1,6 +1,6 @@
 //! Neighbourhoods as large as the noise calls for, on the GPU: the CPU form's steps, a pass each.
 
-use super::cells::{MOST_LEVELS, SLABS};
+use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
     AGREE, DOT_PX, ENOUGH, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_SLOPE,
 };
@@ -29,8 +29,6 @@ const GROUP: usize = 64;
 const QUANTILES_TAKEN: usize = 3 * SCALES + 1;
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
-/// Side of the smallest cells.
-const LEAST_SIDE_PX: u32 = 2;
 
 /// `Level` of `shared/levels.wgsl`: side, columns, rows and first cell.
 type Level = [u32; 4];
@@ -76,7 +74,8 @@ impl AdaptBuffers {
 
 /// Cells of all levels if they are as small as can be.
 fn most_cells(size: [u32; 2]) -> usize {
-    let mut sides = size.map(|side| side.div_ceil(LEAST_SIDE_PX) as usize);
+    let side_px = least_side_px(size);
+    let mut sides = size.map(|side| (side as usize).div_ceil(side_px));
     let mut cells = 0;
     for _ in 0..MOST_LEVELS {
         cells += sides[0] * sides[1];
@@ -150,7 +149,11 @@ impl AdaptPasses {
             ("QUANTILE", QUANTILE.into()),
         ];
         Ok(Self {
-            arrange: Pass::new(gpu, &ARRANGE, &[("MOST_LEVELS", MOST_LEVELS as f64)])?,
+            arrange: Pass::new(
+                gpu,
+                &ARRANGE,
+                &[("MOST_LEVELS", MOST_LEVELS as f64), ("MOST_FINEST", MOST_FINEST as f64)],
+            )?,
             fill: Pass::new(gpu, &FILL, &[])?,
             merge: Pass::new(gpu, &MERGE, &[])?,
             which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,

@@ -26,7 +26,7 @@ use self::measure::{
 };
 use self::report::Report;
 use self::scenes::{NAMES, PaperScene};
-use crate::args::PaperArgs;
+use crate::bench::args::PaperArgs;
 use crate::exit::{Exit, Failure, suggest};
 use crate::output::{check_target, print_line, write_file};
 use crate::progress::Bar;
