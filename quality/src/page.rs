@@ -21,7 +21,7 @@ Gaussian, the same in all directions; its standard deviation is given in percent
 second, which is shifted by so many percent of the diagonal and turned by 0.1°. `uneven` has dense and sparse patches, \
 `striped` dense and sparse stripes, `gradient` a density that falls to a twentieth.
 
-One ray through the centre of each pixel tells what is truly there. Five ways to draw the points are compared:
+One ray through the centre of each pixel tells what is truly there. These ways to draw the points are compared:
 
 - **ours**: this project with its default settings.
 - **paper**: the paper's, k = 10.

@@ -1,4 +1,4 @@
-//! Pictures lit by this crate against the renderer's own.
+//! Pictures lit from depths and normals against those that the renderer made at once.
 
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::DVec3;

@@ -44,14 +44,14 @@ const NONE: f64 = f64::NAN;
 /// One line for each case. Set anew when pictures got better: what was measured, with a few percent to spare.
 #[rustfmt::skip]
 const LIMITS: [Limits; 8] = [
-    Limits { case: "figure:60K own", normals: [7.4, 9.4], ratios: [1.24, 1.25], flipped: 0.53, holes: 0.02, leaks: 0.02, before: 0.55, iou: 0.948, depth_px: 0.55, psnr: 20.5, flip: 0.103, motion: [1.40, 1.60] },
-    Limits { case: "two-scales:150K own", normals: [5.7, 10.2], ratios: [1.23, 1.25], flipped: 0.53, holes: 0.02, leaks: 0.02, before: 1.15, iou: 0.961, depth_px: 0.41, psnr: 22.2, flip: 0.069, motion: [NONE; 2] },
-    Limits { case: "statue:150K own", normals: [21.0, 22.3], ratios: [1.07, 1.05], flipped: 0.63, holes: 0.02, leaks: 0.02, before: 1.31, iou: 0.951, depth_px: 0.96, psnr: 18.7, flip: 0.183, motion: [NONE; 2] },
-    Limits { case: "statue:150K near", normals: [16.2, 22.7], ratios: [1.04, 1.04], flipped: 1.28, holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 1.76, psnr: 20.4, flip: 0.160, motion: [NONE; 2] },
-    Limits { case: "bumpy:200K front", normals: [0.52, 1.56], ratios: [1.15, 1.25], flipped: 0.02, holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.996, depth_px: 0.14, psnr: 34.3, flip: 0.012, motion: [NONE; 2] },
-    Limits { case: "bumpy:200K-uneven front", normals: [0.78, 2.02], ratios: [1.07, 1.14], flipped: 0.02, holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.996, depth_px: 0.19, psnr: 34.7, flip: 0.016, motion: [NONE; 2] },
-    Limits { case: "bumpy:200K-noise0.3% front", normals: [28.8, 37.8], ratios: [5.60, 3.93], flipped: 3.1, holes: 0.19, leaks: 0.02, before: 4.7, iou: 0.947, depth_px: 5.8, psnr: 17.5, flip: 0.280, motion: [44.0, 25.2] },
-    Limits { case: "bumpy:200K-outliers2% front", normals: [15.1, 57.2], ratios: [26.6, 41.1], flipped: 5.2, holes: 0.11, leaks: 0.04, before: 20.6, iou: 0.444, depth_px: 9.4, psnr: 9.7, flip: 0.546, motion: [NONE; 2] },
+    Limits { case: "figure:60K own", normals: [7.4, 9.4], ratios: [1.24, 1.25], flipped: 0.51, holes: 0.02, leaks: 0.02, before: 0.52, iou: 0.948, depth_px: 0.54, psnr: 21.4, flip: 0.112, motion: [1.38, 1.50] },
+    Limits { case: "two-scales:150K own", normals: [5.7, 10.2], ratios: [1.23, 1.25], flipped: 0.51, holes: 0.02, leaks: 0.02, before: 1.13, iou: 0.961, depth_px: 0.41, psnr: 23.6, flip: 0.082, motion: [NONE; 2] },
+    Limits { case: "statue:150K own", normals: [22.5, 23.5], ratios: [1.15, 1.10], flipped: 0.66, holes: 0.02, leaks: 0.02, before: 1.28, iou: 0.951, depth_px: 0.97, psnr: 18.4, flip: 0.233, motion: [NONE; 2] },
+    Limits { case: "statue:150K near", normals: [16.2, 22.7], ratios: [1.04, 1.04], flipped: 1.26, holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 1.74, psnr: 20.3, flip: 0.187, motion: [NONE; 2] },
+    Limits { case: "bumpy:200K front", normals: [0.52, 1.56], ratios: [1.15, 1.25], flipped: 0.02, holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.996, depth_px: 0.14, psnr: 37.4, flip: 0.016, motion: [NONE; 2] },
+    Limits { case: "bumpy:200K-uneven front", normals: [0.78, 2.02], ratios: [1.07, 1.14], flipped: 0.02, holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.996, depth_px: 0.19, psnr: 36.9, flip: 0.021, motion: [NONE; 2] },
+    Limits { case: "bumpy:200K-noise0.3% front", normals: [5.8, 7.9], ratios: [1.12, 0.82], flipped: 0.03, holes: 0.03, leaks: 0.02, before: 0.55, iou: 0.977, depth_px: 1.53, psnr: 25.1, flip: 0.121, motion: [2.60, 2.05] },
+    Limits { case: "bumpy:200K-outliers2% front", normals: [3.95, 13.9], ratios: [6.9, 9.9], flipped: 1.35, holes: 0.02, leaks: 0.02, before: 4.3, iou: 0.859, depth_px: 1.70, psnr: 16.0, flip: 0.168, motion: [NONE; 2] },
 ];
 
 /// What of a picture is beyond its limits.
@@ -152,6 +152,19 @@ fn bumpy_with_noise() {
 #[test]
 fn bumpy_with_outliers() {
     hold("bumpy:200K-outliers2% front");
+}
+
+/// Without what is adapted to noise the limits would not be met.
+#[test]
+fn the_papers_settings_are_not_enough_for_noise() {
+    for name in ["bumpy:200K-noise0.3% front", "bumpy:200K-outliers2% front"] {
+        let case = Case { motion: false, ..quick().into_iter().find(|case| case.name() == name).expect("this case") };
+        let subject = Subject::new(case.recipe).expect("a subject");
+        let mut painter = Painter::new(&subject);
+        let (outcome, _) = measure(&case, &subject, &mut painter, &[Method::Paper]).expect("a measured case");
+        let found = misses(outcome.of(Method::Paper).expect("a picture"), limits_of(&case)).join("\n");
+        notices(&found, &["normals", "before", "IoU", "PSNR", "FLIP"]);
+    }
 }
 
 #[test]

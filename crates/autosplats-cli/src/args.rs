@@ -162,7 +162,7 @@ pub(crate) struct CameraArgs {
 #[command(next_help_heading = "Surface")]
 pub(crate) struct SurfaceArgs {
     /// Neighbours of each point that its splat is made from, 1 to 64; more is smoother. 'auto' takes 10, and more, up to
-    /// thousands, where points scatter about the surface
+    /// thousands, where points scatter about the surface, and shows points on no surface as dots or not at all
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
     /// How the neighbours are found
@@ -184,7 +184,7 @@ pub(crate) struct SurfaceArgs {
         conflicts_with = "keep_outliers"
     )]
     pub(crate) e0: u32,
-    /// Keep points that have no neighbour
+    /// Keep points that have no neighbour, or are far from all of them
     #[arg(long)]
     pub(crate) keep_outliers: bool,
     /// How much emptier the surroundings have to become for a group of points to end there, above 1

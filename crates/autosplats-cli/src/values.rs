@@ -6,6 +6,7 @@ use std::str::FromStr;
 use autosplats::{Background, ColorMode, MAX_SIDE, Reconstruction};
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{DepthCamera, parse_count};
+use serde::{Serialize, Serializer};
 
 /// The colour modes by name; any other name is a field's.
 pub(crate) const COLOR_MODES: [&str; 11] = [
@@ -48,6 +49,15 @@ impl FromStr for Neighbors {
             _ if text == "auto" => Ok(Self::Auto),
             Ok(k) => Ok(Self::Count(k)),
             _ => Err("a number of neighbours is a whole number, or 'auto'".into()),
+        }
+    }
+}
+
+impl Serialize for Neighbors {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Auto => serializer.serialize_str("auto"),
+            Self::Count(k) => serializer.serialize_u32(*k),
         }
     }
 }

@@ -361,6 +361,8 @@ fn images_of_points_are_seen_from_the_origin_unless_they_were_moved() {
     let identity = "0 0 0 1 0 0 0";
     let seen = [Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..1200 }];
     assert_eq!(scans(40, &points, identity), seen, "as the camera has them");
+    let none = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 0\nHEIGHT 2\nPOINTS 2\nDATA ascii\n0 0 1\n0 1 1\n";
+    assert_eq!(load("a.pcd", none.as_bytes()).scans(), [], "an image without a width");
     let turned: Vec<DVec3> = points.iter().map(|point| DVec3::new(point.z, -point.x, -point.y)).collect();
     assert_eq!(scans(40, &turned, identity), seen, "turned about it");
     let moved: Vec<DVec3> = points.iter().map(|point| *point + DVec3::new(3.0, 0.0, -3.0)).collect();

@@ -2,10 +2,10 @@
 //!
 //! The method is Preiner, Jeschke and Wimmer, "Auto Splats: Dynamic Point Cloud Visualization on the GPU" (EGPGV 2012): no
 //! normals, no radii and no preprocessing are needed, because the surface is found anew for the points visible in each
-//! frame. A frame is five stages, each a module of this crate that owns the type that leaves it:
+//! frame. A frame is six stages, each a module of this crate that owns the type that leaves it:
 //!
 //! ```text
-//! PointCloud --project--> ScreenPoints --search--> Neighborhoods --fit--> Surfels --splat--> GBuffer --shade--> Image
+//! PointCloud --project--> ScreenPoints --search--> Neighborhoods --fit--> Surfels --adapt--> Surfels --splat--> GBuffer --shade--> Image
 //! ```
 //!
 //! ```

@@ -283,7 +283,14 @@ fn poison_changes_nothing() {
     let poison = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e38, 1e38, 1e30, -1e25];
     let rules = [
         Reconstruction::default(),
-        Reconstruction { k: 64, outlier_expansions: None, gap_factor: None, ..Reconstruction::default() },
+        // Far points kept in the picture make slabs of cells thicker, and a pixel of a silhouette may come free: not adaptive.
+        Reconstruction {
+            k: 64,
+            outlier_expansions: None,
+            gap_factor: None,
+            adaptive: false,
+            ..Reconstruction::default()
+        },
     ];
     for camera in cameras() {
         for (name, positions) in test_clouds::all(3000) {

@@ -17,6 +17,7 @@ use crate::output::print_line;
 use crate::progress::Bar;
 use crate::render::{render_failure, scene_camera};
 use crate::threads::start_threads;
+use crate::values::Neighbors;
 
 /// Frames before those that count: buffers are made, caches filled, clocks sped up.
 const WARM_UP: usize = 3;
@@ -30,8 +31,7 @@ struct Bench<'a> {
     version: &'static str,
     scene: &'a str,
     size: [u32; 2],
-    /// A number, or `auto`.
-    k: String,
+    k: Neighbors,
     engine: String,
     /// Frames measured; times are medians of them.
     frames: usize,
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         version: env!("CARGO_PKG_VERSION"),
         scene,
         size: *size,
-        k: k.to_string(),
+        k: *k,
         engine: engine.name(),
         frames: *frames,
         stream: *stream,

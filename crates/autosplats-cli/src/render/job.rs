@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use autosplats::{Backend, Background, ColorMap, ColorMode, Reconstruction, Settings, Shading};
+use autosplats::{Backend, Background, ColorMap, ColorMode, MAX_SIDE, Reconstruction, Settings, Shading};
 use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
@@ -65,6 +65,11 @@ impl Job {
             check_target(target, inputs.files().chain(camera.file()))?;
         }
         let [width, height] = size.map(|side| u64::from(side) * u64::from(supersample));
+        if width.max(height) > u64::from(MAX_SIDE) {
+            return Err(Failure::usage(format!(
+                "--supersample {supersample} renders {width}x{height}, and pictures have at most {MAX_SIDE} pixels a side"
+            )));
+        }
         check_memory(&format!("a picture of {width}x{height}"), width * height * BYTES_PER_PIXEL)
             .map_err(read_failure)?;
         let SurfaceArgs { backend, first_radius, .. } = surface;

@@ -25,6 +25,7 @@ override THICKEST: f32;
 override THICKEST_FIRST: f32;
 override SCATTER: f32;
 override AGREE: f32;
+override FARTHEST: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
 override DOT_PX: f32;
@@ -102,7 +103,11 @@ fn choose(surfel: Surfel, noise: f32, enough: f32) -> Quadric {
         }
     }
     if count == 0u {
-        return fallback;
+        best = fallback;
+    }
+    // A quadric further away is another surface.
+    if !(abs(best.height) <= FARTHEST * noise) {
+        return Quadric();
     }
     return best;
 }

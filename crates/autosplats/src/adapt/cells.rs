@@ -113,8 +113,10 @@ struct Slabs {
 impl Slabs {
     fn new(side_px: usize, view: &View) -> Self {
         // Depths between two powers of two share 2²³ steps.
-        let share = (side_px as f32 / view.focal_px).min(1.0);
-        let shift = (23 - ((1.0 / share) as u32).max(1).ilog2().min(23)).min(23);
+        let side = side_px as f32;
+        // The difference of bits is the logarithm rounded down, the same on every device.
+        let doublings = (view.focal_px.max(side).to_bits() - side.to_bits()) >> 23;
+        let shift = 23 - doublings.min(23);
         Self { perspective: view.perspective, shift, per_unit: view.focal_px / side_px as f32 }
     }
 

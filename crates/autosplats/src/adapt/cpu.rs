@@ -32,6 +32,8 @@ pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
 pub(super) const AGREE: f32 = 3.0;
 
+/// A surfel moves at most this many times the noise; a quadric further away is another surface.
+pub(super) const FARTHEST: f32 = 6.0;
 /// Points whose surface variation times k-radius, in usual k-radii, is above this are drawn as dots. At edges and corners
 /// it is up to 0.15 times as many usual k-radii as the points there are apart; in a cloud that fills space 0.2 times.
 pub(super) const STRAY_DOT: f32 = 0.4;
@@ -172,7 +174,8 @@ fn choose<S: Simd>(
             break;
         }
     }
-    if count == 0 { fallback } else { best }
+    let quadric = if count == 0 { fallback } else { best };
+    quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
 }
 
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.

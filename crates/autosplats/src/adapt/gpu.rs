@@ -2,7 +2,8 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, DOT_PX, ENOUGH, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_SLOPE,
+    AGREE, DOT_PX, ENOUGH, FARTHEST, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX,
+    TINY_SLOPE,
 };
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
@@ -129,6 +130,7 @@ impl AdaptPasses {
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("SCATTER", SCATTER.into()),
                 ("AGREE", AGREE.into()),
+                ("FARTHEST", FARTHEST.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),

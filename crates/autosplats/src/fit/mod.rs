@@ -23,7 +23,7 @@ pub(crate) use given::{GivenPlanes, place};
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Surfel {
-    /// The point itself, view space.
+    /// The point itself, or where the surface is that was fitted to noisy ones, view space.
     pub(crate) center: [f32; 3],
     /// Semi-minor axis, world units; 0 if the point was discarded.
     pub(crate) radius: f32,
@@ -37,7 +37,7 @@ pub(crate) struct Surfel {
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
-    /// Pixel column in the low, row in the high 16 bits.
+    /// Of the centre: pixel column in the low, row in the high 16 bits.
     pub(crate) pixel: u32,
     /// Index in the cloud.
     pub(crate) source: u32,

@@ -103,7 +103,7 @@ impl CpuRenderer {
         let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
         clock.lap(|timings| &mut timings.project);
 
-        if settings_splat.adaptive {
+        if settings_splat.adaptive && given.is_none() {
             adapter.begin(screen, &view, settings_splat.k);
             clock.lap(|timings| &mut timings.adapt);
         }

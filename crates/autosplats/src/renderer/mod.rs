@@ -49,7 +49,7 @@ pub struct Counts {
     pub passive: usize,
     /// Passive points that turned out not to be hidden and were reconstructed in the second pass.
     pub recovered: usize,
-    /// Points discarded because they have no neighbour.
+    /// Points discarded because they have no neighbour, or because they are far from all of them and on no surface.
     pub outliers: usize,
     /// Points that kept fewer than k neighbours, because of a gap or of the bound on search work.
     pub clamped: usize,
@@ -197,7 +197,7 @@ impl Renderer {
     }
 
     /// Renders `cloud` with normals and radii found beforehand instead of on the fly: what [`estimate_normals`] gives for
-    /// the same `k`, on either side. Neither outliers nor gaps are looked for, and splats are circles whatever
+    /// the same `k`, on either side. Neither outliers, gaps nor noise are looked for, and splats are circles whatever
     /// [`ellipses`](Reconstruction::ellipses) says. A point with a normal that is not finite, or a radius that is not finite or
     /// not above 0, draws nothing and is counted as an outlier. On the CPU only.
     ///

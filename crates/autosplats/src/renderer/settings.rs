@@ -21,7 +21,8 @@ pub struct Reconstruction {
     /// Neighbours per point, 1 to 64.
     pub k: u32,
     /// Fit larger neighbourhoods, of up to thousands of points, where points scatter too much for k neighbours to tell the
-    /// surface, and move splats onto what is fitted. A scan without noise is left as it is.
+    /// surface, and move splats onto what is fitted, as circles. Points far from their neighbours and on no surface become
+    /// dots or, unless outliers are kept, are discarded. A surface without noise is left as it is.
     pub adaptive: bool,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
@@ -33,7 +34,8 @@ pub struct Reconstruction {
     pub gap_factor: Option<f32>,
     /// Factor on every splat radius, 0.01 to 10.
     pub splat_scale: f32,
-    /// Draw ellipses along the principal axes of each neighbourhood instead of circles [Paper, §6].
+    /// Draw ellipses along the principal axes of each neighbourhood instead of circles [Paper, §6], but for splats that
+    /// [`adaptive`](Self::adaptive) fitted.
     pub ellipses: bool,
     /// Reconstruct points behind the nearest one of their screen cell only where they turn out visible [Paper, §7].
     pub grid_culling: bool,

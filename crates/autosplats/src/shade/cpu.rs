@@ -20,7 +20,7 @@ pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 /// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
 /// the 255.
 pub(super) const ENCODE_STEPS: usize = 1 << 13;
-/// Rows that a thread shades at a time.
+/// Least rows that a thread shades at a time; as many as occlusion reaches if that is more.
 const BAND: usize = 32;
 /// Pixels looked at to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
@@ -59,16 +59,17 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep
     image.linear.resize(if keep_linear { width * height } else { 0 }, [0.0; 3]);
     let shader = Shader::new(layers, scene, shading);
     let inks = Inks { table: encode_table(), linear: linear_steps() };
-    let bands = image.pixels.par_chunks_mut(width * BAND).enumerate();
+    let rows = BAND.max(reach(&shader.pairs));
+    let bands = image.pixels.par_chunks_mut(width * rows).enumerate();
     if keep_linear {
-        bands.zip(image.linear.par_chunks_mut(width * BAND)).for_each_init(
+        bands.zip(image.linear.par_chunks_mut(width * rows)).for_each_init(
             Band::default,
             |band, ((i, pixels), linear)| {
-                band.shade(&shader, &inks, i * BAND, pixels, linear);
+                band.shade(&shader, &inks, i * rows, pixels, linear);
             },
         );
     } else {
-        bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, &inks, i * BAND, pixels, &mut []));
+        bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, &inks, i * rows, pixels, &mut []));
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
         let encode = |channel| encode(&inks.table, channel);

@@ -17,7 +17,7 @@ struct Neighborhood {
 
 // An oriented disc in view space.
 struct Surfel {
-    // The point itself.
+    // The point itself, or where the surface is that was fitted to noisy ones.
     center: vec3f,
     // Semi-minor axis, world units; 0 if the point was discarded.
     radius: f32,

@@ -138,7 +138,9 @@ fn at_the_origin(points: usize) -> Scan {
 /// An image of points was taken by a sensor. Where the file says no more than the default that was its origin, unless the
 /// points were moved since: seen from there, neighbours in a row are about the same angle apart, near or far.
 fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
-    let Some(width) = header.width.filter(|_| header.viewpoint == Viewpoint::Identity && header.height > 1) else {
+    let Some(width) =
+        header.width.filter(|&width| width > 0 && header.viewpoint == Viewpoint::Identity && header.height > 1)
+    else {
         return false;
     };
     let ray = |i: usize| cloud.world_position(i).try_normalize().filter(|ray| ray.is_finite());

@@ -51,7 +51,7 @@ pub(crate) fn has_sensors(cloud: &PointCloud) -> bool {
 /// Where a scan's sensor stood, about the cloud's origin.
 fn position(cloud: &PointCloud, scan: &Scan) -> Option<[f32; 3]> {
     let position = (scan.position() - cloud.origin()).as_vec3();
-    (position.abs().max_element() <= FARTHEST).then_some(position.to_array())
+    (position.is_finite() && position.abs().max_element() <= FARTHEST).then_some(position.to_array())
 }
 
 impl Sensors {
