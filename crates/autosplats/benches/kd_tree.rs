@@ -16,7 +16,7 @@ use autosplats::cloud::{
     PointCloud,
     glam::{DVec3, Vec3},
 };
-use autosplats::{Camera, Projection, Renderer, Settings};
+use autosplats::{Camera, Projection, Reconstruction, Renderer, Settings};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
@@ -62,9 +62,11 @@ fn main() {
 
 /// Times one cloud and prints a line of the table.
 fn compare(name: &str, order: &str, cloud: &PointCloud, camera: &Camera, rounds: usize) {
-    let mut unculled = Settings::default();
+    // What the kd-tree is asked for: no more than k neighbours.
+    let reconstruction = Reconstruction { adaptive: false, ..Reconstruction::default() };
+    let settings = Settings { reconstruction, ..Settings::default() };
+    let mut unculled = settings.clone();
     unculled.reconstruction.grid_culling = false;
-    let settings = Settings::default();
     let mut renderer = Renderer::new();
     let visible = visible_points(&mut renderer, cloud, camera, &unculled);
     // The first frame makes the buffers, as the first of many does.
