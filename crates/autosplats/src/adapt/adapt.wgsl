@@ -132,16 +132,17 @@ fn move_onto(place: u32, surfel: Surfel, quadric: Quadric) {
 
 // Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
 fn shrink(place: u32, surfel: Surfel) {
-    let stray = surfel.curvature * surfel.k_radius;
     let usual = measured[2];
     // A handful of points has nothing that is usual.
     if usual == 0.0 {
         return;
     }
-    if stray > STRAY_DROPPED * usual && frame.keep_outliers == 0u {
+    let ratio = surfel.k_radius / usual;
+    let stray = surfel.curvature * ratio * ratio;
+    if stray > STRAY_DROPPED && frame.keep_outliers == 0u {
         surfels[place].radius = 0.0;
         atomicAdd(&counters[OUTLIERS], 1u);
-    } else if stray > STRAY_DOT * usual {
+    } else if stray > STRAY_DOT {
         surfels[place].radius = min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
     }
 }

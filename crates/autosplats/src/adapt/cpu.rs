@@ -34,11 +34,12 @@ pub(super) const AGREE: f32 = 3.0;
 
 /// A surfel moves at most this many times the noise; a quadric further away is another surface.
 pub(super) const FARTHEST: f32 = 6.0;
-/// Points whose surface variation times k-radius, in usual k-radii, is above this are drawn as dots. At edges and corners
-/// it is up to 0.15 times as many usual k-radii as the points there are apart; in a cloud that fills space 0.2 times.
-pub(super) const STRAY_DOT: f32 = 0.4;
+/// Points whose surface variation, times the square of the k-radius in usual ones, is above this are drawn as dots. Surface
+/// variation is up to 0.15 at edges and corners, which stay where points are up to four times as far apart as usual; in a
+/// cloud that fills space it is 0.2 by mean, and much less for some.
+pub(super) const STRAY_DOT: f32 = 2.5;
 /// And above this they are outliers.
-pub(super) const STRAY_DROPPED: f32 = 0.9;
+pub(super) const STRAY_DROPPED: f32 = 5.0;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
@@ -181,14 +182,15 @@ fn choose<S: Simd>(
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
 #[inline(always)]
 fn shrink(surfel: &mut Surfel, task: &Task) {
-    let stray = surfel.curvature * surfel.k_radius;
     // A handful of points has nothing that is usual.
     if task.usual.k_radius == 0.0 {
         return;
     }
-    if stray > STRAY_DROPPED * task.usual.k_radius && !task.keep_outliers {
+    let ratio = surfel.k_radius / task.usual.k_radius;
+    let stray = surfel.curvature * ratio * ratio;
+    if stray > STRAY_DROPPED && !task.keep_outliers {
         surfel.radius = 0.0;
-    } else if stray > STRAY_DOT * task.usual.k_radius {
+    } else if stray > STRAY_DOT {
         surfel.radius = surfel.radius.min(DOT_PX * task.view.pixel_size(surfel.center[2]));
     }
 }
