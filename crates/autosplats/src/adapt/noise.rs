@@ -37,7 +37,7 @@ pub(crate) struct Usual {
 }
 
 /// Standard deviation of points from their surface: `factor`·depthᵖ, world units. Where it is more than half the distance of
-/// points it is measured too large, up to three times at two distances: clusters that noise puts into slabs of their own
+/// points it is measured too large, three times at nearly three distances: clusters that noise puts into slabs of their own
 /// weigh like as many that it does not. Larger neighbourhoods than needed are the consequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {

@@ -1,5 +1,7 @@
 //! Shading on the CPU, row by row.
 
+use std::sync::LazyLock;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -58,34 +60,34 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep
     image.linear.clear();
     image.linear.resize(if keep_linear { width * height } else { 0 }, [0.0; 3]);
     let shader = Shader::new(layers, scene, shading);
-    let inks = Inks { table: encode_table(), linear: linear_steps() };
+    let inks = &Inks { table: encode_table(), linear: linear_steps() };
     let rows = BAND.max(reach(&shader.pairs));
     let bands = image.pixels.par_chunks_mut(width * rows).enumerate();
     if keep_linear {
         bands.zip(image.linear.par_chunks_mut(width * rows)).for_each_init(
             Band::default,
             |band, ((i, pixels), linear)| {
-                band.shade(&shader, &inks, i * rows, pixels, linear);
+                band.shade(&shader, inks, i * rows, pixels, linear);
             },
         );
     } else {
-        bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, &inks, i * rows, pixels, &mut []));
+        bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, inks, i * rows, pixels, &mut []));
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
-        let encode = |channel| encode(&inks.table, channel);
+        let encode = |channel| encode(inks.table, channel);
         legend::draw(image, shading, scale, scene.value_offset(&shading.color), encode);
     }
 }
 
 /// From linear light to 8-bit sRGB and back.
 struct Inks {
-    table: Vec<u8>,
+    table: &'static [u8],
     linear: [f32; 256],
 }
 
 impl Inks {
     fn encode(&self, color: [f32; 3]) -> [u8; 4] {
-        let [r, g, b] = color.map(|channel| encode(&self.table, channel));
+        let [r, g, b] = color.map(|channel| encode(self.table, channel));
         [r, g, b, 255]
     }
 
@@ -339,6 +341,9 @@ pub(super) fn encode(table: &[u8], channel: f32) -> u8 {
 }
 
 /// 8-bit sRGB channels of linear ones from 0 to 1.
-pub(super) fn encode_table() -> Vec<u8> {
-    (0..=ENCODE_STEPS).map(|step| (srgb(step as f32 / ENCODE_STEPS as f32) * 255.0).round() as u8).collect()
+pub(super) fn encode_table() -> &'static [u8] {
+    static TABLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        (0..=ENCODE_STEPS).map(|step| (srgb(step as f32 / ENCODE_STEPS as f32) * 255.0).round() as u8).collect()
+    });
+    &TABLE
 }

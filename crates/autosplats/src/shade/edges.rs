@@ -152,7 +152,7 @@ fn is_inside([width, height]: [usize; 2], x: isize, y: isize) -> bool {
 mod tests {
     use super::*;
     use crate::camera::{Camera, Projection};
-    use crate::splat::{GBuffer, TILE};
+    use crate::splat::GBuffer;
     use glam::DVec3;
 
     const SIZE: usize = 48;
@@ -164,9 +164,7 @@ mod tests {
 
     /// Depths of a picture, by the middle of each pixel.
     fn depths(of: impl Fn(f32, f32) -> f32) -> Depths {
-        let area = TILE * TILE;
-        let mut layers =
-            GBuffer { width: SIZE as u32, height: SIZE as u32, depth: vec![f32::INFINITY; area], ..GBuffer::default() };
+        let mut layers = GBuffer::new(SIZE as u32, SIZE as u32);
         for pixel in 0..SIZE * SIZE {
             let [x, y] = [pixel % SIZE, pixel / SIZE];
             let at = layers.index(x, y);

@@ -71,7 +71,7 @@ impl ShadeBuffers {
         let pixels = width * height;
         let samples = pixels.div_ceil(sample_step(pixels));
         let tables = gpu.storage::<u32>("tables of shading", encode_words() + height)?;
-        let mut encode = encode_table();
+        let mut encode = encode_table().to_vec();
         encode.resize(4 * encode_words(), 0);
         gpu.queue.write_buffer(&tables, 0, &encode);
         Ok(Self {

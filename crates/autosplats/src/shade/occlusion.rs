@@ -122,7 +122,7 @@ mod tests {
     use super::super::depths::LANES;
     use super::*;
     use crate::camera::{Camera, Projection};
-    use crate::splat::{GBuffer, TILE_AREA};
+    use crate::splat::GBuffer;
     use crate::test_clouds::Random;
     use glam::DVec3;
 
@@ -139,8 +139,7 @@ mod tests {
         let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
         let view = camera.view(DVec3::ZERO, [SIZE as u32; 2]).expect("a view");
         let side = SIZE as u32;
-        let mut layers =
-            GBuffer { width: side, height: side, depth: vec![f32::INFINITY; TILE_AREA], ..GBuffer::default() };
+        let mut layers = GBuffer::new(side, side);
         for pixel in 0..SIZE * SIZE {
             let [x, y] = [pixel % SIZE, pixel / SIZE];
             let at = layers.index(x, y);

@@ -4,7 +4,7 @@ use autosplats_cloud::glam::DVec3;
 
 use super::*;
 use crate::camera::{Camera, Projection, View};
-use crate::splat::{GBuffer, TILE_AREA};
+use crate::splat::GBuffer;
 
 #[test]
 fn srgb_round_trip() {
@@ -22,17 +22,7 @@ fn view(size: [u32; 2]) -> View {
 /// A wall at depth 2 that faces the eye and covers the left half of the picture.
 fn half_a_wall(size: [u32; 2]) -> GBuffer {
     let [width, height] = size;
-    let tiles = width.div_ceil(64) * height.div_ceil(64);
-    let area = TILE_AREA * tiles as usize;
-    let mut layers = GBuffer {
-        width,
-        height,
-        weight: vec![0.0; area],
-        depth: vec![f32::INFINITY; area],
-        normal: vec![[0.0; 3]; area],
-        point: vec![u32::MAX; area],
-        ..GBuffer::default()
-    };
+    let mut layers = GBuffer::new(width, height);
     for pixel in 0..(width / 2 * height) as usize {
         let index = layers.index(pixel % (width / 2) as usize, pixel / (width / 2) as usize);
         layers.weight[index] = 1.0;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::camera::{Camera, Projection};
-use crate::splat::{GBuffer, TILE_AREA};
+use crate::splat::GBuffer;
 use crate::{Renderer, Settings};
 
 /// Samples along each side of a pixel.
@@ -60,16 +60,7 @@ fn traced(exact: &ExactScene, camera: &Camera, [width, height]: [u32; 2]) -> GBu
             Some(((hit.distance * direction.dot(forward)) as f32, normal))
         })
         .collect();
-    let area = TILE_AREA * (width.div_ceil(64) * height.div_ceil(64)) as usize;
-    let mut layers = GBuffer {
-        width,
-        height,
-        weight: vec![0.0; area],
-        depth: vec![f32::INFINITY; area],
-        normal: vec![[0.0; 3]; area],
-        point: vec![u32::MAX; area],
-        ..GBuffer::default()
-    };
+    let mut layers = GBuffer::new(width, height);
     for (pixel, hit) in hits.into_iter().enumerate() {
         let at = layers.index(pixel % width as usize, pixel / width as usize);
         if let Some((depth, normal)) = hit {

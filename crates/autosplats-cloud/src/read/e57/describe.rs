@@ -16,7 +16,7 @@ const LISTED: usize = 100;
 pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let (pages, root) = open(job)?;
     let (major, minor) = pages.version;
-    let library = root.library.as_ref().map(|library| format!(" ({})", shown_text(library))).unwrap_or_default();
+    let writer = root.writer.as_ref().map(|writer| format!(" ({})", shown_text(writer))).unwrap_or_default();
     let mut attributes: Vec<Attribute> = Vec::new();
     let mut known = std::collections::HashSet::new();
     for element in root.scans.iter().flat_map(|scan| &scan.elements) {
@@ -39,7 +39,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
         notes.push(format!("the file is cut off at byte {}", job.bytes.len()));
     }
     Ok(Description {
-        format: format!("E57 {major}.{minor}{library}"),
+        format: format!("E57 {major}.{minor}{writer}"),
         points: root.scans.iter().try_fold(0_u64, |sum, scan| sum.checked_add(scan.points)),
         bounds: bounds(&root.scans),
         attributes,

@@ -20,7 +20,7 @@ const MAX_NAMESPACES: usize = 1 << 10;
 
 /// The XML section.
 pub(super) struct Root {
-    pub(super) library: Option<String>,
+    pub(super) writer: Option<String>,
     pub(super) guid: Option<String>,
     /// Seconds of GPS time.
     pub(super) created: Option<f64>,
@@ -32,9 +32,9 @@ pub(super) struct Root {
 }
 
 impl Root {
-    /// Whether this library wrote the file.
+    /// Whether the file is one of ours.
     pub(super) fn is_ours(&self) -> bool {
-        self.library.as_ref().is_some_and(|library| library.starts_with("autosplats "))
+        self.writer.as_ref().is_some_and(|writer| writer.starts_with("autosplats "))
     }
 }
 
@@ -123,7 +123,7 @@ impl Root {
             [first, ..] => notes.push(format!("{} scans have no points, the first is scan {first}", empty.len())),
         }
         Ok(Self {
-            library: text(root, "e57LibraryVersion"),
+            writer: text(root, "e57LibraryVersion"),
             guid: text(root, "guid"),
             created: time(root, "creationDateTime"),
             crs: crs(text(root, "coordinateMetadata").as_deref()),

@@ -38,6 +38,6 @@ pub(crate) fn finish(read: &ReadPicture<'_>, scene: &Scene<'_>, shading: &Shadin
         let scale = Scale::new(shading.color_map.unwrap_or(map), range);
         let table = encode_table();
         let offset = scene.value_offset(&shading.color);
-        legend::draw(image, shading, &scale, offset, |channel| encode(&table, channel));
+        legend::draw(image, shading, &scale, offset, |channel| encode(table, channel));
     }
 }

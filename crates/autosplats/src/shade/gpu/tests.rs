@@ -11,7 +11,7 @@ use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::{COUNTERS, Counter};
-use crate::splat::{GBuffer, TILE_AREA, upload_layers};
+use crate::splat::{GBuffer, upload_layers};
 use crate::test_clouds::{self, EYE, Random};
 use crate::{Renderer, Settings};
 
@@ -122,16 +122,7 @@ fn assert_same(host: &Image, device: &Image, shading: &Shading, case: &str) {
 
 fn layers_of(size: [u32; 2]) -> GBuffer {
     let [width, height] = size;
-    let area = TILE_AREA * (width.div_ceil(64) * height.div_ceil(64)) as usize;
-    GBuffer {
-        width,
-        height,
-        weight: vec![0.0; area],
-        depth: vec![f32::INFINITY; area],
-        normal: vec![[0.0; 3]; area],
-        point: vec![u32::MAX; area],
-        ..GBuffer::default()
-    }
+    GBuffer::new(width, height)
 }
 
 /// Blocks of pixels at any depth and under any light, some of them empty, with every layer but colour.
