@@ -52,6 +52,7 @@ impl Method {
 pub fn paper() -> Reconstruction {
     Reconstruction {
         k: 10,
+        points_per_pixel: 1,
         adaptive: false,
         engine: SearchEngine::default(),
         outlier_expansions: Some(1),

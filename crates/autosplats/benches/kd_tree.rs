@@ -63,7 +63,7 @@ fn main() {
 /// Times one cloud and prints a line of the table.
 fn compare(name: &str, order: &str, cloud: &PointCloud, camera: &Camera, rounds: usize) {
     // What the kd-tree is asked for: no more than k neighbours.
-    let reconstruction = Reconstruction { adaptive: false, ..Reconstruction::default() };
+    let reconstruction = Reconstruction::paper();
     let settings = Settings { reconstruction, ..Settings::default() };
     let mut unculled = settings.clone();
     unculled.reconstruction.grid_culling = false;

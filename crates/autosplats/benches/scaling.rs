@@ -18,7 +18,7 @@ fn main() {
     };
     println!("{}, the cathedral\n", machine());
     // The table has a column for each of the paper's stages.
-    let reconstruction = Reconstruction { adaptive: false, ..Reconstruction::default() };
+    let reconstruction = Reconstruction::paper();
     let settings = Settings { reconstruction, ..Settings::default() };
     println!(
         "| points | visible | project | search | fit | splat | shade | frame ms | project, ns a point \

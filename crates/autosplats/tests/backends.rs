@@ -157,6 +157,7 @@ fn every_setting() {
         ("small splats", Reconstruction { splat_scale: 0.3, ..usual() }),
         ("huge splats", Reconstruction { splat_scale: 10.0, ..usual() }),
         ("ellipses", Reconstruction { ellipses: true, ..usual() }),
+        ("one point a pixel", Reconstruction { points_per_pixel: 1, ..usual() }),
         ("no culling", Reconstruction { grid_culling: false, ..usual() }),
         ("no refinement", Reconstruction { depth_refinement: false, ..usual() }),
     ];
@@ -186,8 +187,7 @@ fn adapted_to_noise() {
             let case = format!("{name} {count} {sigma} {k}");
             compare(&mut gpu, &cloud, &camera, SIZE, &settings, &case);
             // And as before once it is no longer asked for.
-            let as_the_paper = Reconstruction { adaptive: false, ..Reconstruction::default() };
-            let settings = Settings { reconstruction: as_the_paper, ..Settings::default() };
+            let settings = Settings { reconstruction: Reconstruction::paper(), ..Settings::default() };
             compare(&mut gpu, &cloud, &camera, SIZE, &settings, &case);
         }
     }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use autosplats::Reconstruction;
 use clap::{Args, Subcommand};
 
 use crate::args::RunArgs;
@@ -38,6 +39,9 @@ pub(crate) struct BenchArgs {
     /// Neighbours of each point, 1 to 64, or 'auto': 10, and more where points scatter
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
+    /// Points that a pixel keeps, 1 or 2
+    #[arg(long, value_name = "COUNT", default_value_t = Reconstruction::default().points_per_pixel, allow_negative_numbers = true)]
+    pub(crate) points_per_pixel: u32,
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],

@@ -57,13 +57,27 @@ struct Run {
 
 /// Renders the same frame again and again and prints the medians.
 pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let BenchArgs { evaluation, scene, engine, first_radius, backends, k, size, frames, stream, json, run } = args;
+    let BenchArgs {
+        evaluation,
+        scene,
+        engine,
+        first_radius,
+        backends,
+        k,
+        points_per_pixel,
+        size,
+        frames,
+        stream,
+        json,
+        run,
+    } = args;
     if let Some(Evaluation::Paper(args)) = evaluation {
         return paper::run(args);
     }
     start_threads(run)?;
     let mut settings = Settings::default();
     (settings.reconstruction.k, settings.reconstruction.adaptive) = k.settings();
+    settings.reconstruction.points_per_pixel = *points_per_pixel;
     settings.reconstruction.engine = engine.with_first_radius(*first_radius);
     settings.check().map_err(render_failure)?;
     let name = scene.strip_prefix("scene:").unwrap_or(scene);

@@ -136,6 +136,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
     let (k, adaptive) = surface.k.settings();
     let reconstruction = Reconstruction {
         k,
+        points_per_pixel: surface.points_per_pixel,
         adaptive,
         engine: surface.engine.with_first_radius(surface.first_radius),
         outlier_expansions: (!surface.keep_outliers).then_some(surface.e0),

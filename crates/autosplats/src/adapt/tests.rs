@@ -10,7 +10,7 @@ use super::noise::{Noise, Usual, measure};
 use super::quadric::{Gathered, Quadric};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{FitRules, Surfel, Surfels, fit};
-use crate::project::{Projector, ScreenPoints};
+use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, noisy};
 
@@ -34,7 +34,7 @@ impl Case {
         let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
         let view = camera.view(DVec3::ZERO, size).expect("a view");
         let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-        let screen = Projector::default().project(&cloud, &view, K, true).clone();
+        let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(K)).clone();
         let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0) };
         let fit_rules = FitRules { k: K, splat_scale: 1.0, ellipses: false, keep_outliers: false };
         let fitted = [&screen.active, &screen.passive].map(|queries| {

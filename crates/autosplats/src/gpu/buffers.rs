@@ -11,6 +11,16 @@ const PART: u64 = 16;
 const MOST_WASTE: u64 = 4;
 
 impl Gpu {
+    /// Whether a storage buffer may have `len` values of type `T`.
+    pub(crate) fn binds<T>(&self, len: usize) -> bool {
+        (len * size_of::<T>()) as u64 <= self.most_bound()
+    }
+
+    fn most_bound(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+
     /// A storage buffer of `len` values of type `T`, at least one; it can be copied to and from.
     ///
     /// # Errors
@@ -18,8 +28,7 @@ impl Gpu {
     pub(crate) fn storage<T>(&self, label: &'static str, len: usize) -> Result<wgpu::Buffer, Error> {
         // None may be empty; shaders take the length of an array from the size.
         let size = (len.max(1) * size_of::<T>()) as u64;
-        let limits = self.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = self.most_bound();
         if size > most {
             return Err(Error::DeviceLimit { what: label, needed: size, allowed: most });
         }

@@ -16,6 +16,7 @@ pub(crate) struct FrameUniform {
     pub(crate) near: f32,
     pub(crate) perspective: u32,
     pub(crate) k: u32,
+    pub(crate) halves: u32,
     pub(crate) grid_culling: u32,
     pub(crate) ellipses: u32,
     pub(crate) keep_outliers: u32,
@@ -26,6 +27,9 @@ pub(crate) struct FrameUniform {
     pub(crate) gap_growth: f32,
     /// Of the kd-tree search, world units.
     pub(crate) first_radius: f32,
+    pub(crate) unused_0: u32,
+    pub(crate) unused_1: u32,
+    pub(crate) unused_2: u32,
 }
 
 impl FrameUniform {
@@ -41,6 +45,7 @@ impl FrameUniform {
             near: view.near,
             perspective: view.perspective.into(),
             k,
+            halves: 0,
             grid_culling: 0,
             ellipses: 0,
             keep_outliers: 0,
@@ -48,6 +53,9 @@ impl FrameUniform {
             outlier_growth: f32::INFINITY,
             gap_growth: f32::INFINITY,
             first_radius: 1.0,
+            unused_0: 0,
+            unused_1: 0,
+            unused_2: 0,
         }
     }
 }

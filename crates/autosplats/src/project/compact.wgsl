@@ -20,14 +20,12 @@
 fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     rank_clear(local);
     let block = group_index(workgroup);
-    let area = frame.size.x * frame.size.y;
     let strip_px = counters[STRIP_PX];
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let at = block * 2048u + flag;
-        if at < area {
-            let pixel = cell_pixel(at, strip_px).pixel;
-            if keys[pixel.y * frame.size.x + pixel.x].x != EMPTY_KEY {
+        if at < arrayLength(&keys) {
+            if keys[cell_slot(at, strip_px).slot].x != EMPTY_KEY {
                 rank_set(flag);
             }
         }
@@ -37,13 +35,13 @@ fn compact(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let at = block * 2048u + flag;
-        if at < area {
-            let place = cell_pixel(at, strip_px);
+        if at < arrayLength(&keys) {
+            let place = cell_slot(at, strip_px);
             let index = before + rank_of(flag);
             if place.first {
                 cell_start[place.cell] = index;
             }
-            let key = keys[place.pixel.y * frame.size.x + place.pixel.x];
+            let key = keys[place.slot];
             if key.x != EMPTY_KEY {
                 source[index] = key.x;
                 pixels[index] = (place.pixel.y << 16u) | place.pixel.x;

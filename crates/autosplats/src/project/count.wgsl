@@ -1,4 +1,4 @@
-// Counts the screen points of each block of 2048 pixels in cell order, and of each density cell, whose nearest depth it
+// Counts the screen points of each block of 2048 slots in cell order, and of each density cell, whose nearest depth it
 // finds too [Paper, §5.1].
 //
 // Reads: keys, counters. Writes: block_sums, density.
@@ -30,12 +30,12 @@ fn count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     var own = 0u;
     for (var step = 0u; step < 8u; step++) {
         let at = block * 2048u + step * 256u + local;
-        if at < frame.size.x * frame.size.y {
-            let pixel = cell_pixel(at, strip_px).pixel;
-            let key = keys[pixel.y * frame.size.x + pixel.x];
+        if at < arrayLength(&keys) {
+            let place = cell_slot(at, strip_px);
+            let key = keys[place.slot];
             if key.x != EMPTY_KEY {
                 own += 1u;
-                let cell = density_cell(pixel, cell_px, cell_columns);
+                let cell = density_cell(place.pixel, cell_px, cell_columns);
                 atomicAdd(&density[2u * cell], 1u);
                 atomicMin(&density[2u * cell + 1u], key.y);
             }

@@ -6,7 +6,7 @@ use autosplats_cloud::PointCloud;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{DensityGrid, Dropped, ScreenCells, ScreenPoint, ScreenPoints};
+use super::{DensityGrid, Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
 use crate::camera::View;
 
 /// Points projected per task.
@@ -18,40 +18,71 @@ const EMPTY: u64 = u64::MAX;
 /// A strip is this many mean distances between screen points high: with one strip more above and below, sixteen points
 /// of a strip see their ten nearest neighbours among about a hundred candidates.
 pub(super) const STRIP_SPACINGS: f32 = 3.0;
+/// The second point of a pixel is no further behind the first than this many pixels are wide: a surface seen at 83° from its
+/// normal. What is further away is another surface, hidden most of the time.
+pub(super) const GATE_PX: f32 = 8.0;
+/// Least mean distance between screen points, in pixels: there may be two in each.
+pub(super) const LEAST_SPACING_PX: f32 = 0.5;
 /// Side in pixels of the blocks that tell covered from empty screen when the density is measured.
 const OCCUPANCY_PX: usize = 16;
 
 /// Projects clouds; keeps its buffers from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Projector {
-    /// Per pixel `depth bits << 32 | point index`: positive floats order as their bits do.
+    /// Per pixel, or half of one, `depth bits << 32 | point index`: positive floats order as their bits do.
     keys: Vec<AtomicU64>,
     screen: ScreenPoints,
 }
 
 impl Projector {
-    /// Projects `cloud`, which has fewer than 2³² points, for `view`; the density grid holds about `k` points a cell.
-    pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, k: u32, grid_culling: bool) -> &ScreenPoints {
-        let width = view.width as usize;
-        self.screen.dropped = nearest_per_pixel(cloud.positions(), view, &mut self.keys);
-        let spacing_px = mean_spacing(&self.keys, width);
-        compact(cloud.positions(), view, &self.keys, spacing_px, &mut self.screen);
-        measure_density(&self.keys, view, spacing_px, k, &mut self.screen.density);
+    /// Projects `cloud`, which has fewer than 2³² points, for `view`.
+    pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> &ScreenPoints {
+        let ProjectRules { k, halves, grid_culling } = *rules;
+        self.screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, &mut self.keys);
+        if halves {
+            erase_far_seconds(&mut self.keys, view);
+        }
+        let keys = Keys { slots: &self.keys, per_pixel: 1 + usize::from(halves), width: view.width as usize };
+        let spacing_px = mean_spacing(keys);
+        compact(cloud.positions(), view, keys, spacing_px, &mut self.screen);
+        measure_density(keys, view, spacing_px, k, &mut self.screen.density);
         split_by_depth(grid_culling, &mut self.screen);
         &self.screen
     }
 }
 
-/// Fills `keys` with the nearest point of each pixel.
-fn nearest_per_pixel(positions: &[[f32; 3]], view: &View, keys: &mut Vec<AtomicU64>) -> Dropped {
+/// The points of each pixel, in one slot or two.
+#[derive(Clone, Copy)]
+struct Keys<'a> {
+    slots: &'a [AtomicU64],
+    per_pixel: usize,
+    /// Of the picture, in pixels.
+    width: usize,
+}
+
+impl<'a> Keys<'a> {
+    /// Slots of a row of pixels.
+    fn row_len(&self) -> usize {
+        self.width * self.per_pixel
+    }
+
+    /// Rows of pixels from `rows.start` up to the end of the picture at most.
+    fn rows(&self, rows: std::ops::Range<usize>) -> std::slice::Chunks<'a, AtomicU64> {
+        let end = self.slots.len().min(rows.end * self.row_len());
+        self.slots[rows.start * self.row_len()..end].chunks(self.row_len())
+    }
+}
+
+/// Fills `keys` with the nearest point of each pixel, or each half of one.
+fn nearest_per_pixel(positions: &[[f32; 3]], view: &View, halves: bool, keys: &mut Vec<AtomicU64>) -> Dropped {
     let pixels = view.width as usize * view.height as usize;
-    keys.resize_with(pixels, AtomicU64::default);
+    keys.resize_with(pixels << u32::from(halves), AtomicU64::default);
     keys.par_chunks_mut(1 << 16).for_each(|keys| keys.iter_mut().for_each(|key| *key.get_mut() = EMPTY));
     let keys = keys.as_slice();
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
     positions.par_chunks(CHUNK).enumerate().for_each(|(chunk, positions)| {
         let first = (chunk * CHUNK) as u32;
-        let dropped = pulp::Arch::new().dispatch(|| project_chunk(positions, first, view, keys));
+        let dropped = pulp::Arch::new().dispatch(|| project_chunk(positions, first, view, halves, keys));
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
         outside.fetch_add(dropped.outside, Ordering::Relaxed);
@@ -60,36 +91,36 @@ fn nearest_per_pixel(positions: &[[f32; 3]], view: &View, keys: &mut Vec<AtomicU
     Dropped { not_finite, behind, outside }
 }
 
-/// Where a point goes: a pixel index, or why nowhere.
+/// Where a point goes: the index of a slot of the keys, or why nowhere.
 const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
 #[inline(always)]
-fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, keys: &[AtomicU64]) -> Dropped {
+fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, halves: bool, keys: &[AtomicU64]) -> Dropped {
     let mut dropped = Dropped::default();
-    let mut pixel = [0u32; LANES];
+    let mut slot = [0u32; LANES];
     let mut depth = [0f32; LANES];
     for (group, positions) in positions.chunks(LANES).enumerate() {
         if let Ok(positions) = <&[[f32; 3]; LANES]>::try_from(positions) {
             for lane in 0..LANES {
-                (pixel[lane], depth[lane]) = project_point(positions[lane], view);
+                (slot[lane], depth[lane]) = project_point(positions[lane], view, halves);
             }
         } else {
             for (lane, &position) in positions.iter().enumerate() {
-                (pixel[lane], depth[lane]) = project_point(position, view);
+                (slot[lane], depth[lane]) = project_point(position, view, halves);
             }
         }
         for lane in 0..positions.len() {
-            match pixel[lane] {
+            match slot[lane] {
                 NOT_FINITE => dropped.not_finite += 1,
                 BEHIND => dropped.behind += 1,
                 OUTSIDE => dropped.outside += 1,
-                pixel => {
+                slot => {
                     let index = first + (group * LANES + lane) as u32;
                     let key = u64::from(depth[lane].to_bits()) << 32 | u64::from(index);
                     // Most points lose; a plain load tells them so without taking the cache line from other threads.
-                    let cell = &keys[pixel as usize];
+                    let cell = &keys[slot as usize];
                     if key < cell.load(Ordering::Relaxed) {
                         cell.fetch_min(key, Ordering::Relaxed);
                     }
@@ -100,46 +131,73 @@ fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, keys: &[Atomic
     dropped
 }
 
-/// Pixel index and depth of one point, without branches.
+/// Slot and depth of one point, without branches. Halves of pixels lie side by side and one below the other in turn, like
+/// the black and the white squares of a chessboard: so no direction is seen better than another.
 #[inline(always)]
-fn project_point(position: [f32; 3], view: &View) -> (u32, f32) {
+fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32) {
     let [x, y, z] = view.to_view(position).to_array();
     let [px, py] = view.to_pixel(Vec3::new(x, y, z));
     // Inside the image the coordinates are positive, so that truncation is rounding down.
     let inside = (px >= 0.0) & (py >= 0.0) & (px < view.width as f32) & (py < view.height as f32);
-    let pixel = (py as u32).wrapping_mul(view.width).wrapping_add(px as u32);
-    let pixel = if inside { pixel } else { OUTSIDE };
-    let pixel = if z > view.near { pixel } else { BEHIND };
+    let [column, row] = [px as u32, py as u32];
+    let pixel = row.wrapping_mul(view.width).wrapping_add(column);
+    let along = if column.wrapping_add(row) & 1 == 1 { px - column as f32 } else { py - row as f32 };
+    let slot = if halves { (pixel << 1) | u32::from(along >= 0.5) } else { pixel };
+    let slot = if inside { slot } else { OUTSIDE };
+    let slot = if z > view.near { slot } else { BEHIND };
     // Finite coordinates so large that their transform is not count as not finite too.
     #[allow(clippy::eq_op, reason = "three subtractions vectorise, is_finite does not")]
     let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
-    (if finite { pixel } else { NOT_FINITE }, z)
+    (if finite { slot } else { NOT_FINITE }, z)
 }
 
 fn is_owned(key: &AtomicU64) -> bool {
     key.load(Ordering::Relaxed) != EMPTY
 }
 
+/// Depth of a point from its key.
+fn depth_of(key: u64) -> f32 {
+    f32::from_bits((key >> 32) as u32)
+}
+
+/// Empties the slots of points far behind the other one of their pixel.
+fn erase_far_seconds(keys: &mut [AtomicU64], view: &View) {
+    keys.par_chunks_mut(1 << 16).for_each(|keys| {
+        for pair in keys.chunks_exact_mut(2) {
+            let [one, other] = [*pair[0].get_mut(), *pair[1].get_mut()];
+            let [near, far] = [one.min(other), one.max(other)];
+            if far != EMPTY {
+                let gate = depth_of(near) + GATE_PX * view.pixel_size(depth_of(near));
+                if depth_of(far) > gate {
+                    *pair[usize::from(other == far)].get_mut() = EMPTY;
+                }
+            }
+        }
+    });
+}
+
 /// Mean distance in pixels between screen points where there are any.
 // Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
-fn mean_spacing(keys: &[AtomicU64], width: usize) -> f32 {
+fn mean_spacing(keys: Keys) -> f32 {
+    let block_slots = OCCUPANCY_PX * keys.per_pixel;
     let (points, blocks) = keys
-        .par_chunks(width * OCCUPANCY_PX)
+        .slots
+        .par_chunks(OCCUPANCY_PX * keys.row_len())
         .map(|rows| {
-            let mut occupied = vec![0usize; width.div_ceil(OCCUPANCY_PX)];
-            for row in rows.chunks(width) {
-                for (block, keys) in row.chunks(OCCUPANCY_PX).enumerate() {
-                    occupied[block] += keys.iter().filter(|key| is_owned(key)).count();
+            let mut occupied = vec![0usize; keys.width.div_ceil(OCCUPANCY_PX)];
+            for row in rows.chunks(keys.row_len()) {
+                for (block, slots) in row.chunks(block_slots).enumerate() {
+                    occupied[block] += slots.iter().filter(|key| is_owned(key)).count();
                 }
             }
             (occupied.iter().sum(), occupied.iter().filter(|&&n| n > 0).count())
         })
         .reduce(|| (0, 0), |a: (usize, usize), b| (a.0 + b.0, a.1 + b.1));
-    ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt().max(1.0)
+    ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt().max(LEAST_SPACING_PX)
 }
 
 /// Lists the owners of pixels in cell order.
-fn compact(positions: &[[f32; 3]], view: &View, keys: &[AtomicU64], spacing_px: f32, screen: &mut ScreenPoints) {
+fn compact(positions: &[[f32; 3]], view: &View, keys: Keys, spacing_px: f32, screen: &mut ScreenPoints) {
     let [width, height] = [view.width as usize, view.height as usize];
     let strip_px = ((STRIP_SPACINGS * spacing_px).round() as usize).clamp(1, 256);
     let strips = height.div_ceil(strip_px);
@@ -148,15 +206,15 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &[AtomicU64], spacing_px: 
     cells.start.resize(strips * width + 1, 0);
 
     // Points of each cell first, then where each cell begins.
-    let strip_keys = |strip: usize| &keys[strip * strip_px * width..height.min((strip + 1) * strip_px) * width];
+    let strip_rows = |strip: usize| keys.rows(strip * strip_px..(strip + 1) * strip_px);
     let strip_len: Vec<u32> = cells.start[..strips * width]
         .par_chunks_mut(width)
         .enumerate()
         .map(|(strip, start)| {
             start.fill(0);
-            for row in strip_keys(strip).chunks(width) {
-                for (count, key) in start.iter_mut().zip(row) {
-                    *count += u32::from(is_owned(key));
+            for row in strip_rows(strip) {
+                for (count, slots) in start.iter_mut().zip(row.chunks(keys.per_pixel)) {
+                    *count += slots.iter().map(|key| u32::from(is_owned(key))).sum::<u32>();
                 }
             }
             let mut sum = 0;
@@ -183,17 +241,18 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &[AtomicU64], spacing_px: 
     }
     tasks.into_par_iter().for_each(|(strip, first, start, points, source)| {
         start.iter_mut().for_each(|cell| *cell += first);
-        let keys = strip_keys(strip);
         let mut next = 0;
         for x in 0..width {
-            for (y, row) in (strip * strip_px..).zip(keys.chunks(width)) {
-                let key = row[x].load(Ordering::Relaxed);
-                if key != EMPTY {
-                    let index = key as u32;
-                    let position_view = view.to_view(positions[index as usize]).to_array();
-                    points[next] = ScreenPoint { position_view, pixel: (y << 16 | x) as u32 };
-                    source[next] = index;
-                    next += 1;
+            for (y, row) in (strip * strip_px..).zip(strip_rows(strip)) {
+                for key in &row[x * keys.per_pixel..][..keys.per_pixel] {
+                    let key = key.load(Ordering::Relaxed);
+                    if key != EMPTY {
+                        let index = key as u32;
+                        let position_view = view.to_view(positions[index as usize]).to_array();
+                        points[next] = ScreenPoint { position_view, pixel: (y << 16 | x) as u32 };
+                        source[next] = index;
+                        next += 1;
+                    }
                 }
             }
         }
@@ -201,7 +260,7 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &[AtomicU64], spacing_px: 
 }
 
 /// Counts points and finds the nearest depth per cell of about `k` points.
-fn measure_density(keys: &[AtomicU64], view: &View, spacing_px: f32, k: u32, density: &mut DensityGrid) {
+fn measure_density(keys: Keys, view: &View, spacing_px: f32, k: u32, density: &mut DensityGrid) {
     let [width, height] = [view.width as usize, view.height as usize];
     let cell_px = ((spacing_px * (k as f32).sqrt()).round() as usize).max(2);
     let columns = width.div_ceil(cell_px);
@@ -211,19 +270,19 @@ fn measure_density(keys: &[AtomicU64], view: &View, spacing_px: f32, k: u32, den
     density.count.resize(cells, 0);
     density.nearest.resize(cells, f32::INFINITY);
     let rows = density.count.par_chunks_mut(columns).zip(density.nearest.par_chunks_mut(columns));
-    rows.zip(keys.par_chunks(width * cell_px)).for_each(|((count, nearest), keys)| {
+    rows.zip(keys.slots.par_chunks(cell_px * keys.row_len())).for_each(|((count, nearest), rows)| {
         count.fill(0);
         nearest.fill(f32::INFINITY);
-        for row in keys.chunks(width) {
-            for (cell, keys) in row.chunks(cell_px).enumerate() {
+        for row in rows.chunks(keys.row_len()) {
+            for (cell, slots) in row.chunks(cell_px * keys.per_pixel).enumerate() {
                 let mut least = EMPTY;
-                for key in keys {
+                for key in slots {
                     let key = key.load(Ordering::Relaxed);
                     count[cell] += u32::from(key != EMPTY);
                     least = least.min(key);
                 }
                 if least != EMPTY {
-                    nearest[cell] = nearest[cell].min(f32::from_bits((least >> 32) as u32));
+                    nearest[cell] = nearest[cell].min(depth_of(least));
                 }
             }
         }

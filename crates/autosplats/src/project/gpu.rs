@@ -1,7 +1,7 @@
 //! Projection on the GPU: the CPU form's steps, a pass each.
 
 use super::ScreenPoint;
-use super::cpu::STRIP_SPACINGS;
+use super::cpu::{GATE_PX, LEAST_SPACING_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
 use crate::Error;
 use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
@@ -109,6 +109,8 @@ pub(crate) const COUNTERS: usize = Counter::LeftRecovered as usize + 1;
 #[derive(Debug)]
 pub(crate) struct ScreenBuffers {
     pub(crate) size: [u32; 2],
+    /// Whether halves of pixels keep a point each.
+    pub(crate) halves: bool,
     /// Most screen points that there can be.
     pub(crate) capacity: u32,
     /// `u32` per [`Counter`].
@@ -136,19 +138,26 @@ pub(crate) struct ScreenBuffers {
 }
 
 impl ScreenBuffers {
+    /// Whether the device binds a `T` for each screen point that there can be if halves of pixels keep one each.
+    pub(crate) fn has_room_for_halves<T>(gpu: &Gpu, size: [u32; 2], points: usize) -> bool {
+        gpu.binds::<T>(capacity(size, true, points))
+    }
+
     /// Room for a picture of `size` of a cloud of `points` points with `values` values each.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], points: usize, values: usize) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], halves: bool, points: usize, values: usize) -> Result<Self, Error> {
         let [width, height] = size.map(|side| side as usize);
         let pixels = width * height;
-        let capacity = points.min(pixels);
+        let slots = pixels << u32::from(halves);
+        let capacity = capacity(size, halves, points);
         Ok(Self {
             size,
+            halves,
             capacity: capacity as u32,
             counters: gpu.storage::<u32>("counters", COUNTERS)?,
-            keys: gpu.storage::<[u32; 2]>("keys of pixels", pixels)?,
+            keys: gpu.storage::<[u32; 2]>("keys of pixels", slots)?,
             // Cells are two pixels wide at least.
             density: gpu.storage::<[u32; 2]>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
             cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
@@ -159,7 +168,7 @@ impl ScreenBuffers {
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
             left: gpu.storage::<u32>("queries left", capacity)?,
-            block_sums: gpu.storage::<u32>("sums of blocks", pixels.div_ceil(BLOCK as usize))?,
+            block_sums: gpu.storage::<u32>("sums of blocks", slots.div_ceil(BLOCK as usize))?,
             arguments: gpu.buffer(
                 "arguments",
                 WORKS * WORK_BYTES,
@@ -172,6 +181,11 @@ impl ScreenBuffers {
     pub(crate) fn groups(&self, work: Work) -> Groups {
         Groups::Counted(self.arguments.clone(), work as u64 * WORK_BYTES)
     }
+}
+
+/// Most screen points that a picture of a cloud can have.
+fn capacity([width, height]: [u32; 2], halves: bool, points: usize) -> usize {
+    points.min((width as usize * height as usize) << u32::from(halves))
 }
 
 /// Finds how many workgroups there are of each [`Work`].
@@ -265,8 +279,12 @@ impl ProjectPasses {
         Ok(Self {
             clear: pass(&CLEAR)?,
             nearest: NearestPass::new(gpu, int64)?,
-            occupancy: pass(&OCCUPANCY)?,
-            grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
+            occupancy: Pass::new(gpu, &OCCUPANCY, &[("GATE_PX", GATE_PX.into())])?,
+            grid: Pass::new(
+                gpu,
+                &GRID,
+                &[("STRIP_SPACINGS", STRIP_SPACINGS.into()), ("LEAST_SPACING_PX", LEAST_SPACING_PX.into())],
+            )?,
             count: pass(&COUNT)?,
             scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,
@@ -289,17 +307,17 @@ impl ProjectPasses {
         let ScreenBuffers { counters, keys, density, cell_start, source, pixels, points, values, block_sums, .. } =
             screen;
         let [width, height] = screen.size;
-        let area = width * height;
-        let pixel_blocks = area.div_ceil(BLOCK);
-        let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], area.div_ceil(GROUP))];
+        let slots = (width * height) << u32::from(screen.halves);
+        let slot_blocks = slots.div_ceil(BLOCK);
+        let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], slots.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         let blocks_16 = width.div_ceil(16) * height.div_ceil(16);
         steps.push(self.occupancy.step(gpu, &[frame, keys, counters], blocks_16));
         steps.push(self.grid.step(gpu, &[frame, counters], 1));
-        steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], pixel_blocks));
+        steps.push(self.count.step(gpu, &[frame, keys, counters, block_sums, density], slot_blocks));
         steps.push(self.scan_visible.step(gpu, &[frame, block_sums, counters], 1));
         let compact = [frame, keys, counters, block_sums, source, pixels, cell_start];
-        steps.push(self.compact.step(gpu, &compact, pixel_blocks));
+        steps.push(self.compact.step(gpu, &compact, slot_blocks));
         steps.push(self.work.step(gpu, frame, screen));
         for chunk in cloud.chunks() {
             let gather =

@@ -1,8 +1,10 @@
 //! Project: every point to its pixel, the nearest wins [Paper, §3, §5.1, §7].
 //!
 //! # How it works
-//! A pixel keeps the smallest of (depth, point index), so ties go to the lower index. What survives, the *screen points*,
-//! is compacted into a list ordered by screen cell, for the search to read its surroundings in few contiguous runs: the
+//! A pixel, or each half of one, keeps the smallest of (depth, point index), so ties go to the lower index. Halves lie side by
+//! side and one below the other in turn, and of two points far apart in depth only the nearer counts. The paper has one
+//! point a pixel and names as a weakness what that loses: at silhouettes, in thin parts and where points are denser than
+//! pixels, the neighbours that the fit would need. What survives, the *screen points*, is compacted into a list ordered by screen cell, for the search to read its surroundings in few contiguous runs: the
 //! screen is cut into strips a few pixels high, a cell is one pixel wide and a strip high, and cells follow each other
 //! along the strip. Any sixteen neighbours in that list lie close together on the screen, whatever the local density.
 //!
@@ -24,7 +26,26 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::camera::View;
 
-/// A projected point: one that owns its pixel.
+/// What projection keeps.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ProjectRules {
+    /// Screen points that a cell of the density grid holds by mean.
+    pub(crate) k: u32,
+    /// Whether each half of a pixel keeps its nearest point, instead of each pixel.
+    pub(crate) halves: bool,
+    /// Whether points well behind the nearest of their cell become passive.
+    pub(crate) grid_culling: bool,
+}
+
+#[cfg(test)]
+impl ProjectRules {
+    /// As pictures have it by default.
+    pub(crate) fn usual(k: u32) -> Self {
+        Self { k, halves: true, grid_culling: true }
+    }
+}
+
+/// A projected point: one that owns its pixel, or half of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ScreenPoint {

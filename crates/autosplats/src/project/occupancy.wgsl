@@ -1,7 +1,7 @@
-// Counts screen points, and the blocks of 16² pixels that hold any: the covered part of the screen, whose density says how
-// large cells must be.
+// Erases points far behind the other one of their pixel. Counts screen points, and the blocks of 16² pixels that hold any:
+// the covered part of the screen, whose density says how large cells must be.
 //
-// Reads: keys. Writes: counters. One workgroup per block.
+// Reads and writes: keys. Writes: counters. One workgroup per block.
 
 #import frame
 #import groups
@@ -9,8 +9,11 @@
 #import keys
 #import divide
 
-@group(0) @binding(1) var<storage, read> keys: array<vec2u>;
+@group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
+
+// The second point of a pixel is no further behind the first than this many pixels are wide.
+override GATE_PX: f32;
 
 var<workgroup> owned: atomic<u32>;
 
@@ -23,12 +26,31 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let columns = (frame.size.x + 15u) / 16u;
     let block = divide(group_index(workgroup), columns);
     let pixel = 16u * block.yx + vec2u(local % 16u, local / 16u);
-    if all(pixel < frame.size) && keys[pixel.y * frame.size.x + pixel.x].x != EMPTY_KEY {
-        atomicAdd(&owned, 1u);
+    if all(pixel < frame.size) {
+        let slot = (pixel.y * frame.size.x + pixel.x) << frame.halves;
+        var own = u32(keys[slot].x != EMPTY_KEY);
+        if frame.halves == 1u && keys[slot + 1u].x != EMPTY_KEY {
+            own += 1u;
+            if own == 2u && erase_far(slot) {
+                own = 1u;
+            }
+        }
+        atomicAdd(&owned, own);
     }
     workgroupBarrier();
     if local == 0u && atomicLoad(&owned) > 0u {
         atomicAdd(&counters[VISIBLE], atomicLoad(&owned));
         atomicAdd(&counters[BLOCKS], 1u);
     }
+}
+
+// Empties the farther one of two slots if it is too far; whether it is.
+fn erase_far(slot: u32) -> bool {
+    let depth = vec2f(bitcast<f32>(keys[slot].y), bitcast<f32>(keys[slot + 1u].y));
+    let near = min(depth.x, depth.y);
+    if max(depth.x, depth.y) <= near + GATE_PX * pixel_size(near) {
+        return false;
+    }
+    keys[slot + u32(depth.y > depth.x)] = vec2u(EMPTY_KEY);
+    return true;
 }

@@ -1,4 +1,4 @@
-// Every point to its pixel, the nearest wins [Paper, §3]: depth and index in one 64-bit atomic minimum.
+// Every point to its pixel, or half of one, the nearest wins [Paper, §3]: depth and index in one 64-bit atomic minimum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters. `project_32` does the same with 32 bits.
 
@@ -20,11 +20,11 @@ fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     if index < chunk.len {
         let at = 3u * index;
         let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));
-        if projected.pixel >= PIXEL_OUTSIDE {
-            count_dropped(projected.pixel);
+        if projected.slot >= SLOT_OUTSIDE {
+            count_dropped(projected.slot);
         } else {
             let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(chunk.first + index);
-            atomicMin(&keys[projected.pixel], key);
+            atomicMin(&keys[projected.slot], key);
         }
     }
     count_dropped_finish(local);

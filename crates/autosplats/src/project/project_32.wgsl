@@ -1,4 +1,4 @@
-// What `project` does, where there are no 64-bit atomics: run twice, it finds the nearest depth of each pixel, then the lowest
+// What `project` does, where there are no 64-bit atomics: run twice, it finds the nearest depth of each slot, then the lowest
 // index among the points at that depth. One pass that is told which turn it is and not two, because no device owes two
 // programs the same bits: a point whose depth differed between them would leave a hole.
 //
@@ -25,14 +25,14 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         let at = 3u * index;
         let projected = project_point(vec3f(positions[at], positions[at + 1u], positions[at + 2u]));
         let depth = bitcast<u32>(projected.depth);
-        if projected.pixel >= PIXEL_OUTSIDE {
+        if projected.slot >= SLOT_OUTSIDE {
             if turn == 0u {
-                count_dropped(projected.pixel);
+                count_dropped(projected.slot);
             }
         } else if turn == 0u {
-            atomicMin(&keys[2u * projected.pixel + 1u], depth);
-        } else if atomicLoad(&keys[2u * projected.pixel + 1u]) == depth {
-            atomicMin(&keys[2u * projected.pixel], chunk.first + index);
+            atomicMin(&keys[2u * projected.slot + 1u], depth);
+        } else if atomicLoad(&keys[2u * projected.slot + 1u]) == depth {
+            atomicMin(&keys[2u * projected.slot], chunk.first + index);
         }
     }
     count_dropped_finish(local);

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
-use super::{Dropped, Projector, ScreenPoint, ScreenPoints};
+use super::cpu::GATE_PX;
+use super::{Dropped, ProjectRules, Projector, ScreenPoint, ScreenPoints};
 use crate::camera::{Camera, Projection};
 use crate::test_clouds::{self, EYE, Positions, Random};
 
@@ -49,12 +50,31 @@ fn place(camera: &Camera, size: [u32; 2], position: [f32; 3]) -> Place {
 /// What projection must find.
 #[derive(Default)]
 struct Oracle {
-    /// Index and view-space position of each pixel's owner.
-    owners: HashMap<[usize; 2], (usize, DVec3)>,
+    /// Index and view-space position of the owner of each pixel, or of its halves.
+    owners: HashMap<([usize; 2], usize), (usize, DVec3)>,
     dropped: Dropped,
 }
 
-fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Oracle {
+/// Left and right halves, or upper and lower ones.
+fn half([x, y]: [f64; 2]) -> usize {
+    let along = if (x as usize + y as usize) % 2 == 1 { x } else { y };
+    usize::from(along.fract() >= 0.5)
+}
+
+/// Depth beyond which the second point of a pixel does not count.
+fn gate(camera: &Camera, size: [u32; 2], near: f64) -> f64 {
+    near + f64::from(GATE_PX) * unit(camera, size, near)
+}
+
+/// World units in a pixel at a depth.
+fn unit(camera: &Camera, [_, height]: [u32; 2], depth: f64) -> f64 {
+    match camera.projection {
+        Projection::PerspectiveFovDeg(fov) => 2.0 * (0.5 * fov.to_radians()).tan() * depth / f64::from(height),
+        Projection::OrthographicHeight(world) => world / f64::from(height),
+    }
+}
+
+fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]], halves: bool) -> Oracle {
     let mut oracle = Oracle::default();
     for (index, &position) in positions.iter().enumerate() {
         match place(camera, size, position) {
@@ -62,7 +82,8 @@ fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Oracle {
             Place::Behind => oracle.dropped.behind += 1,
             Place::Ahead(px, view) => {
                 if (0..2).all(|i| (0.0..f64::from(size[i])).contains(&px[i])) {
-                    let owner = oracle.owners.entry(px.map(|c| c as usize)).or_insert((index, view));
+                    let slot = if halves { half(px) } else { 0 };
+                    let owner = oracle.owners.entry((px.map(|c| c as usize), slot)).or_insert((index, view));
                     if view.z < owner.1.z {
                         *owner = (index, view);
                     }
@@ -72,19 +93,27 @@ fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Oracle {
             }
         }
     }
+    let nearest = oracle.owners.clone();
+    oracle.owners.retain(|&(pixel, slot), (_, view)| {
+        nearest.get(&(pixel, 1 - slot)).is_none_or(|(_, other)| view.z <= gate(camera, size, other.z))
+    });
     oracle
 }
 
-/// The points that `f32` cannot put elsewhere than `f64`: not within 2e-3 px of a pixel's border (rounding of positions and
-/// of the rotation reaches 1e-4 px here), and not within 1e-5 of another point's depth in the same pixel but for copies.
+/// The points that `f32` cannot put elsewhere than `f64`: not within 2e-3 px of the border of a pixel or of half of one
+/// (rounding of positions and of the rotation reaches 1e-4 px here), and not within 1e-5 of another point's depth in the same
+/// pixel but for copies, or of where such a point would not count.
 fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions {
     let mut taken: HashMap<[i64; 2], Vec<([f32; 3], f64)>> = HashMap::new();
     let mut settled = Positions::new();
     for &position in positions {
         if let Place::Ahead(px, view) = place(camera, size, position) {
             let others = taken.entry(px.map(|c| c.floor() as i64)).or_default();
-            let clear = others.iter().all(|&(other, depth)| other == position || (depth - view.z).abs() > 1e-5);
-            if !clear || px.iter().any(|c| (c - c.round()).abs() < 2e-3) {
+            let clear = others.iter().all(|&(other, depth)| {
+                let far = depth.max(view.z) - gate(camera, size, depth.min(view.z));
+                other == position || ((depth - view.z).abs() > 1e-5 && far.abs() > 1e-5)
+            });
+            if !clear || px.iter().any(|c| (2.0 * c - (2.0 * c).round()).abs() < 4e-3) {
                 continue;
             }
             others.push((position, view.z));
@@ -101,9 +130,9 @@ fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 
     ensure(*dropped == oracle.dropped, &format!("dropped {dropped:?}, not {:?}", oracle.dropped))?;
     ensure(points.len() == oracle.owners.len() && source.len() == points.len(), "number of screen points")?;
     for (point, &source) in points.iter().zip(source) {
-        let owner = oracle.owners.get(&point.pixel_xy());
-        let &(index, view) = owner.ok_or_else(|| format!("nothing projects to {:?}", point.pixel_xy()))?;
-        ensure(index == source as usize, &format!("point {source} owns the pixel of {index}"))?;
+        let owners = [0, 1].map(|slot| oracle.owners.get(&(point.pixel_xy(), slot)));
+        let owner = owners.into_iter().flatten().find(|(index, _)| *index == source as usize);
+        let &(_, view) = owner.ok_or_else(|| format!("point {source} owns no half of {:?}", point.pixel_xy()))?;
         let error = (DVec3::from(point.position_view.map(f64::from)) - view).abs().max_element();
         // f32 rounding of a rotation of coordinates up to 50.
         ensure(error < 2e-5, &format!("position of point {source} is off by {error}"))?;
@@ -123,10 +152,6 @@ fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 
     let coarse = |p: &ScreenPoint| p.pixel_xy().map(|c| c / density.cell_px);
     ensure(density.columns == width.div_ceil(density.cell_px), "columns of the density grid")?;
     ensure(density.count.len() == density.columns * height.div_ceil(density.cell_px), "cells of the density grid")?;
-    let unit = |depth: f64| match camera.projection {
-        Projection::PerspectiveFovDeg(fov) => 2.0 * (0.5 * fov.to_radians()).tan() * depth / height as f64,
-        Projection::OrthographicHeight(world) => world / height as f64,
-    };
     let mut culled = vec![false; points.len()];
     for index in 0..density.count.len() {
         let here = [index % density.columns, index / density.columns];
@@ -134,7 +159,7 @@ fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 
         ensure(density.count[index] as usize == members.len(), &format!("count of density cell {index}"))?;
         let nearest = members.iter().map(|&i| points[i].position_view[2]).fold(f32::INFINITY, f32::min);
         ensure(density.nearest[index] == nearest, &format!("nearest depth of density cell {index}"))?;
-        let plane = f64::from(nearest) + density.cell_px as f64 * unit(f64::from(nearest));
+        let plane = f64::from(nearest) + density.cell_px as f64 * unit(camera, size, f64::from(nearest));
         let error = (f64::from(density.culling[index]) - plane).abs();
         // f32 rounding of a product and a sum.
         ensure(members.is_empty() || error < 1e-5 * plane, &format!("culling plane of density cell {index}"))?;
@@ -157,9 +182,12 @@ fn every_cloud_at_every_size() {
             for size in SIZES {
                 let positions = settled(&camera, size, &positions);
                 let view = camera.view(DVec3::ZERO, size).expect("a view");
-                let screen = projector.project(&cloud(&positions), &view, 10, true);
-                let outcome = compare(screen, &oracle(&camera, size, &positions), &camera, size);
-                assert_eq!(outcome, Ok(()), "{name}, {size:?}, {:?}", camera.projection);
+                for halves in [false, true] {
+                    let rules = ProjectRules { halves, ..ProjectRules::usual(10) };
+                    let screen = projector.project(&cloud(&positions), &view, &rules);
+                    let outcome = compare(screen, &oracle(&camera, size, &positions, halves), &camera, size);
+                    assert_eq!(outcome, Ok(()), "{name}, {size:?}, {:?}, {halves}", camera.projection);
+                }
             }
         }
     }
@@ -170,7 +198,7 @@ fn comparison_sees_each_kind_of_error() {
     let (camera, size) = (cameras()[0], [121, 90]);
     let positions = settled(&camera, size, &test_clouds::two_layers(2000));
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    let oracle = oracle(&camera, size, &positions);
+    let oracle = oracle(&camera, size, &positions, true);
     type Spoil = fn(&mut ScreenPoints);
     let errors: [(&str, Spoil); 9] = [
         ("other owner", |s| s.source[3] += 1),
@@ -190,7 +218,7 @@ fn comparison_sees_each_kind_of_error() {
         ("wrong list", |s| s.passive.extend(s.active.pop())),
     ];
     let mut projector = Projector::default();
-    let right = projector.project(&cloud(&positions), &view, 10, true);
+    let right = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10));
     assert_eq!(compare(right, &oracle, &camera, size), Ok(()), "nothing is wrong yet");
     for (name, spoil) in errors {
         let mut wrong = right.clone();
@@ -240,7 +268,7 @@ fn each_drop_is_counted_for_its_reason() {
         for (camera, expected) in [(perspective, in_perspective), (parallel, in_parallel)] {
             let view = camera.view(DVec3::ZERO, [8, 8]).expect("a view");
             let mut projector = Projector::default();
-            let screen = projector.project(&cloud(&[position]), &view, 10, true);
+            let screen = projector.project(&cloud(&[position]), &view, &ProjectRules::usual(10));
             assert_eq!(screen.dropped, expected, "{name}, {:?}", camera.projection);
             assert_eq!(screen.points.len(), usize::from(expected == visible), "{name}: number of screen points");
         }
@@ -266,8 +294,8 @@ fn poison_harms_nobody() {
         mixed.extend(&healthy);
         random.shuffle(&mut mixed);
         let (mut clean, mut mixed_projector) = (Projector::default(), Projector::default());
-        let clean = clean.project(&cloud(&healthy), &view, 10, true);
-        let screen = mixed_projector.project(&cloud(&mixed), &view, 10, true);
+        let clean = clean.project(&cloud(&healthy), &view, &ProjectRules::usual(10));
+        let screen = mixed_projector.project(&cloud(&mixed), &view, &ProjectRules::usual(10));
         let near = screen.points.iter().filter(|point| point.position_view[2] < 100.0);
         let by_pixel = |point: &&ScreenPoint| point.pixel;
         let mut near: Vec<_> = near.collect();
@@ -288,8 +316,8 @@ fn order_of_points_does_not_matter() {
             let mut shuffled = positions.clone();
             Random::new(12).shuffle(&mut shuffled);
             let (mut first, mut second) = (Projector::default(), Projector::default());
-            let first = first.project(&cloud(&positions), &view, 10, true);
-            let second = second.project(&cloud(&shuffled), &view, 10, true);
+            let first = first.project(&cloud(&positions), &view, &ProjectRules::usual(10));
+            let second = second.project(&cloud(&shuffled), &view, &ProjectRules::usual(10));
             assert_eq!(first.points, second.points, "{name}: screen points");
             assert_eq!(first.cells.start, second.cells.start, "{name}: cells");
             let places = |screen: &ScreenPoints, cloud: &[[f32; 3]]| -> Positions {
@@ -307,8 +335,28 @@ fn equal_points_go_to_the_lower_index() {
     let mut positions = vec![[0.5, 0.0, 3.0]; 40_000];
     positions[..100].fill([0.5, 0.0, 4.0]);
     let mut projector = Projector::default();
-    let screen = projector.project(&cloud(&positions), &view, 10, true);
+    let screen = projector.project(&cloud(&positions), &view, &ProjectRules::usual(10));
     assert_eq!(screen.source, [100], "the first of the nearest");
+}
+
+/// A pixel keeps two points of one surface, also a steep one, and no second one of what is behind it.
+#[test]
+fn halves_keep_a_point_each_of_one_surface() {
+    let camera = straight(Projection::OrthographicHeight(4.0));
+    let view = camera.view(DVec3::ZERO, [4, 4]).expect("a view");
+    // A pixel is 1 wide. In that right of and below the centre halves are one below the other, in the next side by side.
+    let kept = |positions: &[[f32; 3]]| -> Vec<u32> {
+        let mut projector = Projector::default();
+        let mut source = projector.project(&cloud(positions), &view, &ProjectRules::usual(10)).source.clone();
+        source.sort_unstable();
+        source
+    };
+    assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 6.0], [0.2, 0.8, 7.0]]), [0, 1], "the nearest of each half");
+    assert_eq!(kept(&[[0.2, 0.2, 5.0], [0.8, 0.2, 4.0]]), [1], "halves lie one below the other here");
+    assert_eq!(kept(&[[1.2, 0.2, 5.0], [1.8, 0.2, 4.0]]), [0, 1], "and side by side there");
+    assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 5.1 + GATE_PX]]), [0], "what is far behind is another surface");
+    assert_eq!(kept(&[[0.5, 0.2, 5.1 + GATE_PX], [0.5, 0.8, 5.0]]), [1], "in either half");
+    assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 4.9 + GATE_PX]]), [0, 1], "steep surfaces are one");
 }
 
 /// The density grid is as coarse as promised: about k points to a cell where there are points.
@@ -319,7 +367,7 @@ fn density_cells_hold_about_k_points() {
     let positions: Positions = test_clouds::plane(5000).iter().map(|&[x, y, _]| [x, y, 2.0]).collect();
     for k in [4, 10, 64] {
         let mut projector = Projector::default();
-        let screen = projector.project(&cloud(&positions), &view, k, true);
+        let screen = projector.project(&cloud(&positions), &view, &ProjectRules::usual(k));
         let area = (screen.density.cell_px * screen.density.cell_px) as f32;
         let mean = screen.points.len() as f32 / (200.0 * 200.0) * area;
         // Cells have a whole number of pixels.

@@ -12,7 +12,7 @@ use crate::adapt::Adapter;
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
-use crate::project::{Projector, ScreenPoints};
+use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
 use crate::shade::{Image, Scene, linear_steps, shade};
 use crate::splat::{Attributes, PointColors, Splatter};
@@ -100,7 +100,12 @@ impl CpuRenderer {
             *sensors = Sensors::new(cloud);
         }
 
-        let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
+        let rules = ProjectRules {
+            k: settings_splat.k,
+            halves: settings_splat.halves(),
+            grid_culling: settings_splat.grid_culling,
+        };
+        let screen = projector.project(cloud, &view, &rules);
         clock.lap(|timings| &mut timings.project);
 
         if settings_splat.adaptive && given.is_none() {

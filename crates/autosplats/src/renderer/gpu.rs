@@ -77,6 +77,7 @@ struct Passes {
 #[derive(Clone, Debug, PartialEq)]
 struct Shape {
     size: [u32; 2],
+    halves: bool,
     search: SearchKind,
     adaptive: bool,
     depth_refinement: bool,
@@ -352,8 +353,12 @@ impl GpuRenderer {
 
     /// Makes buffers and steps for a frame unless the last frame's will do.
     fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<(), Error> {
+        // Nothing that each screen point has is larger than its surfel.
+        let halves = settings.reconstruction.halves()
+            && ScreenBuffers::has_room_for_halves::<Surfel>(&self.gpu, size, self.cloud.capacity());
         let shape = Shape {
             size,
+            halves,
             search: (discriminant(&settings.reconstruction.engine), settings.reconstruction.k),
             adaptive: settings.reconstruction.adaptive,
             depth_refinement: settings.reconstruction.depth_refinement,
@@ -391,7 +396,7 @@ impl GpuRenderer {
             *splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
         }
         let (Some((_, search)), Some((_, splat))) = (search, splat) else { return Ok(()) };
-        let screen = ScreenBuffers::new(gpu, size, cloud.capacity(), cloud.words())?;
+        let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
         let adapt = match adapt {
@@ -442,6 +447,7 @@ impl Prepared {
             gap_factor: reconstruction.gap_factor,
         };
         let told = FrameUniform {
+            halves: self.shape.halves.into(),
             grid_culling: reconstruction.grid_culling.into(),
             ellipses: reconstruction.ellipses.into(),
             keep_outliers: reconstruction.outlier_expansions.is_none().into(),

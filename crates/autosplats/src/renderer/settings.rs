@@ -15,11 +15,16 @@ pub struct Settings {
     pub all_layers: bool,
 }
 
-/// How points become splats. But for [`adaptive`](Self::adaptive), the defaults are the paper's.
+/// How points become splats. The default goes beyond [the paper's](Self::paper) in
+/// [`points_per_pixel`](Self::points_per_pixel) and [`adaptive`](Self::adaptive).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reconstruction {
     /// Neighbours per point, 1 to 64.
     pub k: u32,
+    /// Most points that a pixel keeps, 1 or 2: the nearest, as in the paper, or the nearest of each half. Two show silhouettes,
+    /// thin parts and whatever has points denser than pixels more truly, and take up to twice as long to search and to fit.
+    /// The engine [`SearchEngine::SplatCommunication`] and devices too small for two have one.
+    pub points_per_pixel: u32,
     /// Fit larger neighbourhoods, of up to thousands of points, where points scatter too much for k neighbours to tell the
     /// surface, and move splats onto what is fitted, as circles. Points far from their neighbours and on no surface become
     /// dots or, unless outliers are kept, are discarded. A surface without noise is left as it is.
@@ -47,6 +52,7 @@ impl Default for Reconstruction {
     fn default() -> Self {
         Self {
             k: 10,
+            points_per_pixel: 2,
             adaptive: true,
             engine: SearchEngine::default(),
             outlier_expansions: Some(1),
@@ -59,6 +65,18 @@ impl Default for Reconstruction {
     }
 }
 
+impl Reconstruction {
+    /// What the paper does: one point a pixel, and k = 10 for all.
+    pub fn paper() -> Self {
+        Self { points_per_pixel: 1, adaptive: false, ..Self::default() }
+    }
+
+    /// Whether halves of pixels keep a point each.
+    pub(super) fn halves(&self) -> bool {
+        self.points_per_pixel == 2 && self.engine != SearchEngine::SplatCommunication
+    }
+}
+
 impl Settings {
     /// Checks every value against its range.
     ///
@@ -68,8 +86,10 @@ impl Settings {
         fn within(name: &'static str, ok: bool, value: impl ToString, range: &'static str) -> Result<(), Error> {
             if ok { Ok(()) } else { Err(Error::Setting { name, value: value.to_string(), range }) }
         }
-        let Reconstruction { k, engine, outlier_expansions, gap_factor, splat_scale, .. } = self.reconstruction;
+        let Reconstruction { k, points_per_pixel, engine, outlier_expansions, gap_factor, splat_scale, .. } =
+            self.reconstruction;
         within("k", (1..=64).contains(&k), k, "within 1 to 64")?;
+        within("points_per_pixel", (1..=2).contains(&points_per_pixel), points_per_pixel, "1 or 2")?;
         if let SearchEngine::KdTree { first_radius: r } = engine {
             within("first_radius", r > 0.0 && r.is_finite(), r, "above 0")?;
         }

@@ -5,7 +5,7 @@ use autosplats_cloud::glam::{DVec3, Vec3};
 
 use super::{LANES, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts, SearchRules, screen_grid};
 use crate::camera::{Camera, Projection, View};
-use crate::project::{Projector, ScreenPoints};
+use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::test_clouds::{self, EYE, Positions};
 
 type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &mut Neighborhoods);
@@ -27,7 +27,7 @@ fn cameras() -> [Camera; 2] {
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    (Projector::default().project(&cloud, &view, k, true).clone(), view)
+    (Projector::default().project(&cloud, &view, &ProjectRules::usual(k)).clone(), view)
 }
 
 /// The other screen points by distance, for each screen point.

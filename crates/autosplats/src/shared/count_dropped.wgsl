@@ -11,9 +11,9 @@ fn count_dropped_clear(local: u32) {
     workgroupBarrier();
 }
 
-fn count_dropped(pixel: u32) {
-    // NOT_FINITE, BEHIND and OUTSIDE are 0, 1, 2, and so count the pixels that stand for them down from the greatest.
-    atomicAdd(&dropped[PIXEL_NOT_FINITE - pixel], 1u);
+fn count_dropped(slot: u32) {
+    // NOT_FINITE, BEHIND and OUTSIDE are 0, 1, 2, and so count the slots that stand for them down from the greatest.
+    atomicAdd(&dropped[SLOT_NOT_FINITE - slot], 1u);
 }
 
 // Call from all; a barrier goes before.

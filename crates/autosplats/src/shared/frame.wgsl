@@ -12,6 +12,8 @@ struct Frame {
     near: f32,
     perspective: u32,
     k: u32,
+    // 1 if each half of a pixel keeps its nearest point, 0 if each pixel does.
+    halves: u32,
     grid_culling: u32,
     ellipses: u32,
     keep_outliers: u32,
@@ -22,6 +24,9 @@ struct Frame {
     gap_growth: f32,
     // Of the kd-tree search, world units.
     first_radius: f32,
+    unused_0: u32,
+    unused_1: u32,
+    unused_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

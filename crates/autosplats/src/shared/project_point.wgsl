@@ -10,13 +10,13 @@ struct Chunk {
     padding: u32,
 }
 
-const PIXEL_NOT_FINITE = 0xffffffffu;
-const PIXEL_BEHIND = 0xfffffffeu;
-const PIXEL_OUTSIDE = 0xfffffffdu;
+const SLOT_NOT_FINITE = 0xffffffffu;
+const SLOT_BEHIND = 0xfffffffeu;
+const SLOT_OUTSIDE = 0xfffffffdu;
 
 struct Projected {
-    // Pixel index, or why there is none.
-    pixel: u32,
+    // Index of a slot of the keys, or why there is none.
+    slot: u32,
     depth: f32,
 }
 
@@ -24,14 +24,22 @@ fn project_point(position: vec3f) -> Projected {
     let position_view = to_view(position);
     // Finite coordinates so large that their transform is not count as not finite too.
     if !(is_finite(position_view.x) && is_finite(position_view.y) && is_finite(position_view.z)) {
-        return Projected(PIXEL_NOT_FINITE, 0.0);
+        return Projected(SLOT_NOT_FINITE, 0.0);
     }
     if !(position_view.z > frame.near) {
-        return Projected(PIXEL_BEHIND, 0.0);
+        return Projected(SLOT_BEHIND, 0.0);
     }
     let at = to_pixel(position_view);
     if !(at.x >= 0.0 && at.y >= 0.0 && at.x < f32(frame.size.x) && at.y < f32(frame.size.y)) {
-        return Projected(PIXEL_OUTSIDE, 0.0);
+        return Projected(SLOT_OUTSIDE, 0.0);
     }
-    return Projected(u32(at.y) * frame.size.x + u32(at.x), position_view.z);
+    let pixel = vec2u(at.xy);
+    let index = pixel.y * frame.size.x + pixel.x;
+    if frame.halves == 0u {
+        return Projected(index, position_view.z);
+    }
+    // Halves of pixels lie side by side and one below the other in turn.
+    let within = at - vec2f(pixel);
+    let along = select(within.y, within.x, ((pixel.x + pixel.y) & 1u) == 1u);
+    return Projected(2u * index + u32(along >= 0.5), position_view.z);
 }

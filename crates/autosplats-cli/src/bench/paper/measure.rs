@@ -1,8 +1,8 @@
 //! What is measured of each scene, and the measuring.
 
 use autosplats::{
-    Backend, Camera, Counts, Error, Image, NormalSettings, PassTime, RadiusTrial, Renderer, SearchEngine, Settings,
-    Timings, best_first_radius, estimate_normals,
+    Backend, Camera, Counts, Error, Image, NormalSettings, PassTime, RadiusTrial, Reconstruction, Renderer,
+    SearchEngine, Settings, Timings, best_first_radius, estimate_normals,
 };
 use autosplats_cloud::PointCloud;
 use serde::{Deserialize, Serialize};
@@ -169,12 +169,9 @@ pub(super) struct Loaded<'a> {
 
 /// The settings of a measurement: the paper's, but these.
 pub(super) fn settings(method: Method, first_radius: f32, k: u32, culled: bool) -> Settings {
-    let mut settings = Settings::default();
-    settings.reconstruction.engine = method.engine(first_radius);
-    settings.reconstruction.k = k;
-    settings.reconstruction.adaptive = false;
-    settings.reconstruction.grid_culling = culled;
-    settings
+    let engine = method.engine(first_radius);
+    let reconstruction = Reconstruction { k, engine, grid_culling: culled, ..Reconstruction::paper() };
+    Settings { reconstruction, ..Settings::default() }
 }
 
 /// Takes what a device refuses as an outcome, everything else as a failure.

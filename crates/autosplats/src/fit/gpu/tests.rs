@@ -10,7 +10,7 @@ use crate::fit::{FitRules, Surfels, fit};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
-use crate::project::{Projector, ScreenPoints};
+use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE};
@@ -29,7 +29,7 @@ impl Case {
         let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
         let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
         let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-        let screen = Projector::default().project(&cloud, &view, RULES.k, true).clone();
+        let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k)).clone();
         let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor };
         let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();

@@ -147,7 +147,7 @@ fn the_device_marks_what_the_host_marks() {
 
 /// Marks a third of the surfels in the first round, the others in the second.
 fn on_device(gpu: &Gpu, passes: &OrientPasses, sensors: &Sensors, surfels: &[Surfel], view: &View) -> Vec<Surfel> {
-    let screen = ScreenBuffers::new(gpu, [view.width, view.height], 0, 0).expect("room");
+    let screen = ScreenBuffers::new(gpu, [view.width, view.height], false, 0, 0).expect("room");
     let active = surfels.len() / 3;
     for (counter, value) in [(Counter::Active, active), (Counter::Recovered, surfels.len() - active)] {
         gpu.queue.write_buffer(&screen.counters, 4 * counter as u64, bytemuck::bytes_of(&(value as u32)));

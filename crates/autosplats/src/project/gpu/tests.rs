@@ -6,7 +6,7 @@ use autosplats_cloud::glam::DVec3;
 use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
-use crate::project::{PointValues, Projector, ScreenPoints, Uploader};
+use crate::project::{PointValues, ProjectRules, Projector, ScreenPoints, Uploader};
 use crate::test_clouds::{self, EYE};
 
 const K: u32 = 10;
@@ -45,7 +45,7 @@ pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, V
 /// A screen as the host has it, brought into the device's form; all active points are queries, those passive recovered
 /// ones.
 pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> ScreenBuffers {
-    let buffers = ScreenBuffers::new(gpu, [view.width, view.height], screen.points.len(), 0).expect("room");
+    let buffers = ScreenBuffers::new(gpu, [view.width, view.height], true, screen.points.len(), 0).expect("room");
     let mut counters = [0u32; COUNTERS];
     for (counter, value) in [
         (Counter::Visible, screen.points.len()),
@@ -82,15 +82,19 @@ pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
     recorder.finish();
 }
 
-fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, culling: bool) -> ScreenPoints {
+fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> ScreenPoints {
     let mut uploader = Uploader::new();
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, cloud.len()).expect("room");
     uploader.positions(gpu, cloud, &device_cloud, &|_| true).expect("an upload");
     uploader.values(gpu, &PointValues::default(), &device_cloud, &|_| true).expect("an upload");
-    let screen = ScreenBuffers::new(gpu, [view.width, view.height], cloud.len(), 0).expect("room");
+    let screen = ScreenBuffers::new(gpu, [view.width, view.height], rules.halves, cloud.len(), 0).expect("room");
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    let told = FrameUniform { grid_culling: culling.into(), ..FrameUniform::new(view, K) };
+    let told = FrameUniform {
+        halves: rules.halves.into(),
+        grid_culling: rules.grid_culling.into(),
+        ..FrameUniform::new(view, K)
+    };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     passes.steps(gpu, &frame, &device_cloud, &screen).iter().for_each(|step| recorder.run(step));
@@ -116,13 +120,20 @@ fn the_device_finds_what_the_host_finds() {
         let cloud = PointCloud::new(DVec3::ZERO, positions);
         for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
             let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
-            for (size, culling) in [([1, 1], true), ([300, 2], false), ([121, 90], true), ([97, 250], false)] {
+            for (size, [halves, grid_culling]) in [
+                ([1, 1], [true, true]),
+                ([300, 2], [true, false]),
+                ([121, 90], [true, true]),
+                ([121, 90], [false, true]),
+                ([97, 250], [false, false]),
+            ] {
+                let rules = ProjectRules { k: K, halves, grid_culling };
                 let view = camera.view(DVec3::ZERO, size).expect("a view");
                 let mut projector = Projector::default();
-                let host = projector.project(&cloud, &view, K, culling);
+                let host = projector.project(&cloud, &view, &rules);
                 for (int64, passes) in &forms {
-                    let device = project(&gpu, passes, &cloud, &view, culling);
-                    let case = format!("{name} {projection:?} {size:?} {int64}");
+                    let device = project(&gpu, passes, &cloud, &view, &rules);
+                    let case = format!("{name} {projection:?} {size:?} {rules:?} {int64}");
                     assert_eq!(device.dropped, host.dropped, "{case}");
                     // Divisions may be off by some units in the last place on a device, which moves a few points of ten
                     // thousand over a pixel's border.

@@ -50,7 +50,7 @@ impl Scene<'_> {
 
     fn upload(&self, gpu: &Gpu, channels: Channels) -> Buffers {
         let size = self.size();
-        let mut screen = ScreenBuffers::new(gpu, size, 0, 0).expect("room");
+        let mut screen = ScreenBuffers::new(gpu, size, false, 0, 0).expect("room");
         // There may be more surfels than pixels here.
         screen.capacity = self.surfels.len() as u32;
         let values = self.surfels.iter().flat_map(|surfel| {

@@ -54,6 +54,7 @@ fn mirrored() -> [Mirrored; 8] {
                 near,
                 perspective,
                 k,
+                halves,
                 grid_culling,
                 ellipses,
                 keep_outliers,
@@ -61,6 +62,9 @@ fn mirrored() -> [Mirrored; 8] {
                 outlier_growth,
                 gap_growth,
                 first_radius,
+                unused_0,
+                unused_1,
+                unused_2,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),

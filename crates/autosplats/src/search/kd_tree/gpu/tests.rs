@@ -8,7 +8,7 @@ use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
-use crate::project::{DeviceCloud, Projector, ScreenPoints, Uploader};
+use crate::project::{DeviceCloud, ProjectRules, Projector, ScreenPoints, Uploader};
 use crate::test_clouds::{self, EYE, Random};
 
 const SIZE: [u32; 2] = [121, 90];
@@ -44,7 +44,7 @@ fn view(scale: f64) -> View {
 
 fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k: u32, first_radius: f32) -> Found {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-    let screen: ScreenPoints = Projector::default().project(&cloud, view, k, true).clone();
+    let screen: ScreenPoints = Projector::default().project(&cloud, view, &ProjectRules::usual(k)).clone();
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, cloud.len()).expect("room");
     Uploader::new().positions(gpu, &cloud, &device_cloud, &|_| true).expect("an upload");
@@ -94,7 +94,7 @@ fn ample_radius(positions: &[[f32; 3]], k: u32) -> f32 {
         .filter_map(|own| distances(positions, own).get(k as usize - 1).copied())
         .collect();
     radii.sort_unstable_by(f64::total_cmp);
-    2.0 * radii.last().copied().unwrap_or(1.0).max(1e-12) as f32
+    2.5 * radii.last().copied().unwrap_or(1.0).max(1e-12) as f32
 }
 
 /// Goes through a tree and checks it; leaves that are larger than a small node may be, and the deepest level.

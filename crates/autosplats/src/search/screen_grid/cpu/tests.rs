@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::camera::{Camera, Projection};
-use crate::project::Projector;
+use crate::project::{ProjectRules, Projector};
 use crate::test_clouds;
 use autosplats_cloud::{PointCloud, glam::DVec3};
 
@@ -10,7 +10,8 @@ fn screen(positions: Vec<[f32; 3]>) -> (ScreenPoints, View) {
     let projection = Projection::PerspectiveFovDeg(30.0);
     let camera = Camera { eye: test_clouds::EYE, look_at: DVec3::ZERO, up: DVec3::NEG_Y, projection };
     let view = camera.view(DVec3::ZERO, [400, 400]).expect("a view");
-    (Projector::default().project(&PointCloud::new(DVec3::ZERO, positions), &view, 10, true).clone(), view)
+    let cloud = PointCloud::new(DVec3::ZERO, positions);
+    (Projector::default().project(&cloud, &view, &ProjectRules::usual(10)).clone(), view)
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
-use crate::project::{Projector, ScreenPoints};
+use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE};
 
@@ -88,10 +88,19 @@ fn forms(gpu: &Gpu, k: u32) -> [(&'static str, SearchPasses); 2] {
         .map(|(name, four)| (name, SearchPasses::with_form(gpu, k, four).expect("passes")))
 }
 
-pub(crate) fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
+fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
+    projected(positions, camera, size, &ProjectRules::usual(k))
+}
+
+pub(crate) fn projected(
+    positions: &[[f32; 3]],
+    camera: &Camera,
+    size: [u32; 2],
+    rules: &ProjectRules,
+) -> (ScreenPoints, View) {
     let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
     let view = camera.view(DVec3::ZERO, size).expect("a view");
-    (Projector::default().project(&cloud, &view, k, true).clone(), view)
+    (Projector::default().project(&cloud, &view, rules).clone(), view)
 }
 
 /// Both rounds; clamped and bounded points.

@@ -6,13 +6,13 @@ use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::gpu::{Clock, Recorder, read_back, test_gpu};
 use crate::project::DeviceCloud;
-use crate::project::ScreenPoints;
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
+use crate::project::{ProjectRules, ScreenPoints};
 use crate::search::SearchRules;
 use crate::search::gpu::convergence;
 use crate::search::screen_grid::gpu::neighborhood_buffer;
-use crate::search::screen_grid::gpu::tests::{Moments, cameras, frame_buffer, on_host, screen};
+use crate::search::screen_grid::gpu::tests::{Moments, cameras, frame_buffer, on_host, projected};
 use crate::test_clouds;
 
 const SIZE: [u32; 2] = [121, 90];
@@ -25,6 +25,11 @@ struct Found {
     bounded: usize,
     /// Points without their radius before the first iteration and after each.
     curve: Vec<u32>,
+}
+
+/// One point a pixel: a texel has room for one.
+fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
+    projected(positions, camera, size, &ProjectRules { halves: false, ..ProjectRules::usual(k) })
 }
 
 fn on_device(
