@@ -213,6 +213,7 @@ fn k_radius_does_not_decrease_with_k() {
                 // Dots, so that each pixel with a point shows this point's own k-radius.
                 let reconstruction = Reconstruction {
                     k,
+                    points_per_pixel: 1,
                     outlier_expansions: None,
                     gap_factor: None,
                     splat_scale: 0.01,
