@@ -1,11 +1,12 @@
 // Fits each surfel anew at the scale that the frame's noise calls for: an invocation per surfel. See the CPU form.
 //
-// Reads: density, levels, clusters, measured. Reads and writes: counters, surfels.
+// Reads: density, levels, clusters, measured, stepped. Reads and writes: counters, surfels.
 
 #import frame
 #import groups
 #import counters
 #import quadric
+#import stepped
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -13,6 +14,8 @@
 @group(0) @binding(4) var<storage, read> clusters: array<vec4f>;
 @group(0) @binding(5) var<storage, read> measured: array<f32>;
 @group(0) @binding(6) var<storage, read_write> surfels: array<Surfel>;
+// In the order of the points, the first from point 0 on.
+@group(0) @binding(7) var<storage, read> stepped: array<Stepped>;
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
@@ -112,14 +115,22 @@ fn choose(surfel: Surfel, noise: f32, enough: f32) -> Quadric {
     return best;
 }
 
-// Turns and moves a surfel onto a quadric.
-fn move_onto(place: u32, surfel: Surfel, quadric: Quadric) {
-    let center = surfel.center + quadric.axis * quadric.height;
+// Turns and moves a surfel onto a quadric: along its axis, or the ray along which its noise was made.
+fn move_onto(place: u32, surfel: Surfel, quadric: Quadric, known: Known) {
+    var offset = quadric.axis * quadric.height;
+    if known.noise > 0.0 {
+        offset = offset_along(known, quadric.normal, offset);
+    }
+    let center = surfel.center + offset;
     let to_eye = select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u);
     let normal = select(quadric.normal, -quadric.normal, dot(quadric.normal, to_eye) < 0.0);
     surfels[place].normal = normal;
-    surfels[place].major_axis = any_orthonormal(normal);
-    surfels[place].major_ratio = 1.0;
+    var shadow = vec4f(any_orthonormal(normal), 1.0);
+    if known.noise > 0.0 {
+        shadow = shadow_along(known, surfel.normal, normal, shadow);
+    }
+    surfels[place].major_axis = shadow.xyz;
+    surfels[place].major_ratio = shadow.w;
     surfels[place].curvature = quadric.curvature;
     let at = to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.
@@ -158,14 +169,19 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     let surfel = surfels[first + index];
     // The first neighbourhood's error is about that of its k points over the k-radius.
-    let noise = noise_at(surfel.center.z);
+    let measured_noise = noise_at(surfel.center.z);
+    var known = known_at(surfel.center, surfel.source);
+    if known.noise <= measured_noise {
+        known = Known();
+    }
+    let noise = max(known.noise, measured_noise);
     let enough = good_enough(noise, surfel.center.z);
     var quadric = Quadric();
     if surfel.radius > 0.0 && noise > enough * surfel.k_radius {
         quadric = choose(surfel, noise, enough);
     }
     if quadric.len > 0u {
-        move_onto(first + index, surfel, quadric);
+        move_onto(first + index, surfel, quadric, known);
     } else if surfel.radius > 0.0 {
         shrink(first + index, surfel);
     }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
+use super::steps::{DepthSteps, Known};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -51,6 +52,8 @@ struct Task<'a> {
     view: &'a View,
     k: u32,
     usual: Usual,
+    /// In view space.
+    steps: &'a DepthSteps,
     keep_outliers: bool,
 }
 
@@ -76,11 +79,13 @@ impl Adapter {
         density: &DensityGrid,
         view: &View,
         k: u32,
+        steps: &DepthSteps,
         keep_outliers: bool,
     ) {
         let Self { cells, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
-        let task = Task { cells, density, view, k, usual, keep_outliers };
+        let steps = &steps.seen_by(view);
+        let task = Task { cells, density, view, k, usual, steps, keep_outliers };
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
             adapt_all(surfels, &task, gathered);
         });
@@ -99,13 +104,15 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
 fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
     for surfel in surfels {
         // The first neighbourhood's error is about that of its k points over the k-radius.
-        let noise = task.usual.noise.at(surfel.center[2]);
+        let measured = task.usual.noise.at(surfel.center[2]);
+        let known = task.steps.at(surfel.center.into(), surfel.source).filter(|known| known.noise > measured);
+        let noise = known.map_or(measured, |known| known.noise);
         let enough = good_enough(noise, surfel.center[2], task.view);
         if surfel.radius > 0.0
             && noise > enough * surfel.k_radius
             && let Some(quadric) = choose(simd, surfel, [noise, enough], task, gathered)
         {
-            place(surfel, &quadric, task.view);
+            place(surfel, &quadric, known.as_ref(), task.view);
         } else {
             shrink(surfel, task);
         }
@@ -195,15 +202,19 @@ fn shrink(surfel: &mut Surfel, task: &Task) {
     }
 }
 
-/// Turns and moves a surfel onto a quadric.
+/// Turns and moves a surfel onto a quadric: along its axis, or the ray along which its noise was made.
 #[inline(always)]
-fn place(surfel: &mut Surfel, quadric: &Quadric, view: &View) {
-    let center = Vec3::from(surfel.center) + quadric.axis * quadric.height;
+fn place(surfel: &mut Surfel, quadric: &Quadric, known: Option<&Known>, view: &View) {
+    let offset = quadric.axis * quadric.height;
+    let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(quadric.normal, offset));
     let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
     let normal = if quadric.normal.dot(to_eye) < 0.0 { -quadric.normal } else { quadric.normal };
+    let circle = (normal.any_orthonormal_vector(), 1.0);
+    let (major_axis, major_ratio) =
+        known.and_then(|known| known.shadow(surfel.normal.into(), normal)).unwrap_or(circle);
     surfel.normal = normal.to_array();
-    surfel.major_axis = normal.any_orthonormal_vector().to_array();
-    surfel.major_ratio = 1.0;
+    surfel.major_axis = major_axis.to_array();
+    surfel.major_ratio = major_ratio;
     surfel.curvature = quadric.curvature;
     let [x, y] = view.to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.

@@ -7,6 +7,7 @@ use super::cpu::{
 };
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
+use super::steps::{DepthSteps, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW, Stepped};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::Error;
 use crate::fit::SWEEPS;
@@ -73,6 +74,38 @@ impl AdaptBuffers {
     }
 }
 
+/// Which of a cloud's points have depths in steps, on the device.
+#[derive(Debug)]
+pub(crate) struct SteppedBuffer {
+    runs: wgpu::Buffer,
+    len: usize,
+}
+
+impl SteppedBuffer {
+    /// Of a cloud that has none.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`] if the device has no room.
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        // A new buffer is all zeros, which is a run without steps.
+        Ok(Self { runs: gpu.storage::<Stepped>("steps of depth", 1)?, len: 1 })
+    }
+
+    /// Holds those of a cloud from now on; returns whether the buffer is another one.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn write(&mut self, gpu: &Gpu, steps: &DepthSteps) -> Result<bool, Error> {
+        let runs = steps.on_device();
+        let is_new = runs.len() != self.len;
+        if is_new {
+            *self = Self { runs: gpu.storage::<Stepped>("steps of depth", runs.len())?, len: runs.len() };
+        }
+        gpu.queue.write_buffer(&self.runs, 0, bytemuck::cast_slice(&runs));
+        Ok(is_new)
+    }
+}
+
 /// Cells of all levels if they are as small as can be.
 fn most_cells(size: [u32; 2]) -> usize {
     let side_px = least_side_px(size);
@@ -134,6 +167,9 @@ impl AdaptPasses {
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),
+                ("GRAZING", GRAZING.into()),
+                ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
+                ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
             ];
             Pass::new(gpu, &ADAPT, &[&quadric[..], &own].concat())
         };
@@ -199,6 +235,7 @@ impl AdaptPasses {
         screen: &ScreenBuffers,
         surfels: &wgpu::Buffer,
         buffers: &AdaptBuffers,
+        stepped: &SteppedBuffer,
         round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
@@ -213,7 +250,7 @@ impl AdaptPasses {
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }
-        let adapt = [frame, counters, density, levels, clusters, measured, surfels];
+        let adapt = [frame, counters, density, levels, clusters, measured, surfels, &stepped.runs];
         steps.push(self.rounds[round as usize].step(gpu, &adapt, screen.groups(round.work_64())));
         steps
     }

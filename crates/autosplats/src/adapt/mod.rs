@@ -20,12 +20,16 @@ mod cpu;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
+mod steps;
 #[cfg(test)]
 mod tests;
 
 #[cfg(test)]
 pub(crate) use cells::SLABS;
 pub(crate) use cpu::Adapter;
+pub(crate) use steps::DepthSteps;
+#[cfg(test)]
+pub(crate) use steps::Stepped;
 
 /// Balls tried around each point, beside the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;

@@ -4,10 +4,10 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 use glam::Vec3;
 
-use super::Adapter;
 use super::cells::{Cells, Cluster, Level};
 use super::noise::{Noise, Usual, measure};
 use super::quadric::{Gathered, Quadric};
+use super::{Adapter, DepthSteps};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{FitRules, Surfel, Surfels, fit};
 use crate::project::{Projector, ScreenPoints};
@@ -22,6 +22,7 @@ pub(crate) struct Case {
     pub(crate) screen: ScreenPoints,
     pub(crate) view: View,
     pub(crate) fitted: [Surfels; 2],
+    pub(crate) steps: DepthSteps,
 }
 
 impl Case {
@@ -44,7 +45,7 @@ impl Case {
             fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels);
             surfels
         });
-        Self { screen, view, fitted }
+        Self { screen, view, fitted, steps: DepthSteps::default() }
     }
 
     pub(crate) fn cells(&self) -> Cells {
@@ -67,7 +68,7 @@ impl Case {
         adapter.begin(&self.screen, &self.view, K);
         let mut adapt = |fitted: &Surfels| {
             let mut surfels = fitted.clone();
-            adapter.adapt(&mut surfels, &self.screen.density, &self.view, K, false);
+            adapter.adapt(&mut surfels, &self.screen.density, &self.view, K, &self.steps, false);
             surfels
         };
         let [mut active, passive] = self.fitted.each_ref().map(&mut adapt);

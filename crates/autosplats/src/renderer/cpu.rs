@@ -8,7 +8,7 @@ use super::attributes::Wanted;
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::Adapter;
+use crate::adapt::{Adapter, DepthSteps};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
@@ -24,8 +24,10 @@ pub(super) struct CpuRenderer {
     neighborhoods: Neighborhoods,
     surfels: Surfels,
     adapter: Adapter,
-    /// Of the cloud of this identity.
-    sensors: (Option<u64>, Sensors),
+    /// Identity of the cloud that what follows is of.
+    known: Option<u64>,
+    sensors: Sensors,
+    steps: DepthSteps,
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -42,7 +44,9 @@ impl Default for CpuRenderer {
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
             adapter: Adapter::default(),
-            sensors: (None, Sensors::default()),
+            known: None,
+            sensors: Sensors::default(),
+            steps: DepthSteps::default(),
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -93,11 +97,13 @@ impl CpuRenderer {
             backs: wanted.backs,
         };
         let settings_splat = &settings.reconstruction;
-        let Self { projector, neighborhoods, surfels, adapter, sensors, recovered, splatter, image, .. } = self;
-        let (known, sensors) = sensors;
+        let Self {
+            projector, neighborhoods, surfels, adapter, known, sensors, steps, recovered, splatter, image, ..
+        } = self;
         let mut clock = Clock::start();
         if known.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);
+            *steps = DepthSteps::new(cloud);
         }
 
         let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
@@ -109,7 +115,7 @@ impl CpuRenderer {
         }
         surfels.clear();
         splatter.begin(&view);
-        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, given };
+        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, steps, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
@@ -162,6 +168,7 @@ struct Reconstruct<'a> {
     view: &'a View,
     settings: &'a Settings,
     sensors: &'a Sensors,
+    steps: &'a DepthSteps,
     given: Option<GivenPlanes<'a>>,
 }
 
@@ -176,7 +183,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
-        let Self { screen, view, settings, sensors, given } = *self;
+        let Self { screen, view, settings, sensors, steps, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -209,7 +216,8 @@ impl Reconstruct<'_> {
         clock.lap(|timings| &mut timings.fit);
 
         if settings.adaptive {
-            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, rules.keep_outliers);
+            let keep_outliers = rules.keep_outliers;
+            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, steps, keep_outliers);
             clock.lap(|timings| &mut timings.adapt);
         }
         sensors.orient(&mut surfels[first..], view);

@@ -9,7 +9,8 @@ use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
 use crate::Error;
-use crate::adapt::gpu::{AdaptBuffers, AdaptPasses};
+use crate::adapt::DepthSteps;
+use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, SteppedBuffer};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
@@ -36,6 +37,7 @@ pub(super) struct GpuRenderer {
     cloud: DeviceCloud,
     /// Where the sensors of its points stood, and the number of runs of points.
     sensors: Option<(wgpu::Buffer, usize)>,
+    stepped: SteppedBuffer,
     resident: Resident,
     /// [`FrameUniform`].
     frame: wgpu::Buffer,
@@ -112,6 +114,7 @@ impl GpuRenderer {
             uploader: Uploader::new(),
             cloud: DeviceCloud::default(),
             sensors: None,
+            stepped: SteppedBuffer::new(&gpu)?,
             resident: Resident::default(),
             frame: gpu.uniform::<FrameUniform>("frame")?,
             passes: Passes {
@@ -183,6 +186,9 @@ impl GpuRenderer {
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
             self.upload_sensors(&Sensors::new(cloud))?;
+            if self.stepped.write(&self.gpu, &DepthSteps::new(cloud))? {
+                self.prepared = None;
+            }
             self.resident.points = points;
         }
         self.cloud.resize_values(&self.gpu, carried.words())?;
@@ -374,7 +380,7 @@ impl GpuRenderer {
         }
         // The old buffers go before the new ones come.
         self.prepared = None;
-        let Self { gpu, cloud, sensors, frame, passes, .. } = self;
+        let Self { gpu, cloud, sensors, stepped, frame, passes, .. } = self;
         let Passes { project, search, fit, orient, adapt, splat, shade } = passes;
         if sensors.is_some() && orient.is_none() {
             *orient = Some(OrientPasses::new(gpu)?);
@@ -415,7 +421,7 @@ impl GpuRenderer {
                 steps.extend(search);
                 steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
                 if let Some((passes, buffers)) = &adapt {
-                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
+                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, stepped, round));
                 }
                 if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
                     steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));

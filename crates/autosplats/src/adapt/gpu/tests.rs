@@ -32,10 +32,12 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&case.view, K)));
+    let mut stepped = SteppedBuffer::new(gpu).expect("room");
+    stepped.write(gpu, &case.steps).expect("room");
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
     for round in [Round::Active, Round::Recovered] {
-        steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, round));
+        steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, &stepped, round));
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
