@@ -1,12 +1,12 @@
 // Fits each surfel anew at the scale that the frame's noise calls for: an invocation per surfel. See the CPU form.
 //
-// Reads: density, levels, clusters, measured, stepped. Reads and writes: counters, surfels.
+// Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
 #import groups
 #import counters
 #import quadric
-#import stepped
+#import depth_noise
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -15,7 +15,7 @@
 @group(0) @binding(5) var<storage, read> measured: array<f32>;
 @group(0) @binding(6) var<storage, read_write> surfels: array<Surfel>;
 // In the order of the points, the first from point 0 on.
-@group(0) @binding(7) var<storage, read> stepped: array<Stepped>;
+@group(0) @binding(7) var<storage, read> depth_noise: array<DepthRun>;
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
@@ -28,6 +28,7 @@ override THICKEST: f32;
 override THICKEST_FIRST: f32;
 override SCATTER: f32;
 override AGREE: f32;
+override WIDEST: f32;
 override FARTHEST: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
@@ -141,6 +142,13 @@ fn move_onto(place: u32, surfel: Surfel, quadric: Quadric, known: Known) {
     }
 }
 
+// Most that the k-radius of a depth camera's point counts as: between two surfaces it is the way to one of them.
+fn widest(surfel: Surfel) -> f32 {
+    let cell_px = atomicLoad(&counters[CELL_PX]);
+    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, atomicLoad(&counters[CELL_COLUMNS]))];
+    return WIDEST * first_radius(cell.x, cell_px, surfel.center.z);
+}
+
 // Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
 fn shrink(place: u32, surfel: Surfel) {
     let usual = measured[2];
@@ -181,6 +189,9 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         quadric = choose(surfel, noise, enough);
     }
     if quadric.len > 0u {
+        if known.noise > 0.0 {
+            surfels[first + index].radius = surfel.radius * min(widest(surfel) / surfel.k_radius, 1.0);
+        }
         move_onto(first + index, surfel, quadric, known);
     } else if surfel.radius > 0.0 {
         shrink(first + index, surfel);

@@ -5,9 +5,9 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
+use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
-use super::steps::{DepthSteps, Known};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -33,6 +33,8 @@ pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
 pub(super) const AGREE: f32 = 3.0;
 
+/// The k-radius of a point that lies between surfaces counts as at most this many first search radii.
+pub(super) const WIDEST: f32 = 3.0;
 /// A surfel moves at most this many times the noise; a quadric further away is another surface.
 pub(super) const FARTHEST: f32 = 6.0;
 /// Points whose surface variation, times the square of the k-radius in usual ones, is above this are drawn as dots. Surface
@@ -53,7 +55,7 @@ struct Task<'a> {
     k: u32,
     usual: Usual,
     /// In view space.
-    steps: &'a DepthSteps,
+    known: &'a DepthNoise,
     keep_outliers: bool,
 }
 
@@ -79,13 +81,13 @@ impl Adapter {
         density: &DensityGrid,
         view: &View,
         k: u32,
-        steps: &DepthSteps,
+        known: &DepthNoise,
         keep_outliers: bool,
     ) {
         let Self { cells, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
-        let steps = &steps.seen_by(view);
-        let task = Task { cells, density, view, k, usual, steps, keep_outliers };
+        let known = &known.seen_by(view);
+        let task = Task { cells, density, view, k, usual, known, keep_outliers };
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
             adapt_all(surfels, &task, gathered);
         });
@@ -105,13 +107,16 @@ fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Tas
     for surfel in surfels {
         // The first neighbourhood's error is about that of its k points over the k-radius.
         let measured = task.usual.noise.at(surfel.center[2]);
-        let known = task.steps.at(surfel.center.into(), surfel.source).filter(|known| known.noise > measured);
+        let known = task.known.at(surfel.center.into(), surfel.source).filter(|known| known.noise > measured);
         let noise = known.map_or(measured, |known| known.noise);
         let enough = good_enough(noise, surfel.center[2], task.view);
         if surfel.radius > 0.0
             && noise > enough * surfel.k_radius
             && let Some(quadric) = choose(simd, surfel, [noise, enough], task, gathered)
         {
+            if known.is_some() {
+                surfel.radius *= (widest(surfel, task) / surfel.k_radius).min(1.0);
+            }
             place(surfel, &quadric, known.as_ref(), task.view);
         } else {
             shrink(surfel, task);
@@ -184,6 +189,13 @@ fn choose<S: Simd>(
     }
     let quadric = if count == 0 { fallback } else { best };
     quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
+}
+
+/// Most that the k-radius of a depth camera's point counts as: between two surfaces it is the way to one of them.
+#[inline(always)]
+fn widest(surfel: &Surfel, task: &Task) -> f32 {
+    let point = ScreenPoint { position_view: surfel.center, pixel: surfel.pixel };
+    WIDEST * task.density.initial_radius(&point, task.k, task.view)
 }
 
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.

@@ -3,11 +3,11 @@
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
     AGREE, DOT_PX, ENOUGH, FARTHEST, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX,
-    TINY_SLOPE,
+    TINY_SLOPE, WIDEST,
 };
+use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
-use super::steps::{DepthSteps, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW, Stepped};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::Error;
 use crate::fit::SWEEPS;
@@ -74,32 +74,32 @@ impl AdaptBuffers {
     }
 }
 
-/// Which of a cloud's points have depths in steps, on the device.
+/// What is known of the noise of a cloud's depths, on the device.
 #[derive(Debug)]
-pub(crate) struct SteppedBuffer {
+pub(crate) struct DepthNoiseBuffer {
     runs: wgpu::Buffer,
     len: usize,
 }
 
-impl SteppedBuffer {
-    /// Of a cloud that has none.
+impl DepthNoiseBuffer {
+    /// Of a cloud of which nothing is known.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        // A new buffer is all zeros, which is a run without steps.
-        Ok(Self { runs: gpu.storage::<Stepped>("steps of depth", 1)?, len: 1 })
+        // A new buffer is all zeros, which is a run of which nothing is known.
+        Ok(Self { runs: gpu.storage::<DepthRun>("noise of depths", 1)?, len: 1 })
     }
 
     /// Holds those of a cloud from now on; returns whether the buffer is another one.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn write(&mut self, gpu: &Gpu, steps: &DepthSteps) -> Result<bool, Error> {
-        let runs = steps.on_device();
+    pub(crate) fn write(&mut self, gpu: &Gpu, noise: &DepthNoise) -> Result<bool, Error> {
+        let runs = noise.on_device();
         let is_new = runs.len() != self.len;
         if is_new {
-            *self = Self { runs: gpu.storage::<Stepped>("steps of depth", runs.len())?, len: runs.len() };
+            *self = Self { runs: gpu.storage::<DepthRun>("noise of depths", runs.len())?, len: runs.len() };
         }
         gpu.queue.write_buffer(&self.runs, 0, bytemuck::cast_slice(&runs));
         Ok(is_new)
@@ -163,6 +163,7 @@ impl AdaptPasses {
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("SCATTER", SCATTER.into()),
                 ("AGREE", AGREE.into()),
+                ("WIDEST", WIDEST.into()),
                 ("FARTHEST", FARTHEST.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
@@ -235,7 +236,7 @@ impl AdaptPasses {
         screen: &ScreenBuffers,
         surfels: &wgpu::Buffer,
         buffers: &AdaptBuffers,
-        stepped: &SteppedBuffer,
+        known: &DepthNoiseBuffer,
         round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
@@ -250,7 +251,7 @@ impl AdaptPasses {
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }
-        let adapt = [frame, counters, density, levels, clusters, measured, surfels, &stepped.runs];
+        let adapt = [frame, counters, density, levels, clusters, measured, surfels, &known.runs];
         steps.push(self.rounds[round as usize].step(gpu, &adapt, screen.groups(round.work_64())));
         steps
     }

@@ -17,19 +17,19 @@
 
 mod cells;
 mod cpu;
+mod depth;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
-mod steps;
 #[cfg(test)]
 mod tests;
 
 #[cfg(test)]
 pub(crate) use cells::SLABS;
 pub(crate) use cpu::Adapter;
-pub(crate) use steps::DepthSteps;
+pub(crate) use depth::DepthNoise;
 #[cfg(test)]
-pub(crate) use steps::Stepped;
+pub(crate) use depth::DepthRun;
 
 /// Balls tried around each point, beside the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;

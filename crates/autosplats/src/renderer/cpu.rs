@@ -8,7 +8,7 @@ use super::attributes::Wanted;
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::{Adapter, DepthSteps};
+use crate::adapt::{Adapter, DepthNoise};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
@@ -27,7 +27,7 @@ pub(super) struct CpuRenderer {
     /// Identity of the cloud that what follows is of.
     known: Option<u64>,
     sensors: Sensors,
-    steps: DepthSteps,
+    depth_noise: DepthNoise,
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -46,7 +46,7 @@ impl Default for CpuRenderer {
             adapter: Adapter::default(),
             known: None,
             sensors: Sensors::default(),
-            steps: DepthSteps::default(),
+            depth_noise: DepthNoise::default(),
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -98,12 +98,22 @@ impl CpuRenderer {
         };
         let settings_splat = &settings.reconstruction;
         let Self {
-            projector, neighborhoods, surfels, adapter, known, sensors, steps, recovered, splatter, image, ..
+            projector,
+            neighborhoods,
+            surfels,
+            adapter,
+            known,
+            sensors,
+            depth_noise,
+            recovered,
+            splatter,
+            image,
+            ..
         } = self;
         let mut clock = Clock::start();
         if known.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);
-            *steps = DepthSteps::new(cloud);
+            *depth_noise = DepthNoise::new(cloud);
         }
 
         let screen = projector.project(cloud, &view, settings_splat.k, settings_splat.grid_culling);
@@ -115,7 +125,7 @@ impl CpuRenderer {
         }
         surfels.clear();
         splatter.begin(&view);
-        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, steps, given };
+        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, depth_noise, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
@@ -168,7 +178,7 @@ struct Reconstruct<'a> {
     view: &'a View,
     settings: &'a Settings,
     sensors: &'a Sensors,
-    steps: &'a DepthSteps,
+    depth_noise: &'a DepthNoise,
     given: Option<GivenPlanes<'a>>,
 }
 
@@ -183,7 +193,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
-        let Self { screen, view, settings, sensors, steps, given } = *self;
+        let Self { screen, view, settings, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -217,7 +227,7 @@ impl Reconstruct<'_> {
 
         if settings.adaptive {
             let keep_outliers = rules.keep_outliers;
-            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, steps, keep_outliers);
+            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, depth_noise, keep_outliers);
             clock.lap(|timings| &mut timings.adapt);
         }
         sensors.orient(&mut surfels[first..], view);

@@ -9,8 +9,8 @@ use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
 use crate::Error;
-use crate::adapt::DepthSteps;
-use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, SteppedBuffer};
+use crate::adapt::DepthNoise;
+use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
@@ -37,7 +37,7 @@ pub(super) struct GpuRenderer {
     cloud: DeviceCloud,
     /// Where the sensors of its points stood, and the number of runs of points.
     sensors: Option<(wgpu::Buffer, usize)>,
-    stepped: SteppedBuffer,
+    depth_noise: DepthNoiseBuffer,
     resident: Resident,
     /// [`FrameUniform`].
     frame: wgpu::Buffer,
@@ -114,7 +114,7 @@ impl GpuRenderer {
             uploader: Uploader::new(),
             cloud: DeviceCloud::default(),
             sensors: None,
-            stepped: SteppedBuffer::new(&gpu)?,
+            depth_noise: DepthNoiseBuffer::new(&gpu)?,
             resident: Resident::default(),
             frame: gpu.uniform::<FrameUniform>("frame")?,
             passes: Passes {
@@ -186,7 +186,7 @@ impl GpuRenderer {
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
             self.upload_sensors(&Sensors::new(cloud))?;
-            if self.stepped.write(&self.gpu, &DepthSteps::new(cloud))? {
+            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud))? {
                 self.prepared = None;
             }
             self.resident.points = points;
@@ -380,7 +380,7 @@ impl GpuRenderer {
         }
         // The old buffers go before the new ones come.
         self.prepared = None;
-        let Self { gpu, cloud, sensors, stepped, frame, passes, .. } = self;
+        let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
         let Passes { project, search, fit, orient, adapt, splat, shade } = passes;
         if sensors.is_some() && orient.is_none() {
             *orient = Some(OrientPasses::new(gpu)?);
@@ -421,7 +421,7 @@ impl GpuRenderer {
                 steps.extend(search);
                 steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
                 if let Some((passes, buffers)) = &adapt {
-                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, stepped, round));
+                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, depth_noise, round));
                 }
                 if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
                     steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));

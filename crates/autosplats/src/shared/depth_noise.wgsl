@@ -1,19 +1,19 @@
-// Noise of depths that come in steps, as `adapt/steps.rs` has it. Wants a binding `stepped` of all runs, one at least, and
+// What is known of the noise of depth cameras, as `adapt/depth/` has it. Wants a binding `depth_noise` of all runs, one at least, and
 // `frame`.
 
 override GRAZING: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
 
-// The sensor whose points have depths in steps, and of the points from one index on.
-struct Stepped {
+// How depths scatter that one sensor measured, those of the points from one index on.
+struct DepthRun {
     // Where it stood, about the cloud's origin.
     position: vec3f,
     // Index of the first point.
     first: u32,
     // Where it looked: a unit vector, in the axes of the cloud.
     axis: vec3f,
-    // Standard deviation of depths from what they should be, at depth 1; 0 if there are no steps.
+    // Standard deviation at depth 1 along the axis; 0 if nothing is known.
     factor: f32,
     power: f32,
     padding: array<u32, 3>,
@@ -30,16 +30,16 @@ struct Known {
 // At a place in view space; of a cloud's point.
 fn known_at(place: vec3f, point: u32) -> Known {
     var low = 0u;
-    var high = arrayLength(&stepped);
+    var high = arrayLength(&depth_noise);
     while high - low > 1u {
         let middle = (low + high) / 2u;
-        if stepped[middle].first <= point {
+        if depth_noise[middle].first <= point {
             low = middle;
         } else {
             high = middle;
         }
     }
-    let run = stepped[low];
+    let run = depth_noise[low];
     let m = frame.view_from_world;
     let axis = m[0] * run.axis.x + m[1] * run.axis.y + m[2] * run.axis.z;
     let from_sensor = place - to_view(run.position);
