@@ -50,14 +50,16 @@ pub(crate) struct AdaptBuffers {
     quantiles: wgpu::Buffer,
     /// Factor and power of the noise, and the median k-radius.
     measured: wgpu::Buffer,
+    /// Not of the stage's own: [`DepthNoiseBuffer`].
+    depth_noise: wgpu::Buffer,
 }
 
 impl AdaptBuffers {
-    /// Room for pictures of `size`.
+    /// Room for pictures of `size`, of clouds whose noise is in `known`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], known: &DepthNoiseBuffer) -> Result<Self, Error> {
         Ok(Self {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
@@ -70,6 +72,7 @@ impl AdaptBuffers {
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
             quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
             measured: gpu.storage::<f32>("noise", 3)?,
+            depth_noise: known.runs.clone(),
         })
     }
 }
@@ -236,11 +239,10 @@ impl AdaptPasses {
         screen: &ScreenBuffers,
         surfels: &wgpu::Buffer,
         buffers: &AdaptBuffers,
-        known: &DepthNoiseBuffer,
         round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
-        let AdaptBuffers { levels, clusters, sampled, scatters, quantiles, measured, .. } = buffers;
+        let AdaptBuffers { levels, clusters, sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
@@ -251,7 +253,7 @@ impl AdaptPasses {
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }
-        let adapt = [frame, counters, density, levels, clusters, measured, surfels, &known.runs];
+        let adapt = [frame, counters, density, levels, clusters, measured, surfels, depth_noise];
         steps.push(self.rounds[round as usize].step(gpu, &adapt, screen.groups(round.work_64())));
         steps
     }

@@ -401,7 +401,7 @@ impl GpuRenderer {
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
         let adapt = match adapt {
-            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size)?)),
+            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
             None => None,
         };
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
@@ -421,7 +421,7 @@ impl GpuRenderer {
                 steps.extend(search);
                 steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
                 if let Some((passes, buffers)) = &adapt {
-                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, depth_noise, round));
+                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
                 }
                 if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
                     steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));

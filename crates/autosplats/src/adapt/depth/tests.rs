@@ -59,7 +59,7 @@ fn the_sensor_may_stand_and_look_anywhere() {
     // Axes as a camera's, a robot's, and a graphics library's.
     let axes = [
         DQuat::IDENTITY,
-        DQuat::from_rotation_y(1.570_796_326_794_896_6),
+        DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2),
         DQuat::from_rotation_x(std::f64::consts::PI),
     ];
     for turn in turns {
@@ -235,7 +235,8 @@ fn surfels_move_along_the_ray() {
         let angle = tilt as f32 / 100.0 * std::f32::consts::FRAC_PI_2;
         let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
         let moved = known.onto(normal, normal * 0.6);
-        assert!(moved.length() <= 1.25 * FARTHEST_ALONG * 0.1, "not beyond what noise is: {tilt} {moved}");
+        let sideways = moved.reject_from_normalized(normal).length();
+        assert!(sideways <= FARTHEST_ALONG * 0.1 + 1e-5, "not beyond what noise is: {tilt} {moved}");
     }
 
     let slanted = Vec3::new(0.6, 0.0, -0.8);

@@ -26,18 +26,18 @@ struct Made {
 
 fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     let screen = upload_screen(gpu, &case.screen, &case.view);
-    let buffers = AdaptBuffers::new(gpu, screen.size).expect("room");
+    let mut known = DepthNoiseBuffer::new(gpu).expect("room");
+    known.write(gpu, &case.known).expect("room");
+    let buffers = AdaptBuffers::new(gpu, screen.size, &known).expect("room");
     let fitted = case.fitted.concat();
     let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&case.view, K)));
-    let mut known = DepthNoiseBuffer::new(gpu).expect("room");
-    known.write(gpu, &case.known).expect("room");
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
     for round in [Round::Active, Round::Recovered] {
-        steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, &known, round));
+        steps.extend(passes.steps(gpu, &frame, &screen, &surfels, &buffers, round));
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
