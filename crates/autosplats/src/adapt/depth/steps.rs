@@ -14,11 +14,11 @@ const LEAST_VALUES: usize = 8;
 const POINTS_PER_VALUE: usize = 6;
 /// Values along other axes per value along the sensor's: coordinates that are all rounded, and grids, have no such axis.
 const OTHER_VALUES: usize = 4;
-/// Steps are at least this many times as wide as that.
+/// Steps are at least this many times as wide as coordinates are rounded.
 const LEAST_STEP: f64 = 8.0;
 /// Points of a depth that tell whether they are a line.
 const LEAST_ALIKE: usize = 8;
-/// Powers of depth that steps may grow with: by how they are stored, by nothing known, and by disparity.
+/// Powers of depth that steps may grow with: of disparities, of anything between, of depths.
 const POWERS: [i32; 3] = [2, 1, 0];
 /// A gap is as wide as a number of steps up to this part of one.
 const TIGHT: f64 = 0.25;
