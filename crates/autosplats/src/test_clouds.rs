@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "unit tests and tests of the public API use different ones")]
 
-use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::glam::{DQuat, DVec3};
 
 /// Reproducible random numbers (SplitMix64).
 pub(crate) struct Random(u64);
@@ -59,6 +59,9 @@ impl Random {
 
 /// Where the test cameras stand.
 pub(crate) const EYE: DVec3 = DVec3::new(0.5, -0.8, -4.0);
+
+/// The middle of the ball in a [`room`], in its axes.
+const BALL: DVec3 = DVec3::new(-0.3, 0.2, 2.0);
 
 pub(crate) type Positions = Vec<[f32; 3]>;
 
@@ -178,4 +181,35 @@ pub(crate) fn all(count: usize) -> Vec<(&'static str, Positions)> {
         ("line", line(count / 4)),
         ("outliers", outliers(count / 4)),
     ]
+}
+
+/// From the axes of the camera of [`room`], which is held askew, to those of the room.
+pub(crate) fn askew() -> DQuat {
+    DQuat::from_rotation_z(0.2) * DQuat::from_rotation_x(0.15) * DQuat::from_rotation_y(-0.1)
+}
+
+/// What a depth camera at the origin sees of a room with a ball in it, in the camera's axes: `width` columns, and the depth
+/// that it measures in place of the right one. In the room's axes the floor is at y = 1, a wall at x = 1.5, another at z = 8.
+pub(crate) fn room(width: usize, mut measured: impl FnMut(f32) -> f32) -> Positions {
+    let height = width / 4 * 3;
+    let mut points = Vec::with_capacity(width * height);
+    for pixel in 0..width * height {
+        let [column, row] = [pixel % width, pixel / width].map(|at| at as f32);
+        let [x, y] = [(column - width as f32 / 2.0) / width as f32, (row - height as f32 / 2.0) / width as f32];
+        let way = askew() * DVec3::new(x.into(), y.into(), 1.0);
+        let until = |at: f64, way: f64| if way > 0.0 { at / way } else { f64::INFINITY };
+        // Half a unit in radius.
+        let [a, b, c] = [way.length_squared(), way.dot(BALL), BALL.length_squared() - 0.25];
+        let root = b * b - a * c;
+        let ball = if root > 0.0 { (b - root.sqrt()) / a } else { f64::INFINITY };
+        let depth = until(1.0, way.y).min(until(1.5, way.x)).min(until(8.0, way.z)).min(ball);
+        let depth = measured(depth as f32);
+        points.push([x * depth, y * depth, depth]);
+    }
+    points
+}
+
+/// A depth in the nearest of a Kinect's steps, each `step` wide at depth 1.
+pub(crate) fn stepped(depth: f32, step: f32) -> f32 {
+    1.0 / (step * (1.0 / (step * depth)).round())
 }

@@ -8,8 +8,8 @@ mod test_clouds;
 
 use std::collections::HashMap;
 
-use autosplats::cloud::glam::DVec3;
-use autosplats::cloud::{FieldValues, PointCloud, Scene};
+use autosplats::cloud::glam::{DMat4, DVec3};
+use autosplats::cloud::{FieldValues, PointCloud, Scan, Scene};
 use autosplats::{
     Backend, Background, Camera, ColorMode, Counts, Error, GBuffer, Image, Projection, Reconstruction, Renderer,
     SearchEngine, Settings, Shading, wgpu,
@@ -123,6 +123,32 @@ fn every_scene() {
             compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), &format!("{name}, {count} points"));
         }
     }
+}
+
+#[test]
+fn depth_cameras_and_what_comes_after() {
+    let Some(mut gpu) = gpu() else { return };
+    let positions = test_clouds::room(240, |depth| test_clouds::stepped(depth, 0.0029));
+    let scan = |points: std::ops::Range<usize>| Scan { name: None, world_from_sensor: DMat4::IDENTITY, points };
+    let half = positions.len() / 2;
+    let camera = Camera {
+        eye: DVec3::new(0.4, -0.3, 0.1),
+        look_at: DVec3::new(0.0, 0.0, 3.0),
+        up: DVec3::NEG_Y,
+        projection: Projection::PerspectiveFovDeg(42.0),
+    };
+    let mut pictures = Vec::new();
+    // One renderer for all: what is known of one cloud must not be held of the next.
+    for scans in
+        [vec![scan(0..2 * half)], vec![], vec![scan(0..half), scan(half..2 * half)], vec![scan(0..half)], vec![]]
+    {
+        let case = format!("{} scans", scans.len());
+        let cloud = PointCloud::new(DVec3::ZERO, positions.clone()).with_scans(scans);
+        compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), &case);
+        pictures.push(Renderer::new().render(&cloud, &camera, SIZE, &Settings::default()).expect("one").image.clone());
+    }
+    assert!(unlike(&pictures[0], &pictures[1]) > 0.1, "steps are to be seen where nothing is known");
+    assert_eq!(pictures[1].pixels, pictures[4].pixels, "nothing is known again");
 }
 
 #[test]

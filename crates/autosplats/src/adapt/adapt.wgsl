@@ -1,11 +1,12 @@
 // Fits each surfel anew at the scale that the frame's noise calls for: an invocation per surfel. See the CPU form.
 //
-// Reads: density, levels, clusters, measured. Reads and writes: counters, surfels.
+// Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
 #import groups
 #import counters
 #import quadric
+#import depth_noise
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -13,6 +14,8 @@
 @group(0) @binding(4) var<storage, read> clusters: array<vec4f>;
 @group(0) @binding(5) var<storage, read> measured: array<f32>;
 @group(0) @binding(6) var<storage, read_write> surfels: array<Surfel>;
+// In the order of the points, the first from point 0 on.
+@group(0) @binding(7) var<storage, read> depth_noise: array<DepthRun>;
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
@@ -25,6 +28,7 @@ override THICKEST: f32;
 override THICKEST_FIRST: f32;
 override SCATTER: f32;
 override AGREE: f32;
+override WIDEST: f32;
 override FARTHEST: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
@@ -112,14 +116,22 @@ fn choose(surfel: Surfel, noise: f32, enough: f32) -> Quadric {
     return best;
 }
 
-// Turns and moves a surfel onto a quadric.
-fn move_onto(place: u32, surfel: Surfel, quadric: Quadric) {
-    let center = surfel.center + quadric.axis * quadric.height;
+// Turns and moves a surfel onto a quadric: along its axis, or the ray along which its noise was made.
+fn move_onto(place: u32, surfel: Surfel, quadric: Quadric, known: Known) {
+    var offset = quadric.axis * quadric.height;
+    if known.noise > 0.0 {
+        offset = offset_along(known, quadric.normal, offset);
+    }
+    let center = surfel.center + offset;
     let to_eye = select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u);
     let normal = select(quadric.normal, -quadric.normal, dot(quadric.normal, to_eye) < 0.0);
     surfels[place].normal = normal;
-    surfels[place].major_axis = any_orthonormal(normal);
-    surfels[place].major_ratio = 1.0;
+    var shadow = vec4f(any_orthonormal(normal), 1.0);
+    if known.noise > 0.0 {
+        shadow = shadow_along(known, surfel.normal, normal, shadow);
+    }
+    surfels[place].major_axis = shadow.xyz;
+    surfels[place].major_ratio = shadow.w;
     surfels[place].curvature = quadric.curvature;
     let at = to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.
@@ -128,6 +140,13 @@ fn move_onto(place: u32, surfel: Surfel, quadric: Quadric) {
         surfels[place].center = center;
         surfels[place].pixel = (pixel.y << 16u) | pixel.x;
     }
+}
+
+// Most that the k-radius of a depth camera's point counts as: between two surfaces it is the way to one of them.
+fn widest(surfel: Surfel) -> f32 {
+    let cell_px = atomicLoad(&counters[CELL_PX]);
+    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, atomicLoad(&counters[CELL_COLUMNS]))];
+    return WIDEST * first_radius(cell.x, cell_px, surfel.center.z);
 }
 
 // Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
@@ -158,14 +177,22 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     let surfel = surfels[first + index];
     // The first neighbourhood's error is about that of its k points over the k-radius.
-    let noise = noise_at(surfel.center.z);
+    let measured_noise = noise_at(surfel.center.z);
+    var known = known_at(surfel.center, surfel.source);
+    if known.noise <= measured_noise {
+        known = Known();
+    }
+    let noise = max(known.noise, measured_noise);
     let enough = good_enough(noise, surfel.center.z);
     var quadric = Quadric();
     if surfel.radius > 0.0 && noise > enough * surfel.k_radius {
         quadric = choose(surfel, noise, enough);
     }
     if quadric.len > 0u {
-        move_onto(first + index, surfel, quadric);
+        if known.noise > 0.0 {
+            surfels[first + index].radius = surfel.radius * min(widest(surfel) / surfel.k_radius, 1.0);
+        }
+        move_onto(first + index, surfel, quadric, known);
     } else if surfel.radius > 0.0 {
         shrink(first + index, surfel);
     }

@@ -5,6 +5,7 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
+use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
 use super::{LEAST_REACH, SCALES, STEP};
@@ -32,6 +33,8 @@ pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
 pub(super) const AGREE: f32 = 3.0;
 
+/// The k-radius of a point that lies between surfaces counts as at most this many first search radii.
+pub(super) const WIDEST: f32 = 3.0;
 /// A surfel moves at most this many times the noise; a quadric further away is another surface.
 pub(super) const FARTHEST: f32 = 6.0;
 /// Points whose surface variation, times the square of the k-radius in usual ones, is above this are drawn as dots. Surface
@@ -51,6 +54,8 @@ struct Task<'a> {
     view: &'a View,
     k: u32,
     usual: Usual,
+    /// In view space.
+    known: &'a DepthNoise,
     keep_outliers: bool,
 }
 
@@ -76,11 +81,13 @@ impl Adapter {
         density: &DensityGrid,
         view: &View,
         k: u32,
+        known: &DepthNoise,
         keep_outliers: bool,
     ) {
         let Self { cells, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
-        let task = Task { cells, density, view, k, usual, keep_outliers };
+        let known = &known.seen_by(view);
+        let task = Task { cells, density, view, k, usual, known, keep_outliers };
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
             adapt_all(surfels, &task, gathered);
         });
@@ -99,13 +106,18 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
 fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
     for surfel in surfels {
         // The first neighbourhood's error is about that of its k points over the k-radius.
-        let noise = task.usual.noise.at(surfel.center[2]);
+        let measured = task.usual.noise.at(surfel.center[2]);
+        let known = task.known.at(surfel.center.into(), surfel.source).filter(|known| known.noise > measured);
+        let noise = known.map_or(measured, |known| known.noise);
         let enough = good_enough(noise, surfel.center[2], task.view);
         if surfel.radius > 0.0
             && noise > enough * surfel.k_radius
             && let Some(quadric) = choose(simd, surfel, [noise, enough], task, gathered)
         {
-            place(surfel, &quadric, task.view);
+            if known.is_some() {
+                surfel.radius *= (widest(surfel, task) / surfel.k_radius).min(1.0);
+            }
+            place(surfel, &quadric, known.as_ref(), task.view);
         } else {
             shrink(surfel, task);
         }
@@ -179,6 +191,13 @@ fn choose<S: Simd>(
     quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
 }
 
+/// Most that the k-radius of a depth camera's point counts as: between two surfaces it is the way to one of them.
+#[inline(always)]
+fn widest(surfel: &Surfel, task: &Task) -> f32 {
+    let point = ScreenPoint { position_view: surfel.center, pixel: surfel.pixel };
+    WIDEST * task.density.initial_radius(&point, task.k, task.view)
+}
+
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
 #[inline(always)]
 fn shrink(surfel: &mut Surfel, task: &Task) {
@@ -195,15 +214,19 @@ fn shrink(surfel: &mut Surfel, task: &Task) {
     }
 }
 
-/// Turns and moves a surfel onto a quadric.
+/// Turns and moves a surfel onto a quadric: along its axis, or the ray along which its noise was made.
 #[inline(always)]
-fn place(surfel: &mut Surfel, quadric: &Quadric, view: &View) {
-    let center = Vec3::from(surfel.center) + quadric.axis * quadric.height;
+fn place(surfel: &mut Surfel, quadric: &Quadric, known: Option<&Known>, view: &View) {
+    let offset = quadric.axis * quadric.height;
+    let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(quadric.normal, offset));
     let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
     let normal = if quadric.normal.dot(to_eye) < 0.0 { -quadric.normal } else { quadric.normal };
+    let circle = (normal.any_orthonormal_vector(), 1.0);
+    let (major_axis, major_ratio) =
+        known.and_then(|known| known.shadow(surfel.normal.into(), normal)).unwrap_or(circle);
     surfel.normal = normal.to_array();
-    surfel.major_axis = normal.any_orthonormal_vector().to_array();
-    surfel.major_ratio = 1.0;
+    surfel.major_axis = major_axis.to_array();
+    surfel.major_ratio = major_ratio;
     surfel.curvature = quadric.curvature;
     let [x, y] = view.to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.

@@ -3,8 +3,9 @@
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
     AGREE, DOT_PX, ENOUGH, FARTHEST, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX,
-    TINY_SLOPE,
+    TINY_SLOPE, WIDEST,
 };
+use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
 use super::{LEAST_REACH, SCALES, STEP};
@@ -49,14 +50,16 @@ pub(crate) struct AdaptBuffers {
     quantiles: wgpu::Buffer,
     /// Factor and power of the noise, and the median k-radius.
     measured: wgpu::Buffer,
+    /// Not of the stage's own: [`DepthNoiseBuffer`].
+    depth_noise: wgpu::Buffer,
 }
 
 impl AdaptBuffers {
-    /// Room for pictures of `size`.
+    /// Room for pictures of `size`, of clouds whose noise is in `known`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
-    pub(crate) fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Gpu, size: [u32; 2], known: &DepthNoiseBuffer) -> Result<Self, Error> {
         Ok(Self {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
@@ -69,7 +72,40 @@ impl AdaptBuffers {
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
             quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
             measured: gpu.storage::<f32>("noise", 3)?,
+            depth_noise: known.runs.clone(),
         })
+    }
+}
+
+/// What is known of the noise of a cloud's depths, on the device.
+#[derive(Debug)]
+pub(crate) struct DepthNoiseBuffer {
+    runs: wgpu::Buffer,
+    len: usize,
+}
+
+impl DepthNoiseBuffer {
+    /// Of a cloud of which nothing is known.
+    ///
+    /// # Errors
+    /// [`Error::DeviceMemory`] if the device has no room.
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        // A new buffer is all zeros, which is a run of which nothing is known.
+        Ok(Self { runs: gpu.storage::<DepthRun>("noise of depths", 1)?, len: 1 })
+    }
+
+    /// Holds those of a cloud from now on; returns whether the buffer is another one.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    pub(crate) fn write(&mut self, gpu: &Gpu, noise: &DepthNoise) -> Result<bool, Error> {
+        let runs = noise.on_device();
+        let is_new = runs.len() != self.len;
+        if is_new {
+            *self = Self { runs: gpu.storage::<DepthRun>("noise of depths", runs.len())?, len: runs.len() };
+        }
+        gpu.queue.write_buffer(&self.runs, 0, bytemuck::cast_slice(&runs));
+        Ok(is_new)
     }
 }
 
@@ -130,10 +166,14 @@ impl AdaptPasses {
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("SCATTER", SCATTER.into()),
                 ("AGREE", AGREE.into()),
+                ("WIDEST", WIDEST.into()),
                 ("FARTHEST", FARTHEST.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),
+                ("GRAZING", GRAZING.into()),
+                ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
+                ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
             ];
             Pass::new(gpu, &ADAPT, &[&quadric[..], &own].concat())
         };
@@ -202,7 +242,7 @@ impl AdaptPasses {
         round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
-        let AdaptBuffers { levels, clusters, sampled, scatters, quantiles, measured, .. } = buffers;
+        let AdaptBuffers { levels, clusters, sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
@@ -213,7 +253,7 @@ impl AdaptPasses {
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }
-        let adapt = [frame, counters, density, levels, clusters, measured, surfels];
+        let adapt = [frame, counters, density, levels, clusters, measured, surfels, depth_noise];
         steps.push(self.rounds[round as usize].step(gpu, &adapt, screen.groups(round.work_64())));
         steps
     }

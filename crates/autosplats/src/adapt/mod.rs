@@ -14,9 +14,13 @@
 //! with the smaller ones within their errors and scatter no more, which they do on smooth surfaces and do not at edges.
 //! Where the first ten neighbours are good enough, the fit stays as it was; nearly everything does in a scan without noise.
 //! Where they are not, the surfel turns to the fitted normal, and its centre moves along it onto the fitted surface.
+//!
+//! Depth cameras have noise that no ball of these sizes shows, because neighbours err alike. It is known from the scan as a whole
+//! (`depth`) and taken where it is the larger; surfels move along the sensor's ray then.
 
 mod cells;
 mod cpu;
+mod depth;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
@@ -26,6 +30,9 @@ mod tests;
 #[cfg(test)]
 pub(crate) use cells::SLABS;
 pub(crate) use cpu::Adapter;
+pub(crate) use depth::DepthNoise;
+#[cfg(test)]
+pub(crate) use depth::DepthRun;
 
 /// Balls tried around each point, beside the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;

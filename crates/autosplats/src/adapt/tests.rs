@@ -1,13 +1,13 @@
 //! Adapted surfels against surfaces that are known.
 
-use autosplats_cloud::PointCloud;
-use autosplats_cloud::glam::DVec3;
+use autosplats_cloud::glam::{DMat4, DVec3};
+use autosplats_cloud::{PointCloud, Scan};
 use glam::Vec3;
 
-use super::Adapter;
 use super::cells::{Cells, Cluster, Level};
 use super::noise::{Noise, Usual, measure};
 use super::quadric::{Gathered, Quadric};
+use super::{Adapter, DepthNoise};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{FitRules, Surfel, Surfels, fit};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
@@ -22,6 +22,7 @@ pub(crate) struct Case {
     pub(crate) screen: ScreenPoints,
     pub(crate) view: View,
     pub(crate) fitted: [Surfels; 2],
+    pub(crate) known: DepthNoise,
 }
 
 impl Case {
@@ -32,9 +33,25 @@ impl Case {
     /// Seen from a place `scale` times as far away.
     fn scaled(positions: &[[f32; 3]], projection: Projection, size: [u32; 2], scale: f64) -> Self {
         let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
+        Self::of(&PointCloud::new(DVec3::ZERO, positions.to_vec()), &camera, size)
+    }
+
+    /// What a depth camera with coarse steps sees of a room, seen from beside the camera.
+    pub(crate) fn stepped() -> Self {
+        let positions = test_clouds::room(320, |depth| test_clouds::stepped(depth, 0.0029));
+        let scan = Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..positions.len() };
+        let camera = Camera {
+            eye: DVec3::new(0.4, -0.3, 0.1),
+            look_at: DVec3::new(0.0, 0.0, 3.0),
+            up: DVec3::NEG_Y,
+            projection: Projection::PerspectiveFovDeg(42.0),
+        };
+        Self::of(&PointCloud::new(DVec3::ZERO, positions).with_scans(vec![scan]), &camera, [480, 360])
+    }
+
+    fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2]) -> Self {
         let view = camera.view(DVec3::ZERO, size).expect("a view");
-        let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
-        let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(K)).clone();
+        let screen = Projector::default().project(cloud, &view, &ProjectRules::usual(K)).clone();
         let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0) };
         let fit_rules = FitRules { k: K, splat_scale: 1.0, ellipses: false, keep_outliers: false };
         let fitted = [&screen.active, &screen.passive].map(|queries| {
@@ -44,7 +61,7 @@ impl Case {
             fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels);
             surfels
         });
-        Self { screen, view, fitted }
+        Self { screen, view, fitted, known: DepthNoise::new(cloud) }
     }
 
     pub(crate) fn cells(&self) -> Cells {
@@ -67,7 +84,7 @@ impl Case {
         adapter.begin(&self.screen, &self.view, K);
         let mut adapt = |fitted: &Surfels| {
             let mut surfels = fitted.clone();
-            adapter.adapt(&mut surfels, &self.screen.density, &self.view, K, false);
+            adapter.adapt(&mut surfels, &self.screen.density, &self.view, K, &self.known, false);
             surfels
         };
         let [mut active, passive] = self.fitted.each_ref().map(&mut adapt);
@@ -173,6 +190,41 @@ fn normals_of_a_noisy_sphere_are_the_spheres() {
     let before = mean_error(case.fitted.iter().flatten(), normal);
     let after = mean_error(&case.adapted(), normal);
     assert!(before > 15.0 && after < 5.0, "{before} degrees off, then {after}");
+}
+
+#[test]
+fn surfaces_in_steps_are_smooth() {
+    let case = Case::stepped();
+    let askew = test_clouds::askew().as_quat();
+    let back = case.view.view_from_world.transpose();
+    // In the room's axes.
+    let world = |surfel: &Surfel| askew * (back * Vec3::from(surfel.center) + case.view.eye_local);
+    let view = |normal: Vec3| case.view.view_from_world * (askew.inverse() * normal);
+    // By where points are, and not near where the two meet.
+    let floor = |surfel: &Surfel| {
+        let at = world(surfel);
+        (at.x.abs() < 0.8 && at.z < 5.0 && at.y > 0.8).then(|| view(Vec3::Y))
+    };
+    let wall = |surfel: &Surfel| {
+        let at = world(surfel);
+        (at.y.abs() < 0.7 && at.z < 7.0 && at.x > 1.3).then(|| view(Vec3::X))
+    };
+    let fitted = case.fitted.concat();
+    let adapted = case.adapted();
+    for (name, before, after) in [
+        ("floor", mean_error(&fitted, floor), mean_error(&adapted, floor)),
+        ("wall", mean_error(&fitted, wall), mean_error(&adapted, wall)),
+    ] {
+        assert!(before > 2.0 && after < 0.2 * before, "{name}: normals {before} degrees off, then {after}");
+    }
+    // How far from the wall.
+    let distance = |surfels: &[Surfel]| {
+        let on_wall = surfels.iter().filter(|surfel| surfel.radius > 0.0 && wall(surfel).is_some());
+        let squares: Vec<f32> = on_wall.map(|surfel| (world(surfel).x - 1.5).powi(2)).collect();
+        (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
+    };
+    let [before, after] = [distance(&fitted), distance(&adapted)];
+    assert!(after < 0.5 * before, "{before} off the wall, then {after}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ const SHARED: &[(&str, &str)] = &[
     ("cell_order", include_str!("../shared/cell_order.wgsl")),
     ("screen", include_str!("../shared/screen.wgsl")),
     ("culled", include_str!("../shared/culled.wgsl")),
+    ("depth_noise", include_str!("../shared/depth_noise.wgsl")),
     ("surfel", include_str!("../shared/surfel.wgsl")),
     ("eigen", include_str!("../shared/eigen.wgsl")),
     ("orthonormal", include_str!("../shared/orthonormal.wgsl")),

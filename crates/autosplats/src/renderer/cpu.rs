@@ -8,7 +8,7 @@ use super::attributes::Wanted;
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::Adapter;
+use crate::adapt::{Adapter, DepthNoise};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
@@ -24,8 +24,10 @@ pub(super) struct CpuRenderer {
     neighborhoods: Neighborhoods,
     surfels: Surfels,
     adapter: Adapter,
-    /// Of the cloud of this identity.
-    sensors: (Option<u64>, Sensors),
+    /// Identity of the cloud that what follows is of.
+    known: Option<u64>,
+    sensors: Sensors,
+    depth_noise: DepthNoise,
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -42,7 +44,9 @@ impl Default for CpuRenderer {
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
             adapter: Adapter::default(),
-            sensors: (None, Sensors::default()),
+            known: None,
+            sensors: Sensors::default(),
+            depth_noise: DepthNoise::default(),
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -93,11 +97,23 @@ impl CpuRenderer {
             backs: wanted.backs,
         };
         let settings_splat = &settings.reconstruction;
-        let Self { projector, neighborhoods, surfels, adapter, sensors, recovered, splatter, image, .. } = self;
-        let (known, sensors) = sensors;
+        let Self {
+            projector,
+            neighborhoods,
+            surfels,
+            adapter,
+            known,
+            sensors,
+            depth_noise,
+            recovered,
+            splatter,
+            image,
+            ..
+        } = self;
         let mut clock = Clock::start();
         if known.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);
+            *depth_noise = DepthNoise::new(cloud);
         }
 
         let rules = ProjectRules {
@@ -114,7 +130,7 @@ impl CpuRenderer {
         }
         surfels.clear();
         splatter.begin(&view);
-        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, given };
+        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, depth_noise, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
         recovered.clear();
         let hidden = |&index: &u32| {
@@ -167,6 +183,7 @@ struct Reconstruct<'a> {
     view: &'a View,
     settings: &'a Settings,
     sensors: &'a Sensors,
+    depth_noise: &'a DepthNoise,
     given: Option<GivenPlanes<'a>>,
 }
 
@@ -181,7 +198,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock,
     ) -> crate::search::SearchCounts {
-        let Self { screen, view, settings, sensors, given } = *self;
+        let Self { screen, view, settings, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -214,7 +231,8 @@ impl Reconstruct<'_> {
         clock.lap(|timings| &mut timings.fit);
 
         if settings.adaptive {
-            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, rules.keep_outliers);
+            let keep_outliers = rules.keep_outliers;
+            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, depth_noise, keep_outliers);
             clock.lap(|timings| &mut timings.adapt);
         }
         sensors.orient(&mut surfels[first..], view);

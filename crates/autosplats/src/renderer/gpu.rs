@@ -9,7 +9,8 @@ use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
 use crate::Error;
-use crate::adapt::gpu::{AdaptBuffers, AdaptPasses};
+use crate::adapt::DepthNoise;
+use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
@@ -36,6 +37,7 @@ pub(super) struct GpuRenderer {
     cloud: DeviceCloud,
     /// Where the sensors of its points stood, and the number of runs of points.
     sensors: Option<(wgpu::Buffer, usize)>,
+    depth_noise: DepthNoiseBuffer,
     resident: Resident,
     /// [`FrameUniform`].
     frame: wgpu::Buffer,
@@ -113,6 +115,7 @@ impl GpuRenderer {
             uploader: Uploader::new(),
             cloud: DeviceCloud::default(),
             sensors: None,
+            depth_noise: DepthNoiseBuffer::new(&gpu)?,
             resident: Resident::default(),
             frame: gpu.uniform::<FrameUniform>("frame")?,
             passes: Passes {
@@ -184,6 +187,9 @@ impl GpuRenderer {
             self.cloud.resize(&self.gpu, cloud.len())?;
             self.uploader.positions(&self.gpu, cloud, &self.cloud, &|done| report(part * done))?;
             self.upload_sensors(&Sensors::new(cloud))?;
+            if self.depth_noise.write(&self.gpu, &DepthNoise::new(cloud))? {
+                self.prepared = None;
+            }
             self.resident.points = points;
         }
         self.cloud.resize_values(&self.gpu, carried.words())?;
@@ -379,7 +385,7 @@ impl GpuRenderer {
         }
         // The old buffers go before the new ones come.
         self.prepared = None;
-        let Self { gpu, cloud, sensors, frame, passes, .. } = self;
+        let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
         let Passes { project, search, fit, orient, adapt, splat, shade } = passes;
         if sensors.is_some() && orient.is_none() {
             *orient = Some(OrientPasses::new(gpu)?);
@@ -400,7 +406,7 @@ impl GpuRenderer {
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
         let adapt = match adapt {
-            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size)?)),
+            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
             None => None,
         };
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;

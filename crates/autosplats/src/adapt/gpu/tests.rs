@@ -26,7 +26,9 @@ struct Made {
 
 fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     let screen = upload_screen(gpu, &case.screen, &case.view);
-    let buffers = AdaptBuffers::new(gpu, screen.size).expect("room");
+    let mut known = DepthNoiseBuffer::new(gpu).expect("room");
+    known.write(gpu, &case.known).expect("room");
+    let buffers = AdaptBuffers::new(gpu, screen.size, &known).expect("room");
     let fitted = case.fitted.concat();
     let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
@@ -112,13 +114,14 @@ fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
 
 fn is_like(device: &Surfel, host: &Surfel) -> bool {
     let apart = (0..3).map(|axis| (device.center[axis] - host.center[axis]).powi(2)).sum::<f32>().sqrt();
-    let of_fit = |surfel: &Surfel| (surfel.radius, surfel.k_radius, surfel.source, surfel.screen);
+    let of_fit = |surfel: &Surfel| (surfel.k_radius, surfel.source, surfel.screen);
     of_fit(device) == of_fit(host)
+        && (device.radius - host.radius).abs() <= 1e-5 * host.radius
         && angle(device.normal, host.normal) < 0.5
         && angle(device.major_axis, host.major_axis) < 1.0
         && apart <= 0.01 * host.k_radius
         && (device.curvature - host.curvature).abs() < 1e-3
-        && device.major_ratio == host.major_ratio
+        && (device.major_ratio - host.major_ratio).abs() <= 0.02 * host.major_ratio
 }
 
 /// Surfels that differ.
@@ -189,6 +192,26 @@ fn the_device_adapts_as_the_host_does() {
 }
 
 #[test]
+fn the_device_knows_the_noise_of_a_depth_camera_as_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    let mut case = Case::stepped();
+    assert_eq!(case.known.on_device().len(), 1, "one scan");
+    let made = on_device(&gpu, &passes, &case);
+    let host = case.adapted();
+    let changed = host.iter().zip(&case.fitted.concat()).filter(|(a, b)| a != b).count();
+    assert!(2 * changed > host.len(), "{changed} of {} adapted", host.len());
+    compare_surfels(&made.surfels, &host).unwrap_or_else(|error| panic!("{error}"));
+    // Of points from one index on something is known, of the others nothing.
+    let half = host.len() as u32 / 2;
+    case.known.runs.insert(0, bytemuck::Zeroable::zeroed());
+    case.known.runs[1].first = half;
+    let made = on_device(&gpu, &passes, &case);
+    compare_surfels(&made.surfels, &case.adapted()).unwrap_or_else(|error| panic!("two runs: {error}"));
+    assert!(made.surfels != host, "less is known");
+}
+
+#[test]
 fn whatever_the_cloud_the_device_adapts_as_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let passes = AdaptPasses::new(&gpu).expect("passes");
@@ -246,6 +269,7 @@ fn comparison_sees_what_is_wrong() {
         changed(|surfel| surfel.normal = surfel.normal.map(|c| -c)),
         changed(|surfel| surfel.curvature += 0.01),
         changed(|surfel| surfel.radius *= 1.01),
+        changed(|surfel| surfel.major_ratio *= 1.05),
     ];
     for surfels in wrong {
         assert!(compare_surfels(&surfels, &adapted).is_err(), "not noticed: {:?}", surfels[0]);

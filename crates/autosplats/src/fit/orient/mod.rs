@@ -54,35 +54,42 @@ fn position(cloud: &PointCloud, scan: &Scan) -> Option<[f32; 3]> {
     (position.is_finite() && position.abs().max_element() <= FARTHEST).then_some(position.to_array())
 }
 
+/// Runs of points by the scan that they belong to, as the index of the first point and the scan, from point 0 on. A point
+/// that several scans claim belongs to the first of them.
+pub(crate) fn runs(cloud: &PointCloud) -> Vec<(u32, Option<&Scan>)> {
+    let mut scans: Vec<&Scan> = cloud.scans().iter().filter(|scan| !scan.points.is_empty()).collect();
+    scans.sort_by_key(|scan| (scan.points.start, scan.points.end));
+    let mut runs = Vec::new();
+    let mut end = 0;
+    for scan in scans {
+        if scan.points.start > end {
+            runs.push((end as u32, None));
+        }
+        if scan.points.end > end {
+            runs.push((end.max(scan.points.start) as u32, Some(scan)));
+            end = scan.points.end;
+        }
+    }
+    if end < cloud.len() {
+        runs.push((end as u32, None));
+    }
+    runs
+}
+
 impl Sensors {
-    /// Those of the scans of `cloud`. A point that several scans claim belongs to the first of them.
+    /// Those of the scans of `cloud`.
     pub(crate) fn new(cloud: &PointCloud) -> Self {
         if !has_sensors(cloud) {
             return Self::default();
         }
-        let mut scans: Vec<&Scan> = cloud.scans().iter().filter(|scan| !scan.points.is_empty()).collect();
-        scans.sort_by_key(|scan| (scan.points.start, scan.points.end));
-        let mut runs: Vec<Sensor> = Vec::new();
-        let mut begin = |first: usize, position: Option<[f32; 3]>| {
-            let position = position.unwrap_or([f32::INFINITY; 3]);
-            if runs.last().is_none_or(|last| last.position != position) {
-                runs.push(Sensor { position, first: first as u32 });
-            }
-        };
-        let mut end = 0;
-        for scan in scans {
-            if scan.points.start > end {
-                begin(end, None);
-            }
-            if scan.points.end > end {
-                begin(end.max(scan.points.start), position(cloud, scan));
-                end = scan.points.end;
+        let mut of_sensors: Vec<Sensor> = Vec::new();
+        for (first, scan) in runs(cloud) {
+            let position = scan.and_then(|scan| position(cloud, scan)).unwrap_or([f32::INFINITY; 3]);
+            if of_sensors.last().is_none_or(|last| last.position != position) {
+                of_sensors.push(Sensor { position, first });
             }
         }
-        if end < cloud.len() {
-            begin(end, None);
-        }
-        Self { runs }
+        Self { runs: of_sensors }
     }
 
     /// Number of runs of points.

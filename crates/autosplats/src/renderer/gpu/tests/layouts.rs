@@ -5,7 +5,7 @@ use std::mem::offset_of;
 use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 
 use super::passes;
-use crate::adapt::{SCALES, SLABS};
+use crate::adapt::{DepthRun, SCALES, SLABS};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
@@ -42,7 +42,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 8] {
+fn mirrored() -> [Mirrored; 9] {
     [
         mirrored!(
             "Frame",
@@ -71,6 +71,7 @@ fn mirrored() -> [Mirrored; 8] {
         mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
         mirrored!("Cover", Cover { weight, rim, point, scalar }),
         mirrored!("Sensor", Sensor { position, first }),
+        mirrored!("DepthRun", DepthRun { position, first, axis, factor, power, padding }),
         mirrored!("ScreenPoint", ScreenPoint { position_view, pixel }),
         mirrored!(
             "Surfel",
