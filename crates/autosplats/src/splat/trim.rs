@@ -52,14 +52,17 @@ pub(super) fn sticks_out(rims: &[Rim], x: usize, y: usize, view: &View) -> bool 
     let stride = (own / STRIDES_PER_REACH).max(1.0) as isize;
     let strides = (FURTHEST * own) as usize / stride as usize + LEAST_REACH_PX;
     let meets_core = |[dx, dy]: [isize; 2]| {
-        let [dx, dy] = [dx * stride, dy * stride];
-        let (mut x, mut y) = (x, y);
-        for _ in 0..strides {
-            match (x.checked_add_signed(dx), y.checked_add_signed(dy)) {
-                (Some(next_x), Some(next_y)) if next_x < width && next_y < height => (x, y) = (next_x, next_y),
+        // Lines of neighbours stop at the same places: if one saw what the next strides over, borders would be dotted.
+        let (along, place) = if dx.abs() == 1 { (dx, x as isize) } else { (dy, y as isize) };
+        let beyond = place % stride;
+        let first = if along > 0 || beyond == 0 { stride - beyond } else { beyond };
+        for at in 0..strides as isize {
+            let distance = first + at * stride;
+            let (x, y) = match (x.checked_add_signed(dx * distance), y.checked_add_signed(dy * distance)) {
+                (Some(x), Some(y)) if x < width && y < height => (x, y),
                 // Beyond the picture the surface goes on.
                 _ => return true,
-            }
+            };
             match rims[tiled_index(width, x, y)] {
                 EMPTY => return false,
                 CORE => return true,
@@ -86,7 +89,8 @@ mod tests {
     use crate::camera::{Camera, Projection};
     use autosplats_cloud::glam::DVec3;
 
-    /// The pixels of a drawing (`#` core, `+` tail that reaches 2 pixels, blank empty) that trimming takes off, as `x`.
+    /// The pixels of a drawing (`#` core, `+` tail that reaches 2 pixels, `*` one that reaches 12, blank empty) that trimming
+    /// takes off, as `x`.
     fn trimmed(drawing: &[&str]) -> Vec<String> {
         let camera = Camera {
             eye: DVec3::ZERO,
@@ -102,6 +106,7 @@ mod tests {
                 rims[tiled_index(size[0] as usize, x, y)] = match pixel {
                     b'#' => CORE,
                     b'+' => 2.0,
+                    b'*' => 12.0,
                     _ => EMPTY,
                 };
             }
@@ -140,6 +145,17 @@ mod tests {
             "            ",
         ];
         assert_eq!(trimmed(&drawing), expected, "only what nothing closes in goes");
+    }
+
+    #[test]
+    fn neighbours_that_take_strides_agree() {
+        // Every other pixel of this row would meet the core at the left end, were lines to begin wherever they do.
+        let empty = "                    ";
+        let mut drawing = vec![empty; 40];
+        drawing[20] = "  *# ***********##  ";
+        drawing[21] = "  ################  ";
+        let row = &trimmed(&drawing)[20][5..16];
+        assert!(row.bytes().all(|pixel| pixel == row.as_bytes()[0]), "all or none: {row}");
     }
 
     #[test]

@@ -88,10 +88,9 @@ fn sticks_out(pixel: vec2i, own: f32) -> bool {
     // What has no core anywhere around, as a point alone, sticks out of nothing.
     var is_tail = false;
     for (var line = 0u; line < 8u; line++) {
-        let step = lines[line] * stride;
-        let ahead = meets_core(pixel, step, strides);
+        let ahead = meets_core(pixel, lines[line], stride, strides);
         // Where nothing is ahead, what is behind tells only of a core anywhere around.
-        let behind = (ahead || !is_tail) && meets_core(pixel, -step, strides);
+        let behind = (ahead || !is_tail) && meets_core(pixel, -lines[line], stride, strides);
         if ahead && behind {
             return false;
         }
@@ -100,10 +99,14 @@ fn sticks_out(pixel: vec2i, own: f32) -> bool {
     return is_tail;
 }
 
-fn meets_core(origin: vec2i, step: vec2i, strides: i32) -> bool {
-    var pixel = origin;
-    for (var stride = 0; stride < strides; stride++) {
-        pixel += step;
+fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> bool {
+    // Lines of neighbours stop at the same places.
+    let by_x = abs(direction.x) == 1;
+    let beyond = select(origin.y, origin.x, by_x) % stride;
+    let is_up = select(direction.y, direction.x, by_x) > 0;
+    let first = select(beyond, stride - beyond, is_up || beyond == 0);
+    for (var at = 0; at < strides; at++) {
+        let pixel = origin + direction * (first + at * stride);
         if any(pixel < vec2i(0)) || any(pixel >= vec2i(frame.size)) {
             // Beyond the picture the surface goes on.
             return true;
