@@ -1,4 +1,4 @@
-//! The choice of a scale for each surfel.
+//! Surfels turned and moved onto sheets, or onto a quadric of their own; the choice of a quadric's scale.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
+use super::sheets::{Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -58,6 +59,7 @@ struct Task<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct Adapter {
     cells: Cells,
+    sheets: Sheets,
     /// Measured by the first surfels of a frame.
     usual: Option<Usual>,
 }
@@ -66,6 +68,7 @@ impl Adapter {
     /// Sums up the screen points of a new frame, whose cells in the density grid hold about `k` points.
     pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
         self.cells.fill(screen, view, k);
+        self.sheets.clear(&self.cells);
         self.usual = None;
     }
 
@@ -78,11 +81,18 @@ impl Adapter {
         k: u32,
         keep_outliers: bool,
     ) {
-        let Self { cells, usual } = self;
+        let Self { cells, sheets, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
         let task = Task { cells, density, view, k, usual, keep_outliers };
+        surfels.par_chunks(TASK).for_each(|surfels| {
+            surfels.iter().filter(|surfel| task.calls(surfel).is_some()).for_each(|surfel| {
+                sheets.ask(surfel, cells, view);
+            });
+        });
+        sheets.fit(cells, &usual.noise, view);
+        let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
-            adapt_all(surfels, &task, gathered);
+            adapt_all(surfels, &task, sheets, gathered);
         });
     }
 }
@@ -94,46 +104,70 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
     surfel.k_radius.max(LEAST_REACH * density.initial_radius(&point, k, view))
 }
 
+impl Task<'_> {
+    /// Noise at a surfel, and the standard error of a normal that is good enough there, if the first neighbours are not.
+    #[inline(always)]
+    fn calls(&self, surfel: &Surfel) -> Option<(f32, f32)> {
+        // The first neighbourhood's error is about that of its k points over the k-radius.
+        let noise = self.usual.noise.at(surfel.center[2]);
+        let enough = good_enough(noise, surfel.center[2], self.view);
+        (surfel.radius > 0.0 && noise > enough * surfel.k_radius).then_some((noise, enough))
+    }
+}
+
 #[pulp::with_simd(adapt_all = pulp::Arch::new())]
 #[inline(always)]
-fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
+fn adapt_all_with<'a, S: Simd>(
+    simd: S,
+    surfels: &'a mut [Surfel],
+    task: &'a Task<'a>,
+    sheets: &'a Sheets,
+    gathered: &'a mut Gathered,
+) {
+    let Task { cells, density, view, k, .. } = *task;
     for surfel in surfels {
-        // The first neighbourhood's error is about that of its k points over the k-radius.
-        let noise = task.usual.noise.at(surfel.center[2]);
-        let enough = good_enough(noise, surfel.center[2], task.view);
-        if surfel.radius > 0.0
-            && noise > enough * surfel.k_radius
-            && let Some(quadric) = choose(simd, surfel, [noise, enough], task, gathered)
-        {
-            place(surfel, &quadric, task.view);
-        } else {
+        let Some((noise, enough)) = task.calls(surfel) else {
             shrink(surfel, task);
+            continue;
+        };
+        let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
+        let first = is_reliable.then(|| (surfel.normal.into(), noise / surfel.k_radius));
+        let alone = || {
+            let radius = first_radius(surfel, density, view, k);
+            let quadric = choose(simd, surfel.center, radius, first, (noise, enough), (cells, view), gathered)?;
+            let Quadric { normal, height, axis, curvature, .. } = quadric;
+            Some(Surface { offset: axis * height, normal, curvature })
+        };
+        match sheets.blend(surfel.center, first, noise, cells, view).or_else(alone) {
+            Some(surface) => place(surfel, &surface, view),
+            None => shrink(surfel, task),
         }
     }
 }
 
 /// Standard error of a normal, radians, that no larger ball need better.
 #[inline(always)]
-fn good_enough(noise: f32, depth: f32, view: &View) -> f32 {
+pub(super) fn good_enough(noise: f32, depth: f32, view: &View) -> f32 {
     ENOUGH + TINY_SLOPE * (TINY_PX - noise / view.pixel_size(depth)).max(0.0)
 }
 
-/// The quadric of the largest ball that agrees with the smaller ones; `None` if none is better than the first neighbours.
+/// The quadric of the largest ball around `center` that agrees with the smaller ones and with the `first` normal, where its
+/// standard error is known; `None` if none is better than the first neighbours. Radii are multiples of `radius`.
 #[inline(always)]
-fn choose<S: Simd>(
+pub(super) fn choose<S: Simd>(
     simd: S,
-    surfel: &Surfel,
-    [noise, enough]: [f32; 2],
-    task: &Task,
+    center: [f32; 3],
+    mut radius: f32,
+    first: Option<(Vec3, f32)>,
+    (noise, enough): (f32, f32),
+    (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<Quadric> {
-    let Task { cells, density, view, k, .. } = *task;
-    let mut radius = first_radius(surfel, density, view, k);
     // Normals to agree with, and their errors.
     let mut reliable = [(Vec3::ZERO, 0.0); SCALES + 1];
     let mut count = 0;
-    if noise < THICKEST_FIRST * surfel.k_radius {
-        reliable[0] = (surfel.normal.into(), noise / surfel.k_radius);
+    if let Some(first) = first {
+        reliable[0] = first;
         count = 1;
     }
     let mut best = None;
@@ -148,7 +182,7 @@ fn choose<S: Simd>(
         if !thin & (scale + 1 < SCALES) {
             continue;
         }
-        if gathered.read(cells, surfel.center, radius, view) < LEAST_CLUSTERS {
+        if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
             continue;
         }
         let (along, curvature) = axis.unwrap_or_else(|| gathered.plane(simd));
@@ -195,16 +229,17 @@ fn shrink(surfel: &mut Surfel, task: &Task) {
     }
 }
 
-/// Turns and moves a surfel onto a quadric.
+/// Turns and moves a surfel onto a surface.
 #[inline(always)]
-fn place(surfel: &mut Surfel, quadric: &Quadric, view: &View) {
-    let center = Vec3::from(surfel.center) + quadric.axis * quadric.height;
+fn place(surfel: &mut Surfel, surface: &Surface, view: &View) {
+    let &Surface { offset, normal, curvature } = surface;
+    let center = Vec3::from(surfel.center) + offset;
     let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
-    let normal = if quadric.normal.dot(to_eye) < 0.0 { -quadric.normal } else { quadric.normal };
+    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
     surfel.normal = normal.to_array();
     surfel.major_axis = normal.any_orthonormal_vector().to_array();
     surfel.major_ratio = 1.0;
-    surfel.curvature = quadric.curvature;
+    surfel.curvature = curvature;
     let [x, y] = view.to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.
     if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {

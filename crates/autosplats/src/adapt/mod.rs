@@ -20,6 +20,7 @@ mod cpu;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
+mod sheets;
 #[cfg(test)]
 mod tests;
 
