@@ -68,7 +68,9 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
                 let square = sheet.error * sheet.error;
                 let normal = sheet_normal(sheet, over);
                 let across = cross(normal, first.xyz);
-                if first.w >= 0.0 && dot(across, across) > AGREE * AGREE * (square + first.w * first.w) {
+                // The smallest of a sheet's balls was held against nothing.
+                let agrees = dot(across, across) <= AGREE * AGREE * (square + first.w * first.w);
+                if first.w >= 0.0 && !(agrees && sheet.scatter <= SCATTER * noise) {
                     continue;
                 }
                 // To the eighth: about as likely as noise puts a point there.

@@ -28,6 +28,9 @@ pub(super) const RELIABLE: f32 = 0.12;
 pub(super) const THICKEST: f32 = 0.28;
 /// The same of the first neighbourhood, whose plane has no error of its own to tell.
 pub(super) const THICKEST_FIRST: f32 = 0.15;
+/// Least trace, times weight, of what [`Quadric::error`] is the root of, in radii: that of a round ball, evenly filled. Where
+/// even that is no reliable error the quadric need not be fitted: true of most first balls.
+pub(super) const LEAST_TRACE: f32 = 8.0;
 /// Larger balls may scatter this many times the noise.
 pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
@@ -184,6 +187,12 @@ pub(super) fn choose<S: Simd>(
         }
         if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
             continue;
+        }
+        if axis.is_none() && scale + 1 < SCALES {
+            let least = noise * (1.0 / (RELIABLE * radius));
+            if gathered.weight() < LEAST_TRACE * least * least {
+                continue;
+            }
         }
         let (along, curvature) = axis.unwrap_or_else(|| gathered.plane(simd));
         let quadric = gathered.quadric(simd, radius, along, curvature);

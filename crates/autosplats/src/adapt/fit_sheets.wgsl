@@ -80,7 +80,7 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             quadric.error * noise,
             quadric.slope,
             quadric.curvature,
-            0.0,
+            quadric.scatter,
         );
         for (var index = 0u; index < SLABS; index++) {
             if left[index] > 0.0 {

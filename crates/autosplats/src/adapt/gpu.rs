@@ -2,8 +2,8 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, DOT_PX, ENOUGH, FARTHEST, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX,
-    TINY_SLOPE,
+    AGREE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST,
+    THICKEST_FIRST, TINY_PX, TINY_SLOPE,
 };
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
@@ -146,6 +146,7 @@ impl AdaptPasses {
         let choose = [
             step,
             ("RELIABLE", RELIABLE.into()),
+            ("LEAST_TRACE", LEAST_TRACE.into()),
             ("THICKEST", THICKEST.into()),
             ("SCATTER", SCATTER.into()),
             ("AGREE", AGREE.into()),

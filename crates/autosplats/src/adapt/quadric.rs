@@ -103,6 +103,18 @@ impl Gathered {
         len
     }
 
+    /// Sum of the clusters' weights.
+    #[inline(always)]
+    pub(super) fn weight(&self) -> f32 {
+        let mut sums = Lanes::default();
+        for [.., weights] in &self.lanes {
+            for lane in 0..LANES {
+                sums.0[lane] += weights.0[lane];
+            }
+        }
+        sums.0.iter().sum()
+    }
+
     /// Axis of least spread of the clusters, and their surface variation.
     #[inline(always)]
     pub(super) fn plane<S: Simd>(&self, simd: S) -> (Vec3, f32) {

@@ -5,6 +5,7 @@
 
 override STEP: f32;
 override RELIABLE: f32;
+override LEAST_TRACE: f32;
 override THICKEST: f32;
 override SCATTER: f32;
 override AGREE: f32;
@@ -38,7 +39,9 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
         let ball = ball_around(center, radius);
         if !has_axis {
             plane = plane_of(ball);
-            if plane.len < LEAST_CLUSTERS {
+            let least = noise * (1.0 / (RELIABLE * radius));
+            let is_vain = plane.weight < LEAST_TRACE * least * least && scale + 1u < SCALES;
+            if plane.len < LEAST_CLUSTERS || is_vain {
                 continue;
             }
         }

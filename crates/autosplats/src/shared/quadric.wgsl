@@ -31,6 +31,8 @@ struct Plane {
     curvature: f32,
     // Clusters in the ball.
     len: u32,
+    // Sum of their weights.
+    weight: f32,
 }
 
 struct Quadric {
@@ -109,14 +111,14 @@ fn plane_of(ball: Ball) -> Plane {
         }
     }
     if len < LEAST_CLUSTERS {
-        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, len);
+        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, len, first.w);
     }
     let share = 1.0 / first.w;
     let mean = first.xyz * share;
     let found = eigen(squares * share - mean * mean, products * share - mean.yxx * mean.zzy);
     let least = max(found.values.x, 0.0);
     let sum = least + found.values.y + found.values.z;
-    return Plane(found.least, select(0.0, least / sum, sum > 0.0), len);
+    return Plane(found.least, select(0.0, least / sum, sum > 0.0), len, first.w);
 }
 
 // A row of the equations: four columns, the two of the slopes, and the right-hand side.

@@ -20,7 +20,8 @@ struct Sheet {
     error: f32,
     slope: vec2f,
     curvature: f32,
-    padding: f32,
+    // Standard deviation of points from it, world units.
+    scatter: f32,
 }
 
 // Where a place is over a sheet.
