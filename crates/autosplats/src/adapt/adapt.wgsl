@@ -1,130 +1,137 @@
-// Fits each surfel anew at the scale that the frame's noise calls for: an invocation per surfel. See the CPU form.
+// Turns and moves each surfel that the noise tilts onto the sheets beside it: an invocation per surfel. See the CPU form.
 //
-// Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
+// Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
 
 #import frame
 #import groups
 #import counters
-#import quadric
+#import base_radius
+#import calls
+#import choose
 #import depth_noise
+#import sheet
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
 @group(0) @binding(3) var<storage, read> levels: array<Level>;
 @group(0) @binding(4) var<storage, read> clusters: array<vec4f>;
 @group(0) @binding(5) var<storage, read> measured: array<f32>;
-@group(0) @binding(6) var<storage, read_write> surfels: array<Surfel>;
-// In the order of the points, the first from point 0 on.
+@group(0) @binding(6) var<storage, read> sheets: array<Sheet>;
 @group(0) @binding(7) var<storage, read> depth_noise: array<DepthRun>;
+@group(0) @binding(8) var<storage, read_write> surfels: array<Surfel>;
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
-override STEP: f32;
-override ENOUGH: f32;
-override TINY_PX: f32;
-override TINY_SLOPE: f32;
-override RELIABLE: f32;
-override THICKEST: f32;
 override THICKEST_FIRST: f32;
-override SCATTER: f32;
-override AGREE: f32;
 override WIDEST: f32;
-override FARTHEST: f32;
+override GRAZING: f32;
+override FARTHEST_ALONG: f32;
+override LONGEST_SHADOW: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
 override DOT_PX: f32;
 
-// Standard deviation of points from their surface at a depth above 0.
-fn noise_at(depth: f32) -> f32 {
-    let power = measured[1];
-    return measured[0] * select(pow(depth, power), 1.0, power == 0.0);
+// The surface beside a surfel.
+struct Surface {
+    // From the surfel to the surface.
+    offset: vec3f,
+    // Sum of weights; 0 if there is none.
+    weight: f32,
+    // Of either sign.
+    normal: vec3f,
+    curvature: f32,
 }
 
-// Standard error of a normal, radians, that no larger ball need better.
-fn good_enough(noise: f32, depth: f32) -> f32 {
-    return ENOUGH + TINY_SLOPE * max(TINY_PX - noise / pixel_size(depth), 0.0);
-}
-
-// The quadric of the largest ball that agrees with the smaller ones; of no clusters if none is better than the first
-// neighbours.
-fn choose(surfel: Surfel, noise: f32, enough: f32) -> Quadric {
-    let cell_px = atomicLoad(&counters[CELL_PX]);
-    var radius = base_radius(surfel, cell_px, atomicLoad(&counters[CELL_COLUMNS]));
-    // Normals to agree with, and their errors.
-    var reliable: array<vec4f, SCALES + 1u>;
-    var count = 0u;
-    if noise < THICKEST_FIRST * surfel.k_radius {
-        reliable[0] = vec4f(surfel.normal, noise / surfel.k_radius);
-        count = 1u;
+// The surface beside a surfel, from the sheets of the four cells around it that agree with the `first` normal.
+fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
+    var sum = Surface();
+    let level = levels[SHEET_LEVEL];
+    if level.side_px == 0u {
+        return sum;
     }
-    var best = Quadric();
-    // Where nothing is reliable, the least error.
-    var fallback = Quadric();
-    // Heights of the first ball are along its plane's normal, those of larger ones along the normal found before.
-    var plane = Plane();
-    var has_axis = false;
-    for (var scale = 0u; scale < SCALES; scale++) {
-        radius *= STEP;
-        // Points of a ball that the noise fills are no surface. The largest ball has to do where there is no better.
-        let thin = noise < THICKEST * radius;
-        if !thin && scale + 1u < SCALES {
-            continue;
-        }
-        let ball = ball_around(surfel.center, radius);
-        if !has_axis {
-            plane = plane_of(ball);
-            if plane.len < LEAST_CLUSTERS {
-                continue;
+    let at = to_pixel(center) * (1.0 / f32(level.side_px)) - 0.5;
+    let low = vec2u(max(floor(at), vec2f(0.0)));
+    let high = min(vec2u(max(at + 1.0, vec2f(0.0))), vec2u(level.columns, level.rows) - 1u);
+    let per_farthest = 1.0 / (FARTHEST * noise);
+    for (var row = low.y; row <= high.y; row++) {
+        for (var column = low.x; column <= high.x; column++) {
+            let cell = row * level.columns + column;
+            // Falls to 0 where the next cells come in.
+            let apart = 1.0 - abs(at - vec2f(vec2u(column, row)));
+            for (var index = 0u; index < SLABS; index++) {
+                let sheet = sheets[cell * SLABS + index];
+                if !(sheet.radius > 0.0) {
+                    break;
+                }
+                let over = under(sheet, center);
+                let away = over.height * per_farthest;
+                let rest = 1.0 - away * away;
+                if !(over.near > 0.0 && rest > 0.0) {
+                    continue;
+                }
+                let square = sheet.error * sheet.error;
+                let normal = sheet_normal(sheet, over);
+                let across = cross(normal, first.xyz);
+                // The smallest of a sheet's balls was held against nothing.
+                let agrees = dot(across, across) <= AGREE * AGREE * (square + first.w * first.w);
+                if first.w >= 0.0 && !(agrees && sheet.scatter <= SCATTER * noise) {
+                    continue;
+                }
+                // To the eighth: about as likely as noise puts a point there.
+                let second = rest * rest;
+                let fourth = second * second;
+                let weight = apart.x * apart.y * (over.near * over.near * over.near) * (fourth * fourth) / square;
+                sum.normal += normal * select(weight, -weight, dot(normal, sum.normal) < 0.0);
+                sum.offset += sheet.axis * (over.height * weight);
+                sum.curvature += sheet.curvature * weight;
+                sum.weight += weight;
             }
         }
-        let quadric = quadric_of(ball, plane.axis, plane.curvature);
-        if quadric.len < LEAST_CLUSTERS {
-            continue;
-        }
-        let error = quadric.error * noise;
-        if !(thin && error < RELIABLE) {
-            if fallback.len == 0u || quadric.error < fallback.error {
-                fallback = quadric;
-            }
-            continue;
-        }
-        var agrees = count == 0u || quadric.scatter <= SCATTER * noise;
-        for (var index = 0u; index < count; index++) {
-            let other = reliable[index];
-            let across = cross(quadric.normal, other.xyz);
-            agrees &= dot(across, across) <= AGREE * AGREE * (error * error + other.w * other.w);
-        }
-        if !agrees {
-            break;
-        }
-        reliable[count] = vec4f(quadric.normal, error);
-        count++;
-        plane.axis = quadric.normal;
-        has_axis = true;
-        best = quadric;
-        if error < enough {
-            break;
-        }
     }
-    if count == 0u {
-        best = fallback;
+    if sum.weight > 0.0 {
+        let per_total = 1.0 / sum.weight;
+        sum.offset *= per_total;
+        sum.normal = normalize(sum.normal);
+        sum.curvature *= per_total;
     }
-    // A quadric further away is another surface.
-    if !(abs(best.height) <= FARTHEST * noise) {
-        return Quadric();
-    }
-    return best;
+    return sum;
 }
 
-// Turns and moves a surfel onto a quadric: along its axis, or the ray along which its noise was made.
-fn move_onto(place: u32, surfel: Surfel, quadric: Quadric, known: Known) {
-    var offset = quadric.axis * quadric.height;
+// A move by `offset` onto the plane with a `normal`, made along the ray instead; along the normal where the ray is nearly in
+// the plane.
+fn offset_along(known: Known, normal: vec3f, offset: vec3f) -> vec3f {
+    let distance = dot(offset, normal);
+    let slope = dot(known.ray, normal);
+    let inverse = 1.0 / (slope * slope + GRAZING * GRAZING);
+    let along = distance * slope * inverse;
+    let rest = distance * GRAZING * GRAZING * inverse;
+    let limit = FARTHEST_ALONG * known.noise;
+    let part = select(1.0, limit / abs(along), abs(along) > limit);
+    return (known.ray * along + normal * rest) * part;
+}
+
+// The shadow that a disc with the normal `before` casts along the ray on a plane with the normal `after`, as its major axis
+// and ratio; `otherwise` if it is no longer.
+fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> vec4f {
+    let slope = dot(known.ray, after);
+    let ratio = min(abs(dot(known.ray, before)) / max(abs(slope), GRAZING), LONGEST_SHADOW);
+    let major = known.ray - after * slope;
+    let length_squared = dot(major, major);
+    if ratio > 1.0 && length_squared > 0.0 {
+        return vec4f(major * inverseSqrt(length_squared), ratio);
+    }
+    return otherwise;
+}
+
+// Turns and moves a surfel onto a surface: along its axis, or the ray along which its noise was made.
+fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
+    var offset = surface.offset;
     if known.noise > 0.0 {
-        offset = offset_along(known, quadric.normal, offset);
+        offset = offset_along(known, surface.normal, offset);
     }
     let center = surfel.center + offset;
     let to_eye = select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u);
-    let normal = select(quadric.normal, -quadric.normal, dot(quadric.normal, to_eye) < 0.0);
+    let normal = select(surface.normal, -surface.normal, dot(surface.normal, to_eye) < 0.0);
     surfels[place].normal = normal;
     var shadow = vec4f(any_orthonormal(normal), 1.0);
     if known.noise > 0.0 {
@@ -132,7 +139,7 @@ fn move_onto(place: u32, surfel: Surfel, quadric: Quadric, known: Known) {
     }
     surfels[place].major_axis = shadow.xyz;
     surfels[place].major_ratio = shadow.w;
-    surfels[place].curvature = quadric.curvature;
+    surfels[place].curvature = surface.curvature;
     let at = to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.
     if center.z > frame.near && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
@@ -169,31 +176,36 @@ fn shrink(place: u32, surfel: Surfel) {
 @compute @workgroup_size(64)
 fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let active_points = atomicLoad(&counters[ACTIVE]);
-    let first = select(0u, active_points, ROUND == 1u);
+    let first_of_round = select(0u, active_points, ROUND == 1u);
     let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
     let index = group_index(workgroup) * 64u + local;
     if index >= len {
         return;
     }
-    let surfel = surfels[first + index];
-    // The first neighbourhood's error is about that of its k points over the k-radius.
-    let measured_noise = noise_at(surfel.center.z);
-    var known = known_at(surfel.center, surfel.source);
-    if known.noise <= measured_noise {
-        known = Known();
-    }
-    let noise = max(known.noise, measured_noise);
-    let enough = good_enough(noise, surfel.center.z);
-    var quadric = Quadric();
-    if surfel.radius > 0.0 && noise > enough * surfel.k_radius {
-        quadric = choose(surfel, noise, enough);
-    }
-    if quadric.len > 0u {
-        if known.noise > 0.0 {
-            surfels[first + index].radius = surfel.radius * min(widest(surfel) / surfel.k_radius, 1.0);
+    let surfel = surfels[first_of_round + index];
+    let known = known_beyond(noise_at(surfel.center.z), surfel.center, surfel.source);
+    let noise = max(known.noise, noise_at(surfel.center.z));
+    let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
+    var surface = Surface();
+    if calls(surfel, noise, enough) {
+        let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
+        let first = vec4f(surfel.normal, select(-1.0, noise / surfel.k_radius, is_reliable));
+        surface = blend(surfel.center, first, noise);
+        if !(surface.weight > 0.0) {
+            let cell_px = atomicLoad(&counters[CELL_PX]);
+            let radius = base_radius(surfel, cell_px, atomicLoad(&counters[CELL_COLUMNS]));
+            let quadric = choose(surfel.center, radius, first, noise, enough);
+            if quadric.len > 0u {
+                surface = Surface(quadric.axis * quadric.height, 1.0, quadric.normal, quadric.curvature);
+            }
         }
-        move_onto(first + index, surfel, quadric, known);
+    }
+    if surface.weight > 0.0 {
+        if known.noise > 0.0 {
+            surfels[first_of_round + index].radius = surfel.radius * min(widest(surfel) / surfel.k_radius, 1.0);
+        }
+        move_onto(first_of_round + index, surfel, surface, known);
     } else if surfel.radius > 0.0 {
-        shrink(first + index, surfel);
+        shrink(first_of_round + index, surfel);
     }
 }

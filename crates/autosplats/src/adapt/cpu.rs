@@ -1,4 +1,4 @@
-//! The choice of a scale for each surfel.
+//! Surfels turned and moved onto sheets, or onto a quadric of their own; the choice of a quadric's scale.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -8,6 +8,7 @@ use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
+use super::sheets::{Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -20,14 +21,21 @@ pub(super) const ENOUGH: f32 = 0.025;
 /// Noise that is smaller than this, in pixels, may as well be detail too small for the pixels: the less there is, the larger
 /// an error is good enough.
 pub(super) const TINY_PX: f32 = 0.5;
-/// By how much, in radians a pixel.
+/// By how much, in radians a pixel, where k-radii are [`TINY_REACH_PX`] pixels.
 pub(super) const TINY_SLOPE: f32 = 0.5;
+/// And the more, the denser points are on the screen, with the square of that over the k-radius,
+pub(super) const TINY_REACH_PX: f32 = 2.0;
+/// up to so many times: in far views all detail looks like noise.
+pub(super) const MOST_TINY: f32 = 3.0;
 /// Largest standard error of a normal that others are held against.
 pub(super) const RELIABLE: f32 = 0.12;
 /// Most noise, as a part of a ball's radius, with which its points are a surface at all.
 pub(super) const THICKEST: f32 = 0.28;
 /// The same of the first neighbourhood, whose plane has no error of its own to tell.
 pub(super) const THICKEST_FIRST: f32 = 0.15;
+/// Least trace, times weight, of what [`Quadric::error`] is the root of, in radii: that of a round ball, evenly filled. Where
+/// even that is no reliable error the quadric need not be fitted: true of most first balls.
+pub(super) const LEAST_TRACE: f32 = 8.0;
 /// Larger balls may scatter this many times the noise.
 pub(super) const SCATTER: f32 = 2.2;
 /// Normals agree within this many standard errors.
@@ -63,6 +71,7 @@ struct Task<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct Adapter {
     cells: Cells,
+    sheets: Sheets,
     /// Measured by the first surfels of a frame.
     usual: Option<Usual>,
 }
@@ -71,6 +80,7 @@ impl Adapter {
     /// Sums up the screen points of a new frame, whose cells in the density grid hold about `k` points.
     pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
         self.cells.fill(screen, view, k);
+        self.sheets.clear(&self.cells);
         self.usual = None;
     }
 
@@ -84,12 +94,19 @@ impl Adapter {
         known: &DepthNoise,
         keep_outliers: bool,
     ) {
-        let Self { cells, usual } = self;
+        let Self { cells, sheets, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, k, usual, known, keep_outliers };
+        surfels.par_chunks(TASK).for_each(|surfels| {
+            surfels.iter().filter(|surfel| task.call(surfel).is_some()).for_each(|surfel| {
+                sheets.ask(surfel, cells, view);
+            });
+        });
+        sheets.fit(cells, &|place, point| task.noise(place, point).0, view);
+        let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
-            adapt_all(surfels, &task, gathered);
+            adapt_all(surfels, &task, sheets, gathered);
         });
     }
 }
@@ -101,51 +118,95 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
     surfel.k_radius.max(LEAST_REACH * density.initial_radius(&point, k, view))
 }
 
+/// What calls for more than the first neighbours of a surfel.
+#[derive(Clone, Copy)]
+struct Call {
+    /// Standard deviation of points from their surface, world units.
+    noise: f32,
+    /// Standard error of a normal that is good enough, radians.
+    enough: f32,
+    /// Where it is the noise of a depth camera.
+    known: Option<Known>,
+}
+
+impl Task<'_> {
+    /// Noise at a place in view space, of a cloud's point: the larger of what was measured and what is known.
+    #[inline(always)]
+    fn noise(&self, place: Vec3, point: u32) -> (f32, Option<Known>) {
+        let measured = self.usual.noise.at(place.z);
+        let known = self.known.at(place, point).filter(|known| known.noise > measured);
+        (known.map_or(measured, |known| known.noise), known)
+    }
+
+    #[inline(always)]
+    fn call(&self, surfel: &Surfel) -> Option<Call> {
+        // The first neighbourhood's error is about that of its k points over the k-radius.
+        let (noise, known) = self.noise(surfel.center.into(), surfel.source);
+        let enough = good_enough(noise, surfel.k_radius, surfel.center[2], self.view);
+        (surfel.radius > 0.0 && noise > enough * surfel.k_radius).then_some(Call { noise, enough, known })
+    }
+}
+
 #[pulp::with_simd(adapt_all = pulp::Arch::new())]
 #[inline(always)]
-fn adapt_all_with<'a, S: Simd>(simd: S, surfels: &'a mut [Surfel], task: &'a Task<'a>, gathered: &'a mut Gathered) {
+fn adapt_all_with<'a, S: Simd>(
+    simd: S,
+    surfels: &'a mut [Surfel],
+    task: &'a Task<'a>,
+    sheets: &'a Sheets,
+    gathered: &'a mut Gathered,
+) {
+    let Task { cells, density, view, k, .. } = *task;
     for surfel in surfels {
-        // The first neighbourhood's error is about that of its k points over the k-radius.
-        let measured = task.usual.noise.at(surfel.center[2]);
-        let known = task.known.at(surfel.center.into(), surfel.source).filter(|known| known.noise > measured);
-        let noise = known.map_or(measured, |known| known.noise);
-        let enough = good_enough(noise, surfel.center[2], task.view);
-        if surfel.radius > 0.0
-            && noise > enough * surfel.k_radius
-            && let Some(quadric) = choose(simd, surfel, [noise, enough], task, gathered)
-        {
-            if known.is_some() {
-                surfel.radius *= (widest(surfel, task) / surfel.k_radius).min(1.0);
-            }
-            place(surfel, &quadric, known.as_ref(), task.view);
-        } else {
+        let Some(Call { noise, enough, known }) = task.call(surfel) else {
             shrink(surfel, task);
+            continue;
+        };
+        let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
+        let first = is_reliable.then(|| (surfel.normal.into(), noise / surfel.k_radius));
+        let alone = || {
+            let radius = first_radius(surfel, density, view, k);
+            let quadric = choose(simd, surfel.center, radius, first, (noise, enough), (cells, view), gathered)?;
+            let Quadric { normal, height, axis, curvature, .. } = quadric;
+            Some(Surface { offset: axis * height, normal, curvature })
+        };
+        match sheets.blend(surfel.center, first, noise, cells, view).or_else(alone) {
+            Some(surface) => {
+                if known.is_some() {
+                    surfel.radius *= (widest(surfel, task) / surfel.k_radius).min(1.0);
+                }
+                place(surfel, &surface, known.as_ref(), view);
+            }
+            None => shrink(surfel, task),
         }
     }
 }
 
 /// Standard error of a normal, radians, that no larger ball need better.
 #[inline(always)]
-fn good_enough(noise: f32, depth: f32, view: &View) -> f32 {
-    ENOUGH + TINY_SLOPE * (TINY_PX - noise / view.pixel_size(depth)).max(0.0)
+pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) -> f32 {
+    let pixel = view.pixel_size(depth);
+    let dense = TINY_REACH_PX * pixel / k_radius;
+    ENOUGH + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
 }
 
-/// The quadric of the largest ball that agrees with the smaller ones; `None` if none is better than the first neighbours.
+/// The quadric of the largest ball around `center` that agrees with the smaller ones and with the `first` normal, where its
+/// standard error is known; `None` if none is better than the first neighbours. Radii are multiples of `radius`.
 #[inline(always)]
-fn choose<S: Simd>(
+pub(super) fn choose<S: Simd>(
     simd: S,
-    surfel: &Surfel,
-    [noise, enough]: [f32; 2],
-    task: &Task,
+    center: [f32; 3],
+    mut radius: f32,
+    first: Option<(Vec3, f32)>,
+    (noise, enough): (f32, f32),
+    (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<Quadric> {
-    let Task { cells, density, view, k, .. } = *task;
-    let mut radius = first_radius(surfel, density, view, k);
     // Normals to agree with, and their errors.
     let mut reliable = [(Vec3::ZERO, 0.0); SCALES + 1];
     let mut count = 0;
-    if noise < THICKEST_FIRST * surfel.k_radius {
-        reliable[0] = (surfel.normal.into(), noise / surfel.k_radius);
+    if let Some(first) = first {
+        reliable[0] = first;
         count = 1;
     }
     let mut best = None;
@@ -160,8 +221,14 @@ fn choose<S: Simd>(
         if !thin & (scale + 1 < SCALES) {
             continue;
         }
-        if gathered.read(cells, surfel.center, radius, view) < LEAST_CLUSTERS {
+        if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
             continue;
+        }
+        if axis.is_none() && scale + 1 < SCALES {
+            let least = noise * (1.0 / (RELIABLE * radius));
+            if gathered.weight() < LEAST_TRACE * least * least {
+                continue;
+            }
         }
         let (along, curvature) = axis.unwrap_or_else(|| gathered.plane(simd));
         let quadric = gathered.quadric(simd, radius, along, curvature);
@@ -214,20 +281,20 @@ fn shrink(surfel: &mut Surfel, task: &Task) {
     }
 }
 
-/// Turns and moves a surfel onto a quadric: along its axis, or the ray along which its noise was made.
+/// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known.
 #[inline(always)]
-fn place(surfel: &mut Surfel, quadric: &Quadric, known: Option<&Known>, view: &View) {
-    let offset = quadric.axis * quadric.height;
-    let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(quadric.normal, offset));
+fn place(surfel: &mut Surfel, surface: &Surface, known: Option<&Known>, view: &View) {
+    let &Surface { offset, normal, curvature } = surface;
+    let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(normal, offset));
     let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
-    let normal = if quadric.normal.dot(to_eye) < 0.0 { -quadric.normal } else { quadric.normal };
+    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
     let circle = (normal.any_orthonormal_vector(), 1.0);
     let (major_axis, major_ratio) =
         known.and_then(|known| known.shadow(surfel.normal.into(), normal)).unwrap_or(circle);
     surfel.normal = normal.to_array();
     surfel.major_axis = major_axis.to_array();
     surfel.major_ratio = major_ratio;
-    surfel.curvature = quadric.curvature;
+    surfel.curvature = curvature;
     let [x, y] = view.to_pixel(center);
     // A centre beside the picture has no pixel to be hidden at.
     if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {

@@ -2,12 +2,13 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, DOT_PX, ENOUGH, FARTHEST, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX,
-    TINY_SLOPE, WIDEST,
+    AGREE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, MOST_TINY, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST,
+    THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
+use super::sheets::{COVERED, COVERED_REACH, LEVEL, MOST_PX, PARTS};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::Error;
 use crate::fit::SWEEPS;
@@ -15,7 +16,8 @@ use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers};
 
 #[cfg(test)]
-pub(crate) const PASSES: &[PassSource] = &[ARRANGE, FILL, MERGE, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ADAPT];
+pub(crate) const PASSES: &[PassSource] =
+    &[ARRANGE, FILL, MERGE, FORGET, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ASK, FIT_SHEETS, ADAPT];
 const ARRANGE: PassSource = PassSource::new("adapt/arrange", include_str!("arrange.wgsl"));
 const FILL: PassSource = PassSource::new("adapt/fill", include_str!("fill.wgsl"));
 const MERGE: PassSource = PassSource::new("adapt/merge", include_str!("merge.wgsl"));
@@ -23,6 +25,9 @@ const SAMPLE_PASS: PassSource = PassSource::new("adapt/sample", include_str!("sa
 const SCATTERS: PassSource = PassSource::new("adapt/scatter", include_str!("scatter.wgsl"));
 const QUANTILES: PassSource = PassSource::new("adapt/quantile", include_str!("quantile.wgsl"));
 const NOISE: PassSource = PassSource::new("adapt/noise", include_str!("noise.wgsl"));
+const FORGET: PassSource = PassSource::new("adapt/forget", include_str!("forget.wgsl"));
+const ASK: PassSource = PassSource::new("adapt/ask", include_str!("ask.wgsl"));
+const FIT_SHEETS: PassSource = PassSource::new("adapt/fit_sheets", include_str!("fit_sheets.wgsl"));
 const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgsl"));
 
 /// Invocations in a workgroup of the passes.
@@ -36,6 +41,8 @@ const WORK_BYTES: u64 = 12;
 type Level = [u32; 4];
 /// Mean and count.
 type Cluster = [f32; 4];
+/// `Sheet` of `shared/sheet.wgsl`.
+type Sheet = [f32; 16];
 
 /// What the stage keeps on the device from pass to pass.
 #[derive(Debug)]
@@ -44,6 +51,9 @@ pub(crate) struct AdaptBuffers {
     /// Workgroups that fill each level, three `u32`.
     arguments: wgpu::Buffer,
     clusters: wgpu::Buffer,
+    /// Number of surfels that ask for the sheets of a cell, the sum of their k-radii and the first of their points.
+    asked: wgpu::Buffer,
+    sheets: wgpu::Buffer,
     /// Places of the surfels of the sample, and their number.
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
@@ -68,6 +78,8 @@ impl AdaptBuffers {
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size))?,
+            asked: gpu.storage::<[u32; 3]>("surfels that ask for sheets", most_sheet_cells(size))?,
+            sheets: gpu.storage::<[Sheet; SLABS]>("sheets", most_sheet_cells(size))?,
             sampled: gpu.storage::<u32>("sampled surfels", SAMPLE + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
             quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
@@ -121,6 +133,12 @@ fn most_cells(size: [u32; 2]) -> usize {
     cells
 }
 
+/// Cells that have sheets if they are as small as can be.
+fn most_sheet_cells(size: [u32; 2]) -> usize {
+    let side_px = least_side_px(size) << LEVEL;
+    size.map(|side| (side as usize).div_ceil(side_px)).iter().product()
+}
+
 /// The passes of the stage.
 #[derive(Debug)]
 pub(crate) struct AdaptPasses {
@@ -133,7 +151,11 @@ pub(crate) struct AdaptPasses {
     scatter: Pass,
     quantile: Pass,
     noise: Pass,
-    rounds: [Pass; 2],
+    forget: Pass,
+    fit_sheets: Pass,
+    /// Of both rounds.
+    ask: [Pass; 2],
+    adapt: [Pass; 2],
 }
 
 impl AdaptPasses {
@@ -145,29 +167,45 @@ impl AdaptPasses {
         let quadric = [
             ("SWEEPS", SWEEPS as f64),
             ("MOST_LEVELS", MOST_LEVELS as f64),
-            ("LEAST_REACH", LEAST_REACH.into()),
             ("CELLS_PER_RADIUS", CELLS_PER_RADIUS.into()),
             ("LEAST_CLUSTERS", LEAST_CLUSTERS as f64),
             ("FULL", FULL.into()),
             ("RIDGE", RIDGE.into()),
             ("LEAST_PIVOT", LEAST_PIVOT.into()),
-            ("STEP", STEP.into()),
         ];
+        let least_reach = ("LEAST_REACH", LEAST_REACH.into());
+        let step = ("STEP", STEP.into());
+        let calls = [
+            ("ENOUGH", ENOUGH.into()),
+            ("TINY_PX", TINY_PX.into()),
+            ("TINY_SLOPE", TINY_SLOPE.into()),
+            ("TINY_REACH_PX", TINY_REACH_PX.into()),
+            ("MOST_TINY", MOST_TINY.into()),
+        ];
+        let choose = [
+            step,
+            ("RELIABLE", RELIABLE.into()),
+            ("LEAST_TRACE", LEAST_TRACE.into()),
+            ("THICKEST", THICKEST.into()),
+            ("SCATTER", SCATTER.into()),
+            ("AGREE", AGREE.into()),
+            ("FARTHEST", FARTHEST.into()),
+        ];
+        let level = ("SHEET_LEVEL", LEVEL as f64);
+        let parts = ("PARTS", PARTS.into());
+        let ask = |round: Round| {
+            let own = [("ROUND", f64::from(round as u32)), level, parts, ("MOST_PX", MOST_PX.into())];
+            Pass::new(gpu, &ASK, &[&calls[..], &own].concat())
+        };
         let sample = ("SAMPLE", SAMPLE as f64);
         let scales = ("SCALES", SCALES as f64);
-        let round = |round: Round| {
+        let adapt = |round: Round| {
             let own = [
                 ("ROUND", f64::from(round as u32)),
-                ("ENOUGH", ENOUGH.into()),
-                ("TINY_PX", TINY_PX.into()),
-                ("TINY_SLOPE", TINY_SLOPE.into()),
-                ("RELIABLE", RELIABLE.into()),
-                ("THICKEST", THICKEST.into()),
+                level,
+                least_reach,
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
-                ("SCATTER", SCATTER.into()),
-                ("AGREE", AGREE.into()),
                 ("WIDEST", WIDEST.into()),
-                ("FARTHEST", FARTHEST.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),
@@ -175,13 +213,14 @@ impl AdaptPasses {
                 ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
                 ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
             ];
-            Pass::new(gpu, &ADAPT, &[&quadric[..], &own].concat())
+            Pass::new(gpu, &ADAPT, &[&quadric[..], &calls, &choose, &own].concat())
         };
         let which = |level: usize| {
             let told = gpu.uniform::<u32>("level")?;
             gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
             Ok::<_, Error>(told)
         };
+        let sheets = [level, parts, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
         let quantile = [
             scales,
             sample,
@@ -200,14 +239,21 @@ impl AdaptPasses {
             merge: Pass::new(gpu, &MERGE, &[])?,
             which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,
             sample: Pass::new(gpu, &SAMPLE_PASS, &[sample])?,
-            scatter: Pass::new(gpu, &SCATTERS, &[&quadric[..], &[sample, ("THIN", THIN.into())]].concat())?,
+            scatter: Pass::new(
+                gpu,
+                &SCATTERS,
+                &[&quadric[..], &[sample, step, least_reach, ("THIN", THIN.into())]].concat(),
+            )?,
             quantile: Pass::new(gpu, &QUANTILES, &quantile)?,
             noise: Pass::new(
                 gpu,
                 &NOISE,
                 &[scales, sample, ("LEAST_SAMPLE", LEAST_SAMPLE as f64), ("APART", APART.into())],
             )?,
-            rounds: [round(Round::Active)?, round(Round::Recovered)?],
+            forget: Pass::new(gpu, &FORGET, &[level])?,
+            fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[&quadric[..], &calls, &choose, &sheets].concat())?,
+            ask: [ask(Round::Active)?, ask(Round::Recovered)?],
+            adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
         })
     }
 
@@ -220,7 +266,7 @@ impl AdaptPasses {
         buffers: &AdaptBuffers,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
-        let AdaptBuffers { levels, arguments, clusters, .. } = buffers;
+        let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
         let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * WORK_BYTES);
         let mut steps = vec![
             self.arrange.step(gpu, &[frame, counters, levels, arguments], 1),
@@ -228,6 +274,7 @@ impl AdaptPasses {
         ];
         let merge = |(level, which)| self.merge.step(gpu, &[frame, levels, clusters, which], groups(level));
         steps.extend((1..).zip(&self.which).map(merge));
+        steps.push(self.forget.step(gpu, &[levels, asked, sheets], groups(LEVEL)));
         steps
     }
 
@@ -242,7 +289,8 @@ impl AdaptPasses {
         round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
-        let AdaptBuffers { levels, clusters, sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
+        let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
+        let AdaptBuffers { sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
@@ -253,8 +301,15 @@ impl AdaptPasses {
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }
-        let adapt = [frame, counters, density, levels, clusters, measured, surfels, depth_noise];
-        steps.push(self.rounds[round as usize].step(gpu, &adapt, screen.groups(round.work_64())));
+        let groups = || screen.groups(round.work_64());
+        let ask = [frame, counters, levels, measured, surfels, depth_noise, asked];
+        let fit = [frame, levels, clusters, measured, asked, depth_noise, sheets];
+        let adapt = [frame, counters, density, levels, clusters, measured, sheets, depth_noise, surfels];
+        steps.extend([
+            self.ask[round as usize].step(gpu, &ask, groups()),
+            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), LEVEL as u64 * WORK_BYTES)),
+            self.adapt[round as usize].step(gpu, &adapt, groups()),
+        ]);
         steps
     }
 }

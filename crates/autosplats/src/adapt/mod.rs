@@ -10,10 +10,15 @@
 //!
 //! How far points scatter is one number for the whole frame (`noise`): it is what is left of the quadrics at the first scale
 //! where many of a sample of points find a surface thinner than their ball is wide. With that number the error of each fit is
-//! known beforehand; a point takes the first scale whose error is small enough. Larger ones are taken only while they agree
+//! known beforehand; the first scale is taken whose error is small enough. Larger ones are taken only while they agree
 //! with the smaller ones within their errors and scatter no more, which they do on smooth surfaces and do not at edges.
 //! Where the first ten neighbours are good enough, the fit stays as it was; nearly everything does in a scan without noise.
-//! Where they are not, the surfel turns to the fitted normal, and its centre moves along it onto the fitted surface.
+//!
+//! Where they are not, balls are not tried around each surfel, which would cost more than all else in a frame, but around
+//! the clusters of cells about two points wide: that makes *sheets* (`sheets`), one for each surface in a cell. A surfel
+//! blends those of the four cells around it at its own place: the nearer the centre of a sheet's ball, the nearer the sheet
+//! itself and the smaller its error, the more it counts, and what is another surface does not. It turns to the blended
+//! normal, and its centre moves onto the surface. A surfel without a sheet tries its own balls.
 //!
 //! Depth cameras have noise that no ball of these sizes shows, because neighbours err alike. It is known from the scan as a whole
 //! (`depth`) and taken where it is the larger; surfels move along the sensor's ray then.
@@ -24,6 +29,7 @@ mod depth;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
+mod sheets;
 #[cfg(test)]
 mod tests;
 

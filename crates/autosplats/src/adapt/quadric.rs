@@ -42,6 +42,12 @@ pub(super) struct Quadric {
     pub(super) error: f32,
     /// Surface variation λ0/(λ0+λ1+λ2) of the clusters, 0 to 1/3.
     pub(super) curvature: f32,
+    /// Of the ball.
+    pub(super) radius: f32,
+    /// Slopes at the point along `any_orthonormal_vector` of the axis, and at right angles to both.
+    pub(super) slope: [f32; 2],
+    /// Coefficients of the squares and the product of the two, xx, xy and yy, in radii.
+    pub(super) bend: [f32; 3],
 }
 
 impl Gathered {
@@ -95,6 +101,18 @@ impl Gathered {
         }
         self.len = len;
         len
+    }
+
+    /// Sum of the clusters' weights.
+    #[inline(always)]
+    pub(super) fn weight(&self) -> f32 {
+        let mut sums = Lanes::default();
+        for [.., weights] in &self.lanes {
+            for lane in 0..LANES {
+                sums.0[lane] += weights.0[lane];
+            }
+        }
+        sums.0.iter().sum()
     }
 
     /// Axis of least spread of the clusters, and their surface variation.
@@ -183,6 +201,10 @@ impl Gathered {
         let slope_y = rows[5][6] / pivot(5);
         let slope_x = (rows[4][6] - rows[4][5] * slope_y) / pivot(4);
         let height = (rows[3][6] - rows[3][4] * slope_x - rows[3][5] * slope_y) / pivot(3);
+        let known = |row: usize| rows[row][3] * height + rows[row][4] * slope_x + rows[row][5] * slope_y;
+        let yy = (rows[2][6] - known(2)) / pivot(2);
+        let xy = (rows[1][6] - known(1) - rows[1][2] * yy) / pivot(1);
+        let xx = (rows[0][6] - known(0) - rows[0][1] * xy - rows[0][2] * yy) / pivot(0);
         // Trace of the inverse of the 2×2 matrix that is left for the slopes.
         let tilt = rows[4][5] / pivot(4);
         let trace = 1.0 / pivot(4) + (1.0 + tilt * tilt) / pivot(5);
@@ -194,6 +216,9 @@ impl Gathered {
             scatter: (rest.max(0.0) / freedom).sqrt() * radius,
             error: trace.sqrt() / radius,
             curvature,
+            radius,
+            slope: [slope_x, slope_y],
+            bend: [xx, xy, yy],
         }
     }
 }

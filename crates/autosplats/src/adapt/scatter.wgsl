@@ -5,6 +5,7 @@
 #import frame
 #import groups
 #import counters
+#import base_radius
 #import quadric
 #import scatters
 

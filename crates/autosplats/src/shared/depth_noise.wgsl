@@ -1,9 +1,5 @@
-// What is known of the noise of depth cameras, as `adapt/depth/` has it. Wants a binding `depth_noise` of all runs, one at least, and
-// `frame`.
-
-override GRAZING: f32;
-override FARTHEST_ALONG: f32;
-override LONGEST_SHADOW: f32;
+// What is known of the noise of depth cameras, as `adapt/depth/` has it. Imports: frame. The including pass binds
+// `depth_noise`: all runs, one at least.
 
 // How depths scatter that one sensor measured, those of the points from one index on.
 struct DepthRun {
@@ -52,28 +48,11 @@ fn known_at(place: vec3f, point: u32) -> Known {
     return Known();
 }
 
-// A move by `offset` onto the plane with a `normal`, made along the ray instead; along the normal where the ray is nearly in
-// the plane.
-fn offset_along(known: Known, normal: vec3f, offset: vec3f) -> vec3f {
-    let distance = dot(offset, normal);
-    let slope = dot(known.ray, normal);
-    let inverse = 1.0 / (slope * slope + GRAZING * GRAZING);
-    let along = distance * slope * inverse;
-    let rest = distance * GRAZING * GRAZING * inverse;
-    let limit = FARTHEST_ALONG * known.noise;
-    let part = select(1.0, limit / abs(along), abs(along) > limit);
-    return (known.ray * along + normal * rest) * part;
-}
-
-// The shadow that a disc with the normal `before` casts along the ray on a plane with the normal `after`, as its major axis
-// and ratio; `otherwise` if it is no longer.
-fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> vec4f {
-    let slope = dot(known.ray, after);
-    let ratio = min(abs(dot(known.ray, before)) / max(abs(slope), GRAZING), LONGEST_SHADOW);
-    let major = known.ray - after * slope;
-    let length_squared = dot(major, major);
-    if ratio > 1.0 && length_squared > 0.0 {
-        return vec4f(major * inverseSqrt(length_squared), ratio);
+// The same if it is more than what was `measured`.
+fn known_beyond(measured_noise: f32, place: vec3f, point: u32) -> Known {
+    let known = known_at(place, point);
+    if known.noise > measured_noise {
+        return known;
     }
-    return otherwise;
+    return Known();
 }

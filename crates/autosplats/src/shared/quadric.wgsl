@@ -1,9 +1,6 @@
-// A height field with six coefficients over a ball's points: see the CPU form. Imports: frame, density, screen,
-// surfel, levels, eigen, orthonormal. The including pass binds `density`, `levels` and `clusters`.
+// A height field with six coefficients over a ball's points: see the CPU form. Imports: frame, levels, eigen,
+// orthonormal. The including pass binds `levels` and `clusters`.
 
-#import density
-#import screen
-#import surfel
 #import levels
 #import eigen
 #import orthonormal
@@ -12,7 +9,6 @@
 const SCALES = 6u;
 
 override MOST_LEVELS: u32;
-override LEAST_REACH: f32;
 override CELLS_PER_RADIUS: f32;
 override LEAST_CLUSTERS: u32;
 override FULL: f32;
@@ -35,6 +31,8 @@ struct Plane {
     curvature: f32,
     // Clusters in the ball.
     len: u32,
+    // Sum of their weights.
+    weight: f32,
 }
 
 struct Quadric {
@@ -51,12 +49,12 @@ struct Quadric {
     curvature: f32,
     // Clusters in the ball.
     len: u32,
-}
-
-// Radius that the balls around a surfel are multiples of.
-fn base_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
-    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, cell_columns)];
-    return max(surfel.k_radius, LEAST_REACH * first_radius(cell.x, cell_px, surfel.center.z));
+    // Of the ball.
+    radius: f32,
+    // Slopes at the point along `any_orthonormal` of the axis, and at right angles to both.
+    slope: vec2f,
+    // Coefficients of the squares and the product of the two, xx, xy and yy, in radii.
+    bend: vec3f,
 }
 
 fn ball_around(center: vec3f, radius: f32) -> Ball {
@@ -113,14 +111,14 @@ fn plane_of(ball: Ball) -> Plane {
         }
     }
     if len < LEAST_CLUSTERS {
-        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, len);
+        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, len, first.w);
     }
     let share = 1.0 / first.w;
     let mean = first.xyz * share;
     let found = eigen(squares * share - mean * mean, products * share - mean.yxx * mean.zzy);
     let least = max(found.values.x, 0.0);
     let sum = least + found.values.y + found.values.z;
-    return Plane(found.least, select(0.0, least / sum, sum > 0.0), len);
+    return Plane(found.least, select(0.0, least / sum, sum > 0.0), len, first.w);
 }
 
 // A row of the equations: four columns, the two of the slopes, and the right-hand side.
@@ -176,7 +174,7 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
         }
     }
     if len < LEAST_CLUSTERS {
-        return Quadric(axis, 0.0, axis, 0.0, 0.0, 0.0, len);
+        return Quadric(axis, 0.0, axis, 0.0, 0.0, 0.0, len, ball.radius, vec2f(0.0), vec3f(0.0));
     }
     let w = first.x;
     let ridge = RIDGE * w;
@@ -227,6 +225,10 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     let slope_y = r5.right.z * i5;
     let slope_x = (r4.right.z - r4.right.y * slope_y) * i4;
     let height = (r3.right.z - r3.right.x * slope_x - r3.right.y * slope_y) * i3;
+    let known = vec3f(height, slope_x, slope_y);
+    let yy = (r2.right.z - dot(vec3f(r2.left.w, r2.right.xy), known)) * i2;
+    let xy = (r1.right.z - dot(vec3f(r1.left.w, r1.right.xy), known) - r1.left.z * yy) * i1;
+    let xx = (r0.right.z - dot(vec3f(r0.left.w, r0.right.xy), known) - r0.left.y * xy - r0.left.z * yy) * i0;
     // Trace of the inverse of the 2×2 matrix that is left for the slopes.
     let tilt = r4.right.y * i4;
     let trace = i4 + (1.0 + tilt * tilt) * i5;
@@ -239,5 +241,8 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
         sqrt(trace) / ball.radius,
         curvature,
         len,
+        ball.radius,
+        vec2f(slope_x, slope_y),
+        vec3f(xx, xy, yy),
     );
 }

@@ -1,0 +1,46 @@
+// Asks for sheets where surfels are that the noise tilts: an invocation per surfel.
+//
+// Reads: counters, levels, measured, surfels, depth_noise. Writes: asked, of each cell the number of surfels, the sum of their
+// k-radii and the first of their points.
+
+#import frame
+#import groups
+#import counters
+#import levels
+#import divide
+#import calls
+#import depth_noise
+#import sheet
+#import screen
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> levels: array<Level>;
+@group(0) @binding(3) var<storage, read> measured: array<f32>;
+@group(0) @binding(4) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
+@group(0) @binding(6) var<storage, read_write> asked: array<atomic<u32>>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+override PARTS: f32;
+override MOST_PX: f32;
+
+@compute @workgroup_size(64)
+fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let level = levels[SHEET_LEVEL];
+    let index = group_index(workgroup) * 64u + local;
+    if index >= select(counters[ACTIVE], counters[RECOVERED], ROUND == 1u) || level.side_px == 0u {
+        return;
+    }
+    let surfel = surfels[select(0u, counters[ACTIVE], ROUND == 1u) + index];
+    let measured_noise = noise_at(surfel.center.z);
+    let noise = max(measured_noise, known_at(surfel.center, surfel.source).noise);
+    if calls(surfel, noise, good_enough(noise, surfel.k_radius, surfel.center.z)) {
+        let at = pixel_xy(surfel.pixel);
+        let cell = divide(at.y, level.side_px).x * level.columns + divide(at.x, level.side_px).x;
+        let k_radius_px = surfel.k_radius / pixel_size(surfel.center.z);
+        atomicAdd(&asked[3u * cell], 1u);
+        atomicAdd(&asked[3u * cell + 1u], u32(min(k_radius_px, MOST_PX) * PARTS));
+        atomicMin(&asked[3u * cell + 2u], surfel.source);
+    }
+}

@@ -1,0 +1,109 @@
+// Fits sheets to the clusters of each cell that surfels ask for, largest first, until each has one or is near one: an invocation
+// per cell. See the CPU form.
+//
+// Reads: levels, clusters, measured, asked, depth_noise. Reads and writes: sheets.
+
+#import frame
+#import groups
+#import calls
+#import choose
+#import depth_noise
+#import sheet
+#import divide
+
+@group(0) @binding(1) var<storage, read> levels: array<Level>;
+@group(0) @binding(2) var<storage, read> clusters: array<vec4f>;
+@group(0) @binding(3) var<storage, read> measured: array<f32>;
+@group(0) @binding(4) var<storage, read> asked: array<u32>;
+@group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
+@group(0) @binding(6) var<storage, read_write> sheets: array<Sheet>;
+
+override PARTS: f32;
+override COVERED: f32;
+override COVERED_REACH: f32;
+
+struct Asked {
+    // Mean k-radius, pixels; 0 if none asks.
+    k_radius_px: f32,
+    // First of the points.
+    point: u32,
+}
+
+// Of the surfels that ask for a cell or one beside it, which may blend its sheets.
+fn asked_around(level: Level, cell: u32) -> Asked {
+    let at = divide(cell, level.columns).yx;
+    let low = max(at, vec2u(1u)) - 1u;
+    let high = min(at + 1u, vec2u(level.columns, level.rows) - 1u);
+    var sum = vec2u(0u);
+    var point = 0xffffffffu;
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let at = 3u * (y * level.columns + x);
+            sum += vec2u(asked[at], asked[at + 1u]);
+            point = min(point, asked[at + 2u]);
+        }
+    }
+    return Asked(select(0.0, f32(sum.y) / (f32(sum.x) * PARTS), sum.x > 0u), point);
+}
+
+@compute @workgroup_size(64)
+fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let level = levels[SHEET_LEVEL];
+    let cell = group_index(workgroup) * 64u + local;
+    if cell >= level.columns * level.rows || sheets[cell * SLABS].radius != UNKNOWN {
+        return;
+    }
+    let around = asked_around(level, cell);
+    if around.k_radius_px == 0.0 {
+        return;
+    }
+    let first = (level.first + cell) * SLABS;
+    var left: array<f32, SLABS>;
+    for (var index = 0u; index < SLABS; index++) {
+        left[index] = clusters[first + index].w;
+        if left[index] == 0.0 {
+            break;
+        }
+    }
+    var len = 0u;
+    loop {
+        var largest = 0u;
+        for (var index = 1u; index < SLABS; index++) {
+            largest = select(largest, index, left[index] > left[largest]);
+        }
+        if left[largest] == 0.0 {
+            break;
+        }
+        left[largest] = 0.0;
+        let center = clusters[first + largest].xyz;
+        let noise = max(noise_at(center.z), known_at(center, around.point).noise);
+        let radius = around.k_radius_px * pixel_size(center.z);
+        let quadric = choose(center, radius, vec4f(-1.0), noise, good_enough(noise, radius, center.z));
+        if quadric.len == 0u {
+            continue;
+        }
+        let sheet = Sheet(
+            center,
+            quadric.radius,
+            quadric.axis,
+            quadric.height / quadric.radius,
+            quadric.bend,
+            quadric.error * noise,
+            quadric.slope,
+            quadric.curvature,
+            quadric.scatter,
+        );
+        for (var index = 0u; index < SLABS; index++) {
+            if left[index] > 0.0 {
+                let over = under(sheet, clusters[first + index].xyz);
+                let is_covered = abs(over.height) < COVERED * noise && over.near > 1.0 - COVERED_REACH;
+                left[index] = select(left[index], 0.0, is_covered);
+            }
+        }
+        sheets[cell * SLABS + len] = sheet;
+        len++;
+    }
+    if len == 0u {
+        sheets[cell * SLABS].radius = NONE;
+    }
+}

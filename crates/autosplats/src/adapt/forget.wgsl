@@ -1,0 +1,25 @@
+// Forgets the sheets of the frame before: an invocation per cell.
+//
+// Reads: levels. Writes: asked, sheets.
+
+#import groups
+#import levels
+#import sheet
+
+@group(0) @binding(0) var<storage, read> levels: array<Level>;
+@group(0) @binding(1) var<storage, read_write> asked: array<u32>;
+@group(0) @binding(2) var<storage, read_write> sheets: array<Sheet>;
+
+@compute @workgroup_size(64)
+fn forget(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let level = levels[SHEET_LEVEL];
+    let cell = group_index(workgroup) * 64u + local;
+    if cell < level.columns * level.rows {
+        asked[3u * cell] = 0u;
+        asked[3u * cell + 1u] = 0u;
+        asked[3u * cell + 2u] = 0xffffffffu;
+        for (var index = 0u; index < SLABS; index++) {
+            sheets[cell * SLABS + index].radius = UNKNOWN;
+        }
+    }
+}

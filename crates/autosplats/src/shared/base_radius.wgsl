@@ -1,0 +1,13 @@
+// Radius of the balls around a surfel. Imports: frame, density, screen, surfel. The including pass binds `density`.
+
+#import density
+#import screen
+#import surfel
+
+override LEAST_REACH: f32;
+
+// Radius that the balls around a surfel are multiples of.
+fn base_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
+    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, cell_columns)];
+    return max(surfel.k_radius, LEAST_REACH * first_radius(cell.x, cell_px, surfel.center.z));
+}

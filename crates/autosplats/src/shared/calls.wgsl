@@ -1,0 +1,27 @@
+// Noise, and which surfels it calls to be turned. Imports: frame, surfel. The including pass binds `measured`.
+
+#import surfel
+
+override ENOUGH: f32;
+override TINY_PX: f32;
+override TINY_SLOPE: f32;
+override TINY_REACH_PX: f32;
+override MOST_TINY: f32;
+
+// Standard deviation of points from their surface at a depth above 0.
+fn noise_at(depth: f32) -> f32 {
+    let power = measured[1];
+    return measured[0] * select(pow(depth, power), 1.0, power == 0.0);
+}
+
+// Standard error of a normal, radians, that no larger ball need better.
+fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {
+    let pixel = pixel_size(depth);
+    let dense = TINY_REACH_PX * pixel / k_radius;
+    return ENOUGH + TINY_SLOPE * min(dense * dense, MOST_TINY) * max(TINY_PX - noise / pixel, 0.0);
+}
+
+// Whether the noise calls for more than a surfel's first neighbours, whose error is about that of k points over the k-radius.
+fn calls(surfel: Surfel, noise: f32, enough: f32) -> bool {
+    return surfel.radius > 0.0 && noise > enough * surfel.k_radius;
+}
