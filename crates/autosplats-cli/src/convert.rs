@@ -53,7 +53,7 @@ fn thin(cloud: &mut PointCloud, thinning: &ThinningArgs, quiet: bool) -> Result<
     Ok(())
 }
 
-fn thin_failure(error: Error) -> Failure {
+pub(crate) fn thin_failure(error: Error) -> Failure {
     match error {
         Error::Cancelled => Failure::interrupted(),
         error => Failure::usage(error),

@@ -14,6 +14,7 @@ const BENCH_EXAMPLES: &str = "\
 Examples:
   autosplats bench
   autosplats bench --scene cathedral:10M --backend cpu,gpu
+  autosplats bench --scene statue:1M --noise 0.005
   autosplats bench --scene statue:1M -k 20 --size 1280x720 --frames 100 --json
   autosplats bench --scene cathedral:10M --backend gpu --stream
   autosplats bench paper --quick --out /tmp/paper";
@@ -42,6 +43,9 @@ pub(crate) struct BenchArgs {
     /// Points that a pixel keeps, 1 or 2
     #[arg(long, value_name = "COUNT", default_value_t = Reconstruction::default().points_per_pixel, allow_negative_numbers = true)]
     pub(crate) points_per_pixel: u32,
+    /// Shake the points by normally distributed noise with this standard deviation along each axis, in the scene's units
+    #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
+    pub(crate) noise: Option<f64>,
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],

@@ -10,6 +10,7 @@ use autosplats_cloud::PointCloud;
 use serde::Serialize;
 
 use self::args::{BenchArgs, Evaluation};
+use crate::convert::thin_failure;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
@@ -65,6 +66,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         backends,
         k,
         points_per_pixel,
+        noise,
         size,
         frames,
         stream,
@@ -89,7 +91,11 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         renderer.check(&settings).map_err(render_failure)?;
         renderers.push(renderer);
     }
-    let cloud = inputs.read(run.quiet)?;
+    let mut cloud = inputs.read(run.quiet)?;
+    if let Some(sigma) = *noise {
+        let bar = Bar::new("shaking", run.quiet);
+        cloud.add_noise(sigma, 0, &bar).map_err(thin_failure)?;
+    }
     let mut bench = Bench {
         version: env!("CARGO_PKG_VERSION"),
         scene,
