@@ -1,12 +1,13 @@
 //! Projection on the CPU.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use autosplats_cloud::PointCloud;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{DensityGrid, Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
+use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
 use crate::camera::View;
 
 /// Points projected per task.
@@ -38,38 +39,77 @@ impl Projector {
     /// Projects `cloud`, which has fewer than 2³² points, for `view`.
     pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> &ScreenPoints {
         let ProjectRules { k, halves, grid_culling } = *rules;
-        self.screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, &mut self.keys);
-        if halves {
-            erase_far_seconds(&mut self.keys, view);
-        }
-        let keys = Keys { slots: &self.keys, per_pixel: 1 + usize::from(halves), width: view.width as usize };
-        let spacing_px = mean_spacing(keys);
-        compact(cloud.positions(), view, keys, spacing_px, &mut self.screen);
-        measure_density(keys, view, spacing_px, k, &mut self.screen.density);
-        split_by_depth(grid_culling, &mut self.screen);
-        &self.screen
+        let Self { keys, screen } = self;
+        screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys);
+        let keys = Keys::settle(keys, view, halves);
+        let spacing_px = keys.mean_spacing();
+        compact(cloud.positions(), view, &keys, spacing_px, screen);
+        measure_density(screen, view, spacing_px, k);
+        split_by_depth(grid_culling, screen);
+        screen
     }
 }
 
-/// The points of each pixel, in one slot or two.
-#[derive(Clone, Copy)]
+/// The points of each pixel, in one slot or two, and where there are any: most of many pictures is empty.
 struct Keys<'a> {
     slots: &'a [AtomicU64],
     per_pixel: usize,
     /// Of the picture, in pixels.
     width: usize,
+    /// Points in each square of [`OCCUPANCY_PX`] pixels.
+    occupied: Vec<u32>,
 }
 
 impl<'a> Keys<'a> {
-    /// Slots of a row of pixels.
-    fn row_len(&self) -> usize {
-        self.width * self.per_pixel
+    /// Empties slots of points far behind the other one of their pixel, and counts the rest.
+    fn settle(slots: &'a mut [AtomicU64], view: &View, halves: bool) -> Self {
+        let per_pixel = 1 + usize::from(halves);
+        let width = view.width as usize;
+        let mut occupied = vec![0; width.div_ceil(OCCUPANCY_PX) * (view.height as usize).div_ceil(OCCUPANCY_PX)];
+        let block_rows = slots.par_chunks_mut(OCCUPANCY_PX * width * per_pixel);
+        block_rows.zip(occupied.par_chunks_mut(width.div_ceil(OCCUPANCY_PX))).for_each(|(rows, occupied)| {
+            for row in rows.chunks_mut(width * per_pixel) {
+                for (block, count) in row.chunks_mut(OCCUPANCY_PX * per_pixel).zip(&mut *occupied) {
+                    let all = block.iter_mut().fold(EMPTY, |all, key| all & *key.get_mut());
+                    if all == EMPTY {
+                        continue;
+                    }
+                    if halves {
+                        block.chunks_exact_mut(2).for_each(|pair| erase_far_second(pair, view));
+                    }
+                    *count += block.iter().map(|key| u32::from(is_owned(key))).sum::<u32>();
+                }
+            }
+        });
+        Self { slots, per_pixel, width, occupied }
     }
 
-    /// Rows of pixels from `rows.start` up to the end of the picture at most.
-    fn rows(&self, rows: std::ops::Range<usize>) -> std::slice::Chunks<'a, AtomicU64> {
-        let end = self.slots.len().min(rows.end * self.row_len());
-        self.slots[rows.start * self.row_len()..end].chunks(self.row_len())
+    /// Squares of pixels in a row.
+    fn columns(&self) -> usize {
+        self.width.div_ceil(OCCUPANCY_PX)
+    }
+
+    /// Whether there is a point in the square in this column of squares that holds a row of pixels.
+    fn is_occupied(&self, column: usize, y: usize) -> bool {
+        self.occupied[y / OCCUPANCY_PX * self.columns() + column] > 0
+    }
+
+    /// Pixel columns of a column of squares.
+    fn columns_px(&self, column: usize) -> Range<usize> {
+        column * OCCUPANCY_PX..((column + 1) * OCCUPANCY_PX).min(self.width)
+    }
+
+    /// The slots of pixel (x, y).
+    fn at(&self, x: usize, y: usize) -> &'a [AtomicU64] {
+        &self.slots[(y * self.width + x) * self.per_pixel..][..self.per_pixel]
+    }
+
+    /// Mean distance in pixels between screen points where there are any.
+    // Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
+    fn mean_spacing(&self) -> f32 {
+        let blocks = self.occupied.iter().filter(|&&points| points > 0).count();
+        let points = self.occupied.iter().sum::<u32>();
+        ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt().max(LEAST_SPACING_PX)
     }
 }
 
@@ -160,44 +200,19 @@ fn depth_of(key: u64) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 
-/// Empties the slots of points far behind the other one of their pixel.
-fn erase_far_seconds(keys: &mut [AtomicU64], view: &View) {
-    keys.par_chunks_mut(1 << 16).for_each(|keys| {
-        for pair in keys.chunks_exact_mut(2) {
-            let [one, other] = [*pair[0].get_mut(), *pair[1].get_mut()];
-            let [near, far] = [one.min(other), one.max(other)];
-            if far != EMPTY {
-                let gate = depth_of(near) + GATE_PX * view.pixel_size(depth_of(near));
-                if depth_of(far) > gate {
-                    *pair[usize::from(other == far)].get_mut() = EMPTY;
-                }
-            }
-        }
-    });
-}
-
-/// Mean distance in pixels between screen points where there are any.
-// Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
-fn mean_spacing(keys: Keys) -> f32 {
-    let block_slots = OCCUPANCY_PX * keys.per_pixel;
-    let (points, blocks) = keys
-        .slots
-        .par_chunks(OCCUPANCY_PX * keys.row_len())
-        .map(|rows| {
-            let mut occupied = vec![0usize; keys.width.div_ceil(OCCUPANCY_PX)];
-            for row in rows.chunks(keys.row_len()) {
-                for (block, slots) in row.chunks(block_slots).enumerate() {
-                    occupied[block] += slots.iter().filter(|key| is_owned(key)).count();
-                }
-            }
-            (occupied.iter().sum(), occupied.iter().filter(|&&n| n > 0).count())
-        })
-        .reduce(|| (0, 0), |a: (usize, usize), b| (a.0 + b.0, a.1 + b.1));
-    ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt().max(LEAST_SPACING_PX)
+/// Empties the slot of the farther one of a pixel's two points if it is far behind the other.
+#[inline(always)]
+fn erase_far_second(pair: &mut [AtomicU64], view: &View) {
+    let [one, other] = [0, 1].map(|half| *pair[half].get_mut());
+    let [near, far] = [one.min(other), one.max(other)];
+    let near = depth_of(near);
+    if far != EMPTY && depth_of(far) > near + GATE_PX * view.pixel_size(near) {
+        *pair[usize::from(other == far)].get_mut() = EMPTY;
+    }
 }
 
 /// Lists the owners of pixels in cell order.
-fn compact(positions: &[[f32; 3]], view: &View, keys: Keys, spacing_px: f32, screen: &mut ScreenPoints) {
+fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, screen: &mut ScreenPoints) {
     let [width, height] = [view.width as usize, view.height as usize];
     let strip_px = ((STRIP_SPACINGS * spacing_px).round() as usize).clamp(1, 256);
     let strips = height.div_ceil(strip_px);
@@ -206,15 +221,17 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: Keys, spacing_px: f32, scr
     cells.start.resize(strips * width + 1, 0);
 
     // Points of each cell first, then where each cell begins.
-    let strip_rows = |strip: usize| keys.rows(strip * strip_px..(strip + 1) * strip_px);
+    let strip_rows = |strip: usize| strip * strip_px..height.min((strip + 1) * strip_px);
     let strip_len: Vec<u32> = cells.start[..strips * width]
         .par_chunks_mut(width)
         .enumerate()
         .map(|(strip, start)| {
             start.fill(0);
-            for row in strip_rows(strip) {
-                for (count, slots) in start.iter_mut().zip(row.chunks(keys.per_pixel)) {
-                    *count += slots.iter().map(|key| u32::from(is_owned(key))).sum::<u32>();
+            for y in strip_rows(strip) {
+                for column in (0..keys.columns()).filter(|&column| keys.is_occupied(column, y)) {
+                    for x in keys.columns_px(column) {
+                        start[x] += keys.at(x, y).iter().map(|key| u32::from(is_owned(key))).sum::<u32>();
+                    }
                 }
             }
             let mut sum = 0;
@@ -242,47 +259,48 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: Keys, spacing_px: f32, scr
     tasks.into_par_iter().for_each(|(strip, first, start, points, source)| {
         start.iter_mut().for_each(|cell| *cell += first);
         let mut next = 0;
-        for x in 0..width {
-            for (y, row) in (strip * strip_px..).zip(strip_rows(strip)) {
-                for key in &row[x * keys.per_pixel..][..keys.per_pixel] {
-                    let key = key.load(Ordering::Relaxed);
-                    if key != EMPTY {
-                        let index = key as u32;
-                        let position_view = view.to_view(positions[index as usize]).to_array();
-                        points[next] = ScreenPoint { position_view, pixel: (y << 16 | x) as u32 };
-                        source[next] = index;
-                        next += 1;
-                    }
+        let rows = strip_rows(strip);
+        // A strip no higher than a square meets two of them at most.
+        let is_occupied = |&column: &usize| {
+            rows.clone().step_by(OCCUPANCY_PX).chain([rows.end - 1]).any(|y| keys.is_occupied(column, y))
+        };
+        for x in (0..keys.columns()).filter(is_occupied).flat_map(|column| keys.columns_px(column)) {
+            for (y, key) in rows.clone().flat_map(|y| keys.at(x, y).iter().map(move |key| (y, key))) {
+                let key = key.load(Ordering::Relaxed);
+                if key != EMPTY {
+                    let index = key as u32;
+                    let position_view = view.to_view(positions[index as usize]).to_array();
+                    points[next] = ScreenPoint { position_view, pixel: (y << 16 | x) as u32 };
+                    source[next] = index;
+                    next += 1;
                 }
             }
         }
     });
 }
 
-/// Counts points and finds the nearest depth per cell of about `k` points.
-fn measure_density(keys: Keys, view: &View, spacing_px: f32, k: u32, density: &mut DensityGrid) {
+/// Counts screen points and finds the nearest depth per cell of about `k` points.
+fn measure_density(screen: &mut ScreenPoints, view: &View, spacing_px: f32, k: u32) {
+    let ScreenPoints { points, cells, density, .. } = screen;
     let [width, height] = [view.width as usize, view.height as usize];
     let cell_px = ((spacing_px * (k as f32).sqrt()).round() as usize).max(2);
     let columns = width.div_ceil(cell_px);
-    let cells = columns * height.div_ceil(cell_px);
+    let len = columns * height.div_ceil(cell_px);
     density.cell_px = cell_px;
     density.columns = columns;
-    density.count.resize(cells, 0);
-    density.nearest.resize(cells, f32::INFINITY);
+    density.count.resize(len, 0);
+    density.nearest.resize(len, f32::INFINITY);
     let rows = density.count.par_chunks_mut(columns).zip(density.nearest.par_chunks_mut(columns));
-    rows.zip(keys.slots.par_chunks(cell_px * keys.row_len())).for_each(|((count, nearest), rows)| {
+    rows.enumerate().for_each(|(row, (count, nearest))| {
         count.fill(0);
         nearest.fill(f32::INFINITY);
-        for row in rows.chunks(keys.row_len()) {
-            for (cell, slots) in row.chunks(cell_px * keys.per_pixel).enumerate() {
-                let mut least = EMPTY;
-                for key in slots {
-                    let key = key.load(Ordering::Relaxed);
-                    count[cell] += u32::from(key != EMPTY);
-                    least = least.min(key);
-                }
-                if least != EMPTY {
-                    nearest[cell] = nearest[cell].min(depth_of(least));
+        let rows = row * cell_px..height.min((row + 1) * cell_px);
+        for strip in rows.start / cells.strip_px..=(rows.end - 1) / cells.strip_px {
+            for point in &points[cells.run(strip, 0, width - 1)] {
+                let [x, y] = point.pixel_xy();
+                if rows.contains(&y) {
+                    count[x / cell_px] += 1;
+                    nearest[x / cell_px] = nearest[x / cell_px].min(point.position_view[2]);
                 }
             }
         }
