@@ -55,8 +55,8 @@ impl Noise {
 
     /// From a sample, nearest first.
     fn of(sample: &[Sampled]) -> Self {
-        let third = sample.len() / 3;
-        let [near, far] = [&sample[..third], &sample[sample.len() - third..]];
+        let [near, far] = ends(sample);
+        let third = near.len();
         if let ([.., last], [first, ..]) = (near, far)
             && first.depth > APART * last.depth
         {
@@ -81,12 +81,22 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
     let step = surfels.len().div_ceil(SAMPLE).max(1);
     // A discarded point has no ball.
     let kept = surfels.iter().step_by(step).filter(|surfel| surfel.radius > 0.0);
-    let mut sample: Vec<Sampled> =
-        kept.map(|&surfel| Sampled { surfel, depth: surfel.center[2], scatter: [None; SCALES] }).collect();
-    sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
-        measure_scatter(sample, &Task { cells, density, view, k }, gathered);
-    });
+    let of = |&surfel: &Surfel| {
+        let radius = first_radius(&surfel, density, view, k);
+        Sampled { surfel, depth: surfel.center[2], radius, scatter: [None; SCALES] }
+    };
+    let mut sample: Vec<Sampled> = kept.map(of).collect();
     sample.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    for scale in 0..SCALES {
+        sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
+            measure_scatter(sample, scale, &Task { cells, view }, gathered);
+        });
+        // What larger balls would say is not asked for then; most frames need the first alone.
+        let [near, far] = ends(&sample);
+        if [near, far, &sample].iter().all(|part| (0..=scale).any(|scale| tells_noise(part, scale).is_some())) {
+            break;
+        }
+    }
     let noise = Noise::of(&sample);
     sample.sort_by(|a, b| a.surfel.k_radius.total_cmp(&b.surfel.k_radius));
     let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { sample[sample.len() / 2].surfel.k_radius };
@@ -97,9 +107,13 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
 #[derive(Clone, Copy)]
 struct Task<'a> {
     cells: &'a Cells,
-    density: &'a DensityGrid,
     view: &'a View,
-    k: u32,
+}
+
+/// The nearest and the farthest third of a sample.
+fn ends(sample: &[Sampled]) -> [&[Sampled]; 2] {
+    let third = sample.len() / 3;
+    [&sample[..third], &sample[sample.len() - third..]]
 }
 
 /// A surfel of the sample.
@@ -107,6 +121,8 @@ struct Task<'a> {
 struct Sampled {
     surfel: Surfel,
     depth: f32,
+    /// Of the ball before the next.
+    radius: f32,
     /// In each ball that holds enough to fit.
     scatter: [Option<Scatter>; SCALES],
 }
@@ -116,19 +132,16 @@ struct Sampled {
 fn measure_scatter_with<'a, S: Simd>(
     simd: S,
     sample: &'a mut [Sampled],
+    scale: usize,
     task: &'a Task<'a>,
     gathered: &'a mut Gathered,
 ) {
-    let Task { cells, density, view, k } = *task;
-    for Sampled { surfel, scatter, .. } in sample {
-        let mut radius = first_radius(surfel, density, view, k);
-        for out in scatter {
-            radius *= STEP;
-            if gathered.read(cells, surfel.center, radius, view) >= LEAST_CLUSTERS {
-                let (axis, curvature) = gathered.plane(simd);
-                let distance = gathered.quadric(simd, radius, axis, curvature).scatter;
-                *out = Some(Scatter { distance, thin: distance < THIN * radius });
-            }
+    for Sampled { surfel, radius, scatter, .. } in sample {
+        *radius *= STEP;
+        if gathered.read(task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
+            let (axis, curvature) = gathered.plane(simd);
+            let distance = gathered.quadric(simd, *radius, axis, curvature).scatter;
+            scatter[scale] = Some(Scatter { distance, thin: distance < THIN * *radius });
         }
     }
 }
@@ -146,18 +159,16 @@ fn scatter_level(sample: &[Sampled]) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
-        let found: Vec<Scatter> = sample.iter().filter_map(|sampled| sampled.scatter[scale]).collect();
-        if found.len() < LEAST_SAMPLE.max(sample.len() / LEAST_SHARE) {
-            before = None;
-            continue;
-        }
-        let mut thin: Vec<f32> = found.iter().filter(|found| found.thin).map(|found| found.distance).collect();
-        if thin.len() as f32 >= THIN_SHARE * found.len() as f32 {
+        if let Some(mut thin) = tells_noise(sample, scale) {
             return quantile(&mut thin);
         }
         // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
         // fill the ball or of structure.
-        let mut all: Vec<f32> = found.iter().map(|found| found.distance).collect();
+        let mut all: Vec<f32> = found(sample, scale).map(|found| found.distance).collect();
+        if !is_enough(all.len(), sample) {
+            before = None;
+            continue;
+        }
         let now = quantile(&mut all);
         if let Some(before) = before
             && now < least_growth * before
@@ -167,6 +178,22 @@ fn scatter_level(sample: &[Sampled]) -> f32 {
         before = Some(now);
     }
     plateau
+}
+
+/// What the balls of a scale found.
+fn found(sample: &[Sampled], scale: usize) -> impl Iterator<Item = Scatter> {
+    sample.iter().filter_map(move |sampled| sampled.scatter[scale])
+}
+
+fn is_enough(found: usize, sample: &[Sampled]) -> bool {
+    found >= LEAST_SAMPLE.max(sample.len() / LEAST_SHARE)
+}
+
+/// Distances from thin surfaces, if so many balls of a scale found one that they tell the noise.
+fn tells_noise(sample: &[Sampled], scale: usize) -> Option<Vec<f32>> {
+    let thin: Vec<f32> = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
+    let found = found(sample, scale).count();
+    (is_enough(found, sample) && thin.len() as f32 >= THIN_SHARE * found as f32).then_some(thin)
 }
 
 fn quantile(values: &mut [f32]) -> f32 {
