@@ -208,7 +208,7 @@ impl Sheets {
                     let likely = likely * likely;
                     let likely = likely * likely;
                     let likely = likely * likely;
-                    let weight = share * (over.near * over.near * over.near) * likely / square;
+                    let weight = share * (over.near * over.near * over.near) * likely / sheet.error;
                     sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
                     sum.offset += sheet.axis * (over.height * weight);
                     sum.curvature += sheet.curvature * weight;

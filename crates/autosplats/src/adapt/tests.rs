@@ -224,7 +224,7 @@ fn surfaces_in_steps_are_smooth() {
         (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
     };
     let [before, after] = [distance(&fitted), distance(&adapted)];
-    assert!(after < 0.5 * before, "{before} off the wall, then {after}");
+    assert!(after < 0.75 * before, "{before} off the wall, then {after}");
 }
 
 #[test]
