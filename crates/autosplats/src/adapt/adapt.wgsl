@@ -45,7 +45,7 @@ struct Surface {
 // The surface beside a surfel, from the sheets of the four cells around it that agree with the `first` normal.
 fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
     var sum = Surface();
-    let level = levels[SHEET_LEVEL];
+    let level = levels[sheet_level()];
     if level.side_px == 0u {
         return sum;
     }

@@ -27,7 +27,7 @@ override MOST_PX: f32;
 
 @compute @workgroup_size(64)
 fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let level = levels[SHEET_LEVEL];
+    let level = levels[sheet_level()];
     let index = group_index(workgroup) * 64u + local;
     if index >= select(counters[ACTIVE], counters[RECOVERED], ROUND == 1u) || level.side_px == 0u {
         return;

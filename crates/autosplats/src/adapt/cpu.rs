@@ -96,6 +96,7 @@ impl Adapter {
     ) {
         let Self { cells, sheets, usual } = self;
         let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
+        sheets.level = usual.sheet_level;
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, k, usual, known, keep_outliers };
         surfels.par_chunks(TASK).for_each(|surfels| {

@@ -48,7 +48,7 @@ fn asked_around(level: Level, cell: u32) -> Asked {
 
 @compute @workgroup_size(64)
 fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let level = levels[SHEET_LEVEL];
+    let level = levels[sheet_level()];
     let cell = group_index(workgroup) * 64u + local;
     if cell >= level.columns * level.rows || sheets[cell * SLABS].radius != UNKNOWN {
         return;

@@ -10,9 +10,12 @@
 @group(0) @binding(1) var<storage, read_write> asked: array<u32>;
 @group(0) @binding(2) var<storage, read_write> sheets: array<Sheet>;
 
+// The finest level whose cells may have sheets: they are the most.
+override FINE_SHEETS: u32;
+
 @compute @workgroup_size(64)
 fn forget(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let level = levels[SHEET_LEVEL];
+    let level = levels[FINE_SHEETS];
     let cell = group_index(workgroup) * 64u + local;
     if cell < level.columns * level.rows {
         asked[3u * cell] = 0u;

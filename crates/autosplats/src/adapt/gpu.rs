@@ -6,9 +6,9 @@ use super::cpu::{
     THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
-use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THIN, THIN_SHARE};
+use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
-use super::sheets::{COVERED, COVERED_REACH, LEVEL, MOST_PX, PARTS};
+use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::Error;
 use crate::fit::SWEEPS;
@@ -58,7 +58,7 @@ pub(crate) struct AdaptBuffers {
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
     quantiles: wgpu::Buffer,
-    /// Factor and power of the noise, and the median k-radius.
+    /// Factor and power of the noise, the median k-radius, and the level of the cells that have sheets.
     measured: wgpu::Buffer,
     /// Not of the stage's own: [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
@@ -83,7 +83,7 @@ impl AdaptBuffers {
             sampled: gpu.storage::<u32>("sampled surfels", SAMPLE + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
             quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
-            measured: gpu.storage::<f32>("noise", 3)?,
+            measured: gpu.storage::<f32>("noise", 4)?,
             depth_noise: known.runs.clone(),
         })
     }
@@ -135,7 +135,7 @@ fn most_cells(size: [u32; 2]) -> usize {
 
 /// Cells that have sheets if they are as small as can be.
 fn most_sheet_cells(size: [u32; 2]) -> usize {
-    let side_px = least_side_px(size) << LEVEL;
+    let side_px = least_side_px(size) << SHEET_LEVELS[0];
     size.map(|side| (side as usize).div_ceil(side_px)).iter().product()
 }
 
@@ -191,10 +191,9 @@ impl AdaptPasses {
             ("AGREE", AGREE.into()),
             ("FARTHEST", FARTHEST.into()),
         ];
-        let level = ("SHEET_LEVEL", LEVEL as f64);
         let parts = ("PARTS", PARTS.into());
         let ask = |round: Round| {
-            let own = [("ROUND", f64::from(round as u32)), level, parts, ("MOST_PX", MOST_PX.into())];
+            let own = [("ROUND", f64::from(round as u32)), parts, ("MOST_PX", MOST_PX.into())];
             Pass::new(gpu, &ASK, &[&calls[..], &own].concat())
         };
         let sample = ("SAMPLE", SAMPLE as f64);
@@ -202,7 +201,6 @@ impl AdaptPasses {
         let adapt = |round: Round| {
             let own = [
                 ("ROUND", f64::from(round as u32)),
-                level,
                 least_reach,
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("WIDEST", WIDEST.into()),
@@ -220,7 +218,7 @@ impl AdaptPasses {
             gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
             Ok::<_, Error>(told)
         };
-        let sheets = [level, parts, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
+        let sheets = [parts, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
         let quantile = [
             scales,
             sample,
@@ -248,9 +246,17 @@ impl AdaptPasses {
             noise: Pass::new(
                 gpu,
                 &NOISE,
-                &[scales, sample, ("LEAST_SAMPLE", LEAST_SAMPLE as f64), ("APART", APART.into())],
+                &[
+                    scales,
+                    sample,
+                    ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
+                    ("APART", APART.into()),
+                    ("THICK_NOISE", THICK_NOISE.into()),
+                    ("FINE_SHEETS", SHEET_LEVELS[0] as f64),
+                    ("COARSE_SHEETS", SHEET_LEVELS[1] as f64),
+                ],
             )?,
-            forget: Pass::new(gpu, &FORGET, &[level])?,
+            forget: Pass::new(gpu, &FORGET, &[("FINE_SHEETS", SHEET_LEVELS[0] as f64)])?,
             fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[&quadric[..], &calls, &choose, &sheets].concat())?,
             ask: [ask(Round::Active)?, ask(Round::Recovered)?],
             adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
@@ -274,7 +280,7 @@ impl AdaptPasses {
         ];
         let merge = |(level, which)| self.merge.step(gpu, &[frame, levels, clusters, which], groups(level));
         steps.extend((1..).zip(&self.which).map(merge));
-        steps.push(self.forget.step(gpu, &[levels, asked, sheets], groups(LEVEL)));
+        steps.push(self.forget.step(gpu, &[levels, asked, sheets], groups(SHEET_LEVELS[0])));
         steps
     }
 
@@ -307,7 +313,7 @@ impl AdaptPasses {
         let adapt = [frame, counters, density, levels, clusters, measured, sheets, depth_noise, surfels];
         steps.extend([
             self.ask[round as usize].step(gpu, &ask, groups()),
-            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), LEVEL as u64 * WORK_BYTES)),
+            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), SHEET_LEVELS[0] as u64 * WORK_BYTES)),
             self.adapt[round as usize].step(gpu, &adapt, groups()),
         ]);
         steps

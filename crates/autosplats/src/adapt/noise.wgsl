@@ -1,6 +1,7 @@
 // How far points scatter about the surface: see the CPU form. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: measured: the factor, the power of depth, and the median k-radius.
+// Reads: surfels, sampled, quantiles. Writes: measured: the factor, the power of depth, the median k-radius, and the
+// level of the cells that have sheets.
 
 #import frame
 #import surfel
@@ -15,6 +16,9 @@ override SCALES: u32;
 override SAMPLE: u32;
 override LEAST_SAMPLE: u32;
 override APART: f32;
+override THICK_NOISE: f32;
+override FINE_SHEETS: u32;
+override COARSE_SHEETS: u32;
 
 // The noise of a part of the sample, whose points are at about the same depth; 0 if it is too small to tell.
 fn scatter_level(part: u32) -> f32 {
@@ -70,5 +74,11 @@ fn noise() {
     measured[0] = found.x;
     measured[1] = found.y;
     let k_radius = bitcast<f32>(quantiles[K_RADII * SCALES].y);
-    measured[2] = select(0.0, k_radius, sampled[SAMPLE] >= LEAST_SAMPLE);
+    let len = sampled[SAMPLE];
+    measured[2] = select(0.0, k_radius, len >= LEAST_SAMPLE);
+    var usual = 0.0;
+    if len > 0u {
+        usual = found.x * select(pow(depth(len / 2u), found.y), 1.0, found.y == 0.0);
+    }
+    measured[3] = f32(select(FINE_SHEETS, COARSE_SHEETS, usual > THICK_NOISE * measured[2]));
 }

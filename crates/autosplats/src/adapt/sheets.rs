@@ -6,14 +6,15 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use super::cells::{Cell, Cells, SLABS};
+use super::cells::{Cell, Cells, Level, SLABS};
 use super::cpu::{AGREE, FARTHEST, SCATTER, choose, good_enough};
 use super::quadric::Gathered;
 use crate::camera::View;
 use crate::fit::Surfel;
 
-/// Level of the cells that have sheets. Their width is about two distances between points, that of the smallest balls three.
-pub(super) const LEVEL: usize = 1;
+/// Levels of the cells that may have sheets. Their width is about two distances between points, that of the smallest balls
+/// three; or twice as much.
+pub(super) const SHEET_LEVELS: [usize; 2] = [1, 2];
 /// A cluster within this many times the noise of a sheet needs none of its own,
 pub(super) const COVERED: f32 = 2.0;
 /// if it is no further from the centre of the sheet's ball than this part of the squared radius: at a grazing angle a cell
@@ -114,6 +115,8 @@ impl Default for Asked {
 /// The sheets of all cells of a level that surfels ask for.
 #[derive(Debug, Default)]
 pub(super) struct Sheets {
+    /// Of the cells.
+    pub(super) level: usize,
     stacks: Vec<Stack>,
     /// Of each stack; [`UNKNOWN`] before anyone has asked.
     len: Vec<u8>,
@@ -125,7 +128,7 @@ const UNKNOWN: u8 = u8::MAX;
 impl Sheets {
     /// Forgets those of the frame before.
     pub(super) fn clear(&mut self, cells: &Cells) {
-        let len = cells.levels.get(LEVEL).map_or(0, |level| level.cells.len());
+        let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.cells.len());
         self.stacks.resize(len, Stack::default());
         self.len.clear();
         self.len.resize(len, UNKNOWN);
@@ -136,7 +139,7 @@ impl Sheets {
     /// Asks for sheets where a surfel is.
     #[inline(always)]
     pub(super) fn ask(&self, surfel: &Surfel, cells: &Cells, view: &View) {
-        let Some(level) = cells.levels.get(LEVEL) else { return };
+        let Some(level) = cells.levels.get(self.level) else { return };
         let [column, row] = [surfel.pixel & 0xffff, surfel.pixel >> 16].map(|at| at as usize / level.side_px);
         let asked = &self.asked[row * level.columns + column];
         let k_radius_px = surfel.k_radius / view.pixel_size(surfel.center[2]);
@@ -147,13 +150,17 @@ impl Sheets {
 
     /// Fits those that were asked for and are not there yet; `noise` tells it at a place in view space, of a cloud's point.
     pub(super) fn fit(&mut self, cells: &Cells, noise: &(dyn Fn(Vec3, u32) -> f32 + Sync), view: &View) {
-        let Some(level) = cells.levels.get(LEVEL) else { return };
-        let Self { stacks, len, asked } = self;
-        let task = Task { cells, asked, noise, view };
+        let Some(level) = cells.levels.get(self.level) else { return };
+        let Self { stacks, len, asked, .. } = self;
+        let task = Task { cells, level, asked, noise, view };
         let rows = (stacks.par_chunks_mut(level.columns), len.par_chunks_mut(level.columns));
-        rows.into_par_iter().enumerate().for_each_init(Gathered::default, |gathered, (row, (stacks, len))| {
-            fit_row(row, stacks, len, &task, gathered);
-        });
+        // There is room for finer ones.
+        rows.into_par_iter().take(level.rows).enumerate().for_each_init(
+            Gathered::default,
+            |gathered, (row, (stacks, len))| {
+                fit_row(row, stacks, len, &task, gathered);
+            },
+        );
     }
 
     /// The surface beside `center`, from the sheets of the four cells around it that agree with the `first` normal, where
@@ -167,7 +174,7 @@ impl Sheets {
         cells: &Cells,
         view: &View,
     ) -> Option<Surface> {
-        let level = cells.levels.get(LEVEL)?;
+        let level = cells.levels.get(self.level)?;
         let per_side = 1.0 / level.side_px as f32;
         let [x, y] = view.to_pixel(center.into()).map(|at| at * per_side - 0.5);
         // Casts from float saturate at 0.
@@ -232,6 +239,7 @@ impl Sheets {
 #[derive(Clone, Copy)]
 struct Task<'a> {
     cells: &'a Cells,
+    level: &'a Level,
     asked: &'a [Asked],
     noise: &'a (dyn Fn(Vec3, u32) -> f32 + Sync),
     view: &'a View,
@@ -242,7 +250,7 @@ impl Task<'_> {
     /// of their points.
     #[inline(always)]
     fn asked_around(&self, row: usize, column: usize) -> Option<(f32, u32)> {
-        let level = &self.cells.levels[LEVEL];
+        let level = self.level;
         let (mut sum, mut point) = (0, u32::MAX);
         for y in row.saturating_sub(1)..=(row + 1).min(level.rows - 1) {
             for x in column.saturating_sub(1)..=(column + 1).min(level.columns - 1) {
@@ -266,7 +274,7 @@ fn fit_row_with<'a, S: Simd>(
     task: &'a Task<'a>,
     gathered: &'a mut Gathered,
 ) {
-    let level = &task.cells.levels[LEVEL];
+    let level = task.level;
     for (column, cell) in level.cells[row * level.columns..][..level.columns].iter().enumerate() {
         if len[column] == UNKNOWN
             && cell[0].count > 0.0

@@ -14,6 +14,11 @@ fn noise_at(depth: f32) -> f32 {
     return measured[0] * select(pow(depth, power), 1.0, power == 0.0);
 }
 
+// Level of the cells that have sheets.
+fn sheet_level() -> u32 {
+    return u32(measured[3]);
+}
+
 // Standard error of a normal, radians, that no larger ball need better.
 fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {
     let pixel = pixel_size(depth);

@@ -1,9 +1,7 @@
-// Quadrics that the surfels around share: see the CPU form. Imports: orthonormal.
+// Quadrics that the surfels around share: see the CPU form. A cell has up to SLABS of them. Imports: orthonormal.
 
 #import orthonormal
 
-// Level of the cells that have sheets; a cell has up to SLABS of them.
-override SHEET_LEVEL: u32;
 // In place of the radius: no sheet, as nobody has asked for any yet, or as none was found.
 const UNKNOWN = 0.0;
 const NONE = -1.0;

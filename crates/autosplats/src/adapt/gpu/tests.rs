@@ -41,10 +41,10 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
-    let [factor, power, k_radius] = read_back::<[f32; 3]>(gpu, &buffers.measured, 1).expect("noise")[0];
+    let [factor, power, k_radius, level] = read_back::<[f32; 4]>(gpu, &buffers.measured, 1).expect("noise")[0];
     Made {
         cells: read_cells(gpu, &buffers, screen.size),
-        usual: Usual { noise: Noise { factor, power }, k_radius },
+        usual: Usual { noise: Noise { factor, power }, k_radius, sheet_level: level as usize },
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }
@@ -108,7 +108,8 @@ fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
     let near = |a: f32, b: f32| (a - b).abs() <= 0.01 * b.abs() + 1e-6;
     let same = near(device.noise.factor, host.noise.factor)
         && near(device.noise.power, host.noise.power)
-        && device.k_radius == host.k_radius;
+        && device.k_radius == host.k_radius
+        && device.sheet_level == host.sheet_level;
     if same { Ok(()) } else { Err(format!("{device:?}, on the host {host:?}")) }
 }
 
@@ -250,11 +251,12 @@ fn comparison_sees_what_is_wrong() {
 
     let usual = case.usual();
     assert!(compare_usual(usual, usual).is_ok(), "nothing is wrong yet");
-    let with = |factor: f32, power: f32, k_radius: f32| Usual { noise: Noise { factor, power }, k_radius };
-    let Usual { noise: Noise { factor, power }, k_radius } = usual;
+    let Usual { noise: Noise { factor, power }, k_radius, sheet_level } = usual;
+    let with = |factor: f32, power: f32, k_radius: f32| Usual { noise: Noise { factor, power }, k_radius, sheet_level };
     assert!(compare_usual(with(1.02 * factor, power, k_radius), usual).is_err(), "more noise");
     assert!(compare_usual(with(factor, 0.1, k_radius), usual).is_err(), "that grows with depth");
     assert!(compare_usual(with(factor, power, 1.001 * k_radius), usual).is_err(), "points further apart");
+    assert!(compare_usual(Usual { sheet_level: 3 - sheet_level, ..usual }, usual).is_err(), "sheets of other cells");
 
     let adapted = case.adapted();
     assert!(compare_surfels(&adapted, &adapted).is_ok(), "nothing is wrong yet");
