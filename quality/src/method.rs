@@ -48,7 +48,7 @@ impl Method {
     }
 }
 
-/// The paper's settings, whatever the defaults are.
+/// The paper's settings, field by field: whatever the library's defaults become.
 pub fn paper() -> Reconstruction {
     Reconstruction {
         k: 10,

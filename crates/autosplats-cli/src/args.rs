@@ -165,8 +165,14 @@ pub(crate) struct SurfaceArgs {
     /// thousands, where points scatter about the surface, and shows points on no surface as dots or not at all
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
-    /// Points that a pixel keeps, 1 or 2: 2 show outlines, thin parts and dense scans more truly
-    #[arg(long, value_name = "COUNT", default_value_t = Reconstruction::default().points_per_pixel, allow_negative_numbers = true)]
+    /// Points that a pixel keeps, 1 or 2: 2 show outlines, thin parts and dense scans more truly. The engine
+    /// splat-communication and graphics devices with little room keep 1
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = Reconstruction::default().points_per_pixel,
+        allow_negative_numbers = true
+    )]
     pub(crate) points_per_pixel: u32,
     /// How the neighbours are found
     #[arg(long, value_enum, default_value = "screen-grid")]

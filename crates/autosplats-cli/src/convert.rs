@@ -44,16 +44,16 @@ fn thin(cloud: &mut PointCloud, thinning: &ThinningArgs, quiet: bool) -> Result<
     }
     if let Some(size) = thinning.voxel {
         let bar = Bar::new("thinning", quiet);
-        cloud.thin_by_voxel(size, &bar).map_err(thin_failure)?;
+        cloud.thin_by_voxel(size, &bar).map_err(edit_failure)?;
     }
     if let Some(sigma) = thinning.noise {
         let bar = Bar::new("shaking", quiet);
-        cloud.add_noise(sigma, thinning.seed, &bar).map_err(thin_failure)?;
+        cloud.add_noise(sigma, thinning.seed, &bar).map_err(edit_failure)?;
     }
     Ok(())
 }
 
-pub(crate) fn thin_failure(error: Error) -> Failure {
+pub(crate) fn edit_failure(error: Error) -> Failure {
     match error {
         Error::Cancelled => Failure::interrupted(),
         error => Failure::usage(error),

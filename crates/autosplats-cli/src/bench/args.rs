@@ -41,7 +41,12 @@ pub(crate) struct BenchArgs {
     #[arg(short, value_name = "COUNT|auto", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) k: Neighbors,
     /// Points that a pixel keeps, 1 or 2
-    #[arg(long, value_name = "COUNT", default_value_t = Reconstruction::default().points_per_pixel, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = Reconstruction::default().points_per_pixel,
+        allow_negative_numbers = true
+    )]
     pub(crate) points_per_pixel: u32,
     /// Shake the points by normally distributed noise with this standard deviation along each axis, in the scene's units
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]

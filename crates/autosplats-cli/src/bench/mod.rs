@@ -10,7 +10,7 @@ use autosplats_cloud::PointCloud;
 use serde::Serialize;
 
 use self::args::{BenchArgs, Evaluation};
-use crate::convert::thin_failure;
+use crate::convert::edit_failure;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
@@ -33,6 +33,10 @@ struct Bench<'a> {
     scene: &'a str,
     size: [u32; 2],
     k: Neighbors,
+    points_per_pixel: u32,
+    /// Standard deviation of what the points were shaken by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    noise: Option<f64>,
     engine: String,
     /// Frames measured; times are medians of them.
     frames: usize,
@@ -94,13 +98,15 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     let mut cloud = inputs.read(run.quiet)?;
     if let Some(sigma) = *noise {
         let bar = Bar::new("shaking", run.quiet);
-        cloud.add_noise(sigma, 0, &bar).map_err(thin_failure)?;
+        cloud.add_noise(sigma, 0, &bar).map_err(edit_failure)?;
     }
     let mut bench = Bench {
         version: env!("CARGO_PKG_VERSION"),
         scene,
         size: *size,
         k: *k,
+        points_per_pixel: *points_per_pixel,
+        noise: *noise,
         engine: engine.name(),
         frames: *frames,
         stream: *stream,
@@ -200,9 +206,11 @@ fn summed(passes: &[PassTime]) -> Vec<(&'static str, usize, f64)> {
 
 impl Bench<'_> {
     fn table(&self, cloud: &PointCloud) -> String {
-        let Self { scene, size: [width, height], k, engine, frames, runs, .. } = self;
+        let Self { scene, size: [width, height], k, points_per_pixel, noise, engine, frames, runs, .. } = self;
+        let noise = noise.map(|noise| format!("noise {noise}, ")).unwrap_or_default();
         let mut lines = vec![format!(
-            "{scene}: {} points, {width}x{height}, k {k}, {engine}; milliseconds, medians of {frames} frames",
+            "{scene}: {} points, {noise}{width}x{height}, k {k}, {points_per_pixel} a pixel, {engine}; milliseconds, medians \
+             of {frames} frames",
             cloud.len()
         )];
         for Run { device, counts, first_upload_ms, picture_ms, timings_ms, passes, unconverged } in runs {

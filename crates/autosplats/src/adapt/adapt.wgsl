@@ -69,11 +69,10 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
                 if !(over.near > 0.0 && rest > 0.0) {
                     continue;
                 }
-                let square = sheet.error * sheet.error;
                 let normal = sheet_normal(sheet, over);
                 let across = cross(normal, first.xyz);
                 // The smallest of a sheet's balls was held against nothing.
-                let agrees = dot(across, across) <= AGREE * AGREE * (square + first.w * first.w);
+                let agrees = dot(across, across) <= AGREE * AGREE * (sheet.error * sheet.error + first.w * first.w);
                 if first.w >= 0.0 && !(agrees && sheet.scatter <= SCATTER * noise) {
                     continue;
                 }

@@ -23,8 +23,9 @@ pub(super) const COVERED: f32 = 2.0;
 pub(super) const COVERED_REACH: f32 = 0.25;
 /// K-radii are summed up in these parts of a pixel, as integers, so that their order does not matter.
 pub(super) const PARTS: f32 = 64.0;
-/// Larger k-radii, in pixels, count as this.
-pub(super) const MOST_PX: f32 = 4096.0;
+/// Larger k-radii, in pixels, count as this: of the nine cells of 32 pixels that are summed up, with two points in each pixel,
+/// that is below 2³².
+pub(super) const MOST_PX: f32 = 2048.0;
 
 /// A quadric over the ball that it was fitted to.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,10 +93,7 @@ pub(super) struct Surface {
 }
 
 /// Sheets of a cell.
-#[derive(Clone, Copy, Debug, Default)]
-struct Stack {
-    sheets: [Sheet; SLABS],
-}
+type Stack = [Sheet; SLABS];
 
 /// Who asks for the sheets of a cell.
 #[derive(Debug)]
@@ -194,19 +192,18 @@ impl Sheets {
                 }
                 // Falls to 0 where the next cells come in.
                 let share = (1.0 - (x - column as f32).abs()) * (1.0 - (y - row as f32).abs());
-                for sheet in &self.stacks[cell].sheets[..len.into()] {
+                for sheet in &self.stacks[cell][..len.into()] {
                     let over = sheet.under(center);
                     let away = over.height * per_farthest;
                     let likely = 1.0 - away * away;
                     if !((over.near > 0.0) & (likely > 0.0)) {
                         continue;
                     }
-                    let square = sheet.error * sheet.error;
                     let normal = sheet.normal(&over);
                     if let Some((first, error)) = first {
                         let across = normal.cross(first).length_squared();
                         // The smallest of a sheet's balls was held against nothing.
-                        let agrees = across <= AGREE * AGREE * (square + error * error);
+                        let agrees = across <= AGREE * AGREE * (sheet.error * sheet.error + error * error);
                         if !(agrees & (sheet.scatter <= SCATTER * noise)) {
                             continue;
                         }
@@ -280,7 +277,7 @@ fn fit_row_with<'a, S: Simd>(
             && cell[0].count > 0.0
             && let Some(asked) = task.asked_around(row, column)
         {
-            len[column] = fit_cell(simd, &mut stacks[column].sheets, cell, asked, task, gathered);
+            len[column] = fit_cell(simd, &mut stacks[column], cell, asked, task, gathered);
         }
     }
 }
@@ -289,7 +286,7 @@ fn fit_row_with<'a, S: Simd>(
 #[inline(always)]
 fn fit_cell<S: Simd>(
     simd: S,
-    sheets: &mut [Sheet; SLABS],
+    sheets: &mut Stack,
     cell: &Cell,
     (k_radius_px, point): (f32, u32),
     task: &Task,

@@ -46,7 +46,7 @@ pub(crate) struct Surfel {
 }
 
 impl Surfel {
-    /// Beyond all indices of screen points, of which there are no more than pixels.
+    /// Beyond all indices of screen points, of which there are no more than two a pixel: 2²⁹.
     pub(crate) const BACK: u32 = 1 << 31;
 
     /// Whether the eye sees the side that the point's sensor did not see.

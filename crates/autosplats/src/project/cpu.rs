@@ -14,16 +14,15 @@ use crate::camera::View;
 const CHUNK: usize = 16 * 1024;
 /// Points transformed at a time.
 const LANES: usize = 16;
-/// Key of a pixel that no point projects to.
+/// Key of a slot that no point projects to.
 const EMPTY: u64 = u64::MAX;
 /// A strip is this many mean distances between screen points high: with one strip more above and below, sixteen points
 /// of a strip see their ten nearest neighbours among about a hundred candidates.
 pub(super) const STRIP_SPACINGS: f32 = 3.0;
 /// The second point of a pixel is no further behind the first than this many pixels are wide: a surface seen at 83° from its
 /// normal. What is further away is another surface, hidden most of the time.
+// Differs from the paper: it keeps the nearest point of each pixel.
 pub(super) const GATE_PX: f32 = 8.0;
-/// Least mean distance between screen points, in pixels: there may be two in each.
-pub(super) const LEAST_SPACING_PX: f32 = 0.5;
 /// Side in pixels of the blocks that tell covered from empty screen when the density is measured.
 const OCCUPANCY_PX: usize = 16;
 
@@ -109,7 +108,7 @@ impl<'a> Keys<'a> {
     fn mean_spacing(&self) -> f32 {
         let blocks = self.occupied.iter().filter(|&&points| points > 0).count();
         let points = self.occupied.iter().sum::<u32>();
-        ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt().max(LEAST_SPACING_PX)
+        ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt()
     }
 }
 
@@ -260,7 +259,7 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
         start.iter_mut().for_each(|cell| *cell += first);
         let mut next = 0;
         let rows = strip_rows(strip);
-        // A strip no higher than a square meets two of them at most.
+        // A row of each square that the strip meets: every sixteenth, and the last.
         let is_occupied = |&column: &usize| {
             rows.clone().step_by(OCCUPANCY_PX).chain([rows.end - 1]).any(|y| keys.is_occupied(column, y))
         };

@@ -1,7 +1,7 @@
 //! Projection on the GPU: the CPU form's steps, a pass each.
 
 use super::ScreenPoint;
-use super::cpu::{GATE_PX, LEAST_SPACING_PX, STRIP_SPACINGS};
+use super::cpu::{GATE_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
 use crate::Error;
 use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
@@ -138,9 +138,9 @@ pub(crate) struct ScreenBuffers {
 }
 
 impl ScreenBuffers {
-    /// Whether the device binds a `T` for each screen point that there can be if halves of pixels keep one each.
+    /// Whether the device binds the keys of two halves a pixel, and a `T` for each screen point that there can be then.
     pub(crate) fn has_room_for_halves<T>(gpu: &Gpu, size: [u32; 2], points: usize) -> bool {
-        gpu.binds::<T>(capacity(size, true, points))
+        gpu.binds::<[u32; 2]>(capacity(size, true, usize::MAX)) && gpu.binds::<T>(capacity(size, true, points))
     }
 
     /// Room for a picture of `size` of a cloud of `points` points with `values` values each.
@@ -280,11 +280,7 @@ impl ProjectPasses {
             clear: pass(&CLEAR)?,
             nearest: NearestPass::new(gpu, int64)?,
             occupancy: Pass::new(gpu, &OCCUPANCY, &[("GATE_PX", GATE_PX.into())])?,
-            grid: Pass::new(
-                gpu,
-                &GRID,
-                &[("STRIP_SPACINGS", STRIP_SPACINGS.into()), ("LEAST_SPACING_PX", LEAST_SPACING_PX.into())],
-            )?,
+            grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
             count: pass(&COUNT)?,
             scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,

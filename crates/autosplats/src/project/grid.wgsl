@@ -10,13 +10,11 @@
 
 // A strip is this many mean distances high: see the CPU form.
 override STRIP_SPACINGS: f32;
-// There may be two points in each pixel.
-override LEAST_SPACING_PX: f32;
 
 @compute @workgroup_size(1)
 fn grid() {
     let covered_px = f32(counters[BLOCKS] * 256u);
-    let spacing_px = max(sqrt(covered_px / f32(max(counters[VISIBLE], 1u))), LEAST_SPACING_PX);
+    let spacing_px = sqrt(covered_px / f32(max(counters[VISIBLE], 1u)));
     counters[STRIP_PX] = clamp(u32(round(STRIP_SPACINGS * spacing_px)), 1u, 256u);
     let cell_px = max(u32(round(spacing_px * sqrt(f32(frame.k)))), 2u);
     counters[CELL_PX] = cell_px;

@@ -4,9 +4,12 @@
 //! A pixel, or each half of one, keeps the smallest of (depth, point index), so ties go to the lower index. Halves lie side by
 //! side and one below the other in turn, and of two points far apart in depth only the nearer counts. The paper has one
 //! point a pixel and names as a weakness what that loses: at silhouettes, in thin parts and where points are denser than
-//! pixels, the neighbours that the fit would need. What survives, the *screen points*, is compacted into a list ordered by screen cell, for the search to read its surroundings in few contiguous runs: the
-//! screen is cut into strips a few pixels high, a cell is one pixel wide and a strip high, and cells follow each other
-//! along the strip. Any sixteen neighbours in that list lie close together on the screen, whatever the local density.
+//! pixels, the neighbours that the fit would need.
+//!
+//! What survives, the *screen points*, is compacted into a list ordered by screen cell, for the search to read its
+//! surroundings in few contiguous runs: the screen is cut into strips a few pixels high, a cell is one pixel wide and a
+//! strip high, and cells follow each other along the strip. Any sixteen neighbours in that list lie close together on the
+//! screen, whatever the local density.
 //!
 //! A coarser grid, about k screen points to a cell, counts points for the first search radius (§5.1) and holds the
 //! nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.

@@ -27,7 +27,8 @@ pub(super) struct CpuRenderer {
     /// Identity of the cloud that what follows is of.
     known: Option<u64>,
     sensors: Sensors,
-    depth_noise: DepthNoise,
+    /// Once a frame of these points was adapted.
+    depth_noise: Option<DepthNoise>,
     /// Passive points to be reconstructed after all.
     recovered: Vec<u32>,
     splatter: Splatter,
@@ -46,7 +47,7 @@ impl Default for CpuRenderer {
             adapter: Adapter::default(),
             known: None,
             sensors: Sensors::default(),
-            depth_noise: DepthNoise::default(),
+            depth_noise: None,
             recovered: Vec::new(),
             splatter: Splatter::default(),
             image: Image::default(),
@@ -113,7 +114,8 @@ impl CpuRenderer {
         let mut clock = Clock::start();
         if known.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);
-            *depth_noise = DepthNoise::new(cloud);
+            *depth_noise = None;
+            clock.lap(|timings| &mut timings.fit);
         }
 
         let rules = ProjectRules {
@@ -125,11 +127,14 @@ impl CpuRenderer {
         clock.lap(|timings| &mut timings.project);
 
         if settings_splat.adaptive && given.is_none() {
+            depth_noise.get_or_insert_with(|| DepthNoise::new(cloud));
             adapter.begin(screen, &view, settings_splat.k);
             clock.lap(|timings| &mut timings.adapt);
         }
         surfels.clear();
         splatter.begin(&view);
+        let nothing = DepthNoise::default();
+        let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
         let reconstruct = Reconstruct { screen, view: &view, settings, sensors, depth_noise, given };
         let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
         recovered.clear();

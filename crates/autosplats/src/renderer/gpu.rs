@@ -359,7 +359,7 @@ impl GpuRenderer {
 
     /// Makes buffers and steps for a frame unless the last frame's will do.
     fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<(), Error> {
-        // Nothing that each screen point has is larger than its surfel.
+        // A screen point has nothing larger than its surfel.
         let halves = settings.reconstruction.halves()
             && ScreenBuffers::has_room_for_halves::<Surfel>(&self.gpu, size, self.cloud.capacity());
         let shape = Shape {

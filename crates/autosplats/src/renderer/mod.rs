@@ -41,7 +41,7 @@ pub struct Counts {
     pub behind: usize,
     /// Points outside the picture.
     pub outside: usize,
-    /// Points that own a pixel, the nearest one there; the rest are hidden behind them.
+    /// Points that own a pixel or half of one, the nearest ones there; the rest are hidden behind them.
     pub visible: usize,
     /// Visible points reconstructed in the first pass.
     pub active: usize,

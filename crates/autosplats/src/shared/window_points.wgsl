@@ -26,12 +26,12 @@ fn window_run(window: Window, strip: u32) -> vec2u {
     return vec2u(cell_start[row + u32(window.low.x)], cell_start[row + u32(window.high.x) + 1u]);
 }
 
-// Number of screen points in the window, or of its pixels where these are few.
+// Number of screen points in the window, or how many it has room for where these are few.
 fn window_len(window: Window, strip_px: u32, few: u32) -> u32 {
     let sides = window.high - window.low + 1.0;
-    let area = u32(sides.x * sides.y);
-    if area <= few {
-        return area;
+    let room = u32(sides.x * sides.y) << frame.halves;
+    if room <= few {
+        return room;
     }
     let strips = window_strips(window, strip_px);
     rounds += strips.y - strips.x + 1u;

@@ -20,6 +20,7 @@ use std::ops::Range;
 
 use autosplats_cloud::{PointCloud, Scan};
 use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::camera::View;
 use crate::fit::orient::runs;
@@ -93,7 +94,8 @@ impl DepthNoise {
             let found = scan.and_then(|scan| of_scan(cloud, scan, first as usize..end, known));
             DepthRun { first, ..found.unwrap_or_else(bytemuck::Zeroable::zeroed) }
         };
-        let found: Vec<DepthRun> = runs.iter().zip(ends).map(of_run).collect();
+        let mut found: Vec<DepthRun> = runs.iter().zip(ends).collect::<Vec<_>>().into_par_iter().map(of_run).collect();
+        found.dedup_by(|run, before| run.factor == 0.0 && before.factor == 0.0);
         let is_known = found.iter().any(|run| run.factor > 0.0);
         Self { runs: if is_known { found } else { Vec::new() } }
     }

@@ -19,6 +19,8 @@ pub(crate) fn frame_buffer(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu:
     let told = FrameUniform {
         outlier_growth: rules.outlier_radius(1.0),
         gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
+        // Of a screen with a point a pixel there is more room than points, which is no wrong bound.
+        halves: 1,
         ..FrameUniform::new(view, rules.k)
     };
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -215,6 +217,29 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
             let squared = |q: usize| (0..3).map(|axis| (at(q)[axis] - at(query as usize)[axis]).powi(2)).sum::<f32>();
             let within = (0..screen.points.len()).filter(|&q| squared(q).sqrt() <= found.k_radius).count() - 1;
             assert_eq!(found.count as usize, within, "k = {k}, point {query}: all neighbours up to the last");
+        }
+    }
+}
+
+/// Small pictures may have more screen points than the bound on work, and more than pixels: searches in them end, and where
+/// they end on the host.
+#[test]
+fn crowded_small_pictures_are_bounded_alike() {
+    let Some(gpu) = test_gpu() else { return };
+    for (size, count) in [([64, 64], 60_000), ([128, 128], 200_000)] {
+        let mut positions = test_clouds::plane(count);
+        // Strays before it, whose neighbours are all far away.
+        let to_eye = EYE.as_vec3() * 0.3;
+        positions.extend((0..20).map(|i| (to_eye + 0.02 * autosplats_cloud::glam::Vec3::splat(i as f32)).to_array()));
+        for k in [10, 64] {
+            let (screen, view) = screen(&positions, &cameras()[1], size, k);
+            assert!(screen.points.len() > 4096, "{size:?}: {} screen points", screen.points.len());
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
+            let counted = on_host(&screen, &view, &rules).1;
+            for (form, passes) in forms(&gpu, k) {
+                let found = on_device(&gpu, &passes, &screen, &view, &rules).1;
+                assert_eq!(found, counted, "{size:?}, k = {k}, {form}: clamped and bounded");
+            }
         }
     }
 }
