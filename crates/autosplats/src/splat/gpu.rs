@@ -11,7 +11,7 @@
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
-use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, STRIDES_PER_REACH};
+use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LONGEST_ALIGNED, STRIDES_PER_REACH};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
@@ -169,6 +169,7 @@ impl SplatPasses {
             ("FURTHEST", FURTHEST.into()),
             ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
             ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
+            ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
         ];
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;

@@ -20,6 +20,8 @@ pub(super) const INNER_WEIGHT: f32 = 1.3;
 pub(super) const FURTHEST: f32 = 5.0;
 /// Strides that a line takes in the reach of a splat wider than so many pixels.
 pub(super) const STRIDES_PER_REACH: f32 = 6.0;
+/// Longest stride, in pixels, that stops where those of neighbours do.
+pub(super) const LONGEST_ALIGNED: isize = 3;
 /// Added to how far lines go: what is a pixel wide has cores here and there along it.
 pub(super) const LEAST_REACH_PX: usize = 2;
 /// Directions of the eight lines.
@@ -52,10 +54,15 @@ pub(super) fn sticks_out(rims: &[Rim], x: usize, y: usize, view: &View) -> bool 
     let stride = (own / STRIDES_PER_REACH).max(1.0) as isize;
     let strides = (FURTHEST * own) as usize / stride as usize + LEAST_REACH_PX;
     let meets_core = |[dx, dy]: [isize; 2]| {
-        // Lines of neighbours stop at the same places: if one saw what the next strides over, borders would be dotted.
+        // Lines of neighbours stop at the same places: if one saw what the next strides over, borders would be dotted. Not
+        // with long strides, which would make rays of what all of them miss.
         let (along, place) = if dx.abs() == 1 { (dx, x as isize) } else { (dy, y as isize) };
         let beyond = place % stride;
-        let first = if along > 0 || beyond == 0 { stride - beyond } else { beyond };
+        let first = match (stride > LONGEST_ALIGNED, along > 0 || beyond == 0) {
+            (true, _) => stride,
+            (false, true) => stride - beyond,
+            (false, false) => beyond,
+        };
         for at in 0..strides as isize {
             let distance = first + at * stride;
             let (x, y) = match (x.checked_add_signed(dx * distance), y.checked_add_signed(dy * distance)) {

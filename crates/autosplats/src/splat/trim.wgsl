@@ -16,6 +16,8 @@
 override FURTHEST: f32;
 override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
+// Longest stride that stops where those of neighbours do.
+override LONGEST_ALIGNED: i32;
 
 // Side of the square of pixels of a workgroup.
 const SQUARE = 32u;
@@ -100,11 +102,12 @@ fn sticks_out(pixel: vec2i, own: f32) -> bool {
 }
 
 fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> bool {
-    // Lines of neighbours stop at the same places.
+    // Lines of neighbours stop at the same places if strides are short.
     let by_x = abs(direction.x) == 1;
     let beyond = select(origin.y, origin.x, by_x) % stride;
     let is_up = select(direction.y, direction.x, by_x) > 0;
-    let first = select(beyond, stride - beyond, is_up || beyond == 0);
+    let aligned = select(beyond, stride - beyond, is_up || beyond == 0);
+    let first = select(aligned, stride, stride > LONGEST_ALIGNED);
     for (var at = 0; at < strides; at++) {
         let pixel = origin + direction * (first + at * stride);
         if any(pixel < vec2i(0)) || any(pixel >= vec2i(frame.size)) {
