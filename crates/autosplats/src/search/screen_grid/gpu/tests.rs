@@ -230,7 +230,7 @@ fn crowded_small_pictures_are_bounded_alike() {
         let mut positions = test_clouds::plane(count);
         // Strays before it, whose neighbours are all far away.
         let to_eye = EYE.as_vec3() * 0.3;
-        positions.extend((0..20).map(|i| (to_eye + 0.02 * autosplats_cloud::glam::Vec3::splat(i as f32)).to_array()));
+        positions.extend((0..20).map(|i| (to_eye + 0.02 * glam::Vec3::splat(i as f32)).to_array()));
         for k in [10, 64] {
             let (screen, view) = screen(&positions, &cameras()[1], size, k);
             assert!(screen.points.len() > 4096, "{size:?}: {} screen points", screen.points.len());
