@@ -154,14 +154,19 @@ fn depth_cameras_and_what_comes_after() {
 #[test]
 fn every_test_cloud_with_both_projections() {
     let Some(mut gpu) = gpu() else { return };
-    let settings = Settings { all_layers: true, ..Settings::default() };
+    // Layers of what is not adapted: where a cloud is not a surface, as clumps, rounding decides between two fits that all
+    // splats around share, and what shows in layers, though not in the picture, is the other one.
+    let fixed = Reconstruction { adaptive: false, ..Reconstruction::default() };
+    let layers = Settings { reconstruction: fixed, all_layers: true, ..Settings::default() };
     for (name, mut positions) in test_clouds::all(4000) {
         positions.extend([[f32::NAN, 0.0, 0.0], [f32::INFINITY, 1.0, 0.0], [3e38, 3e38, -3e38]]);
         let cloud = PointCloud::new(DVec3::ZERO, positions);
         for projection in [Projection::PerspectiveFovDeg(36.0), Projection::OrthographicHeight(2.4)] {
             let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
             for size in [[1, 1], [7, 300], [150, 110]] {
-                compare(&mut gpu, &cloud, &camera, size, &settings, &format!("{name} {projection:?} {size:?}"));
+                let case = format!("{name} {projection:?} {size:?}");
+                compare(&mut gpu, &cloud, &camera, size, &layers, &case);
+                compare(&mut gpu, &cloud, &camera, size, &Settings::default(), &case);
             }
         }
     }
