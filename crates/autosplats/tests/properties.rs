@@ -210,15 +210,14 @@ fn k_radius_does_not_decrease_with_k() {
         for (name, positions) in test_clouds::all(3000) {
             let mut before: Vec<f32> = Vec::new();
             for k in [1, 2, 5, 10, 11, 30, 64] {
-                // Dots, so that each pixel with a point shows this point's own k-radius.
+                // Dots, so that each pixel with a point shows this point's own k-radius; and none that noise would move.
                 let reconstruction = Reconstruction {
                     k,
-                    points_per_pixel: 1,
                     outlier_expansions: None,
                     gap_factor: None,
                     splat_scale: 0.01,
                     grid_culling: false,
-                    ..Reconstruction::default()
+                    ..Reconstruction::paper()
                 };
                 let layers =
                     render(&cloud(&positions), &camera, SIZE, &Settings { reconstruction, ..settings() }).layers;
