@@ -213,3 +213,27 @@ pub(crate) fn room(width: usize, mut measured: impl FnMut(f32) -> f32) -> Positi
 pub(crate) fn stepped(depth: f32, step: f32) -> f32 {
     1.0 / (step * (1.0 / (step * depth)).round())
 }
+
+/// Beams of the lidar of [`swept`], below the horizon.
+pub(crate) const BEAMS: usize = 24;
+
+/// What a spinning lidar one unit above the ground y = 1 leaves: rings ten to thirty times as far apart as their points, up to a
+/// wall z = 4. `measured` turns distances into those that it tells.
+pub(crate) fn swept(mut measured: impl FnMut(f32) -> f32) -> Positions {
+    const TURN: usize = 3000;
+    let one = |ray: usize| {
+        let [beam, step] = [ray / TURN, ray % TURN];
+        let (sin, cos) = (beam_radians(beam)).sin_cos();
+        let azimuth = std::f32::consts::TAU * step as f32 / TURN as f32;
+        let way = [cos * azimuth.sin(), sin, cos * azimuth.cos()];
+        let distance = (1.0 / way[1]).min(if way[2] > 0.0 { 4.0 / way[2] } else { f32::INFINITY });
+        let distance = measured(distance);
+        way.map(|along| along * distance)
+    };
+    (0..BEAMS * TURN).map(one).collect()
+}
+
+/// How far below the horizon a beam of [`swept`] looks.
+pub(crate) fn beam_radians(beam: usize) -> f32 {
+    0.1 + 0.025 * beam as f32
+}

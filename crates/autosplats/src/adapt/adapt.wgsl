@@ -1,4 +1,5 @@
-// Turns and moves each surfel that the noise tilts onto the sheets beside it: an invocation per surfel. See the CPU form.
+// Turns and moves each surfel that the noise tilts onto the sheets beside it, and those of rows onto areas: an invocation per
+// surfel. See the CPU form.
 //
 // Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
 
@@ -9,6 +10,7 @@
 #import calls
 #import choose
 #import depth_noise
+#import rows
 #import sheet
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
@@ -184,6 +186,12 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let surfel = surfels[first_of_round + index];
     let known = known_beyond(noise_at(surfel.center.z), surfel.center, surfel.source);
     let noise = max(known.noise, noise_at(surfel.center.z));
+    if is_row(surfel, known.noise) {
+        let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
+        surfels[first_of_round + index] = turned(surfel, radius, noise);
+        return;
+    }
+    surfels[first_of_round + index].major_ratio = min(surfel.major_ratio, frame.longest);
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     var surface = Surface();
     if calls(surfel, noise, enough) {

@@ -34,8 +34,9 @@ fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
     }
     let surfel = surfels[select(0u, counters[ACTIVE], ROUND == 1u) + index];
     let measured_noise = noise_at(surfel.center.z);
-    let noise = max(measured_noise, known_at(surfel.center, surfel.source).noise);
-    if calls(surfel, noise, good_enough(noise, surfel.k_radius, surfel.center.z)) {
+    let known = known_beyond(measured_noise, surfel.center, surfel.source);
+    let noise = max(measured_noise, known.noise);
+    if !is_row(surfel, known.noise) && calls(surfel, noise, good_enough(noise, surfel.k_radius, surfel.center.z)) {
         let at = pixel_xy(surfel.pixel);
         let cell = divide(at.y, level.side_px).x * level.columns + divide(at.x, level.side_px).x;
         let k_radius_px = surfel.k_radius / pixel_size(surfel.center.z);

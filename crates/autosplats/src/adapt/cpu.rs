@@ -8,6 +8,7 @@ use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
+use super::rows::{is_row, turn};
 use super::sheets::{Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
@@ -54,17 +55,27 @@ pub(super) const STRAY_DROPPED: f32 = 5.0;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
+/// What the stage may be asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AdaptRules {
+    /// Neighbours that the fit had.
+    pub(crate) k: u32,
+    /// Longest ellipse of those that stay as they were, semi-major over semi-minor axis.
+    pub(crate) longest: f32,
+    /// Keep what is no surface at all.
+    pub(crate) keep_outliers: bool,
+}
+
 /// What all surfels share.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     cells: &'a Cells,
     density: &'a DensityGrid,
     view: &'a View,
-    k: u32,
+    rules: &'a AdaptRules,
     usual: Usual,
     /// In view space.
     known: &'a DepthNoise,
-    keep_outliers: bool,
 }
 
 /// Fits surfels anew where noise calls for it; keeps its buffers from frame to frame.
@@ -84,23 +95,23 @@ impl Adapter {
         self.usual = None;
     }
 
-    /// Fits each of `surfels` anew at the scale that the frame's noise calls for.
+    /// Fits each of `surfels` anew at the scale that the frame's noise calls for, and what are rows. The fit has left their
+    /// ellipses as long as they are.
     pub(crate) fn adapt(
         &mut self,
         surfels: &mut [Surfel],
         density: &DensityGrid,
         view: &View,
-        k: u32,
+        rules: &AdaptRules,
         known: &DepthNoise,
-        keep_outliers: bool,
     ) {
         let Self { cells, sheets, usual } = self;
-        let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, k));
+        let usual = *usual.get_or_insert_with(|| measure(surfels, cells, density, view, rules.k));
         sheets.level = usual.sheet_level;
         let known = &known.seen_by(view);
-        let task = Task { cells, density, view, k, usual, known, keep_outliers };
+        let task = Task { cells, density, view, rules, usual, known };
         surfels.par_chunks(TASK).for_each(|surfels| {
-            surfels.iter().filter(|surfel| task.call(surfel).is_some()).for_each(|surfel| {
+            surfels.iter().filter(|surfel| matches!(task.call(surfel), Call::Noise(_))).for_each(|surfel| {
                 sheets.ask(surfel, cells, view);
             });
         });
@@ -121,7 +132,15 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
 
 /// What calls for more than the first neighbours of a surfel.
 #[derive(Clone, Copy)]
-struct Call {
+enum Call {
+    Nothing,
+    Noise(Noisy),
+    /// They are a row of points with this noise, world units.
+    Row(f32),
+}
+
+#[derive(Clone, Copy)]
+struct Noisy {
     /// Standard deviation of points from their surface, world units.
     noise: f32,
     /// Standard error of a normal that is good enough, radians.
@@ -140,11 +159,20 @@ impl Task<'_> {
     }
 
     #[inline(always)]
-    fn call(&self, surfel: &Surfel) -> Option<Call> {
+    fn call(&self, surfel: &Surfel) -> Call {
         // The first neighbourhood's error is about that of its k points over the k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.source);
         let enough = good_enough(noise, surfel.k_radius, surfel.center[2], self.view);
-        (surfel.radius > 0.0 && noise > enough * surfel.k_radius).then_some(Call { noise, enough, known })
+        if surfel.radius == 0.0 {
+            Call::Nothing
+        } else if is_row(surfel) && known.is_none() {
+            // Steps of a depth camera's depths are rows too, but the surface is not in them.
+            Call::Row(noise)
+        } else if noise > enough * surfel.k_radius {
+            Call::Noise(Noisy { noise, enough, known })
+        } else {
+            Call::Nothing
+        }
     }
 }
 
@@ -157,9 +185,16 @@ fn adapt_all_with<'a, S: Simd>(
     sheets: &'a Sheets,
     gathered: &'a mut Gathered,
 ) {
-    let Task { cells, density, view, k, .. } = *task;
+    let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
-        let Some(Call { noise, enough, known }) = task.call(surfel) else {
+        let call = task.call(surfel);
+        if let Call::Row(noise) = call {
+            let radius = first_radius(surfel, density, view, k);
+            turn(simd, surfel, (radius, noise, k), (cells, view), gathered);
+            continue;
+        }
+        surfel.major_ratio = surfel.major_ratio.min(longest);
+        let Call::Noise(Noisy { noise, enough, known }) = call else {
             shrink(surfel, task);
             continue;
         };
@@ -231,7 +266,10 @@ pub(super) fn choose<S: Simd>(
                 continue;
             }
         }
-        let (along, curvature) = axis.unwrap_or_else(|| gathered.plane(simd));
+        let (along, curvature) = axis.unwrap_or_else(|| {
+            let plane = gathered.plane(simd);
+            (plane.axis, plane.curvature())
+        });
         let quadric = gathered.quadric(simd, radius, along, curvature);
         let error = quadric.error * noise;
         if !(thin & (error < RELIABLE)) {
@@ -263,7 +301,7 @@ pub(super) fn choose<S: Simd>(
 #[inline(always)]
 fn widest(surfel: &Surfel, task: &Task) -> f32 {
     let point = ScreenPoint { position_view: surfel.center, pixel: surfel.pixel };
-    WIDEST * task.density.initial_radius(&point, task.k, task.view)
+    WIDEST * task.density.initial_radius(&point, task.rules.k, task.view)
 }
 
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
@@ -275,7 +313,7 @@ fn shrink(surfel: &mut Surfel, task: &Task) {
     }
     let ratio = surfel.k_radius / task.usual.k_radius;
     let stray = surfel.curvature * ratio * ratio;
-    if stray > STRAY_DROPPED && !task.keep_outliers {
+    if stray > STRAY_DROPPED && !task.rules.keep_outliers {
         surfel.radius = 0.0;
     } else if stray > STRAY_DOT {
         surfel.radius = surfel.radius.min(DOT_PX * task.view.pixel_size(surfel.center[2]));

@@ -7,11 +7,12 @@ use super::cpu::{
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
-use super::quadric::{CELLS_PER_RADIUS, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
+use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
+use super::rows::{APART_FROM, AREA, AREA_BESIDE, BESIDE, FARTHEST_REACH, FLAT, HALVES, LEAVES, REACH, ROW, THIN_ROW};
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::Error;
-use crate::fit::SWEEPS;
+use crate::fit::{LONGEST, SWEEPS};
 use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers};
 
@@ -181,6 +182,7 @@ impl AdaptPasses {
             ("TINY_SLOPE", TINY_SLOPE.into()),
             ("TINY_REACH_PX", TINY_REACH_PX.into()),
             ("MOST_TINY", MOST_TINY.into()),
+            ("ROW", ROW.into()),
         ];
         let choose = [
             step,
@@ -190,6 +192,20 @@ impl AdaptPasses {
             ("SCATTER", SCATTER.into()),
             ("AGREE", AGREE.into()),
             ("FARTHEST", FARTHEST.into()),
+        ];
+        let rows = [
+            ("AREA", AREA.into()),
+            ("AREA_BESIDE", AREA_BESIDE.into()),
+            ("BESIDE", BESIDE.into()),
+            ("HALVES", HALVES.into()),
+            ("FLAT", FLAT.into()),
+            ("LEAVES", LEAVES.into()),
+            ("APART_FROM", APART_FROM.into()),
+            ("EVEN_WEIGHT", EVEN_WEIGHT.into()),
+            ("REACH", REACH.into()),
+            ("FARTHEST_REACH", FARTHEST_REACH.into()),
+            ("THIN_ROW", THIN_ROW.into()),
+            ("LONGEST", LONGEST.into()),
         ];
         let parts = ("PARTS", PARTS.into());
         let ask = |round: Round| {
@@ -211,7 +227,7 @@ impl AdaptPasses {
                 ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
                 ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
             ];
-            Pass::new(gpu, &ADAPT, &[&quadric[..], &calls, &choose, &own].concat())
+            Pass::new(gpu, &ADAPT, &[&quadric[..], &calls, &choose, &rows, &own].concat())
         };
         let which = |level: usize| {
             let told = gpu.uniform::<u32>("level")?;

@@ -20,6 +20,9 @@
 //! itself and the smaller its error, the more it counts, and what is another surface does not. It turns to the blended
 //! normal, and its centre moves onto the surface. A surfel without a sheet tries its own balls.
 //!
+//! Points of a spinning lidar are dense along its rings and sparse across: their first neighbours are a *row* (`rows`), no
+//! surface. Balls around such a surfel grow until they hold more than the row.
+//!
 //! Depth cameras have noise that no ball of these sizes shows, because neighbours err alike. It is known from the scan as a whole
 //! (`depth`) and taken where it is the larger; surfels move along the sensor's ray then.
 
@@ -29,13 +32,14 @@ mod depth;
 pub(crate) mod gpu;
 mod noise;
 mod quadric;
+mod rows;
 mod sheets;
 #[cfg(test)]
 mod tests;
 
 #[cfg(test)]
 pub(crate) use cells::SLABS;
-pub(crate) use cpu::Adapter;
+pub(crate) use cpu::{AdaptRules, Adapter};
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]
 pub(crate) use depth::DepthRun;

@@ -148,8 +148,8 @@ fn measure_scatter_with<'a, S: Simd>(
     for Sampled { surfel, radius, scatter, .. } in sample {
         *radius *= STEP;
         if gathered.read(task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
-            let (axis, curvature) = gathered.plane(simd);
-            let distance = gathered.quadric(simd, *radius, axis, curvature).scatter;
+            let plane = gathered.plane(simd);
+            let distance = gathered.quadric(simd, *radius, plane.axis, plane.curvature()).scatter;
             scatter[scale] = Some(Scatter { distance, thin: distance < THIN * *radius });
         }
     }

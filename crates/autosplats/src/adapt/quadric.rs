@@ -20,11 +20,37 @@ pub(super) const RIDGE: f32 = 0.003;
 /// Least pivot of the elimination, as a share of the weight.
 pub(super) const LEAST_PIVOT: f32 = 1e-6;
 
+/// Weight of a ball evenly filled with a point in each square of its radius.
+pub(super) const EVEN_WEIGHT: f32 = 0.5 * std::f32::consts::PI * (1.0 + FULL);
+
 /// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights.
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
     lanes: Vec<[Lanes; 4]>,
     len: usize,
+}
+
+/// The plane through a ball's clusters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    /// Unit axis of least spread; of either sign.
+    pub(super) axis: Vec3,
+    /// Along it, between, and where the spread is largest; squared radii.
+    pub(super) variances: [f32; 3],
+    /// How far the plane is from the ball's centre along the axis, radii.
+    pub(super) height: f32,
+    /// Sum of the clusters' weights.
+    pub(super) weight: f32,
+}
+
+impl Plane {
+    /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
+    #[inline(always)]
+    pub(super) fn curvature(&self) -> f32 {
+        let [least, middle, largest] = self.variances;
+        let sum = least + middle + largest;
+        if sum > 0.0 { least / sum } else { 0.0 }
+    }
 }
 
 /// The quadric fitted to a ball.
@@ -115,9 +141,22 @@ impl Gathered {
         sums.0.iter().sum()
     }
 
-    /// Axis of least spread of the clusters, and their surface variation.
+    /// Forgets the clusters less than `from` radii from the centre towards `side`; returns the number of those left.
+    pub(super) fn keep_beside(&mut self, side: Vec3, from: f32) -> usize {
+        for at in 0..self.len {
+            let [x, y, z, w] = &mut self.lanes[at / LANES];
+            let lane = at % LANES;
+            if side.dot(Vec3::new(x.0[lane], y.0[lane], z.0[lane])) < from {
+                w.0[lane] = 0.0;
+                self.len -= 1;
+            }
+        }
+        self.len
+    }
+
+    /// The plane through the clusters.
     #[inline(always)]
-    pub(super) fn plane<S: Simd>(&self, simd: S) -> (Vec3, f32) {
+    pub(super) fn plane<S: Simd>(&self, simd: S) -> Plane {
         let mut total = [0.0; 10];
         for vector in 0..LANES / S::F32_LANES {
             let mut sums = [F32s::splat(simd, 0.0); 10];
@@ -137,9 +176,13 @@ impl Gathered {
         let second = [xx * share - x * x, xy * share - x * y, xz * share - x * z, yy * share - y * y];
         let (values, axes) =
             eigenvectors([second[0], second[1], second[2], second[3], yz * share - y * z, zz * share - z * z]);
-        let least = values[0].max(0.0);
-        let sum = least + values[1] + values[2];
-        (Vec3::from(axes[0]), if sum > 0.0 { least / sum } else { 0.0 })
+        let axis = Vec3::from(axes[0]);
+        Plane {
+            axis,
+            variances: [values[0].max(0.0), values[1], values[2]],
+            height: axis.dot(Vec3::new(x, y, z)),
+            weight: w,
+        }
     }
 
     /// Fits heights along `axis`.

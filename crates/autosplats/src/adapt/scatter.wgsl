@@ -38,7 +38,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     let plane = plane_of(ball);
     var found = TOO_FEW;
     if plane.len >= LEAST_CLUSTERS {
-        let distance = quadric_of(ball, plane.axis, plane.curvature).scatter;
+        let distance = quadric_of(ball, plane.axis, curvature_of(plane)).scatter;
         found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN * radius);
     }
     scatters[index] = found;

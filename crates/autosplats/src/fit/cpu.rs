@@ -19,7 +19,7 @@ pub(super) const LINE: f32 = 1e-5;
 pub(super) const LEAST_ACROSS: f32 = 1e-3;
 /// Longest ellipse, semi-major over semi-minor axis.
 // Differs from the paper: it sets no limit, and a nearly straight neighbourhood would draw a needle across the picture.
-pub(super) const LONGEST: f32 = 4.0;
+pub(crate) const LONGEST: f32 = 4.0;
 /// Radius in pixels of a point drawn although it has no neighbour.
 pub(super) const LONE_RADIUS_PX: f32 = 1.0;
 
@@ -38,12 +38,17 @@ pub(super) const LOPSIDED: f32 = 0.75;
 /// Fewer neighbours than this are too often on one side by chance.
 pub(super) const LOPSIDED_COUNT: f32 = 6.0;
 
+/// Fewer neighbours than this are a line by chance, and never count as a row of points.
+pub(super) const ROW_COUNT: f32 = 8.0;
+
 /// What the fit may be asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FitRules {
     pub(crate) k: u32,
     pub(crate) splat_scale: f32,
-    pub(crate) ellipses: bool,
+    /// Longest ellipse, semi-major over semi-minor axis; 1 for circles, `f32::MAX` for what is to be adapted, which goes by
+    /// the shape.
+    pub(crate) longest: f32,
     /// Keep outliers: points without neighbours as dots, and those apart from all their neighbours.
     pub(crate) keep_outliers: bool,
 }
@@ -103,7 +108,7 @@ pub(crate) struct Plane {
     pub(crate) normal: [f32; 3],
     /// Unit direction in which the neighbourhood is longest, in the plane.
     pub(crate) major_axis: [f32; 3],
-    /// Eigenvalue along the major axis over the one across it, at least 1.
+    /// Eigenvalue along the major axis over the one across it, at least 1; `f32::MAX` of a line.
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
@@ -140,15 +145,21 @@ impl Fitted {
         let plane = middle > LINE * largest;
         if !plane {
             normal = facing(toward, major_axis, largest > 0.0);
-            // Any tangent does for a circle.
-            major_axis = Vec3::from(normal).any_orthonormal_vector().to_array();
+            if !(largest > 0.0) {
+                // Any tangent does for a circle.
+                major_axis = Vec3::from(normal).any_orthonormal_vector().to_array();
+            }
         }
         let away = normal[0] * toward[0] + normal[1] * toward[1] + normal[2] * toward[2] < 0.0;
         let sum = least.max(0.0) + middle + largest;
         Plane {
             normal: if away { normal.map(|c| -c) } else { normal },
             major_axis,
-            major_ratio: if plane { largest / middle } else { 1.0 },
+            major_ratio: match (plane, largest > 0.0) {
+                (true, _) => largest / middle,
+                (false, true) => f32::MAX,
+                (false, false) => 1.0,
+            },
             curvature: if sum > 0.0 { least.max(0.0) / sum } else { 0.0 },
         }
     }
@@ -168,6 +179,10 @@ impl Fitted {
         let offset = of_lane(&block.offset, lane).map(|sum| sum / count);
         let apart = offset.iter().map(|c| c * c).sum::<f32>() > (LOPSIDED * k_radius) * (LOPSIDED * k_radius);
         let outlier = apart & (count >= LOPSIDED_COUNT) & !rules.keep_outliers;
+        let longest = if count < ROW_COUNT { rules.longest.min(LONGEST) } else { rules.longest };
+        // What is a line has no width to draw.
+        let is_drawn = (plane.major_ratio < f32::MAX) | (longest == f32::MAX);
+        let major_ratio = if is_drawn { plane.major_ratio.min(longest) } else { 1.0 };
         let lone = if rules.keep_outliers { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
             center,
@@ -181,7 +196,7 @@ impl Fitted {
             normal: plane.normal,
             k_radius,
             major_axis: plane.major_axis,
-            major_ratio: if rules.ellipses { plane.major_ratio.min(LONGEST) } else { 1.0 },
+            major_ratio,
             curvature: plane.curvature,
             ..Surfel::default()
         }

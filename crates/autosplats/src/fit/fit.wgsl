@@ -24,6 +24,7 @@ override ROUND: u32;
 override LINE: f32;
 override LEAST_ACROSS: f32;
 override LONGEST: f32;
+override ROW_COUNT: f32;
 override LONE_RADIUS_PX: f32;
 override WIDEST_BEHIND: f32;
 override LOPSIDED: f32;
@@ -93,8 +94,8 @@ fn plane(sums: Neighborhood, to_eye: vec3f) -> Plane {
     if !(middle > LINE * largest) {
         normal = facing(to_eye, major_axis, largest > 0.0);
         // Any tangent does for a circle.
-        major_axis = any_orthonormal(normal);
-        major_ratio = 1.0;
+        major_axis = select(any_orthonormal(normal), major_axis, largest > 0.0);
+        major_ratio = select(1.0, MOST, largest > 0.0);
     }
     let least = max(found.values.x, 0.0);
     let sum = least + middle + largest;
@@ -128,7 +129,12 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
         let widest = WIDEST_BEHIND * first_radius(cell.x, task.cell_px, center.z);
         radius = min(radius, splat_radius(widest, f32(frame.k)));
     }
-    let major_ratio = select(1.0, min(face.major_ratio, LONGEST), frame.ellipses == 1u);
+    // What adapts it goes by its shape.
+    let told = select(frame.longest, MOST, frame.adaptive == 1u);
+    let longest = select(told, min(told, LONGEST), sums.count < ROW_COUNT);
+    // What is a line has no width to draw.
+    let is_drawn = face.major_ratio < MOST || longest == MOST;
+    let major_ratio = select(1.0, min(face.major_ratio, longest), is_drawn);
     return Surfel(
         center,
         radius,

@@ -15,7 +15,7 @@ pub(crate) mod orient;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub(crate) use cpu::{FitRules, Fitted, fit};
+pub(crate) use cpu::{FitRules, Fitted, LONGEST, fit};
 pub(crate) use eigen::{SWEEPS, eigenvectors};
 pub(crate) use given::{GivenPlanes, place};
 

@@ -9,7 +9,7 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 use crate::search::{LANES, NeighborhoodBlock, Neighborhoods};
 use crate::test_clouds::Random;
 
-const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, ellipses: true, keep_outliers: false };
+const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, keep_outliers: false };
 
 /// A point with its neighbours, view space.
 #[derive(Clone, Debug)]
@@ -122,7 +122,7 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
     // Rounding of the eigenvalue, in units of the trace.
     let curvature_tolerance = tolerance / (least + middle + largest);
     ensure(near(surfel.curvature, curvature, curvature_tolerance), &format!("curvature is not {curvature}"))?;
-    let ratio = if rules.ellipses { (largest / middle).min(f64::from(LONGEST)) } else { 1.0 };
+    let ratio = (largest / middle).min(rules.longest.into());
     let ratio_tolerance = 4.0 * tolerance / middle;
     ensure(near(surfel.major_ratio, ratio, ratio_tolerance), &format!("ratio of axes is not {ratio}"))?;
     ensure(surfel.center == n.center.as_vec3().to_array() && surfel.pixel == 3 << 16 | 5, "centre or pixel")
@@ -151,8 +151,8 @@ fn random_neighborhoods(seed: u64, count: usize) -> Vec<Neighborhood> {
 #[test]
 fn random_neighborhoods_are_reconstructed() {
     for view in views() {
-        for ellipses in [false, true] {
-            let rules = FitRules { ellipses, splat_scale: 0.7, ..RULES };
+        for longest in [1.0, LONGEST] {
+            let rules = FitRules { longest, splat_scale: 0.7, ..RULES };
             let neighborhoods = random_neighborhoods(21, 2000);
             let surfels = fitted(&neighborhoods, &view, &rules, f32::INFINITY);
             for (index, (n, surfel)) in neighborhoods.iter().zip(&surfels).enumerate() {

@@ -18,7 +18,8 @@ pub(crate) struct FrameUniform {
     pub(crate) k: u32,
     pub(crate) halves: u32,
     pub(crate) grid_culling: u32,
-    pub(crate) ellipses: u32,
+    /// 1 if what the fit leaves is adapted.
+    pub(crate) adaptive: u32,
     pub(crate) keep_outliers: u32,
     pub(crate) splat_scale: f32,
     /// Radius within which a point must have a neighbour, in first search radii.
@@ -27,9 +28,10 @@ pub(crate) struct FrameUniform {
     pub(crate) gap_growth: f32,
     /// Of the kd-tree search, world units.
     pub(crate) first_radius: f32,
+    /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
+    pub(crate) longest: f32,
     pub(crate) unused_0: u32,
     pub(crate) unused_1: u32,
-    pub(crate) unused_2: u32,
 }
 
 impl FrameUniform {
@@ -47,15 +49,15 @@ impl FrameUniform {
             k,
             halves: 0,
             grid_culling: 0,
-            ellipses: 0,
+            adaptive: 0,
             keep_outliers: 0,
             splat_scale: 1.0,
             outlier_growth: f32::INFINITY,
             gap_growth: f32::INFINITY,
             first_radius: 1.0,
+            longest: 1.0,
             unused_0: 0,
             unused_1: 0,
-            unused_2: 0,
         }
     }
 }

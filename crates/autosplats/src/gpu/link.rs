@@ -24,6 +24,7 @@ const SHARED: &[(&str, &str)] = &[
     ("base_radius", include_str!("../shared/base_radius.wgsl")),
     ("calls", include_str!("../shared/calls.wgsl")),
     ("choose", include_str!("../shared/choose.wgsl")),
+    ("rows", include_str!("../shared/rows.wgsl")),
     ("sheet", include_str!("../shared/sheet.wgsl")),
     ("scatters", include_str!("../shared/scatters.wgsl")),
     ("quantiles", include_str!("../shared/quantiles.wgsl")),

@@ -8,7 +8,7 @@ use super::attributes::Wanted;
 use super::surfels::point_surfels;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::{Adapter, DepthNoise};
+use crate::adapt::{AdaptRules, Adapter, DepthNoise};
 use crate::camera::{Camera, View, guess_axes, up};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
@@ -229,15 +229,16 @@ impl Reconstruct<'_> {
         let rules = FitRules {
             k: settings.k,
             splat_scale: settings.splat_scale,
-            ellipses: settings.ellipses,
+            // What adapts them goes by their shape.
+            longest: if settings.adaptive { f32::MAX } else { settings.longest() },
             keep_outliers: settings.outlier_expansions.is_none(),
         };
         fit(screen, queries, neighborhoods, view, &rules, surfels);
         clock.lap(|timings| &mut timings.fit);
 
         if settings.adaptive {
-            let keep_outliers = rules.keep_outliers;
-            adapter.adapt(&mut surfels[first..], &screen.density, view, settings.k, depth_noise, keep_outliers);
+            let rules = AdaptRules { k: settings.k, longest: settings.longest(), keep_outliers: rules.keep_outliers };
+            adapter.adapt(&mut surfels[first..], &screen.density, view, &rules, depth_noise);
             clock.lap(|timings| &mut timings.adapt);
         }
         sensors.orient(&mut surfels[first..], view);

@@ -455,7 +455,8 @@ impl Prepared {
         let told = FrameUniform {
             halves: self.shape.halves.into(),
             grid_culling: reconstruction.grid_culling.into(),
-            ellipses: reconstruction.ellipses.into(),
+            adaptive: reconstruction.adaptive.into(),
+            longest: reconstruction.longest(),
             keep_outliers: reconstruction.outlier_expansions.is_none().into(),
             splat_scale: reconstruction.splat_scale,
             outlier_growth: rules.outlier_radius(1.0),

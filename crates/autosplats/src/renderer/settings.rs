@@ -1,6 +1,7 @@
 //! What a picture can be asked to be.
 
 use crate::Error;
+use crate::fit::LONGEST;
 use crate::search::SearchEngine;
 use crate::shade::Shading;
 
@@ -69,6 +70,11 @@ impl Reconstruction {
     /// What the paper does: one point a pixel, and k = 10 for all.
     pub fn paper() -> Self {
         Self { points_per_pixel: 1, adaptive: false, ..Self::default() }
+    }
+
+    /// Longest ellipse, semi-major over semi-minor axis.
+    pub(super) fn longest(&self) -> f32 {
+        if self.ellipses { LONGEST } else { 1.0 }
     }
 
     /// Whether halves of pixels keep a point each.

@@ -7,6 +7,7 @@ override TINY_PX: f32;
 override TINY_SLOPE: f32;
 override TINY_REACH_PX: f32;
 override MOST_TINY: f32;
+override ROW: f32;
 
 // Standard deviation of points from their surface at a depth above 0.
 fn noise_at(depth: f32) -> f32 {
@@ -24,6 +25,12 @@ fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {
     let pixel = pixel_size(depth);
     let dense = TINY_REACH_PX * pixel / k_radius;
     return ENOUGH + TINY_SLOPE * min(dense * dense, MOST_TINY) * max(TINY_PX - noise / pixel, 0.0);
+}
+
+// Whether the first neighbours of a surfel are a row. Steps of a depth camera's depths, whose noise is known, are rows too,
+// but the surface is not in them.
+fn is_row(surfel: Surfel, known_noise: f32) -> bool {
+    return surfel.radius > 0.0 && surfel.major_ratio > ROW && known_noise == 0.0;
 }
 
 // Whether the noise calls for more than a surfel's first neighbours, whose error is about that of k points over the k-radius.

@@ -45,7 +45,7 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
                 continue;
             }
         }
-        let quadric = quadric_of(ball, plane.axis, plane.curvature);
+        let quadric = quadric_of(ball, plane.axis, curvature_of(plane));
         if quadric.len < LEAST_CLUSTERS {
             continue;
         }

@@ -15,7 +15,8 @@ struct Frame {
     // 1 if each half of a pixel keeps its nearest point, 0 if each pixel does.
     halves: u32,
     grid_culling: u32,
-    ellipses: u32,
+    // 1 if what the fit leaves is adapted.
+    adaptive: u32,
     keep_outliers: u32,
     splat_scale: f32,
     // A point must have a neighbour within this many first search radii.
@@ -24,9 +25,10 @@ struct Frame {
     gap_growth: f32,
     // Of the kd-tree search, world units.
     first_radius: f32,
+    // Longest ellipse, semi-major over semi-minor axis; 1 for circles.
+    longest: f32,
     unused_0: u32,
     unused_1: u32,
-    unused_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

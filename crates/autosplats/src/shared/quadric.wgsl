@@ -25,14 +25,16 @@ struct Ball {
 }
 
 struct Plane {
-    // Axis of least spread of the clusters.
+    // Unit axis of least spread of the clusters; of either sign.
     axis: vec3f,
-    // Surface variation.
-    curvature: f32,
+    // How far the plane is from the ball's centre along the axis, radii.
+    height: f32,
+    // Along the axis, between, and where the spread is largest; squared radii.
+    variances: vec3f,
+    // Sum of the clusters' weights.
+    weight: f32,
     // Clusters in the ball.
     len: u32,
-    // Sum of their weights.
-    weight: f32,
 }
 
 struct Quadric {
@@ -83,8 +85,19 @@ fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
     return vec4f(offset, select(0.0, weight, rest > 0.0));
 }
 
+// Surface variation.
+fn curvature_of(plane: Plane) -> f32 {
+    let sum = plane.variances.x + plane.variances.y + plane.variances.z;
+    return select(0.0, plane.variances.x / sum, sum > 0.0);
+}
+
 // The plane through the clusters of a ball.
 fn plane_of(ball: Ball) -> Plane {
+    return plane_beside(ball, vec3f(0.0), 0.0);
+}
+
+// The plane through the clusters of a ball that are at least `limit` radii from the centre towards `side`.
+fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
     let per_radius = 1.0 / ball.radius;
     // Sums of weights and positions; of squares xx, yy, zz, and of products yz, xz, xy.
     var first = vec4f(0.0);
@@ -100,7 +113,7 @@ fn plane_of(ball: Ball) -> Plane {
                     break;
                 }
                 let p = weighed(ball, per_radius, cluster);
-                if p.w > 0.0 {
+                if p.w > 0.0 && dot(side, p.xyz) >= limit {
                     let wp = p.w * p.xyz;
                     first += vec4f(wp, p.w);
                     squares += wp * p.xyz;
@@ -111,14 +124,13 @@ fn plane_of(ball: Ball) -> Plane {
         }
     }
     if len < LEAST_CLUSTERS {
-        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, len, first.w);
+        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, vec3f(0.0), first.w, len);
     }
     let share = 1.0 / first.w;
     let mean = first.xyz * share;
     let found = eigen(squares * share - mean * mean, products * share - mean.yxx * mean.zzy);
-    let least = max(found.values.x, 0.0);
-    let sum = least + found.values.y + found.values.z;
-    return Plane(found.least, select(0.0, least / sum, sum > 0.0), len, first.w);
+    let variances = vec3f(max(found.values.x, 0.0), found.values.yz);
+    return Plane(found.least, dot(found.least, mean), variances, first.w, len);
 }
 
 // A row of the equations: four columns, the two of the slopes, and the right-hand side.

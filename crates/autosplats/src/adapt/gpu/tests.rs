@@ -33,7 +33,8 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     let surfels = surfel_buffer(gpu, screen.capacity).expect("room");
     gpu.queue.write_buffer(&surfels, 0, bytemuck::cast_slice(&fitted));
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(&case.view, K)));
+    let told = FrameUniform { adaptive: 1, longest: f32::MAX, ..FrameUniform::new(&case.view, K) };
+    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     let mut steps = passes.steps_cells(gpu, &frame, &screen, &buffers);
     for round in [Round::Active, Round::Recovered] {
@@ -186,7 +187,8 @@ fn the_device_adapts_as_the_host_does() {
             if is_noisy {
                 assert!(2 * changed > host.len(), "{name} {projection:?}: {changed} of {} adapted", host.len());
             } else {
-                assert!(made.surfels == fitted, "{name} {projection:?}: stays as it is");
+                // But for neighbours that are a row by chance.
+                assert!(changed <= host.len() / 1000, "{name} {projection:?}: {changed} changed");
             }
         }
     }
@@ -210,6 +212,15 @@ fn the_device_knows_the_noise_of_a_depth_camera_as_the_host_does() {
     let made = on_device(&gpu, &passes, &case);
     compare_surfels(&made.surfels, &case.adapted()).unwrap_or_else(|error| panic!("two runs: {error}"));
     assert!(made.surfels != host, "less is known");
+}
+
+#[test]
+fn the_device_closes_what_is_between_rows_as_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    let case = Case::swept();
+    let (made, host) = (on_device(&gpu, &passes, &case), case.adapted());
+    compare_surfels(&made.surfels, &host).unwrap_or_else(|error| panic!("{error}"));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use autosplats_cloud::glam::{DMat3, DVec3};
 use super::*;
 use crate::camera::{Camera, Projection, View};
 use crate::fit::tests::eigenvalues;
-use crate::fit::{FitRules, Surfels, fit};
+use crate::fit::{FitRules, LONGEST, Surfels, fit};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
@@ -15,7 +15,7 @@ use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE};
 
-const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, ellipses: true, keep_outliers: false };
+const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, keep_outliers: false };
 
 /// Screen points and their neighbourhoods, of the active and of the passive ones.
 struct Case {
@@ -63,7 +63,7 @@ impl Case {
         let surfels = surfel_buffer(gpu, buffers.capacity).expect("room");
         let told = FrameUniform {
             splat_scale: rules.splat_scale,
-            ellipses: rules.ellipses.into(),
+            longest: rules.longest,
             keep_outliers: rules.keep_outliers.into(),
             ..FrameUniform::new(&self.view, rules.k)
         };
@@ -131,8 +131,8 @@ fn the_device_fits_what_the_host_fits() {
             for gap_factor in [Some(4.0), None] {
                 let case = Case::new(&positions, projection, gap_factor);
                 let moments = case.moments();
-                for (ellipses, keep_outliers, splat_scale) in [(true, false, 1.0), (false, true, 0.7)] {
-                    let rules = FitRules { ellipses, keep_outliers, splat_scale, ..RULES };
+                for (longest, keep_outliers, splat_scale) in [(LONGEST, false, 1.0), (1.0, true, 0.7)] {
+                    let rules = FitRules { longest, keep_outliers, splat_scale, ..RULES };
                     let host = case.on_host(&rules);
                     let (device, counted) = case.on_device(&gpu, &passes, &rules);
                     assert_eq!(device.len(), host.len(), "{name}: every query gives a surfel");

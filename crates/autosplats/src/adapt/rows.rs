@@ -1,0 +1,135 @@
+//! Rows: neighbourhoods that are a line, because a scanner's points are much denser along its scan lines than across.
+//!
+//! A lidar that spins leaves rings on the ground, ten to fifty times as far apart as their points. The nearest
+//! neighbours of such a point all lie on its own ring: no plane can be fitted to them, and their discs reach no other
+//! ring. So larger balls are tried, as for noise, until one holds an area. If that is flat and the row lies in it, the
+//! surfel turns to its plane and becomes an ellipse across the row, as wide as the rows are apart by the points' density in
+//! the ball. Where the surface bends beside the row, as it does at the foot of a wall, the points on either side of
+//! the row are tried alone. What finds no area, as the row at the top of a fence, is drawn as the thin line that it is.
+
+use glam::Vec3;
+use pulp::Simd;
+
+use super::cells::Cells;
+use super::cpu::ENOUGH;
+use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane};
+use super::{SCALES, STEP};
+use crate::camera::View;
+use crate::fit::{LONGEST, Surfel};
+
+/// A neighbourhood is a row if its variance along is this many times that across. Of ten neighbours strewn evenly, one
+/// in thousands is.
+pub(super) const ROW: f32 = 16.0;
+/// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
+pub(super) const AREA: f32 = 0.25;
+/// or, of what is on one side of the row, this.
+pub(super) const AREA_BESIDE: f32 = 0.1;
+/// Of the points on one side, those of the row itself count, to this distance on the other side; radii.
+pub(super) const BESIDE: f32 = 0.1;
+/// Weight of a ball over that of what counts to one side.
+pub(super) const HALVES: f32 = 1.8;
+/// An area is flat if the variance of heights is at most this part of that across.
+pub(super) const FLAT: f32 = 0.06;
+/// Sine of the most that the row leaves the area's plane.
+pub(super) const LEAVES: f32 = 0.25;
+/// Most that the point is above or below the area, radii: more is a row in front of one.
+pub(super) const APART_FROM: f32 = 0.1;
+/// Semi-axis of the ellipse across the row, in distances between rows: its support is 1.4 times as wide.
+pub(super) const REACH: f32 = 0.8;
+/// And at most, radii of the ball.
+pub(super) const FARTHEST_REACH: f32 = 0.7;
+/// Width of a row that belongs to no area, over its splats' length.
+pub(super) const THIN_ROW: f32 = 0.4;
+
+/// Whether the first neighbours of a surfel are a row.
+#[inline(always)]
+pub(super) fn is_row(surfel: &Surfel) -> bool {
+    surfel.major_ratio > ROW
+}
+
+/// Turns a surfel whose neighbours are a row to the area that balls around it find. `radius` is that of the ball before the
+/// first, `noise` the standard deviation of points from their surface, both in world units; `k` neighbours are the row.
+#[inline(always)]
+pub(super) fn turn<S: Simd>(
+    simd: S,
+    surfel: &mut Surfel,
+    (radius, noise, k): (f32, f32, u32),
+    (cells, view): (&Cells, &View),
+    gathered: &mut Gathered,
+) {
+    let row = Vec3::from(surfel.major_axis);
+    let Some((plane, radius)) = area(simd, surfel.center, row, (radius, noise), (cells, view), gathered) else {
+        surfel.radius *= THIN_ROW;
+        surfel.major_ratio = 1.0 / THIN_ROW;
+        return;
+    };
+    let to_eye = if view.perspective { -Vec3::from(surfel.center) } else { Vec3::NEG_Z };
+    let normal = if plane.axis.dot(to_eye) < 0.0 { -plane.axis } else { plane.axis };
+    surfel.normal = normal.to_array();
+    // Not zero: the row is nearly in the plane.
+    surfel.major_axis = normal.cross(row).normalize().to_array();
+    surfel.curvature = plane.curvature();
+    // Rows are as far apart as the density says of points k-radius / (k/2) apart; the splat radius is 2/√k k-radii.
+    let k = k as f32;
+    let in_k_radii = radius / surfel.k_radius;
+    let apart = EVEN_WEIGHT * in_k_radii * in_k_radii * k / (2.0 * plane.weight);
+    let ratio = (REACH * apart).min(FARTHEST_REACH * in_k_radii) * (0.5 * k.sqrt());
+    surfel.radius *= (ratio / LONGEST).max(1.0);
+    surfel.major_ratio = ratio.clamp(1.0, LONGEST);
+}
+
+/// Plane of the first ball around `center` that holds an area with the `row` in it, and the ball's radius.
+#[inline(always)]
+fn area<S: Simd>(
+    simd: S,
+    center: [f32; 3],
+    row: Vec3,
+    (mut radius, noise): (f32, f32),
+    (cells, view): (&Cells, &View),
+    gathered: &mut Gathered,
+) -> Option<(Plane, f32)> {
+    let is_flat = |plane: &Plane| {
+        let [least, middle, _] = plane.variances;
+        (least <= FLAT * middle) & (plane.axis.dot(row).abs() <= LEAVES) & (plane.height.abs() <= APART_FROM)
+    };
+    let mut found = None;
+    for _ in 0..SCALES {
+        radius *= STEP;
+        if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
+            continue;
+        }
+        let plane = gathered.plane(simd);
+        let [_, middle, largest] = plane.variances;
+        if middle < AREA * largest {
+            continue;
+        }
+        if is_flat(&plane) {
+            found = Some((plane, radius));
+            // Of a slope across so many points.
+            if noise * noise <= ENOUGH * ENOUGH * plane.weight * middle * radius * radius {
+                break;
+            }
+        } else {
+            if found.is_none() {
+                let eye = if view.perspective { Vec3::from(center) } else { Vec3::Z };
+                let across = row.cross(eye).normalize_or_zero();
+                let mut least_bend = f32::INFINITY;
+                for side in [across, -across] {
+                    gathered.read(cells, center, radius, view);
+                    if gathered.keep_beside(side, -BESIDE) < LEAST_CLUSTERS {
+                        continue;
+                    }
+                    let plane = gathered.plane(simd);
+                    let [least, middle, largest] = plane.variances;
+                    if (middle >= AREA_BESIDE * largest) & is_flat(&plane) & (least < least_bend * middle) {
+                        least_bend = least / middle;
+                        // As if the other side were as full.
+                        found = Some((Plane { weight: HALVES * plane.weight, ..plane }, radius));
+                    }
+                }
+            }
+            break;
+        }
+    }
+    found
+}

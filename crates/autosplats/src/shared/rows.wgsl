@@ -1,0 +1,101 @@
+// Rows, and the areas that they belong to: see the CPU form. Imports: frame, surfel, quadric. The including pass binds `levels`
+// and `clusters`, and has `STEP`.
+
+#import quadric
+#import surfel
+
+override AREA: f32;
+override AREA_BESIDE: f32;
+override BESIDE: f32;
+override HALVES: f32;
+override FLAT: f32;
+override LEAVES: f32;
+override APART_FROM: f32;
+override EVEN_WEIGHT: f32;
+override REACH: f32;
+override FARTHEST_REACH: f32;
+override THIN_ROW: f32;
+override LONGEST: f32;
+
+struct Area {
+    plane: Plane,
+    // Of the ball; 0 if there is none.
+    radius: f32,
+}
+
+// Whether what a plane was fitted to is an area with the `row` in it.
+fn is_flat(plane: Plane, row: vec3f) -> bool {
+    let is_thin = plane.variances.x <= FLAT * plane.variances.y;
+    return is_thin && abs(dot(plane.axis, row)) <= LEAVES && abs(plane.height) <= APART_FROM;
+}
+
+// Of the areas on the two sides of a `row`, the flatter.
+fn area_beside(ball: Ball, row: vec3f) -> Area {
+    let across_eye = cross(row, select(vec3f(0.0, 0.0, 1.0), ball.center, frame.perspective == 1u));
+    let length_squared = dot(across_eye, across_eye);
+    var side = select(vec3f(0.0), across_eye * inverseSqrt(length_squared), length_squared > 0.0);
+    var found = Area(Plane(), 0.0);
+    for (var index = 0; index < 2; index++) {
+        let plane = plane_beside(ball, side, -BESIDE);
+        let is_area = plane.len >= LEAST_CLUSTERS && plane.variances.y >= AREA_BESIDE * plane.variances.z;
+        let bend = plane.variances.x * found.plane.variances.y;
+        let is_flatter = found.radius == 0.0 || bend < found.plane.variances.x * plane.variances.y;
+        if is_area && is_flat(plane, row) && is_flatter {
+            found = Area(plane, ball.radius);
+        }
+        side = -side;
+    }
+    // As if the other side were as full.
+    found.plane.weight *= HALVES;
+    return found;
+}
+
+// The first ball around `center` that holds an area with the `row` in it.
+fn area(center: vec3f, row: vec3f, least_radius: f32, noise: f32) -> Area {
+    var radius = least_radius;
+    var found = Area(Plane(), 0.0);
+    for (var scale = 0u; scale < SCALES; scale++) {
+        radius *= STEP;
+        let ball = ball_around(center, radius);
+        let plane = plane_of(ball);
+        if plane.len < LEAST_CLUSTERS || plane.variances.y < AREA * plane.variances.z {
+            continue;
+        }
+        if !is_flat(plane, row) {
+            if found.radius == 0.0 {
+                found = area_beside(ball, row);
+            }
+            break;
+        }
+        found = Area(plane, radius);
+        let enough = ENOUGH * radius;
+        if noise * noise <= enough * enough * plane.weight * plane.variances.y {
+            break;
+        }
+    }
+    return found;
+}
+
+// A surfel of a row, turned to its area.
+fn turned(surfel: Surfel, least_radius: f32, noise: f32) -> Surfel {
+    var out = surfel;
+    let found = area(surfel.center, surfel.major_axis, least_radius, noise);
+    if found.radius == 0.0 {
+        out.radius = surfel.radius * THIN_ROW;
+        out.major_ratio = 1.0 / THIN_ROW;
+        return out;
+    }
+    let plane = found.plane;
+    let to_eye = select(vec3f(0.0, 0.0, -1.0), -surfel.center, frame.perspective == 1u);
+    out.normal = select(plane.axis, -plane.axis, dot(plane.axis, to_eye) < 0.0);
+    out.major_axis = normalize(cross(out.normal, surfel.major_axis));
+    out.curvature = curvature_of(plane);
+    // Rows are as far apart as the density says of points k-radius / (k/2) apart; the splat radius is 2/√k k-radii.
+    let k = f32(frame.k);
+    let in_k_radii = found.radius / surfel.k_radius;
+    let apart = EVEN_WEIGHT * in_k_radii * in_k_radii * k / (2.0 * plane.weight);
+    let ratio = min(REACH * apart, FARTHEST_REACH * in_k_radii) * (0.5 * sqrt(k));
+    out.radius = surfel.radius * max(ratio / LONGEST, 1.0);
+    out.major_ratio = clamp(ratio, 1.0, LONGEST);
+    return out;
+}
