@@ -135,8 +135,8 @@ pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, 
 enum Call {
     Nothing,
     Noise(Noisy),
-    /// They are a row of points with this noise, world units.
-    Row(f32),
+    /// They are a row of points.
+    Row,
 }
 
 #[derive(Clone, Copy)]
@@ -167,7 +167,7 @@ impl Task<'_> {
             Call::Nothing
         } else if is_row(surfel) && known.is_none() {
             // Steps of a depth camera's depths are rows too, but the surface is not in them.
-            Call::Row(noise)
+            Call::Row
         } else if noise > enough * surfel.k_radius {
             Call::Noise(Noisy { noise, enough, known })
         } else {
@@ -188,9 +188,9 @@ fn adapt_all_with<'a, S: Simd>(
     let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
         let call = task.call(surfel);
-        if let Call::Row(noise) = call {
+        if let Call::Row = call {
             let radius = first_radius(surfel, density, view, k);
-            turn(simd, surfel, (radius, noise, k), (cells, view), gathered);
+            turn(simd, surfel, (radius, k), (cells, view), gathered);
             continue;
         }
         surfel.major_ratio = surfel.major_ratio.min(longest);

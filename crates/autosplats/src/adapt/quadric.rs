@@ -1,9 +1,11 @@
 //! A height field with six coefficients over a ball's points.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{Cells, Cluster, SLABS};
+use super::cells::{Cell, Cells, Cluster, Level, SLABS};
 use crate::camera::View;
 use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
@@ -22,6 +24,48 @@ pub(super) const LEAST_PIVOT: f32 = 1e-6;
 
 /// Weight of a ball evenly filled with a point in each square of its radius.
 pub(super) const EVEN_WEIGHT: f32 = 0.5 * std::f32::consts::PI * (1.0 + FULL);
+
+/// The cells that may reach into a ball.
+pub(super) struct Window<'a> {
+    level: &'a Level,
+    columns: RangeInclusive<usize>,
+    rows: RangeInclusive<usize>,
+}
+
+impl<'a> Window<'a> {
+    /// Of the ball of `radius` around `center` (view space); `None` if there are no cells.
+    #[inline(always)]
+    pub(super) fn around(cells: &'a Cells, center: Vec3, radius: f32, view: &View) -> Option<Self> {
+        let [px, py] = view.to_pixel(center);
+        let radius_px = radius / view.pixel_size(center.z);
+        let mut level = cells.levels.first()?;
+        for coarser in &cells.levels[1..] {
+            if coarser.side_px as f32 * CELLS_PER_RADIUS <= radius_px {
+                level = coarser;
+            }
+        }
+        let side = level.side_px as f32;
+        // Casts from float saturate at 0.
+        let range = |at: f32, count: usize| {
+            let last = (((at + radius_px) / side) as usize).min(count - 1);
+            (((at - radius_px) / side) as usize).min(last)..=last
+        };
+        Some(Self { level, columns: range(px, level.columns), rows: range(py, level.rows) })
+    }
+
+    /// Number of cells.
+    #[inline(always)]
+    fn len(&self) -> usize {
+        [&self.columns, &self.rows].map(|range| range.end() - range.start() + 1).iter().product()
+    }
+
+    /// The cells, row by row.
+    #[inline(always)]
+    pub(super) fn rows(&self) -> impl Iterator<Item = &'a [Cell]> {
+        let Self { level, columns, rows } = self;
+        rows.clone().map(|row| &level.cells[row * level.columns..][..level.columns][columns.clone()])
+    }
+}
 
 /// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights.
 #[derive(Debug, Default)]
@@ -81,30 +125,15 @@ impl Gathered {
     #[inline(always)]
     pub(super) fn read(&mut self, cells: &Cells, center: [f32; 3], radius: f32, view: &View) -> usize {
         self.len = 0;
-        let [px, py] = view.to_pixel(center.into());
-        let radius_px = radius / view.pixel_size(center[2]);
-        let Some(mut level) = cells.levels.first() else { return 0 };
-        for coarser in &cells.levels[1..] {
-            if coarser.side_px as f32 * CELLS_PER_RADIUS <= radius_px {
-                level = coarser;
-            }
-        }
-        let side = level.side_px as f32;
-        // Casts from float saturate at 0.
-        let range = |at: f32, count: usize| {
-            [((at - radius_px) / side) as usize, (((at + radius_px) / side) as usize).min(count - 1)]
-        };
-        let [x0, x1] = range(px, level.columns);
-        let [y0, y1] = range(py, level.rows);
+        let Some(window) = Window::around(cells, center.into(), radius, view) else { return 0 };
         let [cx, cy, cz] = center;
         let per_radius = 1.0 / radius;
-        let [x0, y0] = [x0.min(x1), y0.min(y1)];
-        let most = (x1 - x0 + 1) * (y1 - y0 + 1) * SLABS;
+        let most = window.len() * SLABS;
         // One more, that the last cluster is written to if it is outside.
         self.lanes.resize((most + 1).div_ceil(LANES), [Lanes::default(); 4]);
         let mut len = 0;
-        for row in y0..=y1 {
-            for cell in &level.cells[row * level.columns..][..level.columns][x0..=x1] {
+        for row in window.rows() {
+            for cell in row {
                 for &Cluster { mean: [x, y, z], count } in cell {
                     if count == 0.0 {
                         break;

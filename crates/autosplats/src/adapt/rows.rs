@@ -5,14 +5,14 @@
 //! ring. So larger balls are tried, as for noise, until one holds an area. If that is flat and the row lies in it, the
 //! surfel turns to its plane and becomes an ellipse across the row, as wide as the rows are apart by the points' density in
 //! the ball. Where the surface bends beside the row, as it does at the foot of a wall, the points on either side of
-//! the row are tried alone. What finds no area, as the row at the top of a fence, is drawn as the thin line that it is.
+//! the row are tried alone. Wires and bars are rows too: their areas end soon, or other things are seen through them. What
+//! finds no area is drawn as the thin line that it is.
 
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::Cells;
-use super::cpu::ENOUGH;
-use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane};
+use super::cells::{Cells, Cluster};
+use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane, Window};
 use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::{LONGEST, Surfel};
@@ -22,12 +22,20 @@ use crate::fit::{LONGEST, Surfel};
 pub(super) const ROW: f32 = 16.0;
 /// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
 pub(super) const AREA: f32 = 0.25;
+/// and if there is more of it: of a ball so many times as wide
+pub(super) const BEYOND: f32 = STEP * STEP;
+/// this part, which three wires side by side do not reach,
+pub(super) const AREA_BEYOND: f32 = 0.35;
 /// or, of what is on one side of the row, this.
-pub(super) const AREA_BESIDE: f32 = 0.1;
+pub(super) const AREA_BESIDE: f32 = 0.2;
 /// Of the points on one side, those of the row itself count, to this distance on the other side; radii.
 pub(super) const BESIDE: f32 = 0.1;
 /// Weight of a ball over that of what counts to one side.
 pub(super) const HALVES: f32 = 1.8;
+/// What is this far from an area's plane is not of the area; radii.
+pub(super) const OFF_AREA: f32 = 0.15;
+/// An area is none where this share of its cells shows what is behind it and nothing of it.
+pub(super) const SEEN_THROUGH: f32 = 0.3;
 /// An area is flat if the variance of heights is at most this part of that across.
 pub(super) const FLAT: f32 = 0.06;
 /// Sine of the most that the row leaves the area's plane.
@@ -37,7 +45,7 @@ pub(super) const APART_FROM: f32 = 0.1;
 /// Semi-axis of the ellipse across the row, in distances between rows: its support is 1.4 times as wide.
 pub(super) const REACH: f32 = 0.8;
 /// And at most, radii of the ball.
-pub(super) const FARTHEST_REACH: f32 = 0.7;
+pub(super) const FARTHEST_REACH: f32 = 0.5;
 /// Width of a row that belongs to no area, over its splats' length.
 pub(super) const THIN_ROW: f32 = 0.4;
 
@@ -47,18 +55,18 @@ pub(super) fn is_row(surfel: &Surfel) -> bool {
     surfel.major_ratio > ROW
 }
 
-/// Turns a surfel whose neighbours are a row to the area that balls around it find. `radius` is that of the ball before the
-/// first, `noise` the standard deviation of points from their surface, both in world units; `k` neighbours are the row.
+/// Turns a surfel whose `k` neighbours are a row to the area that balls around it find; `radius` is that of the ball before
+/// the first, world units.
 #[inline(always)]
 pub(super) fn turn<S: Simd>(
     simd: S,
     surfel: &mut Surfel,
-    (radius, noise, k): (f32, f32, u32),
+    (radius, k): (f32, u32),
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) {
     let row = Vec3::from(surfel.major_axis);
-    let Some((plane, radius)) = area(simd, surfel.center, row, (radius, noise), (cells, view), gathered) else {
+    let Some((plane, radius)) = area(simd, surfel.center, row, radius, (cells, view), gathered) else {
         surfel.radius *= THIN_ROW;
         surfel.major_ratio = 1.0 / THIN_ROW;
         return;
@@ -84,52 +92,68 @@ fn area<S: Simd>(
     simd: S,
     center: [f32; 3],
     row: Vec3,
-    (mut radius, noise): (f32, f32),
+    mut radius: f32,
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<(Plane, f32)> {
+    // What is within a radius, on the side if one is given.
+    let mut plane = |radius: f32, side: Option<Vec3>| {
+        let mut len = gathered.read(cells, center, radius, view);
+        if let Some(side) = side {
+            len = gathered.keep_beside(side, -BESIDE);
+        }
+        (len >= LEAST_CLUSTERS).then(|| gathered.plane(simd))
+    };
+    let is_area = |plane: &Plane, least: f32| plane.variances[1] >= least * plane.variances[2];
     let is_flat = |plane: &Plane| {
         let [least, middle, _] = plane.variances;
         (least <= FLAT * middle) & (plane.axis.dot(row).abs() <= LEAVES) & (plane.height.abs() <= APART_FROM)
     };
-    let mut found = None;
-    for _ in 0..SCALES {
+    let first = (0..SCALES).find_map(|_| {
         radius *= STEP;
-        if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
-            continue;
-        }
-        let plane = gathered.plane(simd);
-        let [_, middle, largest] = plane.variances;
-        if middle < AREA * largest {
-            continue;
-        }
-        if is_flat(&plane) {
-            found = Some((plane, radius));
-            // Of a slope across so many points.
-            if noise * noise <= ENOUGH * ENOUGH * plane.weight * middle * radius * radius {
-                break;
+        plane(radius, None).filter(|plane| is_area(plane, AREA))
+    })?;
+    let goes_on = plane(BEYOND * radius, None).is_some_and(|plane| is_area(&plane, AREA_BEYOND));
+    let mut found = (is_flat(&first) & goes_on).then_some(first);
+    if found.is_none() {
+        let eye = if view.perspective { Vec3::from(center) } else { Vec3::Z };
+        let across = row.cross(eye).normalize_or_zero();
+        let mut least_bend = f32::INFINITY;
+        for side in [across, -across].map(Some) {
+            let Some(beside) = plane(radius, side).filter(is_flat) else { continue };
+            let bend = beside.variances[0] / beside.variances[1];
+            let goes_on = plane(BEYOND * radius, side).is_some_and(|plane| is_area(&plane, AREA_BESIDE));
+            if (bend < least_bend) & goes_on {
+                // As if the other side were as full.
+                found = Some(Plane { weight: HALVES * beside.weight, ..beside });
+                least_bend = bend;
             }
-        } else {
-            if found.is_none() {
-                let eye = if view.perspective { Vec3::from(center) } else { Vec3::Z };
-                let across = row.cross(eye).normalize_or_zero();
-                let mut least_bend = f32::INFINITY;
-                for side in [across, -across] {
-                    gathered.read(cells, center, radius, view);
-                    if gathered.keep_beside(side, -BESIDE) < LEAST_CLUSTERS {
-                        continue;
-                    }
-                    let plane = gathered.plane(simd);
-                    let [least, middle, largest] = plane.variances;
-                    if (middle >= AREA_BESIDE * largest) & is_flat(&plane) & (least < least_bend * middle) {
-                        least_bend = least / middle;
-                        // As if the other side were as full.
-                        found = Some((Plane { weight: HALVES * plane.weight, ..plane }, radius));
-                    }
-                }
-            }
-            break;
         }
     }
-    found
+    found.filter(|plane| !is_seen_through(cells, center, radius, plane.axis, view)).map(|plane| (plane, radius))
+}
+
+/// Whether what is behind a disc of `radius` around `center`, square to `axis`, shows through it.
+fn is_seen_through(cells: &Cells, center: [f32; 3], radius: f32, axis: Vec3, view: &View) -> bool {
+    let center = Vec3::from(center);
+    let of_plane = axis.dot(center);
+    let mut counts = [0u32; 2];
+    let Some(window) = Window::around(cells, center, radius, view) else { return false };
+    for cell in window.rows().flatten() {
+        let (mut is_on, mut is_behind) = (false, false);
+        for &Cluster { mean, .. } in cell.iter().take_while(|cluster| cluster.count > 0.0) {
+            let place = Vec3::from(mean);
+            let off = of_plane - axis.dot(place);
+            // Where the line of sight meets the plane.
+            let along = if view.perspective { place } else { Vec3::Z };
+            let way = off / axis.dot(along);
+            if (place + along * way - center).length_squared() < radius * radius {
+                is_on |= off.abs() <= OFF_AREA * radius;
+                is_behind |= way < 0.0;
+            }
+        }
+        counts[usize::from(is_on)] += u32::from(is_on | is_behind);
+    }
+    let [through, on] = counts.map(|count| count as f32);
+    through > SEEN_THROUGH * (through + on)
 }
