@@ -16,6 +16,8 @@ const WIDEST_SPACING_PX: f64 = 1.5;
 const LEAST_BESIDE: usize = 3;
 /// Cosine of the steepest slant that widens the tolerance in depth.
 const STEEPEST: f64 = 0.1;
+/// How near a surface must be that is taken for one that the sensor of a sweep does not see, as a share of the diagonal.
+const UNSEEN: f64 = 0.01;
 /// Pixels from a silhouette within which normals are judged once more.
 const BAND_PX: usize = 4;
 /// Steps in depth below this many pixels are no silhouettes.
@@ -61,7 +63,7 @@ impl Exact {
             let (spacing, reach, all_around) = match &subject.recipe.sweep {
                 Some(sweep) => {
                     let gap = sweep.gap(&subject.surface, place);
-                    (gap, gap, true)
+                    (gap, if gap.is_finite() { gap } else { UNSEEN * subject.diagonal }, true)
                 }
                 None => {
                     let around = subject.clean.around(place);

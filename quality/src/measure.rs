@@ -28,7 +28,7 @@ pub struct Angles {
 }
 
 /// How much of what a spinning lidar sees is there, where it should be and nowhere else. What it does not see, in shadow or
-/// out of its beams' reach, nothing is asked.
+/// out of its beams' reach, may be there or not.
 #[derive(Clone, Copy, Debug)]
 pub struct Swept {
     /// Share of the true surface that the sensor sees.
@@ -37,7 +37,7 @@ pub struct Swept {
     pub closed: f64,
     /// Of that, what is covered by a surface not farther from the true one than rings are apart.
     pub right: f64,
-    /// Pixels covered where nothing is, over those that the sensor sees.
+    /// Pixels covered where nothing is, or well before what the sensor does not see, over those that it sees.
     pub over: f64,
 }
 
@@ -52,8 +52,8 @@ pub struct Measures {
     pub angles: Option<Angles>,
     /// Mean error in depth, in pixels at that depth, over the same.
     pub depth_px: f64,
-    /// Of the lit picture with the lit truth, decibels, over the pixels that either covers and
-    /// about which something is asked.
+    /// Of the lit picture with the lit truth, decibels, over the pixels that either covers and about which something is
+    /// asked.
     pub psnr: f64,
     /// Mean FLIP error of the same over the same.
     pub flip: f64,
@@ -144,7 +144,12 @@ fn swept(exact: &Exact, picture: &Picture) -> Option<Swept> {
     let closed = here().filter(|(_, shown)| shown.is_some()).count() as f64;
     let is_right = |seen: &Seen, shown: &Shown| (shown.depth - seen.depth).abs() <= seen.tolerance;
     let right = here().filter(|(seen, shown)| shown.is_some_and(|shown| is_right(seen, &shown))).count() as f64;
-    let over = both().filter(|(seen, shown)| seen.is_none() && shown.is_some()).count() as f64;
+    // What is not seen lies in shadow; nothing hangs before it, between what casts the shadow and what it falls on.
+    let is_over = |seen: &Option<Seen>, shown: &Shown| match seen {
+        None => true,
+        Some(seen) => seen.swept == Some(false) && shown.depth < seen.depth - seen.tolerance,
+    };
+    let over = both().filter(|(seen, shown)| shown.is_some_and(|shown| is_over(seen, &shown))).count() as f64;
     let surface = exact.seen.iter().flatten().count() as f64;
     (count > 0.0).then(|| Swept {
         seen: count / surface,

@@ -51,9 +51,10 @@ const SWEPT: &str = "\
 Percent of pixels. *Seen* is the share of the surface that the lidar sees: between its lowest and its highest beam, with \
 nothing in the way, struck at less than 87°. Of that, *closed* is what is covered, by whatever it may be, and *right* what \
 is covered by a surface that is no farther from the true one, in depth, than rings are apart there. *Over* are pixels \
-covered though nothing is there, as a share of those seen: closing gaps must not close what is open. Past the last ring on \
-something no point tells where it ends, so not all of it can be closed. About what the lidar does not see nothing is asked, \
-here and in all tables but that of motion.
+covered though nothing is there, or what is there is not seen by the lidar and lies behind by more than a hundredth of the \
+diagonal, as a share of those seen: closing gaps must not close what is open. Past the last ring on something no point tells \
+where it ends, so not all of it can be closed. Nothing else is asked about what the lidar does not see, here and in all \
+tables but that of motion.
 
 ";
 

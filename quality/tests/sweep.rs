@@ -130,6 +130,10 @@ fn what_is_missing_wrong_or_too_much_is_noticed() {
     let sky = Some(Shown { depth: 10.0, normal: DVec3::Z, point: 0 });
     let full = Picture { width: right.width, shown: right.shown.iter().map(|shown| shown.or(sky)).collect() };
     assert!(measure(&full).over > 0.5, "the sky is closed");
+    let near_all = right.changed(|pixel, shown| {
+        Some(if truth.exact.is_asked(pixel) { shown } else { Shown { depth: shown.depth - 1.0, ..shown } })
+    });
+    assert!(measure(&near_all).over > 0.5, "something hangs before each shadow");
     let shadows = right.changed(|pixel, shown| truth.exact.is_asked(pixel).then_some(shown));
     assert_eq!(measure(&shadows).closed, 1.0, "nothing is asked about what the sensor does not see");
     let lit = Lit::new(&shadows, &truth.exact.rays);
