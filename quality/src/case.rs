@@ -3,7 +3,14 @@
 use autosplats::ViewDirection::{Back, Front, Iso, Left, Top};
 
 use crate::subject::{BUNNY, DANCER, Density, HORSE, Recipe, Source};
+use crate::sweep::Sweep;
 use crate::view::Shot;
+
+/// The edge of the herd's meadow, where a sensor stands as high as on a car, and the view from behind it.
+const EDGE: [f64; 3] = [1.2, -6.9, 1.75];
+const BEHIND_EDGE: Shot = Shot::Behind([2.7, 1.35], [0.3, -2.0, 0.5]);
+/// A sensor of few beams there.
+const FEW_BEAMS: Sweep = Sweep::new(EDGE, [-30.67, 10.67], 32, 1024);
 
 /// A subject and a view of it.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +57,12 @@ pub fn full() -> Vec<Case> {
     let bumpy = Recipe::new(Source::Bumpy(7), 800_000);
     let noisy = bunny.noise(0.003);
     let ear = [0.40, 0.30];
+    let meadow = |sweep| Recipe::swept(Source::Scene("herd"), sweep);
+    let nave = |sweep| Recipe::swept(Source::Scene("cathedral"), sweep);
+    // A car's sensors at the meadow's edge, a robot's in the nave.
+    let many = Sweep::new(EDGE, [-24.8, 2.0], 64, 2048);
+    let wide = Sweep::new([-5.7, -0.15, 1.75], [-45.0, 45.0], 64, 2048);
+    let behind_nave = Shot::Behind([3.0, 0.9], [3.0, 0.5, 2.6]);
     let case = |recipe, shot| Case::new(recipe, shot, [960, 600]);
     vec![
         case(figure, Shot::Own).shown().moving(),
@@ -64,6 +77,11 @@ pub fn full() -> Vec<Case> {
         case(herd, Shot::Parallel(Top)),
         case(cathedral, Shot::Own).shown(),
         case(cathedral, Shot::From([-3.0, 7.0, 2.0], [14.0, 6.5, 4.0], 60.0)),
+        case(meadow(many), BEHIND_EDGE).shown().moving(),
+        case(meadow(many.noise(0.02)), BEHIND_EDGE).shown(),
+        case(meadow(FEW_BEAMS), BEHIND_EDGE).shown(),
+        case(nave(wide), behind_nave).shown(),
+        case(nave(wide.noise(0.02)), behind_nave),
         case(bumpy, Shot::Whole(Front)).shown(),
         case(bumpy.noise(0.003), Shot::Whole(Front)).shown().moving(),
         case(bunny, Shot::Whole(Front)).shown().moving(),
@@ -102,5 +120,6 @@ pub fn quick() -> Vec<Case> {
         case(bumpy.density(Density::Uneven), Shot::Whole(Front)),
         case(bumpy.noise(0.003), Shot::Whole(Front)).shown().moving(),
         case(bumpy.outliers(0.02), Shot::Whole(Front)).shown(),
+        case(Recipe::swept(Source::Scene("herd"), FEW_BEAMS), BEHIND_EDGE),
     ]
 }

@@ -16,6 +16,8 @@ const WIDEST_SPACING_PX: f64 = 1.5;
 const LEAST_BESIDE: usize = 3;
 /// Cosine of the steepest slant that widens the tolerance in depth.
 const STEEPEST: f64 = 0.1;
+/// How near a surface must be that is taken for one that the sensor of a sweep does not see, as a share of the diagonal.
+const UNSEEN: f64 = 0.01;
 /// Pixels from a silhouette within which normals are judged once more.
 const BAND_PX: usize = 4;
 /// Steps in depth below this many pixels are no silhouettes.
@@ -28,12 +30,15 @@ pub struct Seen {
     pub depth: f64,
     /// World space, towards the eye.
     pub normal: DVec3,
-    /// Mean distance in pixels of the points around.
+    /// Mean distance in pixels of the points around; of swept ones the distance along the ring or across, whichever is the
+    /// longer, and infinite where the sensor sees nothing.
     pub spacing_px: f64,
+    /// Of swept points, whether the sensor sees this place.
+    pub swept: Option<bool>,
     /// Whether there are points enough for a closed picture of this place: elsewhere limits do not hold.
     pub sampled: bool,
-    /// Difference in depth within which a surface is the same: the radius of the ball that holds k points, what a slanted
-    /// surface goes back within a pixel, and how far points lie off the surface.
+    /// Difference in depth within which a surface is the same: the radius of the ball that holds k points, or the distance
+    /// of swept ones, what a slanted surface goes back within a pixel, and how far points lie off the surface.
     pub tolerance: f64,
 }
 
@@ -55,15 +60,25 @@ impl Exact {
     /// A camera that cannot see.
     pub fn trace(subject: &Subject, camera: &Camera, size: [u32; 2]) -> Result<Self> {
         Self::trace_with(subject, camera, size, |seen, place, direction, pixel_size| {
-            let around = subject.clean.around(place);
-            let spacing_px = spacing(&around) / pixel_size;
-            let beside = around.iter().filter(|offset| offset.dot(seen.normal).abs() <= 0.5 * offset.length());
+            let (spacing, reach, all_around) = match &subject.recipe.sweep {
+                Some(sweep) => {
+                    let gap = sweep.gap(&subject.surface, place);
+                    (gap, if gap.is_finite() { gap } else { UNSEEN * subject.diagonal }, true)
+                }
+                None => {
+                    let around = subject.clean.around(place);
+                    let beside = around.iter().filter(|offset| offset.dot(seen.normal).abs() <= 0.5 * offset.length());
+                    (spacing(&around), reach(&around), beside.count() >= LEAST_BESIDE)
+                }
+            };
+            let spacing_px = spacing / pixel_size;
             let cos = direction.dot(seen.normal).abs().clamp(STEEPEST, 1.0);
             let slant = pixel_size * (1.0 - cos * cos).sqrt() / cos;
             Seen {
                 spacing_px,
-                sampled: spacing_px <= WIDEST_SPACING_PX && beside.count() >= LEAST_BESIDE,
-                tolerance: reach(&around) + slant + subject.blur,
+                swept: subject.recipe.sweep.map(|_| spacing.is_finite()),
+                sampled: spacing_px <= WIDEST_SPACING_PX && all_around,
+                tolerance: reach + slant + subject.blur,
                 ..seen
             }
         })
@@ -90,7 +105,7 @@ impl Exact {
             let hit = subject.surface.trace(origin, direction)?;
             let depth = hit.distance * direction.dot(rays.axes[2]);
             let normal = if hit.normal.dot(direction) > 0.0 { -hit.normal } else { hit.normal };
-            let seen = Seen { depth, normal, spacing_px: f64::INFINITY, sampled: false, tolerance: 0.0 };
+            let seen = Seen { depth, normal, spacing_px: f64::INFINITY, swept: None, sampled: false, tolerance: 0.0 };
             Some(about(seen, origin + direction * hit.distance, direction, rays.pixel_size(depth)))
         };
         let seen = (0..width * height).into_par_iter().map(trace).collect();
@@ -102,11 +117,22 @@ impl Exact {
         self.seen.len() / self.width
     }
 
+    /// Whether anything is asked about a pixel: not where there is a surface that the sensor of a sweep does not see.
+    pub fn is_asked(&self, pixel: usize) -> bool {
+        self.seen[pixel].is_none_or(|seen| seen.swept != Some(false))
+    }
+
     /// Whether a point shown is one of a sampled surface. An outlier is none, but should not be seen.
     pub fn is_sampled(&self, shown: &Shown, subject: &Subject) -> bool {
-        let clean = &subject.clean;
-        let widest = WIDEST_SPACING_PX * self.rays.pixel_size(shown.depth);
-        subject.is_outlier(shown.point) || spacing(&clean.around(clean.position(shown.point))) <= widest
+        if subject.is_outlier(shown.point) {
+            return true;
+        }
+        let place = subject.clean.position(shown.point);
+        let spacing = match &subject.recipe.sweep {
+            Some(sweep) => sweep.gap(&subject.surface, place),
+            None => spacing(&subject.clean.around(place)),
+        };
+        spacing <= WIDEST_SPACING_PX * self.rays.pixel_size(shown.depth)
     }
 
     /// The true surface at the pixels of the picture that lie at most `reach` pixels from `index` in x and in y.

@@ -1,10 +1,10 @@
 //! Pictures held against the exact surface.
 //!
 //! # How it works
-//! A *case* is a subject and a view of it ([`case`]). A subject is a surface that is known exactly, and points on it as good
-//! or as bad as scanners make them ([`subject`]). One ray per pixel centre tells what is truly there ([`exact`]). Several
-//! methods draw the points ([`method`]); each picture is judged pixel by pixel ([`verdict`]), lit like the truth
-//! ([`light`]), and measured ([`measure`]).
+//! A *case* is a subject and a view of it ([`case`]). A subject is a surface that is known exactly, and points on it as
+//! good or as bad as scanners make them ([`subject`]), strewn or in the rings of a spinning lidar ([`sweep`]). One ray per
+//! pixel centre tells what is truly there ([`exact`]). Several methods draw the points ([`method`]); each picture is judged
+//! pixel by pixel ([`verdict`]), lit like the truth ([`light`]), and measured ([`measure`]).
 
 pub mod case;
 pub mod exact;
@@ -22,6 +22,7 @@ pub mod run;
 pub mod sheet;
 pub mod subject;
 pub mod surface;
+pub mod sweep;
 pub mod table;
 pub mod target;
 pub mod verdict;

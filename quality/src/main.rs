@@ -129,6 +129,13 @@ fn print(outcome: &Outcome) {
             measures.flip
         );
     }
+    for (method, measures) in &outcome.measures {
+        if let Some(swept) = measures.swept {
+            let [seen, closed, right, over] = [swept.seen, swept.closed, swept.right, swept.over].map(|s| 100.0 * s);
+            let name = method.name();
+            println!("    swept {seen:.1} %, {name:<12} closed {closed:6.2}, right {right:6.2}, over {over:6.2}");
+        }
+    }
     let best = |value: fn(&Angles) -> f64| {
         let k = outcome.best_fit(value).map_or(0, |(k, _)| k);
         format!("{:.3} of k = {k}", ratio(outcome, value).unwrap_or(f64::NAN))

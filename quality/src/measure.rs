@@ -1,13 +1,14 @@
 //! The numbers of one picture.
 
-use crate::exact::Exact;
+use crate::exact::{Exact, Seen};
 use crate::flip::Flip;
 use crate::light::{Lit, either, psnr};
-use crate::picture::Picture;
+use crate::picture::{Picture, Shown};
 use crate::subject::Subject;
 use crate::verdict::{Cover, Verdicts};
 
-/// Angles in degrees between the normals shown and the true ones, 0 to 180, where both pictures show a surface.
+/// Angles in degrees between the normals shown and the true ones, 0 to 180, where both pictures show a surface and something
+/// is asked about it.
 #[derive(Clone, Copy, Debug)]
 pub struct Angles {
     /// Mean.
@@ -26,16 +27,33 @@ pub struct Angles {
     pub band: f64,
 }
 
+/// How much of what a spinning lidar sees is there, where it should be and nowhere else. What it does not see, in shadow or
+/// out of its beams' reach, may be there or not.
+#[derive(Clone, Copy, Debug)]
+pub struct Swept {
+    /// Share of the true surface that the sensor sees.
+    pub seen: f64,
+    /// Of that, what is covered.
+    pub closed: f64,
+    /// Of that, what is covered by a surface not farther from the true one than rings are apart.
+    pub right: f64,
+    /// Pixels covered where nothing is, or well before what the sensor does not see, over those that it sees.
+    pub over: f64,
+}
+
 /// The numbers of one picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Measures {
     /// How much is where it should be.
     pub cover: Cover,
+    /// The same between the rings of a sweep; nothing for points that are not swept.
+    pub swept: Option<Swept>,
     /// Errors of normals; nothing for a method that knows none.
     pub angles: Option<Angles>,
-    /// Mean error in depth, in pixels at that depth, where both pictures show a surface.
+    /// Mean error in depth, in pixels at that depth, over the same.
     pub depth_px: f64,
-    /// Of the lit picture with the lit truth, decibels, over the pixels that either covers.
+    /// Of the lit picture with the lit truth, decibels, over the pixels that either covers and about which something is
+    /// asked.
     pub psnr: f64,
     /// Mean FLIP error of the same over the same.
     pub flip: f64,
@@ -63,18 +81,24 @@ impl Truth {
     pub fn measure(&self, picture: &Picture, lit: &Lit, subject: &Subject) -> Measures {
         Measures {
             cover: Verdicts::new(&self.exact, picture, subject).cover(),
+            swept: swept(&self.exact, picture),
             angles: angles(&self.exact, &self.band, picture),
             depth_px: depth_px(&self.exact, picture),
-            psnr: psnr(lit, &self.lit),
+            psnr: psnr(lit, &self.lit, self.compared(lit)),
             flip: self.flip(lit),
         }
     }
 
-    /// Mean FLIP error over the pixels that either picture covers.
+    /// The pixels that either picture covers, but for those that nothing is asked about.
+    fn compared<'a>(&'a self, lit: &'a Lit) -> impl Iterator<Item = usize> + 'a {
+        either(lit, &self.lit).filter(|&pixel| self.exact.is_asked(pixel))
+    }
+
+    /// Mean FLIP error over those.
     fn flip(&self, lit: &Lit) -> f64 {
         let errors = self.flip.errors(&lit.flat());
         let mut mean = Mean::default();
-        either(lit, &self.lit).for_each(|pixel| mean.add(errors[pixel]));
+        self.compared(lit).for_each(|pixel| mean.add(errors[pixel]));
         mean.value()
     }
 }
@@ -88,7 +112,8 @@ pub fn angle(exact: &Exact, picture: &Picture, pixel: usize) -> Option<f64> {
 }
 
 fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
-    let each = (0..band.len()).filter_map(|pixel| Some((angle(exact, picture, pixel)?, band[pixel])));
+    let asked = (0..band.len()).filter(|&pixel| exact.is_asked(pixel));
+    let each = asked.filter_map(|pixel| Some((angle(exact, picture, pixel)?, band[pixel])));
     let mut near = Mean::default();
     let mut all: Vec<f64> = Vec::new();
     for (angle, in_band) in each {
@@ -111,10 +136,33 @@ fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
     })
 }
 
+fn swept(exact: &Exact, picture: &Picture) -> Option<Swept> {
+    let both = || exact.seen.iter().zip(&picture.shown);
+    let here =
+        || both().filter_map(|(seen, shown)| seen.filter(|seen| seen.swept == Some(true)).map(|seen| (seen, shown)));
+    let count = here().count() as f64;
+    let closed = here().filter(|(_, shown)| shown.is_some()).count() as f64;
+    let is_right = |seen: &Seen, shown: &Shown| (shown.depth - seen.depth).abs() <= seen.tolerance;
+    let right = here().filter(|(seen, shown)| shown.is_some_and(|shown| is_right(seen, &shown))).count() as f64;
+    // What is not seen lies in shadow; nothing hangs before it, between what casts the shadow and what it falls on.
+    let is_over = |seen: &Option<Seen>, shown: &Shown| match seen {
+        None => true,
+        Some(seen) => seen.swept == Some(false) && shown.depth < seen.depth - seen.tolerance,
+    };
+    let over = both().filter(|(seen, shown)| shown.is_some_and(|shown| is_over(seen, &shown))).count() as f64;
+    let surface = exact.seen.iter().flatten().count() as f64;
+    (count > 0.0).then(|| Swept {
+        seen: count / surface,
+        closed: closed / count,
+        right: right / count,
+        over: over / count,
+    })
+}
+
 fn depth_px(exact: &Exact, picture: &Picture) -> f64 {
     let mut mean = Mean::default();
-    for (seen, shown) in exact.seen.iter().zip(&picture.shown) {
-        if let (Some(seen), Some(shown)) = (seen, shown) {
+    for pixel in (0..exact.seen.len()).filter(|&pixel| exact.is_asked(pixel)) {
+        if let (Some(seen), Some(shown)) = (&exact.seen[pixel], &picture.shown[pixel]) {
             mean.add((shown.depth - seen.depth).abs() / exact.rays.pixel_size(seen.depth));
         }
     }

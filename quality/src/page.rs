@@ -1,6 +1,6 @@
 //! `docs/QUALITY.md`, from outcomes alone.
 
-use crate::measure::Measures;
+use crate::measure::{Measures, Swept};
 use crate::method::{FIT_KS, Method};
 use crate::run::Outcome;
 use crate::table::{Table, number, percent};
@@ -19,7 +19,10 @@ a sphere with bumps (`bumpy`), and meshes made smooth by Loop subdivision, with 
 Gaussian, the same in all directions; its standard deviation is given in percent of the diagonal of the points' box. \
 `outliers` lie anywhere in the box, as many percent of the points. `scans` are two, every other point belongs to the \
 second, which is shifted by so many percent of the diagonal and turned by 0.1°. `uneven` has dense and sparse patches, \
-`striped` dense and sparse stripes, `gradient` a density that falls to a twentieth.
+`striped` dense and sparse stripes, `gradient` a density that falls to a twentieth. Subjects named like `64x2048` are \
+swept: their points are where the rays of a spinning lidar meet the surface, so many beams at constant steps of elevation \
+and so many steps in a turn, dense along rings and far apart from ring to ring; their `noise` is along the ray, its \
+standard deviation in metres.
 
 One ray through the centre of each pixel tells what is truly there. These ways to draw the points are compared:
 
@@ -34,11 +37,24 @@ Errors of normals are angles to the true normal, over all pixels that both pictu
 pixels of a silhouette, *flipped* the share above 90°. *Holes* are empty pixels at least two pixels inside the true \
 silhouette, *leaks* pixels that show something behind the surface and all that is seen beside it, *before* the same in \
 front of it, *IoU* is the covered pixels' intersection over union, *wider* the pixels by which the silhouette is too wide: \
-all five only where points lie at most 1.5 pixels apart (*sampled*), and left out if that is hardly anywhere. *Depth* is \
-the mean error in depth in pixels. PSNR and FLIP compare pictures lit by the same lights in plain clay, over the pixels \
-that either covers. A moving camera goes around the subject in six steps of 0.7°; *change* is the mean difference of one \
+all five only where points lie at most 1.5 pixels apart (*sampled*), swept ones from ring to ring, and left out if that is \
+hardly anywhere. *Depth* is the mean error in depth in pixels. PSNR and FLIP compare pictures lit by the same lights in \
+plain clay, over the pixels that either covers. A moving camera goes around the subject in six steps of 0.7°; *change* is the mean difference of one \
 surface point between two pictures after one another, which in the true ones comes from light that goes with the camera, \
 and from pixels.
+
+";
+
+const SWEPT: &str = "\
+## Swept points
+
+Percent of pixels. *Seen* is the share of the surface that the lidar sees: between its lowest and its highest beam, with \
+nothing in the way, struck at less than 87°. Of that, *closed* is what is covered, by whatever it may be, and *right* what \
+is covered by a surface that is no farther from the true one, in depth, than rings are apart there. *Over* are pixels \
+covered though nothing is there, or what is there is not seen by the lidar and lies behind by more than a hundredth of the \
+diagonal, as a share of those seen: closing gaps must not close what is open. Past the last ring on something no point tells \
+where it ends, so not all of it can be closed. Nothing else is asked about what the lidar does not see, here and in all \
+tables but that of motion.
 
 ";
 
@@ -64,6 +80,7 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         &normals(outcomes),
         "## Surface\n\nPercent of pixels; p is the paper's.\n\n",
         &cover(outcomes),
+        &swept(outcomes),
         "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels. The best fit is the one with the best \
          normals.\n\n",
         &lit(outcomes),
@@ -126,21 +143,24 @@ fn summary(outcomes: &[Outcome]) -> String {
         "paper",
         "dots",
     ]);
-    let group = |outcome: &Outcome| (outcome.case.recipe.surface_name(), outcome.case.recipe.is_noisy());
+    let group = |outcome: &Outcome| {
+        let recipe = outcome.case.recipe;
+        (recipe.surface_name(), recipe.sweep.is_some(), recipe.is_noisy())
+    };
     let mut groups: Vec<_> = Vec::new();
     for outcome in outcomes {
         if !groups.contains(&group(outcome)) {
             groups.push(group(outcome));
         }
     }
-    for (name, noisy) in groups {
-        let members: Vec<_> = outcomes.iter().filter(|outcome| group(outcome) == (name, noisy)).collect();
+    for (name, swept, noisy) in groups {
+        let members: Vec<_> = outcomes.iter().filter(|outcome| group(outcome) == (name, swept, noisy)).collect();
         let average = |value: &dyn Fn(&Outcome) -> f64, decimals| {
             number(members.iter().map(|outcome| value(outcome)).sum::<f64>() / members.len() as f64, decimals)
         };
         let [ours, paper, dots] = [Method::Ours, Method::Paper, Method::Dots];
         table.row(&[
-            if noisy { format!("{name}, noisy") } else { name.into() },
+            [name, if swept { ", swept" } else { "" }, if noisy { ", noisy" } else { "" }].concat(),
             members.len().to_string(),
             average(&|o| of(o, ours, mean), 2),
             average(&|o| of(o, paper, mean), 2),
@@ -234,6 +254,37 @@ fn cover(outcomes: &[Outcome]) -> String {
         table.row(&cells);
     }
     table.finish()
+}
+
+/// The section about swept points, if there are any.
+fn swept(outcomes: &[Outcome]) -> String {
+    let methods = [Method::Ours, Method::Paper, Method::Dots];
+    let mut table = Table::new(&[
+        "case",
+        "seen",
+        "closed: ours",
+        "paper",
+        "dots",
+        "right: ours",
+        "paper",
+        "dots",
+        "over: ours",
+        "paper",
+        "dots",
+    ]);
+    let mut is_any = false;
+    for outcome in outcomes {
+        let of = |method| outcome.of(method).and_then(|measures| measures.swept);
+        let Some(first) = of(Method::Ours) else { continue };
+        is_any = true;
+        let mut cells = vec![outcome.case.name(), percent(first.seen, 1)];
+        let values: [fn(&Swept) -> f64; 3] = [|swept| swept.closed, |swept| swept.right, |swept| swept.over];
+        for value in values {
+            cells.extend(methods.map(|method| percent(of(method).as_ref().map_or(f64::NAN, value), 2)));
+        }
+        table.row(&cells);
+    }
+    if is_any { [SWEPT, &table.finish()].concat() } else { String::new() }
 }
 
 fn lit(outcomes: &[Outcome]) -> String {

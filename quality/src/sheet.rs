@@ -94,6 +94,7 @@ impl Row {
             part.small(exact.width, |pixel| {
                 let color = match (exact.seen[pixel].is_some(), picture.shown[pixel].is_some()) {
                     (false, false) => NOTHING,
+                    (true, false) if !exact.is_asked(pixel) => NOTHING,
                     (true, false) => MISSING,
                     (false, true) => EXTRA,
                     (true, true) => error_color(angle(exact, picture, pixel).unwrap_or(180.0)),

@@ -2,8 +2,9 @@
 //!
 //! # How it works
 //! Meshes get points strewn evenly over their area. A density other than even strews more, and drops each with a
-//! probability that depends on its place. Then come, in this order: the misregistration of every other point, noise, and
-//! outliers behind all others. The points without the last three say where the surface counts as sampled.
+//! probability that depends on its place. Instead of being strewn, points can be what a spinning lidar sees of the
+//! surface. Then come, in this order: the misregistration of every other point, noise, and outliers behind all others. The
+//! points without the last three say where the surface counts as sampled; of a lidar its steps do.
 
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,7 @@ use crate::mesh::Mesh;
 use crate::neighbors::Neighbors;
 use crate::random::Random;
 use crate::surface::Surface;
+use crate::sweep::Sweep;
 
 /// Neighbours that say how densely a surface is sampled.
 const SPACING_K: NonZero<usize> = NonZero::new(10).expect("above 0");
@@ -65,15 +67,17 @@ pub enum Density {
     Gradient,
 }
 
-/// How to make a subject. Lengths are shares of the diagonal of the points' box.
+/// How to make a subject. Lengths are shares of the diagonal of the points' box, but for those of a sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
     /// The surface.
     pub source: Source,
-    /// Points on the surface, nearly; outliers come on top.
+    /// Points on the surface, nearly, or the rays of a sweep, of which many may miss it; outliers come on top.
     pub count: usize,
-    /// How densely they lie.
+    /// How densely they lie, unless swept.
     pub density: Density,
+    /// The lidar that sees them, if they are not strewn. It has its own noise.
+    pub sweep: Option<Sweep>,
     /// Standard deviation of noise, the same in each of three directions.
     pub noise: f64,
     /// Outliers, as a share of the points, evenly in the box.
@@ -85,7 +89,12 @@ pub struct Recipe {
 impl Recipe {
     /// Clean, even points.
     pub const fn new(source: Source, count: usize) -> Self {
-        Self { source, count, density: Density::Even, noise: 0.0, outliers: 0.0, misregistration: 0.0 }
+        Self { source, count, density: Density::Even, sweep: None, noise: 0.0, outliers: 0.0, misregistration: 0.0 }
+    }
+
+    /// What a spinning lidar sees.
+    pub const fn swept(source: Source, sweep: Sweep) -> Self {
+        Self { sweep: Some(sweep), ..Self::new(source, sweep.count()) }
     }
 
     /// The same with another density.
@@ -110,7 +119,8 @@ impl Recipe {
 
     /// Whether points lie elsewhere than on the surface.
     pub fn is_noisy(&self) -> bool {
-        self.noise > 0.0 || self.outliers > 0.0 || self.misregistration > 0.0
+        let range_noise = self.sweep.map_or(0.0, |sweep| sweep.noise);
+        self.noise > 0.0 || range_noise > 0.0 || self.outliers > 0.0 || self.misregistration > 0.0
     }
 
     /// What the surface is called.
@@ -124,9 +134,17 @@ impl Recipe {
     /// A short name for everything.
     pub fn name(&self) -> String {
         let thousands = self.count / 1000;
-        let count =
-            if thousands.is_multiple_of(1000) { format!("{}M", thousands / 1000) } else { format!("{thousands}K") };
+        let count = match self.sweep {
+            Some(Sweep { beams, azimuths, .. }) => format!("{beams}x{azimuths}"),
+            None if thousands.is_multiple_of(1000) => format!("{}M", thousands / 1000),
+            None => format!("{thousands}K"),
+        };
         let mut name = format!("{}:{count}", self.surface_name());
+        if let Some(Sweep { noise, .. }) = self.sweep
+            && noise > 0.0
+        {
+            name += &format!("-noise{noise}m");
+        }
         if self.density != Density::Even {
             name += &format!("-{:?}", self.density).to_lowercase();
         }
@@ -189,7 +207,10 @@ impl Subject {
             let is_second = recipe.misregistration > 0.0 && i % 2 == 1;
             let point = if is_second { middle + turn * (point - middle) + shift } else { point };
             let noise = if recipe.noise > 0.0 { Random::new(1, i).gauss3() } else { DVec3::ZERO };
-            (point + noise * (recipe.noise * diagonal)).as_vec3().to_array()
+            let along = recipe.sweep.filter(|sweep| sweep.noise > 0.0).map_or(DVec3::ZERO, |sweep| {
+                (point - sweep.origin()).normalize() * (sweep.noise * Random::new(4, i).gauss())
+            });
+            (point + along + noise * (recipe.noise * diagonal)).as_vec3().to_array()
         };
         let mut positions: Vec<_> = clean.iter().enumerate().map(place).collect();
         let outliers = (recipe.outliers * clean.len() as f64) as usize;
@@ -208,7 +229,7 @@ impl Subject {
             surface,
             cloud: with_axes(PointCloud::new(even.origin(), positions)),
             clean: Neighbors::new(&even, SPACING_K),
-            blur: NEARLY_ALL * recipe.noise * diagonal + misplaced,
+            blur: NEARLY_ALL * (recipe.noise * diagonal + recipe.sweep.map_or(0.0, |sweep| sweep.noise)) + misplaced,
             diagonal,
         })
     }
@@ -224,6 +245,9 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
     let mesh = match recipe.source {
         Source::Scene(name) => {
             let (scene, _) = Scene::parse(name)?;
+            if let Some(sweep) = recipe.sweep {
+                return Ok(swept(Surface::Scene(scene), sweep, Axes::ZUp));
+            }
             let cloud = scene.sample(recipe.count, &|_| true)?;
             // Without colours: light shows the shape.
             let plain = PointCloud::new(cloud.origin(), cloud.positions().to_vec()).with_axes(Axes::ZUp);
@@ -232,10 +256,13 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
         Source::Bumpy(levels) => Mesh::bumpy_sphere(levels),
         Source::Mesh { path, levels, .. } => Mesh::read(&data_folder().join(path), levels)?,
     };
+    let axes = if matches!(recipe.source, Source::Bumpy(_)) { Axes::ZUp } else { Axes::YUp };
+    if let Some(sweep) = recipe.sweep {
+        return Ok(swept(Surface::Mesh(Arc::new(mesh)), sweep, axes));
+    }
     let contents = mesh.contents();
     let (low, high) = bounds(contents.cloud.positions());
     let keep = |p: &[f32; 3]| kept(recipe.density, (DVec3::from(p.map(f64::from)) - low) / (high - low));
-    let axes = if matches!(recipe.source, Source::Bumpy(_)) { Axes::ZUp } else { Axes::YUp };
     let sample = |count, seed| sample_surface(&contents, count, seed, &()).context("strewing points");
     let cloud = if recipe.density == Density::Even {
         sample(recipe.count, 1)?
@@ -248,6 +275,12 @@ fn strew(recipe: &Recipe) -> Result<(Surface, PointCloud)> {
         PointCloud::new(many.origin(), left.collect())
     };
     Ok((Surface::Mesh(Arc::new(mesh)), cloud.with_axes(axes)))
+}
+
+/// The surface and what a lidar sees of it.
+fn swept(surface: Surface, sweep: Sweep, axes: Axes) -> (Surface, PointCloud) {
+    let points = sweep.points(&surface).iter().map(|point| point.as_vec3().to_array()).collect();
+    (surface, PointCloud::new(DVec3::ZERO, points).with_axes(axes))
 }
 
 /// Probability that a point at `at`, 0 to 1 along each side of the box, is kept.

@@ -95,6 +95,7 @@ fn change(outcome: &Outcome, value: fn(&Change) -> f64) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::case::quick;
+    use crate::measure::Swept;
     use crate::page::page;
     use crate::run::Motion;
     use crate::verdict::Cover;
@@ -106,7 +107,7 @@ mod tests {
         let measures = |mean: f64, psnr| {
             let angles =
                 Angles { mean, median: mean, rms: mean, below_5: 1.0, below_10: 1.0, flipped: 0.0, band: mean };
-            Measures { cover, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
+            Measures { cover, swept: None, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
         };
         let dots = Measures { angles: None, ..measures(0.0, 20.0) };
         let methods = vec![
@@ -141,5 +142,14 @@ mod tests {
         let line = page.lines().find(|line| line.contains(TARGETS[0].what)).expect("a line for each target");
         assert!(line.contains("| 1 of 2 | 2.000 |") && line.ends_with("missed |"), "{line}");
         assert!(page.contains("![figure](quality/figure.png)") && !page.contains("NaN"), "{page}");
+        assert!(!page.contains("## Swept points"), "no section about what there is none of");
+    }
+
+    #[test]
+    fn the_page_tells_what_is_closed() {
+        let mut outcome = outcome(1.0, 1.0, 30.0);
+        outcome.measures[0].1.swept = Some(Swept { seen: 0.5, closed: 0.875, right: 0.75, over: 0.125 });
+        let page = page(&[outcome], &[]);
+        assert!(page.contains("| 50.0 | 87.50 | – | – | 75.00 | – | – | 12.50 | – | – |"), "{page}");
     }
 }

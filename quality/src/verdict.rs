@@ -45,7 +45,7 @@ pub struct Verdicts {
     inside: usize,
     /// Sampled pixels at its edge.
     edge: usize,
-    /// Median over the surface.
+    /// Median over the surface, where there are points.
     spacing_px: f64,
     /// Share of the surface that is sampled.
     sampled: f64,
@@ -55,7 +55,7 @@ pub struct Verdicts {
 /// are too few of those.
 #[derive(Clone, Copy, Debug)]
 pub struct Cover {
-    /// Median distance of points on the surface seen.
+    /// Median distance of points on the surface seen; of swept ones where the sensor sees it.
     pub spacing_px: f64,
     /// Share of the true surface that is sampled; the rest is left out of all that follows.
     pub sampled: f64,
@@ -86,13 +86,13 @@ impl Verdicts {
         let sampled = |pixel: usize| exact.seen[pixel].is_some_and(|seen| seen.sampled);
         let pixels = 0..exact.seen.len();
         let surfaces = exact.seen.iter().flatten();
-        let mut spacings: Vec<_> = surfaces.clone().map(|seen| seen.spacing_px).collect();
+        let mut spacings: Vec<_> = surfaces.clone().map(|seen| seen.spacing_px).filter(|px| px.is_finite()).collect();
         spacings.sort_unstable_by(f64::total_cmp);
         Self {
             verdicts: pixels.clone().into_par_iter().map(judge).collect(),
             inside: pixels.clone().filter(|&pixel| sampled(pixel) && inside(exact, pixel)).count(),
             edge: pixels.filter(|&pixel| sampled(pixel) && exact.around(pixel, 1).any(|near| near.is_none())).count(),
-            sampled: surfaces.filter(|seen| seen.sampled).count() as f64 / spacings.len() as f64,
+            sampled: surfaces.clone().filter(|seen| seen.sampled).count() as f64 / surfaces.count() as f64,
             spacing_px: spacings.get(spacings.len() / 2).copied().unwrap_or(f64::INFINITY),
         }
     }

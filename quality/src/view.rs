@@ -9,6 +9,8 @@ use crate::surface::Surface;
 
 /// Vertical angle of view, degrees.
 const FOV_DEGREES: f64 = 40.0;
+/// The same behind a sensor.
+const BEHIND_FOV_DEGREES: f64 = 52.0;
 /// Places tried to be near to.
 const NEAR_STEPS: u32 = 40;
 
@@ -27,6 +29,8 @@ pub enum Shot {
     Near(ViewDirection, [f64; 2], f64),
     /// From a place, to a place, with an angle of view in degrees.
     From([f64; 3], [f64; 3], f64),
+    /// From so far behind the sensor of a sweep and above it, to a place.
+    Behind([f64; 2], [f64; 3]),
 }
 
 impl Shot {
@@ -39,13 +43,15 @@ impl Shot {
             Self::Far(..) => "far".into(),
             Self::Near(..) => "near".into(),
             Self::From(..) => "inside".into(),
+            Self::Behind(..) => "behind".into(),
         }
     }
 
     /// The camera for a picture of `size` pixels.
     ///
     /// # Errors
-    /// A scene's own view asked of something that is none, a place to be near to where nothing is.
+    /// A scene's own view asked of something that is none, a place to be near to where nothing is, a sensor to be
+    /// behind where there is none.
     pub fn camera(&self, subject: &Subject, size: [u32; 2]) -> Result<Camera> {
         let fit = |direction, projection| {
             let aspect = f64::from(size[0]) / f64::from(size[1]);
@@ -83,6 +89,13 @@ impl Shot {
             Self::From(eye, look_at, fov) => {
                 let projection = Projection::PerspectiveFovDeg(fov);
                 Camera { eye: eye.into(), look_at: look_at.into(), up: DVec3::Z, projection }
+            }
+            Self::Behind([back, above], look_at) => {
+                let sensor = subject.recipe.sweep.context("no sensor to be behind")?.origin();
+                let ahead = (DVec3::from(look_at) - sensor).with_z(0.0).normalize();
+                let eye = sensor - ahead * back + DVec3::Z * above;
+                let projection = Projection::PerspectiveFovDeg(BEHIND_FOV_DEGREES);
+                Camera { eye, look_at: look_at.into(), up: DVec3::Z, projection }
             }
         })
     }
