@@ -188,7 +188,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let noise = max(known.noise, noise_at(surfel.center.z));
     if is_row(surfel, known.noise) {
         let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
-        surfels[first_of_round + index] = turned(surfel, radius, noise);
+        surfels[first_of_round + index] = turned(surfel, radius);
         return;
     }
     surfels[first_of_round + index].major_ratio = min(surfel.major_ratio, frame.longest);

@@ -8,7 +8,10 @@ use super::cpu::{
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
-use super::rows::{APART_FROM, AREA, AREA_BESIDE, BESIDE, FARTHEST_REACH, FLAT, HALVES, LEAVES, REACH, ROW, THIN_ROW};
+use super::rows::{
+    APART_FROM, AREA, AREA_BESIDE, AREA_BEYOND, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, LEAVES, OFF_AREA, REACH,
+    ROW, SEEN_THROUGH, THIN_ROW,
+};
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::Error;
@@ -195,11 +198,15 @@ impl AdaptPasses {
         ];
         let rows = [
             ("AREA", AREA.into()),
+            ("AREA_BEYOND", AREA_BEYOND.into()),
             ("AREA_BESIDE", AREA_BESIDE.into()),
+            ("BEYOND", BEYOND.into()),
             ("BESIDE", BESIDE.into()),
             ("HALVES", HALVES.into()),
             ("FLAT", FLAT.into()),
             ("LEAVES", LEAVES.into()),
+            ("OFF_AREA", OFF_AREA.into()),
+            ("SEEN_THROUGH", SEEN_THROUGH.into()),
             ("APART_FROM", APART_FROM.into()),
             ("EVEN_WEIGHT", EVEN_WEIGHT.into()),
             ("REACH", REACH.into()),

@@ -19,13 +19,13 @@ use crate::fit::{LONGEST, Surfel};
 
 /// A neighbourhood is a row if its variance along is this many times that across. Of ten neighbours strewn evenly, one
 /// in thousands is.
-pub(super) const ROW: f32 = 16.0;
+pub(super) const ROW: f32 = 12.0;
 /// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
 pub(super) const AREA: f32 = 0.25;
 /// and if there is more of it: of a ball so many times as wide
 pub(super) const BEYOND: f32 = STEP * STEP;
 /// this part, which three wires side by side do not reach,
-pub(super) const AREA_BEYOND: f32 = 0.35;
+pub(super) const AREA_BEYOND: f32 = 0.3;
 /// or, of what is on one side of the row, this.
 pub(super) const AREA_BESIDE: f32 = 0.2;
 /// Of the points on one side, those of the row itself count, to this distance on the other side; radii.
@@ -37,7 +37,7 @@ pub(super) const OFF_AREA: f32 = 0.15;
 /// An area is none where this share of its cells shows what is behind it and nothing of it.
 pub(super) const SEEN_THROUGH: f32 = 0.3;
 /// An area is flat if the variance of heights is at most this part of that across.
-pub(super) const FLAT: f32 = 0.06;
+pub(super) const FLAT: f32 = 0.1;
 /// Sine of the most that the row leaves the area's plane.
 pub(super) const LEAVES: f32 = 0.25;
 /// Most that the point is above or below the area, radii: more is a row in front of one.

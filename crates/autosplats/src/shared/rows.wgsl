@@ -5,11 +5,15 @@
 #import surfel
 
 override AREA: f32;
+override AREA_BEYOND: f32;
 override AREA_BESIDE: f32;
+override BEYOND: f32;
 override BESIDE: f32;
 override HALVES: f32;
 override FLAT: f32;
 override LEAVES: f32;
+override OFF_AREA: f32;
+override SEEN_THROUGH: f32;
 override APART_FROM: f32;
 override EVEN_WEIGHT: f32;
 override REACH: f32;
@@ -29,19 +33,26 @@ fn is_flat(plane: Plane, row: vec3f) -> bool {
     return is_thin && abs(dot(plane.axis, row)) <= LEAVES && abs(plane.height) <= APART_FROM;
 }
 
+// Whether a plane was fitted to something as wide as this part of its length, by variances.
+fn is_area(plane: Plane, least: f32) -> bool {
+    return plane.len >= LEAST_CLUSTERS && plane.variances.y >= least * plane.variances.z;
+}
+
 // Of the areas on the two sides of a `row`, the flatter.
 fn area_beside(ball: Ball, row: vec3f) -> Area {
+    let beyond = ball_around(ball.center, BEYOND * ball.radius);
     let across_eye = cross(row, select(vec3f(0.0, 0.0, 1.0), ball.center, frame.perspective == 1u));
     let length_squared = dot(across_eye, across_eye);
     var side = select(vec3f(0.0), across_eye * inverseSqrt(length_squared), length_squared > 0.0);
     var found = Area(Plane(), 0.0);
     for (var index = 0; index < 2; index++) {
         let plane = plane_beside(ball, side, -BESIDE);
-        let is_area = plane.len >= LEAST_CLUSTERS && plane.variances.y >= AREA_BESIDE * plane.variances.z;
         let bend = plane.variances.x * found.plane.variances.y;
         let is_flatter = found.radius == 0.0 || bend < found.plane.variances.x * plane.variances.y;
-        if is_area && is_flat(plane, row) && is_flatter {
-            found = Area(plane, ball.radius);
+        if plane.len >= LEAST_CLUSTERS && is_flat(plane, row) && is_flatter {
+            if is_area(plane_beside(beyond, side, -BESIDE), AREA_BESIDE) {
+                found = Area(plane, ball.radius);
+            }
         }
         side = -side;
     }
@@ -50,36 +61,66 @@ fn area_beside(ball: Ball, row: vec3f) -> Area {
     return found;
 }
 
+// Whether what is behind a ball's disc square to `axis` shows through it.
+fn is_seen_through(ball: Ball, axis: vec3f) -> bool {
+    let of_plane = dot(axis, ball.center);
+    var on = 0u;
+    var through = 0u;
+    for (var row = ball.low.y; row <= ball.high.y; row++) {
+        let cells = ball.level.first + row * ball.level.columns;
+        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
+            var is_on = false;
+            var is_behind = false;
+            for (var slab = 0u; slab < SLABS; slab++) {
+                let cluster = clusters[cell * SLABS + slab];
+                if cluster.w == 0.0 {
+                    break;
+                }
+                let off = of_plane - dot(axis, cluster.xyz);
+                // Where the line of sight meets the plane.
+                let along = select(vec3f(0.0, 0.0, 1.0), cluster.xyz, frame.perspective == 1u);
+                let way = off / dot(axis, along);
+                let apart = cluster.xyz + along * way - ball.center;
+                if dot(apart, apart) < ball.radius * ball.radius {
+                    is_on |= abs(off) <= OFF_AREA * ball.radius;
+                    is_behind |= way < 0.0;
+                }
+            }
+            on += select(0u, 1u, is_on);
+            through += select(0u, 1u, is_behind && !is_on);
+        }
+    }
+    return f32(through) > SEEN_THROUGH * f32(through + on);
+}
+
 // The first ball around `center` that holds an area with the `row` in it.
-fn area(center: vec3f, row: vec3f, least_radius: f32, noise: f32) -> Area {
+fn area(center: vec3f, row: vec3f, least_radius: f32) -> Area {
     var radius = least_radius;
     var found = Area(Plane(), 0.0);
     for (var scale = 0u; scale < SCALES; scale++) {
         radius *= STEP;
         let ball = ball_around(center, radius);
         let plane = plane_of(ball);
-        if plane.len < LEAST_CLUSTERS || plane.variances.y < AREA * plane.variances.z {
+        if !is_area(plane, AREA) {
             continue;
         }
-        if !is_flat(plane, row) {
-            if found.radius == 0.0 {
-                found = area_beside(ball, row);
-            }
-            break;
+        if is_flat(plane, row) && is_area(plane_of(ball_around(center, BEYOND * radius)), AREA_BEYOND) {
+            found = Area(plane, radius);
+        } else {
+            found = area_beside(ball, row);
         }
-        found = Area(plane, radius);
-        let enough = ENOUGH * radius;
-        if noise * noise <= enough * enough * plane.weight * plane.variances.y {
-            break;
+        if found.radius > 0.0 && is_seen_through(ball, found.plane.axis) {
+            found.radius = 0.0;
         }
+        break;
     }
     return found;
 }
 
 // A surfel of a row, turned to its area.
-fn turned(surfel: Surfel, least_radius: f32, noise: f32) -> Surfel {
+fn turned(surfel: Surfel, least_radius: f32) -> Surfel {
     var out = surfel;
-    let found = area(surfel.center, surfel.major_axis, least_radius, noise);
+    let found = area(surfel.center, surfel.major_axis, least_radius);
     if found.radius == 0.0 {
         out.radius = surfel.radius * THIN_ROW;
         out.major_ratio = 1.0 / THIN_ROW;
