@@ -157,7 +157,8 @@ pub(crate) fn receding(count: usize, sigma: f32) -> Positions {
     let forward = eye / eye.z;
     let mut random = Random::new(12);
     let mut point = || {
-        let depth = 4.0 + 8.0 * random.unit();
+        // As far apart as scanned.
+        let depth = 4.0 * 3f32.powf(random.unit());
         let [x, y] = [0.25 * depth * random.signed(), 0.8 - 0.4 * (depth - 4.0)];
         let point = [eye.x + forward.x * depth + x, eye.y + forward.y * depth + y, eye.z + depth];
         point.map(|c| c + sigma * depth * depth * random.gaussian())

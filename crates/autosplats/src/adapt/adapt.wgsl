@@ -184,8 +184,8 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         return;
     }
     let surfel = surfels[first_of_round + index];
-    let known = known_beyond(noise_at(surfel.center.z), surfel.center, surfel.source);
-    let noise = max(known.noise, noise_at(surfel.center.z));
+    let known = known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source);
+    let noise = max(known.noise, noise_at(surfel.k_radius));
     if is_row(surfel, known.noise) {
         let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
         surfels[first_of_round + index] = turned(surfel, radius);

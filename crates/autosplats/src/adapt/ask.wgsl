@@ -33,7 +33,7 @@ fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
         return;
     }
     let surfel = surfels[select(0u, counters[ACTIVE], ROUND == 1u) + index];
-    let measured_noise = noise_at(surfel.center.z);
+    let measured_noise = noise_at(surfel.k_radius);
     let known = known_beyond(measured_noise, surfel.center, surfel.source);
     let noise = max(measured_noise, known.noise);
     if !is_row(surfel, known.noise) && calls(surfel, noise, good_enough(noise, surfel.k_radius, surfel.center.z)) {

@@ -115,7 +115,7 @@ impl Adapter {
                 sheets.ask(surfel, cells, view);
             });
         });
-        sheets.fit(cells, &|place, point| task.noise(place, point).0, view);
+        sheets.fit(cells, &|place, k_radius, point| task.noise(place, k_radius, point).0, view);
         let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
             adapt_all(surfels, &task, sheets, gathered);
@@ -150,10 +150,10 @@ struct Noisy {
 }
 
 impl Task<'_> {
-    /// Noise at a place in view space, of a cloud's point: the larger of what was measured and what is known.
+    /// Noise at a place in view space, of a cloud's point with a k-radius: the larger of what was measured and what is known.
     #[inline(always)]
-    fn noise(&self, place: Vec3, point: u32) -> (f32, Option<Known>) {
-        let measured = self.usual.noise.at(place.z);
+    fn noise(&self, place: Vec3, k_radius: f32, point: u32) -> (f32, Option<Known>) {
+        let measured = self.usual.noise.at(k_radius);
         let known = self.known.at(place, point).filter(|known| known.noise > measured);
         (known.map_or(measured, |known| known.noise), known)
     }
@@ -161,7 +161,7 @@ impl Task<'_> {
     #[inline(always)]
     fn call(&self, surfel: &Surfel) -> Call {
         // The first neighbourhood's error is about that of its k points over the k-radius.
-        let (noise, known) = self.noise(surfel.center.into(), surfel.source);
+        let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
         let enough = good_enough(noise, surfel.k_radius, surfel.center[2], self.view);
         if surfel.radius == 0.0 {
             Call::Nothing

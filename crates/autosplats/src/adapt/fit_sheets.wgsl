@@ -76,8 +76,8 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         }
         left[largest] = 0.0;
         let center = clusters[first + largest].xyz;
-        let noise = max(noise_at(center.z), known_at(center, around.point).noise);
         let radius = around.k_radius_px * pixel_size(center.z);
+        let noise = max(noise_at(radius), known_at(center, around.point).noise);
         let quadric = choose(center, radius, vec4f(-1.0), noise, good_enough(noise, radius, center.z));
         if quadric.len == 0u {
             continue;

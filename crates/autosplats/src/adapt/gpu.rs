@@ -36,8 +36,8 @@ const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgs
 
 /// Invocations in a workgroup of the passes.
 const GROUP: usize = 64;
-/// Quantiles: of scatters at each scale, of the nearest third of the sample, of the farthest, and of all; and of k-radii.
-const QUANTILES_TAKEN: usize = 3 * SCALES + 1;
+/// Quantiles: of scatters at each scale, of the densest third of the sample, of the sparsest, and of all.
+const QUANTILES_TAKEN: usize = 3 * SCALES;
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 
@@ -326,7 +326,7 @@ impl AdaptPasses {
             steps.extend([
                 self.sample.step(gpu, &[frame, counters, surfels, sampled], SAMPLE.div_ceil(GROUP) as u32),
                 self.scatter.step(gpu, &balls, (SCALES * SAMPLE).div_ceil(GROUP) as u32),
-                self.quantile.step(gpu, &[frame, surfels, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
+                self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }

@@ -14,7 +14,8 @@ use crate::project::DensityGrid;
 
 /// Surfels looked at.
 pub(crate) const SAMPLE: usize = 2048;
-/// The nearest and the farthest third of a sample tell how noise grows with depth if they are this far apart, far over near.
+/// The densest and the sparsest third of a sample tell how noise grows with the k-radius if k-radii are this much larger in
+/// the one than in the other.
 pub(super) const APART: f32 = 1.2;
 /// Surfels per task.
 const TASK: usize = 32;
@@ -43,39 +44,40 @@ pub(crate) struct Usual {
     pub(crate) sheet_level: usize,
 }
 
-/// Standard deviation of points from their surface: `factor`·depthᵖ, world units. Where it is more than half the distance of
+/// Standard deviation of points from their surface: `factor`·(k-radius)ᵖ, world units. What a scanner measures far away is
+/// sparser and has more noise. Where it is more than half the distance of
 /// points it is measured too large, three times at nearly three distances: clusters that noise puts into slabs of their own
 /// weigh like as many that it does not. Larger neighbourhoods than needed are the consequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {
     pub(crate) factor: f32,
-    /// p: 0 for noise that is the same everywhere; up to 2, as depth cameras have it.
+    /// p: 0 for noise that is the same everywhere; up to 2, as of depth cameras.
     pub(crate) power: f32,
 }
 
 impl Noise {
-    /// At a depth above 0.
+    /// Of points with a k-radius above 0.
     #[inline(always)]
-    pub(crate) fn at(&self, depth: f32) -> f32 {
-        if self.power == 0.0 { self.factor } else { self.factor * depth.powf(self.power) }
+    pub(crate) fn at(&self, k_radius: f32) -> f32 {
+        if self.power == 0.0 { self.factor } else { self.factor * k_radius.powf(self.power) }
     }
 
-    /// From a sample, nearest first.
+    /// From a sample, densest first.
     fn of(sample: &[Sampled]) -> Self {
-        let [near, far] = ends(sample);
-        let third = near.len();
-        if let ([.., last], [first, ..]) = (near, far)
-            && first.depth > APART * last.depth
+        let [dense, sparse] = ends(sample);
+        let third = dense.len();
+        if let ([.., last], [first, ..]) = (dense, sparse)
+            && first.surfel.k_radius > APART * last.surfel.k_radius
         {
-            let [near_depth, far_depth] = [near[third / 2].depth, far[third / 2].depth];
-            let [near_noise, far_noise] = [scatter_level(near), scatter_level(far)];
-            if near_noise > 0.0 && far_noise > near_noise {
-                let growth = (far_noise / near_noise).ln() / (far_depth / near_depth).ln();
-                // Little growth is chance, or other things further away.
+            let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius);
+            let [least, most] = [dense, sparse].map(scatter_level);
+            if least > 0.0 && most > least {
+                let growth = (most / least).ln() / (large / small).ln();
+                // Little growth is chance, or other things where points are sparse.
                 let power = (2.0 * (growth - 0.5)).clamp(0.0, 2.0);
                 if power > 0.0 {
-                    let [noise, depth] = [(near_noise * far_noise).sqrt(), (near_depth * far_depth).sqrt()];
-                    return Self { factor: noise / depth.powf(power), power };
+                    let [noise, k_radius] = [(least * most).sqrt(), (small * large).sqrt()];
+                    return Self { factor: noise / k_radius.powf(power), power };
                 }
             }
         }
@@ -90,25 +92,24 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
     let kept = surfels.iter().step_by(step).filter(|surfel| surfel.radius > 0.0);
     let of = |&surfel: &Surfel| {
         let radius = first_radius(&surfel, density, view, k);
-        Sampled { surfel, depth: surfel.center[2], radius, scatter: [None; SCALES] }
+        Sampled { surfel, radius, scatter: [None; SCALES] }
     };
     let mut sample: Vec<Sampled> = kept.map(of).collect();
-    sample.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    sample.sort_by(|a, b| a.surfel.k_radius.total_cmp(&b.surfel.k_radius));
     for scale in 0..SCALES {
         sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
             measure_scatter(sample, scale, &Task { cells, view }, gathered);
         });
         // What larger balls would say is not asked for then; most frames need the first alone.
-        let [near, far] = ends(&sample);
-        if [near, far, &sample].iter().all(|part| (0..=scale).any(|scale| tells_noise(part, scale).is_some())) {
+        let [dense, sparse] = ends(&sample);
+        if [dense, sparse, &sample].iter().all(|part| (0..=scale).any(|scale| tells_noise(part, scale).is_some())) {
             break;
         }
     }
     let noise = Noise::of(&sample);
-    let usual_noise = sample.get(sample.len() / 2).map_or(0.0, |middle| noise.at(middle.depth));
-    sample.sort_by(|a, b| a.surfel.k_radius.total_cmp(&b.surfel.k_radius));
-    let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { sample[sample.len() / 2].surfel.k_radius };
-    let sheet_level = SHEET_LEVELS[usize::from(usual_noise > THICK_NOISE * k_radius)];
+    let middle = sample.get(sample.len() / 2).map_or(0.0, |middle| middle.surfel.k_radius);
+    let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { middle };
+    let sheet_level = SHEET_LEVELS[usize::from(noise.at(middle) > THICK_NOISE * k_radius)];
     Usual { noise, k_radius, sheet_level }
 }
 
@@ -119,7 +120,7 @@ struct Task<'a> {
     view: &'a View,
 }
 
-/// The nearest and the farthest third of a sample.
+/// The densest and the sparsest third of a sample.
 fn ends(sample: &[Sampled]) -> [&[Sampled]; 2] {
     let third = sample.len() / 3;
     [&sample[..third], &sample[sample.len() - third..]]
@@ -129,7 +130,6 @@ fn ends(sample: &[Sampled]) -> [&[Sampled]; 2] {
 #[derive(Clone, Copy, Debug)]
 struct Sampled {
     surfel: Surfel,
-    depth: f32,
     /// Of the ball before the next.
     radius: f32,
     /// In each ball that holds enough to fit.
@@ -163,7 +163,7 @@ struct Scatter {
     thin: bool,
 }
 
-/// The noise of a sample of points at about the same depth; 0 if it is too small to tell.
+/// The noise of a sample of points about as dense; 0 if it is too small to tell.
 fn scatter_level(sample: &[Sampled]) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);

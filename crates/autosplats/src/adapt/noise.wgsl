@@ -1,6 +1,6 @@
 // How far points scatter about the surface: see the CPU form. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: measured: the factor, the power of depth, the median k-radius, and the
+// Reads: surfels, sampled, quantiles. Writes: measured: the factor, the power of the k-radius, the median k-radius, and the
 // level of the cells that have sheets.
 
 #import frame
@@ -20,7 +20,7 @@ override THICK_NOISE: f32;
 override FINE_SHEETS: u32;
 override COARSE_SHEETS: u32;
 
-// The noise of a part of the sample, whose points are at about the same depth; 0 if it is too small to tell.
+// The noise of a part of the sample, whose points are about as dense; 0 if it is too small to tell.
 fn scatter_level(part: u32) -> f32 {
     // Below 0: none.
     var before = -1.0;
@@ -43,25 +43,25 @@ fn scatter_level(part: u32) -> f32 {
     return plateau;
 }
 
-// Of the surfel at a place of the sample, nearest first.
-fn depth(rank: u32) -> f32 {
-    return surfels[sampled[rank]].center.z;
+// Of the surfel at a place of the sample, densest first.
+fn k_radius(rank: u32) -> f32 {
+    return surfels[sampled[rank]].k_radius;
 }
 
 fn noise_of_sample() -> vec2f {
     let len = sampled[SAMPLE];
     let third = len / 3u;
-    if third > 0u && depth(len - third) > APART * depth(third - 1u) {
-        let near_depth = depth(third / 2u);
-        let far_depth = depth(len - third + third / 2u);
-        let near_noise = scatter_level(NEAR);
-        let far_noise = scatter_level(FAR);
-        if near_noise > 0.0 && far_noise > near_noise {
-            let growth = log(far_noise / near_noise) / log(far_depth / near_depth);
-            // Little growth is chance, or other things further away.
+    if third > 0u && k_radius(len - third) > APART * k_radius(third - 1u) {
+        let small = k_radius(third / 2u);
+        let large = k_radius(len - third + third / 2u);
+        let least = scatter_level(DENSE);
+        let most = scatter_level(SPARSE);
+        if least > 0.0 && most > least {
+            let growth = log(most / least) / log(large / small);
+            // Little growth is chance, or other things where points are sparse.
             let power = clamp(2.0 * (growth - 0.5), 0.0, 2.0);
             if power > 0.0 {
-                return vec2f(sqrt(near_noise * far_noise) / pow(sqrt(near_depth * far_depth), power), power);
+                return vec2f(sqrt(least * most) / pow(sqrt(small * large), power), power);
             }
         }
     }
@@ -73,12 +73,12 @@ fn noise() {
     let found = noise_of_sample();
     measured[0] = found.x;
     measured[1] = found.y;
-    let k_radius = bitcast<f32>(quantiles[K_RADII * SCALES].y);
     let len = sampled[SAMPLE];
-    measured[2] = select(0.0, k_radius, len >= LEAST_SAMPLE);
-    var usual = 0.0;
+    var middle = 0.0;
     if len > 0u {
-        usual = found.x * select(pow(depth(len / 2u), found.y), 1.0, found.y == 0.0);
+        middle = k_radius(len / 2u);
     }
+    measured[2] = select(0.0, middle, len >= LEAST_SAMPLE);
+    let usual = found.x * select(pow(middle, found.y), 1.0, found.y == 0.0);
     measured[3] = f32(select(FINE_SHEETS, COARSE_SHEETS, usual > THICK_NOISE * measured[2]));
 }

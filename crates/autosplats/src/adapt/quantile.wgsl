@@ -1,17 +1,15 @@
-// A quantile of the scatter in balls of one size: a workgroup for each size of the nearest third of the sample, then of the
-// farthest, then of all of it; and one more for the median of all k-radii.
+// A quantile of the scatter in balls of one size: a workgroup for each size of the densest third of the sample, then of the
+// sparsest, then of all of it.
 //
-// Reads: surfels, sampled, scatters. Writes: quantiles, each as what it tells and its bits.
+// Reads: sampled, scatters. Writes: quantiles, each as what it tells and its bits.
 
 #import frame
-#import surfel
 #import scatters
 #import quantiles
 
-@group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
-@group(0) @binding(2) var<storage, read> sampled: array<u32>;
-@group(0) @binding(3) var<storage, read> scatters: array<u32>;
-@group(0) @binding(4) var<storage, read_write> quantiles: array<vec2u>;
+@group(0) @binding(1) var<storage, read> sampled: array<u32>;
+@group(0) @binding(2) var<storage, read> scatters: array<u32>;
+@group(0) @binding(3) var<storage, read_write> quantiles: array<vec2u>;
 
 override SCALES: u32;
 override SAMPLE: u32;
@@ -26,22 +24,14 @@ var<workgroup> thin: atomic<u32>;
 // Values below the one tried for each bit.
 var<workgroup> below: array<atomic<u32>, 32>;
 
-// Bits of the value that a quantile is taken of.
-fn value(part: u32, place: u32, rank: u32) -> u32 {
-    if part == K_RADII {
-        return bitcast<u32>(surfels[sampled[rank]].k_radius);
-    }
-    return scatters[place + rank];
-}
-
 @compute @workgroup_size(64)
 fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let part = workgroup.x / SCALES;
     let scale = workgroup.x % SCALES;
     let kept = sampled[SAMPLE];
-    let len = select(kept / 3u, kept, part >= ALL);
-    let begin = select(0u, kept - len, part == FAR);
-    let place = scale * SAMPLE;
+    let len = select(kept / 3u, kept, part == ALL);
+    let begin = select(0u, kept - len, part == SPARSE);
+    let first = scale * SAMPLE + begin;
     if local < 32u {
         atomicStore(&below[local], 0u);
     }
@@ -53,7 +43,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     var own_fitted = 0u;
     var own_thin = 0u;
     for (var index = local; index < len; index += 64u) {
-        let bits = value(part, place, begin + index);
+        let bits = scatters[first + index];
         own_fitted += select(0u, 1u, bits != TOO_FEW);
         own_thin += select(0u, 1u, bits < THICK);
     }
@@ -63,15 +53,14 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let all_fitted = atomicLoad(&fitted);
     let all_thin = atomicLoad(&thin);
     let is_thin = f32(all_thin) >= THIN_SHARE * f32(all_fitted);
-    let share = select(QUANTILE, 0.5, part == K_RADII);
-    let at = u32(share * f32(select(all_fitted, all_thin, is_thin)));
+    let at = u32(QUANTILE * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value that at most `at` are below, bit by bit.
     var found = 0u;
     for (var bit = 31u; bit > 0u; bit--) {
         let tried = found | (1u << (bit - 1u));
         var own = 0u;
         for (var index = local; index < len; index += 64u) {
-            let bits = value(part, place, begin + index);
+            let bits = scatters[first + index];
             let counts = bits != TOO_FEW && (bits < THICK || !is_thin);
             own += select(0u, 1u, counts && (bits & ~THICK) < tried);
         }

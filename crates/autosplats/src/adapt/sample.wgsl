@@ -1,4 +1,4 @@
-// Picks surfels at even distances in their list and sorts them by depth, each by counting those before it.
+// Picks surfels at even distances in their list and sorts them by k-radius, each by counting those before it.
 //
 // Reads: counters, surfels. Writes: sampled, the places of the surfels, and after them their number.
 
@@ -14,17 +14,17 @@ override SAMPLE: u32;
 
 const DISCARDED = 0xffffffffu;
 
-// Bits of depths, which are in the order of depths; four at a time, for fewer rounds of a loop.
-var<workgroup> depths: array<vec4u, SAMPLE / 4u>;
+// Bits of k-radii, which are in their order; four at a time, for fewer rounds of a loop.
+var<workgroup> k_radii: array<vec4u, SAMPLE / 4u>;
 
-// Bits of the depth of a candidate.
-fn depth(index: u32, step: u32, candidates: u32) -> u32 {
+// Bits of the k-radius of a candidate.
+fn k_radius(index: u32, step: u32, candidates: u32) -> u32 {
     if index >= candidates {
         return DISCARDED;
     }
     let place = index * step;
     // A discarded point has no ball.
-    return select(DISCARDED, bitcast<u32>(surfels[place].center.z), surfels[place].radius > 0.0);
+    return select(DISCARDED, bitcast<u32>(surfels[place].k_radius), surfels[place].radius > 0.0);
 }
 
 @compute @workgroup_size(64)
@@ -35,33 +35,33 @@ fn sample(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let fours = (candidates + 3u) / 4u;
     for (var four = local; four < fours; four += 64u) {
         let at = 4u * four;
-        depths[four] = vec4u(
-            depth(at, step, candidates),
-            depth(at + 1u, step, candidates),
-            depth(at + 2u, step, candidates),
-            depth(at + 3u, step, candidates),
+        k_radii[four] = vec4u(
+            k_radius(at, step, candidates),
+            k_radius(at + 1u, step, candidates),
+            k_radius(at + 2u, step, candidates),
+            k_radius(at + 3u, step, candidates),
         );
     }
     workgroupBarrier();
     let own = workgroup.x * 64u + local;
     if own < candidates {
-        let depth_own = vec4u(depth(own, step, candidates));
+        let own_radius = vec4u(k_radius(own, step, candidates));
         var before = vec4u(0u);
         var places = vec4u(0u, 1u, 2u, 3u);
         for (var four = 0u; four < fours; four++) {
-            let others = depths[four];
-            let is_before = (others < depth_own) | ((others == depth_own) & (places < vec4u(own)));
+            let others = k_radii[four];
+            let is_before = (others < own_radius) | ((others == own_radius) & (places < vec4u(own)));
             before += select(vec4u(0u), vec4u(1u), is_before);
             places += 4u;
         }
-        if depth_own.x != DISCARDED {
+        if own_radius.x != DISCARDED {
             sampled[before.x + before.y + before.z + before.w] = own * step;
         }
     }
     if own == 0u {
         var kept = 0u;
         for (var four = 0u; four < fours; four++) {
-            let is_kept = select(vec4u(0u), vec4u(1u), depths[four] != vec4u(DISCARDED));
+            let is_kept = select(vec4u(0u), vec4u(1u), k_radii[four] != vec4u(DISCARDED));
             kept += is_kept.x + is_kept.y + is_kept.z + is_kept.w;
         }
         sampled[SAMPLE] = kept;

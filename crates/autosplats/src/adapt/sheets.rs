@@ -92,6 +92,9 @@ pub(super) struct Surface {
     pub(super) curvature: f32,
 }
 
+/// Noise at a place in view space, of a cloud's point with a k-radius, world units.
+type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> f32 + Sync + 'a;
+
 /// Sheets of a cell.
 type Stack = [Sheet; SLABS];
 
@@ -146,8 +149,8 @@ impl Sheets {
         asked.point.fetch_min(surfel.source, Ordering::Relaxed);
     }
 
-    /// Fits those that were asked for and are not there yet; `noise` tells it at a place in view space, of a cloud's point.
-    pub(super) fn fit(&mut self, cells: &Cells, noise: &(dyn Fn(Vec3, u32) -> f32 + Sync), view: &View) {
+    /// Fits those that were asked for and are not there yet.
+    pub(super) fn fit(&mut self, cells: &Cells, noise: &NoiseAt, view: &View) {
         let Some(level) = cells.levels.get(self.level) else { return };
         let Self { stacks, len, asked, .. } = self;
         let task = Task { cells, level, asked, noise, view };
@@ -238,7 +241,7 @@ struct Task<'a> {
     cells: &'a Cells,
     level: &'a Level,
     asked: &'a [Asked],
-    noise: &'a (dyn Fn(Vec3, u32) -> f32 + Sync),
+    noise: &'a NoiseAt<'a>,
     view: &'a View,
 }
 
@@ -307,8 +310,8 @@ fn fit_cell<S: Simd>(
         }
         left[largest] = 0.0;
         let center = cell[largest].mean;
-        let noise = noise(center.into(), point);
         let radius = k_radius_px * view.pixel_size(center[2]);
+        let noise = noise(center.into(), radius, point);
         let enough = good_enough(noise, radius, center[2], view);
         let Some(quadric) = choose(simd, center, radius, None, (noise, enough), (cells, view), gathered) else {
             continue;

@@ -9,10 +9,10 @@ override TINY_REACH_PX: f32;
 override MOST_TINY: f32;
 override ROW: f32;
 
-// Standard deviation of points from their surface at a depth above 0.
-fn noise_at(depth: f32) -> f32 {
+// Standard deviation of points from their surface, of points with a k-radius above 0.
+fn noise_at(k_radius: f32) -> f32 {
     let power = measured[1];
-    return measured[0] * select(pow(depth, power), 1.0, power == 0.0);
+    return measured[0] * select(pow(k_radius, power), 1.0, power == 0.0);
 }
 
 // Level of the cells that have sheets.
