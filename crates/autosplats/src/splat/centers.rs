@@ -18,7 +18,7 @@ const SUM_BITS: u32 = 12;
 const SUM_MASK: u32 = (1 << SUM_BITS) - 1;
 
 /// One centre in pixel (x, y).
-fn one([x, y]: [usize; 2], center_px: [f32; 2]) -> u32 {
+pub(super) fn one([x, y]: [usize; 2], center_px: [f32; 2]) -> u32 {
     // A centre that was moved out of the picture still has the pixel of its point.
     let step = |center: f32, pixel: usize| (STEPS * (center - pixel as f32)).clamp(0.0, STEPS - 1.0) as u32;
     1 << (2 * SUM_BITS) | step(center_px[1], y) << SUM_BITS | step(center_px[0], x)

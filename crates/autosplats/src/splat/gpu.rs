@@ -14,7 +14,7 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::{
-    AROUND_PX, CORE_WEIGHT, DENSE, DENSE_REACH_PX, FEWEST, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LONGEST_ALIGNED, OFF_PX,
+    AROUND_PX, CORE_WEIGHT, DENSE_REACH_PX, FEWEST, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LONGEST_ALIGNED, OFF_PX,
     STRIDES_PER_REACH,
 };
 use crate::Error;
@@ -183,7 +183,6 @@ impl SplatPasses {
             ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
             ("AROUND_PX", AROUND_PX.into()),
             ("OFF_PX", OFF_PX.into()),
-            ("DENSE", DENSE.into()),
             ("DENSE_REACH_PX", DENSE_REACH_PX.into()),
             ("FEWEST", FEWEST.into()),
             ("STEPS", STEPS.into()),

@@ -7,8 +7,9 @@
 //! reaches, and nothing empty in between; or if there is no core around it at all.
 //!
 //! Where points are about as dense as pixels, discs are too coarse a measure, and what ends the surface are the points
-//! themselves: close to its border, a pixel stays if the mean of the points around is close to its middle. At the end
-//! of points they lie on one side.
+//! themselves: close to an empty pixel, one stays if the mean of the points around is close to its middle, or if the next
+//! pixel away from them stays. At the end of points they lie on one side. Lines between cores kept a row of tails wherever
+//! two cores stood out of a border; of wrong pixels along silhouettes this leaves two thirds.
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
 use super::centers::mean;
@@ -33,11 +34,9 @@ pub(super) const LEAST_REACH_PX: usize = 2;
 pub(super) const AROUND_PX: f32 = 2.5;
 /// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it would be 0.6 pixels,
 /// at that of a surface which curves away, where they lie ever closer, less.
-pub(super) const OFF_PX: f32 = 0.55;
-/// Weights of the points around a pixel from which they tell of a border: a point a pixel has 4.9 inside a surface.
-pub(super) const DENSE: f32 = 3.0;
-/// Reach in pixels up to which a splat says that points are dense enough as well.
-pub(super) const DENSE_REACH_PX: f32 = 2.5;
+pub(super) const OFF_PX: f32 = 0.56;
+/// Reach in pixels up to which a splat says that points are so dense: they are about two pixels apart then.
+pub(super) const DENSE_REACH_PX: f32 = 3.5;
 /// Fewest points around that have a border.
 pub(super) const FEWEST: f32 = 3.0;
 /// Pixels from an empty one that are the border, along an axis; in a square, but for its corners.
@@ -113,16 +112,23 @@ impl Outline<'_> {
         if own == EMPTY {
             return false;
         }
-        let beside = if border { self.is_beside_points([x, y], own.abs()) } else { None };
-        beside.unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
+        let from_points = if border { self.from_points([x, y], own) } else { None };
+        let Some(offset) = from_points else { return own > 0.0 && self.is_open([x, y], own) };
+        // The pixel farther out has to go too: there are no holes where points happen to leave a gap beside the border.
+        is_off(offset) && {
+            let out = outward([x, y], offset);
+            let rim = self.rims[self.index(out)];
+            rim == EMPTY || self.from_points(out, rim).map_or(rim > 0.0, is_off)
+        }
     }
 
-    /// Whether the points around pixel (x, y) lie beside it rather than around, if they are dense enough to tell.
-    fn is_beside_points(&self, [x, y]: [usize; 2], reach_px: f32) -> Option<bool> {
+    /// The mean offset, in pixels, of the points around pixel (x, y) of this rim, if they are dense enough to tell.
+    fn from_points(&self, [x, y]: [usize; 2], rim: Rim) -> Option<[f32; 2]> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
-        if x < window || y < window || x + window >= width || y + window >= height {
-            // Of points beyond the picture nothing is known.
+        // Of points beyond the picture nothing is known.
+        let inside = x >= window && y >= window && x + window < width && y + window < height;
+        if !inside || rim.abs() > DENSE_REACH_PX {
             return None;
         }
         let mut points = 0.0;
@@ -131,16 +137,14 @@ impl Outline<'_> {
             for dx in 0..=2 * window {
                 let (count, offset) = mean(self.centers[self.index([x + dx - window, y + dy - window])]);
                 let [ox, oy] = [offset[0] + (dx as f32 - window as f32), offset[1] + (dy as f32 - window as f32)];
-                let near = (1.0 - (ox * ox + oy * oy) / (AROUND_PX * AROUND_PX)).max(0.0);
+                let near = (1.0 - square([ox, oy]) / (AROUND_PX * AROUND_PX)).max(0.0);
                 let weight = count * near * near * near;
                 points += count;
                 sums = [sums[0] + weight, sums[1] + weight * ox, sums[2] + weight * oy];
             }
         }
         let [weight, ox, oy] = sums;
-        let tells = points >= FEWEST && (weight >= DENSE || reach_px <= DENSE_REACH_PX);
-        // Points so far that none of them weighs anything are beside it.
-        tells.then_some(ox * ox + oy * oy >= (OFF_PX * weight) * (OFF_PX * weight))
+        (points >= FEWEST && weight > 0.0).then_some([ox / weight, oy / weight])
     }
 
     /// Whether the pixel is a tail that nothing closes in, of a splat that reaches so far.
@@ -186,10 +190,27 @@ impl Outline<'_> {
     }
 }
 
+/// Whether points whose mean has this offset lie beside a pixel rather than around it.
+fn is_off(offset: [f32; 2]) -> bool {
+    square(offset) > OFF_PX * OFF_PX
+}
+
+fn square([x, y]: [f32; 2]) -> f32 {
+    x * x + y * y
+}
+
+/// The pixel beside (x, y) that is farthest from points at this offset.
+fn outward([x, y]: [usize; 2], [dx, dy]: [f32; 2]) -> [usize; 2] {
+    let away = |at: usize, offset: f32| if offset > 0.0 { at - 1 } else { at + 1 };
+    if dx.abs() > dy.abs() { [away(x, dx), y] } else { [x, away(y, dy)] }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::centers::one;
     use super::*;
     use crate::camera::{Camera, Projection};
+    use crate::test_clouds::Random;
     use autosplats_cloud::glam::DVec3;
 
     fn view(size: [u32; 2]) -> View {
@@ -266,6 +287,77 @@ mod tests {
         drawing[21] = "  ################  ";
         let row = &trimmed(&drawing)[20][5..16];
         assert!(row.bytes().all(|pixel| pixel == row.as_bytes()[0]), "all or none: {row}");
+    }
+
+    #[test]
+    fn dense_points_end_where_they_end() {
+        // Evenly strewn points below a slanted line, one and a half a pixel; discs of 1.6 pixels, with cores as coarse.
+        let [width, height] = [TILE, 40];
+        let below = |x: f32, y: f32| y - (12.0 + 0.27 * x);
+        let mut random = Random::new(51);
+        let place = |random: &mut Random| [random.unit() * width as f32, random.unit() * height as f32];
+        let points: Vec<_> = (0..width * height * 3 / 2).map(|_| place(&mut random)).collect();
+        let points: Vec<_> = points.into_iter().filter(|&[x, y]| below(x, y) > 0.0).collect();
+        let mut centers = vec![0; TILE_AREA];
+        for &[x, y] in &points {
+            centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
+        }
+        let rim = |pixel: usize| {
+            let [x, y] = [pixel % TILE, pixel / TILE].map(|at| at as f32 + 0.5);
+            let nearest = points.iter().map(|point| (point[0] - x).hypot(point[1] - y)).fold(f32::INFINITY, f32::min);
+            if nearest > 1.6 {
+                EMPTY
+            } else if nearest > 1.0 {
+                1.5
+            } else {
+                -1.5
+            }
+        };
+        let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
+        let view = view([width as u32, height as u32]);
+        // Pixels that stay although they should not, and the other way round.
+        let wrong = |centers: &[u32]| {
+            let outline = Outline { rims: &rims, centers, view: &view };
+            let border = outline.border([0, 0]);
+            let mut wrong = [0, 0];
+            for (x, y) in (3..width - 3).flat_map(|x| (3..height - 3).map(move |y| (x, y))) {
+                let covered = rims[y * TILE + x] != EMPTY;
+                let stays = covered && !outline.sticks_out(x, y, border[y] >> x & 1 == 1);
+                let depth = below(x as f32 + 0.5, y as f32 + 0.5);
+                wrong[usize::from(depth > 0.0)] += usize::from(stays != (depth > 0.0));
+                assert!(stays == (depth > 0.0) || depth.abs() < 1.6, "{x}, {y}: {depth} below the line");
+            }
+            wrong
+        };
+        let ([over, short], [blind, _]) = (wrong(&centers), wrong(&vec![0; TILE_AREA]));
+        assert!(over + short <= width / 3, "{over} too many and {short} too few over {width} columns");
+        assert!(blind > over + short, "{over} and {short} are few against the {blind} of cores alone");
+    }
+
+    #[test]
+    fn borders_are_pixels_close_to_an_empty_one() {
+        let [width, height] = [TILE + 37, TILE + 5];
+        let view = view([width as u32, height as u32]);
+        let mut random = Random::new(52);
+        // What lies in tiles beyond the picture is of no account.
+        let rims: Vec<_> = (0..4 * TILE_AREA).map(|_| if random.below(40) == 0 { EMPTY } else { 1.0 }).collect();
+        let outline = Outline { rims: &rims, centers: &[], view: &view };
+        let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
+        for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {
+            let border = outline.border(tile);
+            for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
+                let [column, row] = [tile[0] + x, tile[1] + y];
+                if column >= width || row >= height {
+                    continue;
+                }
+                let around = (0..5).flat_map(|dy| (0..5).map(move |dx| (dx, dy)));
+                let mut around = around.filter(|&(dx, dy)| dx % 4 != 0 || dy % 4 != 0);
+                let near = around.any(|(dx, dy)| {
+                    (column + dx).checked_sub(2).zip((row + dy).checked_sub(2)).is_some_and(|(x, y)| is_empty(x, y))
+                });
+                assert_eq!(border[y] >> x & 1 == 1, near, "{column}, {row}");
+            }
+        }
     }
 
     #[test]

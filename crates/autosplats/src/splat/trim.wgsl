@@ -22,7 +22,6 @@ override LONGEST_ALIGNED: i32;
 // What points around a pixel at the border are, where their mean may be, and when they tell.
 override AROUND_PX: f32;
 override OFF_PX: f32;
-override DENSE: f32;
 override DENSE_REACH_PX: f32;
 override FEWEST: f32;
 // Steps of a centre's place in its pixel.
@@ -123,48 +122,72 @@ fn five_bits(place: vec2u, row: u32) -> u32 {
 }
 
 fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
+    var points = Points(false, vec2f(0.0));
     if border {
-        let points = points_around(pixel);
-        let tells = points.count >= FEWEST && (points.weight >= DENSE || abs(own) <= DENSE_REACH_PX);
-        if tells {
-            // Points so far that none of them weighs anything are beside it.
-            let most = OFF_PX * points.weight;
-            return dot(points.offset, points.offset) >= most * most;
-        }
+        points = points_around(pixel, own);
     }
-    return own > EMPTY_RIM && is_open(vec2i(pixel), own);
+    if !points.tell {
+        return own > EMPTY_RIM && is_open(vec2i(pixel), own);
+    }
+    if !is_off(points.offset) {
+        return false;
+    }
+    // The pixel farther out has to go too.
+    let out = outward(pixel, points.offset);
+    let rim = cover[out.y * frame.size.x + out.x].rim;
+    if rim == EMPTY_RIM {
+        return true;
+    }
+    let beyond = points_around(out, rim);
+    return select(rim > EMPTY_RIM, is_off(beyond.offset), beyond.tell);
 }
 
-// Points close to a pixel: how many, and weighted.
+// Whether points whose mean has this offset lie beside a pixel rather than around it.
+fn is_off(offset: vec2f) -> bool {
+    return dot(offset, offset) > OFF_PX * OFF_PX;
+}
+
+// The pixel beside one that is farthest from points at this offset.
+fn outward(pixel: vec2u, offset: vec2f) -> vec2u {
+    let away = select(pixel + 1u, pixel - 1u, offset > vec2f(0.0));
+    return select(vec2u(pixel.x, away.y), vec2u(away.x, pixel.y), abs(offset.x) > abs(offset.y));
+}
+
+// The points around a pixel: whether they are dense enough to tell of a border, and the mean of their offsets in pixels.
 struct Points {
-    count: f32,
-    weight: f32,
-    // Sum of weighted offsets from the pixel's middle.
+    tell: bool,
     offset: vec2f,
 }
 
-fn points_around(pixel: vec2u) -> Points {
-    var points = Points(0.0, 0.0, vec2f(0.0));
+fn points_around(pixel: vec2u, rim: f32) -> Points {
     let window = u32(AROUND_PX);
-    if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
-        // Of points beyond the picture nothing is known.
-        return points;
+    // Of points beyond the picture nothing is known.
+    if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) || abs(rim) > DENSE_REACH_PX {
+        return Points(false, vec2f(0.0));
     }
+    var points = 0.0;
+    var sum = 0.0;
+    var offsets = vec2f(0.0);
     for (var y = 0u; y <= 2u * window; y++) {
         for (var x = 0u; x <= 2u * window; x++) {
-            let at = pixel + vec2u(x, y) - window;
-            let bits = centers[at.y * frame.size.x + at.x];
-            let count = f32(bits >> 24u);
-            let mean = (vec2f(vec2u(bits, bits >> 12u) & vec2u(0xfffu)) / max(count, 1.0) + 0.5) / STEPS - 0.5;
-            let offset = mean + (vec2f(vec2u(x, y)) - f32(window));
+            let there = centers_of(pixel + vec2u(x, y) - window);
+            let offset = there.xy + (vec2f(vec2u(x, y)) - f32(window));
             let near = max(1.0 - dot(offset, offset) / (AROUND_PX * AROUND_PX), 0.0);
-            let weight = count * near * near * near;
-            points.count += count;
-            points.weight += weight;
-            points.offset += weight * offset;
+            let weight = there.z * near * near * near;
+            points += there.z;
+            sum += weight;
+            offsets += weight * offset;
         }
     }
-    return points;
+    return Points(points >= FEWEST && sum > 0.0, offsets / max(sum, 1e-9));
+}
+
+// The mean of a pixel's centres from its middle, in pixels, and how many there are.
+fn centers_of(pixel: vec2u) -> vec3f {
+    let bits = centers[pixel.y * frame.size.x + pixel.x];
+    let count = f32(bits >> 24u);
+    let sums = vec2f(vec2u(bits, bits >> 12u) & vec2u(0xfffu));
+    return vec3f((sums / max(count, 1.0) + 0.5) / STEPS - 0.5, count);
 }
 
 fn is_open(pixel: vec2i, own: f32) -> bool {
