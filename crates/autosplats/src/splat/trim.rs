@@ -112,18 +112,18 @@ impl Outline<'_> {
         if own == EMPTY {
             return false;
         }
-        let from_points = if border { self.from_points([x, y], own) } else { None };
-        let Some(offset) = from_points else { return own > 0.0 && self.is_open([x, y], own) };
+        let offset = if border { self.points_offset([x, y], own) } else { None };
+        let Some(offset) = offset else { return own > 0.0 && self.is_open([x, y], own) };
         // The pixel farther out has to go too: there are no holes where points happen to leave a gap beside the border.
         is_off(offset) && {
             let out = outward([x, y], offset);
             let rim = self.rims[self.index(out)];
-            rim == EMPTY || self.from_points(out, rim).map_or(rim > 0.0, is_off)
+            rim == EMPTY || self.points_offset(out, rim).map_or(rim > 0.0, is_off)
         }
     }
 
     /// The mean offset, in pixels, of the points around pixel (x, y) of this rim, if they are dense enough to tell.
-    fn from_points(&self, [x, y]: [usize; 2], rim: Rim) -> Option<[f32; 2]> {
+    fn points_offset(&self, [x, y]: [usize; 2], rim: Rim) -> Option<[f32; 2]> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
         // Of points beyond the picture nothing is known.
