@@ -183,8 +183,8 @@ fn noise_that_grows_with_distance_is_measured() {
         let mut k_radii: Vec<f32> = near.map(|surfel| surfel.k_radius).collect();
         k_radii.sort_by(f32::total_cmp);
         let ratio = noise.at(k_radii[k_radii.len() / 2]) / (sigma * depth * depth);
-        // It is more than half a cell in the distance, where it is measured too large.
-        assert!((0.6..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
+        // Noise makes k-radii larger too, which hides some of its growth.
+        assert!((0.5..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
     }
 }
 

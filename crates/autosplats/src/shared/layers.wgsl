@@ -4,7 +4,7 @@
 struct Cover {
     // Sum of kernel weights; 0 where no surface is.
     weight: f32,
-    // What trimming knows: `EMPTY_RIM`, `CORE_RIM`, or how far the heaviest splat reaches in pixels.
+    // What trimming knows: `EMPTY_RIM`, or how far the heaviest splat reaches in pixels, below 0 in a core.
     rim: f32,
     // Index in the cloud of the heaviest splat's point.
     point: u32,
@@ -12,7 +12,6 @@ struct Cover {
 }
 
 const EMPTY_RIM = 0.0;
-const CORE_RIM = -1.0;
 
 fn not_a_number() -> f32 {
     // Kept from being folded: a constant expression must be finite.

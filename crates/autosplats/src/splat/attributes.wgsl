@@ -218,7 +218,7 @@ fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
     let heaviest = (*sums).heaviest[i];
     var rim = EMPTY_RIM;
     if heaviest >= CORE_WEIGHT || weight >= INNER_WEIGHT {
-        rim = CORE_RIM;
+        rim = -(*sums).reach[i];
     } else if heaviest > 0.0 {
         rim = (*sums).reach[i];
     }

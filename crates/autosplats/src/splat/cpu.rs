@@ -4,9 +4,10 @@ use rayon::prelude::*;
 
 use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
+use super::centers::add_centers;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_REACH;
-use super::trim::{Rim, rim, sticks_out};
+use super::trim::{Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -26,6 +27,7 @@ pub(crate) struct Splatter {
     previous: Vec<f32>,
     /// What trimming needs to know, tile by tile.
     rims: Vec<Rim>,
+    centers: Vec<u32>,
     layers: GBuffer,
 }
 
@@ -83,12 +85,15 @@ impl Splatter {
 
     /// Attribute pass: the weighted mean of all living surfels within ε of the depth map [Paper, §7].
     pub(crate) fn attributes(&mut self, surfels: &[Surfel], view: &View, attributes: &Attributes<'_>) -> &GBuffer {
-        let Self { runs, used, depth, rims, layers, .. } = self;
+        let Self { runs, used, depth, rims, centers, layers, .. } = self;
         layers.resize(view, depth.len(), attributes);
         rims.resize(depth.len(), 0.0);
-        let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(rims.par_chunks_mut(TILE_AREA));
-        tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), rims))| {
+        centers.resize(depth.len(), 0);
+        let known = rims.par_chunks_mut(TILE_AREA).zip(centers.par_chunks_mut(TILE_AREA));
+        let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(known);
+        tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), (rims, centers)))| {
             sums.clear(attributes);
+            add_centers(&runs[..*used], surfels, tile(index, view), centers);
             for run in &runs[..*used] {
                 draw_attributes(run, surfels, tile(index, view), view, depth, attributes, sums);
             }
@@ -103,15 +108,17 @@ impl Splatter {
 
     /// Trims the attributes just drawn: silhouettes end where the surface does. Returns the number of covered pixels too.
     pub(crate) fn trim(&mut self, view: &View) -> (&GBuffer, usize) {
-        let Self { rims, layers, .. } = self;
+        let Self { rims, centers, layers, .. } = self;
+        let outline = Outline { rims, centers, view };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;
+            let border = outline.border([x0, y0]);
             let mut covered = 0;
             for y in y0..(y0 + TILE).min(view.height as usize) {
                 for x in x0..(x0 + TILE).min(view.width as usize) {
                     let at = (y - y0) * TILE + x - x0;
-                    if sticks_out(rims, x, y, view) {
+                    if outline.sticks_out(x, y, border[y - y0] >> (x - x0) & 1 == 1) {
                         layers.clear(at);
                     }
                     covered += usize::from(layers.covers(at));

@@ -6,12 +6,17 @@
 //! in the map is erased, and only those are drawn again that meet a cell of 8×8 pixels where that was so
 //! (`shared/redraw.wgsl`). Attributes are sums, which are to come out as on the CPU and the same each
 //! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×32 pixels finds them, by a
-//! tree over the list instead of bins (`shared/splat.wgsl`, `shared/patch.wgsl`).
+//! tree over the list instead of bins (`shared/splat.wgsl`, `shared/patch.wgsl`). The centres that the trim asks for are
+//! counted by integers, which again no order changes.
 
+use super::centers::STEPS;
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
-use super::trim::{CORE_WEIGHT, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LONGEST_ALIGNED, STRIDES_PER_REACH};
+use super::trim::{
+    AROUND_PX, CORE_WEIGHT, DENSE_REACH_PX, FEWEST, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LONGEST_ALIGNED, OFF_PX,
+    STRIDES_PER_REACH,
+};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
@@ -25,12 +30,13 @@ pub(crate) const PASSES: &[PassSource] = &[
     DEPTH_LARGE,
     RECOVER_COUNT,
     RECOVER,
-    CLEAR_CELLS,
+    CLEAR_WORDS,
     REFINE,
     ERASE,
     ERASE_LARGE,
     REDRAW,
     ATTRIBUTES,
+    ADD_CENTERS,
     TRIM,
 ];
 const SET_UP: PassSource = PassSource::new("splat/set_up", include_str!("set_up.wgsl"));
@@ -40,12 +46,13 @@ const DEPTH_LARGE: PassSource = PassSource::new("splat/depth_large", include_str
 const DEPTH: PassSource = PassSource::new("splat/depth", include_str!("depth.wgsl"));
 const RECOVER_COUNT: PassSource = PassSource::new("splat/recover_count", include_str!("recover_count.wgsl"));
 const RECOVER: PassSource = PassSource::new("splat/recover", include_str!("recover.wgsl"));
-const CLEAR_CELLS: PassSource = PassSource::new("splat/clear_cells", include_str!("clear_cells.wgsl"));
+const CLEAR_WORDS: PassSource = PassSource::new("splat/clear_words", include_str!("clear_words.wgsl"));
 const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.wgsl"));
 const ERASE: PassSource = PassSource::new("splat/erase", include_str!("erase.wgsl"));
 const ERASE_LARGE: PassSource = PassSource::new("splat/erase_large", include_str!("erase_large.wgsl"));
 const REDRAW: PassSource = PassSource::new("splat/redraw", include_str!("redraw.wgsl"));
 const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
+const ADD_CENTERS: PassSource = PassSource::new("splat/add_centers", include_str!("add_centers.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
 /// Pixels of the bounds of a splat that one invocation draws into the depth map.
@@ -75,6 +82,8 @@ pub(crate) struct SplatBuffers {
     /// What the last refinement did to each splat, and in which cells of pixels it erased depths: `shared/redraw.wgsl`.
     changes: wgpu::Buffer,
     cells: wgpu::Buffer,
+    /// Centres of splats in each pixel, row by row.
+    centers: wgpu::Buffer,
 }
 
 impl SplatBuffers {
@@ -92,6 +101,7 @@ impl SplatBuffers {
             depth: gpu.storage::<u32>("depth map", pixels)?,
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
+            centers: gpu.storage::<u32>("centres of splats", pixels)?,
         })
     }
 }
@@ -111,12 +121,13 @@ pub(crate) struct SplatPasses {
     scan_recovered: Pass,
     recover: Pass,
     work: WorkPass,
-    clear_cells: Pass,
+    clear_words: Pass,
     refine: Pass,
     erase: Pass,
     erase_large: Pass,
     redraw: Pass,
     attributes: Pass,
+    add_centers: Pass,
     trim: Pass,
     /// Linear value of each step of a colour.
     linear: wgpu::Buffer,
@@ -170,6 +181,11 @@ impl SplatPasses {
             ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
             ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
             ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
+            ("AROUND_PX", AROUND_PX.into()),
+            ("OFF_PX", OFF_PX.into()),
+            ("DENSE_REACH_PX", DENSE_REACH_PX.into()),
+            ("FEWEST", FEWEST.into()),
+            ("STEPS", STEPS.into()),
         ];
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
@@ -185,12 +201,13 @@ impl SplatPasses {
             scan_recovered: scan_pass(gpu, Counter::Recovered, Some(Counter::Passive))?,
             recover: pass(&RECOVER)?,
             work: WorkPass::new(gpu)?,
-            clear_cells: pass(&CLEAR_CELLS)?,
+            clear_words: pass(&CLEAR_WORDS)?,
             refine: pass(&REFINE)?,
             erase: Pass::new(gpu, &ERASE, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
             erase_large: Pass::new(gpu, &ERASE_LARGE, &[dot_radius])?,
             redraw: Pass::new(gpu, &REDRAW, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
+            add_centers: Pass::new(gpu, &ADD_CENTERS, &[("STEPS", STEPS.into())])?,
             trim: Pass::new(gpu, &TRIM, &trim)?,
             linear: steps,
         })
@@ -206,7 +223,7 @@ impl SplatPasses {
         splats: &SplatBuffers,
         round: Round,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks } = splats;
+        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks, .. } = splats;
         let counters = &screen.counters;
         let set_up = [frame, counters, surfels, list, tree, large];
         let mut steps = vec![self.set_up[round as usize].step(gpu, &set_up, screen.groups(round.work_256()))];
@@ -234,12 +251,12 @@ impl SplatPasses {
         screen: &ScreenBuffers,
         splats: &SplatBuffers,
     ) -> [Step; 6] {
-        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks } = splats;
+        let SplatBuffers { splats: list, tree, large, depth, changes, cells: marks, .. } = splats;
         let counters = &screen.counters;
         let all = || screen.groups(Work::Queries256);
         let larges = || screen.groups(Work::LargeSplats);
         [
-            self.clear_cells.step(gpu, &[frame, marks], cells(screen.size).div_ceil(256)),
+            self.clear_words.step(gpu, &[frame, marks], cells(screen.size).div_ceil(256)),
             self.refine.step(gpu, &[frame, counters, list, depth, tree, changes], all()),
             self.erase.step(gpu, &[frame, counters, list, tree, changes, depth, marks], all()),
             self.erase_large.step(gpu, &[frame, counters, list, tree, changes, large, depth, marks], larges()),
@@ -281,7 +298,7 @@ impl SplatPasses {
         layers: &LayerBuffers,
         depth_refinement: bool,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, depth, .. } = splats;
+        let SplatBuffers { splats: list, tree, depth, centers, .. } = splats;
         let ScreenBuffers { counters, values, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
@@ -291,7 +308,11 @@ impl SplatPasses {
         steps.push(self.boxes.step(gpu, &[frame, counters, tree], tops(screen)));
         let attributes = [frame, &self.linear, list, tree, surfels, values, depth, surface, cover, extras];
         steps.push(self.attributes.step(gpu, &attributes, patches(screen, PATCH)));
-        steps.push(self.trim.step(gpu, &[frame, surface, cover, extras, counters], patches(screen, [SQUARE; 2])));
+        steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
+        let all = screen.groups(Work::Queries256);
+        steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
+        let trim = [frame, surface, cover, extras, counters, centers];
+        steps.push(self.trim.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
 }

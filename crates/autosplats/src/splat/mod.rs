@@ -13,6 +13,7 @@
 
 mod attributes;
 mod bins;
+mod centers;
 mod cpu;
 pub(crate) mod gpu;
 mod layers;

@@ -1,6 +1,6 @@
 // Trim: takes off the tails that splats leave around a silhouette. The CPU form, `trim.rs`, says how.
 //
-// Reads and writes: surface, cover, extras. What is read, the rims, is not written. Writes: counters.
+// Reads: centers. Reads and writes: surface, cover, extras. What is read of them, the rims, is not written. Writes: counters.
 
 #import frame
 #import groups
@@ -11,6 +11,7 @@
 @group(0) @binding(2) var<storage, read_write> cover: array<Cover>;
 @group(0) @binding(3) var<storage, read_write> extras: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read> centers: array<u32>;
 
 // How far lines go, in reaches of the splat; strides in a reach; pixels added to how far they go.
 override FURTHEST: f32;
@@ -18,10 +19,20 @@ override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 // Longest stride that stops where those of neighbours do.
 override LONGEST_ALIGNED: i32;
+// What points around a pixel at the border are, where their mean may be, and when they tell.
+override AROUND_PX: f32;
+override OFF_PX: f32;
+override DENSE_REACH_PX: f32;
+override FEWEST: f32;
+// Steps of a centre's place in its pixel.
+override STEPS: f32;
 
 // Side of the square of pixels of a workgroup.
 const SQUARE = 32u;
 const GROUP = 64u;
+// Pixels from an empty one that are the border; the square and as many on each side.
+const BORDER = 2u;
+const WIDE = 36u;
 
 // Pixels of the workgroup that stay.
 var<workgroup> covered: atomic<u32>;
@@ -29,6 +40,8 @@ var<workgroup> covered: atomic<u32>;
 // each has one to follow lines from then.
 var<workgroup> tails: array<u32, 1024>;
 var<workgroup> tail_count: atomic<u32>;
+// For each row of the wide square, a bit for each pixel that is empty: the first 32 columns, then the others.
+var<workgroup> empties: array<atomic<u32>, 72>;
 
 @compute @workgroup_size(64)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -36,26 +49,40 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         atomicStore(&covered, 0u);
         atomicStore(&tail_count, 0u);
     }
+    for (var word = local; word < 2u * WIDE; word += GROUP) {
+        atomicStore(&empties[word], 0u);
+    }
     workgroupBarrier();
     let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
     let group = group_index(workgroup);
     let corner = SQUARE * vec2u(group % columns, group / columns);
+    for (var place = local; place < WIDE * WIDE; place += GROUP) {
+        let at = vec2u(place % WIDE, place / WIDE);
+        // Pixels before the first are far beyond the last.
+        let pixel = corner + at - BORDER;
+        if all(pixel < frame.size) && cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM {
+            atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
+        }
+    }
+    workgroupBarrier();
     var stay = 0u;
     for (var place = local; place < SQUARE * SQUARE; place += GROUP) {
-        let pixel = corner + vec2u(place % SQUARE, place / SQUARE);
+        let at = vec2u(place % SQUARE, place / SQUARE);
+        let pixel = corner + at;
         if all(pixel < frame.size) {
             let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
             stay += select(1u, 0u, rim == EMPTY_RIM);
-            if rim != EMPTY_RIM && rim != CORE_RIM {
+            if rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at)) {
                 tails[atomicAdd(&tail_count, 1u)] = place;
             }
         }
     }
     workgroupBarrier();
     for (var tail = local; tail < atomicLoad(&tail_count); tail += GROUP) {
-        let pixel = corner + vec2u(tails[tail] % SQUARE, tails[tail] / SQUARE);
+        let place = vec2u(tails[tail] % SQUARE, tails[tail] / SQUARE);
+        let pixel = corner + place;
         let at = pixel.y * frame.size.x + pixel.x;
-        if sticks_out(vec2i(pixel), cover[at].rim) {
+        if sticks_out(pixel, cover[at].rim, is_border(place)) {
             clear(at);
             stay -= 1u;
         }
@@ -79,7 +106,91 @@ fn clear(at: u32) {
     }
 }
 
-fn sticks_out(pixel: vec2i, own: f32) -> bool {
+// Whether a pixel of the square is close to an empty one.
+fn is_border(place: vec2u) -> bool {
+    // Around it in the wide square, three of the outer rows' pixels and five of the others'.
+    let wide = five_bits(place, 1u) | five_bits(place, 2u) | five_bits(place, 3u);
+    return (wide | ((five_bits(place, 0u) | five_bits(place, 4u)) & 14u)) != 0u;
+}
+
+// Which of the five pixels around a place of the square are empty in one of the five rows around it.
+fn five_bits(place: vec2u, row: u32) -> u32 {
+    let low = atomicLoad(&empties[2u * (place.y + row)]);
+    let high = atomicLoad(&empties[2u * (place.y + row) + 1u]);
+    // Shifted twice: a word cannot be shifted by its width.
+    return ((low >> place.x) | ((high << 1u) << (31u - place.x))) & 31u;
+}
+
+fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
+    var points = Points(false, vec2f(0.0));
+    if border {
+        points = points_around(pixel, own);
+    }
+    if !points.tell {
+        return own > EMPTY_RIM && is_open(vec2i(pixel), own);
+    }
+    if !is_off(points.offset) {
+        return false;
+    }
+    // The pixel farther out has to go too.
+    let out = outward(pixel, points.offset);
+    let rim = cover[out.y * frame.size.x + out.x].rim;
+    if rim == EMPTY_RIM {
+        return true;
+    }
+    let beyond = points_around(out, rim);
+    return select(rim > EMPTY_RIM, is_off(beyond.offset), beyond.tell);
+}
+
+// Whether points whose mean has this offset lie beside a pixel rather than around it.
+fn is_off(offset: vec2f) -> bool {
+    return dot(offset, offset) > OFF_PX * OFF_PX;
+}
+
+// The pixel beside one that is farthest from points at this offset.
+fn outward(pixel: vec2u, offset: vec2f) -> vec2u {
+    let away = select(pixel + 1u, pixel - 1u, offset > vec2f(0.0));
+    return select(vec2u(pixel.x, away.y), vec2u(away.x, pixel.y), abs(offset.x) > abs(offset.y));
+}
+
+// The points around a pixel: whether they are dense enough to tell of a border, and the mean of their offsets in pixels.
+struct Points {
+    tell: bool,
+    offset: vec2f,
+}
+
+fn points_around(pixel: vec2u, rim: f32) -> Points {
+    let window = u32(AROUND_PX);
+    // Of points beyond the picture nothing is known.
+    if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) || abs(rim) > DENSE_REACH_PX {
+        return Points(false, vec2f(0.0));
+    }
+    var points = 0.0;
+    var sum = 0.0;
+    var offsets = vec2f(0.0);
+    for (var y = 0u; y <= 2u * window; y++) {
+        for (var x = 0u; x <= 2u * window; x++) {
+            let there = centers_of(pixel + vec2u(x, y) - window);
+            let offset = there.xy + (vec2f(vec2u(x, y)) - f32(window));
+            let near = max(1.0 - dot(offset, offset) / (AROUND_PX * AROUND_PX), 0.0);
+            let weight = there.z * near * near * near;
+            points += there.z;
+            sum += weight;
+            offsets += weight * offset;
+        }
+    }
+    return Points(points >= FEWEST && sum > 0.0, offsets / max(sum, 1e-9));
+}
+
+// The mean of a pixel's centres from its middle, in pixels, and how many there are.
+fn centers_of(pixel: vec2u) -> vec3f {
+    let bits = centers[pixel.y * frame.size.x + pixel.x];
+    let count = f32(bits >> 24u);
+    let sums = vec2f(vec2u(bits, bits >> 12u) & vec2u(0xfffu));
+    return vec3f((sums / max(count, 1.0) + 0.5) / STEPS - 0.5, count);
+}
+
+fn is_open(pixel: vec2i, own: f32) -> bool {
     // Wide splats have wide cores, which strides do not miss; so the work per pixel is bounded whatever the density.
     let stride = i32(max(own / STRIDES_PER_REACH, 1.0));
     let strides = i32(FURTHEST * own) / stride + LEAST_REACH_PX;
@@ -115,11 +226,8 @@ fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> boo
             return true;
         }
         let rim = cover[u32(pixel.y) * frame.size.x + u32(pixel.x)].rim;
-        if rim == EMPTY_RIM {
-            return false;
-        }
-        if rim == CORE_RIM {
-            return true;
+        if rim <= EMPTY_RIM {
+            return rim < EMPTY_RIM;
         }
     }
     return false;

@@ -1,0 +1,29 @@
+// Adds the centre of each splat, dead or alive, to its pixel, for the trim. The CPU form, `centers.rs`, says how.
+//
+// Reads: counters, splats, tree. Reads and writes: centers.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import splat
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> tree: array<vec2u>;
+@group(0) @binding(4) var<storage, read_write> centers: array<atomic<u32>>;
+
+// Steps of a centre's place in its pixel.
+override STEPS: f32;
+
+@compute @workgroup_size(256)
+fn add_centers(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] || is_empty(living_bounds(tree[level_start(SPLATS) + index])) {
+        return;
+    }
+    let splat = &splats[index];
+    let pixel = pixel_xy((*splat).pixel);
+    let place = vec2u(clamp(STEPS * ((*splat).center_px - vec2f(pixel)), vec2f(0.0), vec2f(STEPS - 1.0)));
+    atomicAdd(&centers[pixel.y * frame.size.x + pixel.x], (1u << 24u) | (place.y << 12u) | place.x);
+}
