@@ -184,7 +184,7 @@ fn noise_that_grows_with_distance_is_measured() {
         k_radii.sort_by(f32::total_cmp);
         let ratio = noise.at(k_radii[k_radii.len() / 2]) / (sigma * depth * depth);
         // Noise makes k-radii larger too, which hides some of its growth.
-        assert!((0.5..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
+        assert!((0.45..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
     }
 }
 
