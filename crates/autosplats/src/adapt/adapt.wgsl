@@ -29,6 +29,8 @@ override WIDEST: f32;
 override GRAZING: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
+override SPARSE: f32;
+override AROUND_SPARSE: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
 override DOT_PX: f32;
@@ -157,7 +159,8 @@ fn widest(surfel: Surfel) -> f32 {
     return WIDEST * first_radius(cell.x, cell_px, surfel.center.z);
 }
 
-// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
+// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from all
+// others.
 fn shrink(place: u32, surfel: Surfel) {
     let usual = measured[2];
     // A handful of points has nothing that is usual.
@@ -165,11 +168,19 @@ fn shrink(place: u32, surfel: Surfel) {
         return;
     }
     let ratio = surfel.k_radius / usual;
-    let stray = surfel.curvature * ratio * ratio;
+    var stray = surfel.curvature * ratio * ratio;
+    if ratio > SPARSE {
+        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius));
+        if around.len >= LEAST_CLUSTERS {
+            stray = max(stray, curvature_of(around) * ratio * ratio);
+        } else if around.weight < f32(frame.k) {
+            stray = max(stray, STRAY_DOT);
+        }
+    }
     if stray > STRAY_DROPPED && frame.keep_outliers == 0u {
         surfels[place].radius = 0.0;
         atomicAdd(&counters[OUTLIERS], 1u);
-    } else if stray > STRAY_DOT {
+    } else if stray >= STRAY_DOT {
         surfels[place].radius = min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
     }
 }

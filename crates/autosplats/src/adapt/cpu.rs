@@ -46,12 +46,16 @@ pub(super) const AGREE: f32 = 3.0;
 pub(super) const WIDEST: f32 = 3.0;
 /// A surfel moves at most this many times the noise; a quadric further away is another surface.
 pub(super) const FARTHEST: f32 = 6.0;
-/// Points whose surface variation, times the square of the k-radius in usual ones, is above this are drawn as dots. Surface
+/// Points whose surface variation, times the square of the k-radius in usual ones, is at least this are drawn as dots. Surface
 /// variation is up to 0.15 at edges and corners, which stay where points are up to four times as far apart as usual; in a
 /// cloud that fills space it is 0.2 by mean, and much less for some.
 pub(super) const STRAY_DOT: f32 = 2.5;
 /// And above this they are outliers.
 pub(super) const STRAY_DROPPED: f32 = 5.0;
+/// Where k-radii are this many usual ones, a ball is asked as well: few neighbours lie flat by chance, or are cut off by gaps.
+pub(super) const SPARSE: f32 = 2.5;
+/// Radius of the ball in k-radii. With less weight of points in it than there are neighbours to be, it is no surface.
+pub(super) const AROUND_SPARSE: f32 = 2.0;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
@@ -195,7 +199,7 @@ fn adapt_all_with<'a, S: Simd>(
         }
         surfel.major_ratio = surfel.major_ratio.min(longest);
         let Call::Noise(Noisy { noise, enough, known }) = call else {
-            shrink(surfel, task);
+            shrink(simd, surfel, task, gathered);
             continue;
         };
         let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
@@ -213,7 +217,7 @@ fn adapt_all_with<'a, S: Simd>(
                 }
                 place(surfel, &surface, known.as_ref(), view);
             }
-            None => shrink(surfel, task),
+            None => shrink(simd, surfel, task, gathered),
         }
     }
 }
@@ -304,18 +308,27 @@ fn widest(surfel: &Surfel, task: &Task) -> f32 {
     WIDEST * task.density.initial_radius(&point, task.rules.k, task.view)
 }
 
-/// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between.
+/// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from
+/// all others.
 #[inline(always)]
-fn shrink(surfel: &mut Surfel, task: &Task) {
+fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gathered) {
     // A handful of points has nothing that is usual.
     if task.usual.k_radius == 0.0 {
         return;
     }
     let ratio = surfel.k_radius / task.usual.k_radius;
-    let stray = surfel.curvature * ratio * ratio;
+    let mut stray = surfel.curvature * ratio * ratio;
+    if ratio > SPARSE {
+        let len = gathered.read(task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
+        if len >= LEAST_CLUSTERS {
+            stray = stray.max(gathered.plane(simd).curvature() * ratio * ratio);
+        } else if gathered.weight() < task.rules.k as f32 {
+            stray = stray.max(STRAY_DOT);
+        }
+    }
     if stray > STRAY_DROPPED && !task.rules.keep_outliers {
         surfel.radius = 0.0;
-    } else if stray > STRAY_DOT {
+    } else if stray >= STRAY_DOT {
         surfel.radius = surfel.radius.min(DOT_PX * task.view.pixel_size(surfel.center[2]));
     }
 }

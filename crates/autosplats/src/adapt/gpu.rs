@@ -2,8 +2,8 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, MOST_TINY, RELIABLE, SCATTER, STRAY_DOT, STRAY_DROPPED, THICKEST,
-    THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
+    AGREE, AROUND_SPARSE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, MOST_TINY, RELIABLE, SCATTER, SPARSE, STRAY_DOT,
+    STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
@@ -227,6 +227,8 @@ impl AdaptPasses {
                 least_reach,
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("WIDEST", WIDEST.into()),
+                ("SPARSE", SPARSE.into()),
+                ("AROUND_SPARSE", AROUND_SPARSE.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),

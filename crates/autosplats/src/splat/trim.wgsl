@@ -30,9 +30,10 @@ override STEPS: f32;
 // Side of the square of pixels of a workgroup.
 const SQUARE = 32u;
 const GROUP = 64u;
-// Pixels from an empty one that are the border; the square and as many on each side.
-const BORDER = 2u;
-const WIDE = 36u;
+// Pixels from the middle of an empty square of three that are the border; one more on each side of the workgroup's square.
+const BORDER = 3u;
+const MARGIN = 4u;
+const WIDE = 40u;
 
 // Pixels of the workgroup that stay.
 var<workgroup> covered: atomic<u32>;
@@ -41,7 +42,9 @@ var<workgroup> covered: atomic<u32>;
 var<workgroup> tails: array<u32, 1024>;
 var<workgroup> tail_count: atomic<u32>;
 // For each row of the wide square, a bit for each pixel that is empty: the first 32 columns, then the others.
-var<workgroup> empties: array<atomic<u32>, 72>;
+var<workgroup> empties: array<atomic<u32>, 80>;
+// The same of pixels in the middle of an empty square.
+var<workgroup> middles: array<vec2u, 40>;
 
 @compute @workgroup_size(64)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -59,10 +62,17 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     for (var place = local; place < WIDE * WIDE; place += GROUP) {
         let at = vec2u(place % WIDE, place / WIDE);
         // Pixels before the first are far beyond the last.
-        let pixel = corner + at - BORDER;
+        let pixel = corner + at - MARGIN;
         if all(pixel < frame.size) && cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM {
             atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
         }
+    }
+    workgroupBarrier();
+    if local > 0u && local < WIDE - 1u {
+        let all = empty_row(local - 1u) & empty_row(local) & empty_row(local + 1u);
+        let after = vec2u((all.x >> 1u) | (all.y << 31u), all.y >> 1u);
+        let before = vec2u(all.x << 1u, (all.y << 1u) | (all.x >> 31u));
+        middles[local] = all & after & before;
     }
     workgroupBarrier();
     var stay = 0u;
@@ -106,19 +116,25 @@ fn clear(at: u32) {
     }
 }
 
-// Whether a pixel of the square is close to an empty one.
-fn is_border(place: vec2u) -> bool {
-    // Around it in the wide square, three of the outer rows' pixels and five of the others'.
-    let wide = five_bits(place, 1u) | five_bits(place, 2u) | five_bits(place, 3u);
-    return (wide | ((five_bits(place, 0u) | five_bits(place, 4u)) & 14u)) != 0u;
+fn empty_row(row: u32) -> vec2u {
+    return vec2u(atomicLoad(&empties[2u * row]), atomicLoad(&empties[2u * row + 1u]));
 }
 
-// Which of the five pixels around a place of the square are empty in one of the five rows around it.
-fn five_bits(place: vec2u, row: u32) -> u32 {
-    let low = atomicLoad(&empties[2u * (place.y + row)]);
-    let high = atomicLoad(&empties[2u * (place.y + row) + 1u]);
-    // Shifted twice: a word cannot be shifted by its width.
-    return ((low >> place.x) | ((high << 1u) << (31u - place.x))) & 31u;
+// Whether a pixel of the square is close to the middle of an empty square of three.
+fn is_border(place: vec2u) -> bool {
+    // Around it in the wide square, five of the outer rows' pixels and seven of the others'.
+    var inner = vec2u(0u);
+    for (var row = 2u; row < 7u; row++) {
+        inner |= middles[place.y + row];
+    }
+    let outer = middles[place.y + 1u] | middles[place.y + 7u];
+    return (seven_bits(place.x, inner) | (seven_bits(place.x, outer) & 62u)) != 0u;
+}
+
+// Of a row's bits, those of the seven pixels around a column of the square.
+fn seven_bits(column: u32, bits: vec2u) -> u32 {
+    // The first of them is one beyond that column; shifted twice, as a word cannot be shifted by its width.
+    return (((bits.x >> column) >> 1u) | (bits.y << (31u - column))) & 127u;
 }
 
 fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
