@@ -137,6 +137,23 @@ fn cells_change_no_hit() {
 }
 
 #[test]
+fn rays_in_a_plane_of_the_fold_arrive() {
+    let cathedral = scene("cathedral");
+    // Half a bay is folded at x = -6, the aisles at y = 0.
+    for (origin, plane) in [(DVec3::new(-6.0, 0.3, 1.75), DVec3::X), (DVec3::new(-4.7, 0.0, 1.75), DVec3::Y)] {
+        for step in 0..32 {
+            let (sin, cos) = (0.2 * f64::from(step)).sin_cos();
+            for off in [0.0, 1e-17, -1e-13] {
+                let direction = DVec3::new(0.0, cos, sin) * plane.x + DVec3::new(cos, 0.0, sin) * plane.y + plane * off;
+                let hit = cathedral.trace(origin, direction).expect("nothing leads out of a cathedral");
+                let distance = cathedral.distance(origin + direction.normalize() * hit.distance).abs();
+                assert!(distance < 0.01, "{origin} {direction}: {distance} from the surface");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_number_of_threads_changes_no_byte() {
     let with = |threads: usize, scene: &Scene| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be had");
