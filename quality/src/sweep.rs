@@ -90,7 +90,7 @@ impl Sweep {
             return f64::INFINITY;
         }
         let hit = surface.trace(self.origin(), direction);
-        let Some(hit) = hit.filter(|hit| hit.distance > (1.0 - BEFORE) * range) else { return f64::INFINITY };
+        let Some(hit) = hit.filter(|hit| (hit.distance - range).abs() < BEFORE * range) else { return f64::INFINITY };
         let cos = hit.normal.dot(direction);
         if !(cos.abs() >= FLATTEST) {
             return f64::INFINITY;
@@ -99,6 +99,6 @@ impl Sweep {
         let aside = DVec3::Z.cross(direction);
         // A ray turned by a small angle leaves the point it met by as much, and then goes on to the tangent plane.
         let gap = |turned: DVec3| range * (turned - direction * (turned.dot(hit.normal) / cos)).length();
-        gap(aside * around).max(gap(direction.cross(aside).normalize() * up))
+        gap(aside * around).max(gap(direction.cross(aside).normalize_or(DVec3::X) * up))
     }
 }

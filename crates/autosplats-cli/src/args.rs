@@ -211,7 +211,8 @@ pub(crate) struct SurfaceArgs {
     /// Factor on the size of every splat, 0.01 to 10
     #[arg(long, value_name = "FACTOR", default_value_t = Reconstruction::default().splat_scale, allow_negative_numbers = true)]
     pub(crate) splat_scale: f32,
-    /// Draw ellipses that follow the spread of the neighbours, instead of circles
+    /// Draw ellipses that follow the spread of the neighbours, instead of circles; with '-k auto' rows of points are
+    /// ellipses in any case, and what is fitted to noise is circles
     #[arg(long)]
     pub(crate) ellipses: bool,
     /// Reconstruct hidden points too

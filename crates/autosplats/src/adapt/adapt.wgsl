@@ -199,10 +199,17 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let noise = max(known.noise, noise_at(surfel.k_radius));
     if is_row(surfel, known.noise) {
         let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
-        surfels[first_of_round + index] = turned(surfel, radius);
+        let area = area(surfel.center, surfel.major_axis, radius);
+        let out = turned(surfel, area);
+        surfels[first_of_round + index] = out;
+        if area.radius == 0.0 {
+            shrink(first_of_round + index, out);
+        }
         return;
     }
-    surfels[first_of_round + index].major_ratio = min(surfel.major_ratio, frame.longest);
+    // A line has no width to draw.
+    let drawn_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MOST);
+    surfels[first_of_round + index].major_ratio = drawn_ratio;
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     var surface = Surface();
     if calls(surfel, noise, enough) {

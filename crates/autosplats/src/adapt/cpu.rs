@@ -194,10 +194,14 @@ fn adapt_all_with<'a, S: Simd>(
         let call = task.call(surfel);
         if let Call::Row = call {
             let radius = first_radius(surfel, density, view, k);
-            turn(simd, surfel, (radius, k), (cells, view), gathered);
+            if !turn(simd, surfel, (radius, k), (cells, view), gathered) {
+                shrink(simd, surfel, task, gathered);
+            }
             continue;
         }
-        surfel.major_ratio = surfel.major_ratio.min(longest);
+        // A line has no width to draw.
+        let is_line = surfel.major_ratio == f32::MAX;
+        surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
         let Call::Noise(Noisy { noise, enough, known }) = call else {
             shrink(simd, surfel, task, gathered);
             continue;
@@ -313,7 +317,7 @@ fn widest(surfel: &Surfel, task: &Task) -> f32 {
 #[inline(always)]
 fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gathered) {
     // A handful of points has nothing that is usual.
-    if task.usual.k_radius == 0.0 {
+    if surfel.radius == 0.0 || task.usual.k_radius == 0.0 {
         return;
     }
     let ratio = surfel.k_radius / task.usual.k_radius;

@@ -9,11 +9,11 @@ use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW
 use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
 use super::rows::{
-    APART_FROM, AREA, AREA_BESIDE, AREA_BEYOND, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, LEAVES, OFF_AREA, REACH,
-    ROW, SEEN_THROUGH, THIN_ROW,
+    AREA, AREA_BESIDE, AREA_BEYOND, AREA_NEAR, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH,
+    ROW, ROW_TILT, SEEN_THROUGH, THIN_ROW,
 };
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
-use super::{LEAST_REACH, SCALES, STEP};
+use super::{LEAST_REACH, SCALES, STEP, noise};
 use crate::Error;
 use crate::fit::{LONGEST, SWEEPS};
 use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
@@ -62,7 +62,8 @@ pub(crate) struct AdaptBuffers {
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
     quantiles: wgpu::Buffer,
-    /// Factor and power of the noise, the median k-radius, and the level of the cells that have sheets.
+    /// Level and power of the noise, the median k-radius, the level of the cells that have sheets, and the k-radius up to which
+    /// noise grows.
     measured: wgpu::Buffer,
     /// Not of the stage's own: [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
@@ -87,7 +88,7 @@ impl AdaptBuffers {
             sampled: gpu.storage::<u32>("sampled surfels", SAMPLE + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
             quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
-            measured: gpu.storage::<f32>("noise", 4)?,
+            measured: gpu.storage::<f32>("noise", 5)?,
             depth_noise: known.runs.clone(),
         })
     }
@@ -200,14 +201,15 @@ impl AdaptPasses {
             ("AREA", AREA.into()),
             ("AREA_BEYOND", AREA_BEYOND.into()),
             ("AREA_BESIDE", AREA_BESIDE.into()),
+            ("AREA_NEAR", AREA_NEAR.into()),
             ("BEYOND", BEYOND.into()),
             ("BESIDE", BESIDE.into()),
             ("HALVES", HALVES.into()),
             ("FLAT", FLAT.into()),
-            ("LEAVES", LEAVES.into()),
+            ("ROW_TILT", ROW_TILT.into()),
             ("OFF_AREA", OFF_AREA.into()),
             ("SEEN_THROUGH", SEEN_THROUGH.into()),
-            ("APART_FROM", APART_FROM.into()),
+            ("OFF_ROW", OFF_ROW.into()),
             ("EVEN_WEIGHT", EVEN_WEIGHT.into()),
             ("REACH", REACH.into()),
             ("FARTHEST_REACH", FARTHEST_REACH.into()),
@@ -276,6 +278,7 @@ impl AdaptPasses {
                     sample,
                     ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
                     ("APART", APART.into()),
+                    ("BEYOND", noise::BEYOND as f64),
                     ("THICK_NOISE", THICK_NOISE.into()),
                     ("FINE_SHEETS", SHEET_LEVELS[0] as f64),
                     ("COARSE_SHEETS", SHEET_LEVELS[1] as f64),

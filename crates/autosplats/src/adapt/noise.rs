@@ -17,6 +17,9 @@ pub(crate) const SAMPLE: usize = 2048;
 /// The densest and the sparsest third of a sample tell how noise grows with the k-radius if k-radii are this much larger in
 /// the one than in the other.
 pub(super) const APART: f32 = 1.2;
+/// Noise grows up to twice the k-radius that one of this many of the sample exceeds: strewn points may be as far apart as
+/// they like.
+pub(super) const BEYOND: usize = 8;
 /// Surfels per task.
 const TASK: usize = 32;
 /// Fewer that find anything in a ball say nothing.
@@ -44,22 +47,25 @@ pub(crate) struct Usual {
     pub(crate) sheet_level: usize,
 }
 
-/// Standard deviation of points from their surface: `factor`·(k-radius)ᵖ, world units. What a scanner measures far away is
-/// sparser and has more noise. Where it is more than half the distance of
-/// points it is measured too large, three times at nearly three distances: clusters that noise puts into slabs of their own
-/// weigh like as many that it does not. Larger neighbourhoods than needed are the consequence.
+/// Standard deviation of points from their surface, which may grow with the k-radius: what a scanner measures far away is
+/// sparser and has more noise. Where it is more than half the distance of points it is measured too large, three times at
+/// nearly three distances: clusters that noise puts into slabs of their own weigh like as many that it does not. Larger
+/// neighbourhoods than needed are the consequence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {
-    pub(crate) factor: f32,
-    /// p: 0 for noise that is the same everywhere; up to 2, as of depth cameras.
+    /// At [`most`](Self::most) and beyond, world units.
+    pub(crate) level: f32,
+    /// It goes with this power of the k-radius: 0 if it is the same everywhere; up to 2, as of depth cameras.
     pub(crate) power: f32,
+    /// K-radius up to which its growth was seen, world units.
+    pub(crate) most: f32,
 }
 
 impl Noise {
     /// Of points with a k-radius above 0.
     #[inline(always)]
     pub(crate) fn at(&self, k_radius: f32) -> f32 {
-        if self.power == 0.0 { self.factor } else { self.factor * k_radius.powf(self.power) }
+        if self.power == 0.0 { self.level } else { self.level * (k_radius / self.most).min(1.0).powf(self.power) }
     }
 
     /// From a sample, densest first.
@@ -76,12 +82,14 @@ impl Noise {
                 // Little growth is chance, or other things where points are sparse.
                 let power = (2.0 * (growth - 0.5)).clamp(0.0, 2.0);
                 if power > 0.0 {
-                    let [noise, k_radius] = [(least * most).sqrt(), (small * large).sqrt()];
-                    return Self { factor: noise / k_radius.powf(power), power };
+                    // Through the middle of the two.
+                    let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
+                    let level = least.sqrt() * most.sqrt() * (beyond / (small.sqrt() * large.sqrt())).powf(power);
+                    return Self { level, power, most: beyond };
                 }
             }
         }
-        Self { factor: scatter_level(sample), power: 0.0 }
+        Self { level: scatter_level(sample), power: 0.0, most: 0.0 }
     }
 }
 

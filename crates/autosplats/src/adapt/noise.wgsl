@@ -1,7 +1,7 @@
 // How far points scatter about the surface: see the CPU form. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: measured: the factor, the power of the k-radius, the median k-radius, and the
-// level of the cells that have sheets.
+// Reads: surfels, sampled, quantiles. Writes: measured: the noise, its power of the k-radius, the median k-radius,
+// the level of the cells that have sheets, and the k-radius up to which noise grows.
 
 #import frame
 #import surfel
@@ -16,6 +16,7 @@ override SCALES: u32;
 override SAMPLE: u32;
 override LEAST_SAMPLE: u32;
 override APART: f32;
+override BEYOND: u32;
 override THICK_NOISE: f32;
 override FINE_SHEETS: u32;
 override COARSE_SHEETS: u32;
@@ -48,24 +49,28 @@ fn k_radius(rank: u32) -> f32 {
     return surfels[sampled[rank]].k_radius;
 }
 
-fn noise_of_sample() -> vec2f {
+// Its level, power and largest k-radius.
+fn noise_of_sample() -> vec3f {
     let len = sampled[SAMPLE];
     let third = len / 3u;
     if third > 0u && k_radius(len - third) > APART * k_radius(third - 1u) {
         let small = k_radius(third / 2u);
         let large = k_radius(len - third + third / 2u);
-        let least = scatter_level(DENSE);
-        let most = scatter_level(SPARSE);
+        let least = scatter_level(DENSEST);
+        let most = scatter_level(SPARSEST);
         if least > 0.0 && most > least {
             let growth = log(most / least) / log(large / small);
             // Little growth is chance, or other things where points are sparse.
             let power = clamp(2.0 * (growth - 0.5), 0.0, 2.0);
             if power > 0.0 {
-                return vec2f(sqrt(least * most) / pow(sqrt(small * large), power), power);
+                // Through the middle of the two.
+                let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
+                let level = sqrt(least) * sqrt(most) * pow(beyond / (sqrt(small) * sqrt(large)), power);
+                return vec3f(level, power, beyond);
             }
         }
     }
-    return vec2f(scatter_level(ALL), 0.0);
+    return vec3f(scatter_level(ALL), 0.0, 0.0);
 }
 
 @compute @workgroup_size(1)
@@ -73,12 +78,13 @@ fn noise() {
     let found = noise_of_sample();
     measured[0] = found.x;
     measured[1] = found.y;
+    measured[4] = found.z;
     let len = sampled[SAMPLE];
     var middle = 0.0;
     if len > 0u {
         middle = k_radius(len / 2u);
     }
     measured[2] = select(0.0, middle, len >= LEAST_SAMPLE);
-    let usual = found.x * select(pow(middle, found.y), 1.0, found.y == 0.0);
+    let usual = found.x * select(pow(min(middle / found.z, 1.0), found.y), 1.0, found.y == 0.0);
     measured[3] = f32(select(FINE_SHEETS, COARSE_SHEETS, usual > THICK_NOISE * measured[2]));
 }

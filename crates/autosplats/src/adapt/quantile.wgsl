@@ -30,7 +30,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let scale = workgroup.x % SCALES;
     let kept = sampled[SAMPLE];
     let len = select(kept / 3u, kept, part == ALL);
-    let begin = select(0u, kept - len, part == SPARSE);
+    let begin = select(0u, kept - len, part == SPARSEST);
     let first = scale * SAMPLE + begin;
     if local < 32u {
         atomicStore(&below[local], 0u);

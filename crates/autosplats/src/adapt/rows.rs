@@ -18,7 +18,7 @@ use crate::camera::View;
 use crate::fit::{LONGEST, Surfel};
 
 /// A neighbourhood is a row if its variance along is this many times that across. Of ten neighbours strewn evenly, one
-/// in thousands is.
+/// in two thousand is, and two or three in a thousand at silhouettes.
 pub(super) const ROW: f32 = 12.0;
 /// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
 pub(super) const AREA: f32 = 0.25;
@@ -26,8 +26,10 @@ pub(super) const AREA: f32 = 0.25;
 pub(super) const BEYOND: f32 = STEP * STEP;
 /// this part, which three wires side by side do not reach,
 pub(super) const AREA_BEYOND: f32 = 0.3;
-/// or, of what is on one side of the row, this.
+/// or, of what is on one side of the row, this;
 pub(super) const AREA_BESIDE: f32 = 0.2;
+/// and of the ball itself this, or it would be the row alone.
+pub(super) const AREA_NEAR: f32 = 0.05;
 /// Of the points on one side, those of the row itself count, to this distance on the other side; radii.
 pub(super) const BESIDE: f32 = 0.1;
 /// Weight of a ball over that of what counts to one side.
@@ -39,9 +41,9 @@ pub(super) const SEEN_THROUGH: f32 = 0.3;
 /// An area is flat if the variance of heights is at most this part of that across.
 pub(super) const FLAT: f32 = 0.1;
 /// Sine of the most that the row leaves the area's plane.
-pub(super) const LEAVES: f32 = 0.25;
+pub(super) const ROW_TILT: f32 = 0.25;
 /// Most that the point is above or below the area, radii: more is a row in front of one.
-pub(super) const APART_FROM: f32 = 0.1;
+pub(super) const OFF_ROW: f32 = 0.1;
 /// Semi-axis of the ellipse across the row, in distances between rows: its support is 1.4 times as wide.
 pub(super) const REACH: f32 = 0.8;
 /// And at most, radii of the ball.
@@ -56,7 +58,7 @@ pub(super) fn is_row(surfel: &Surfel) -> bool {
 }
 
 /// Turns a surfel whose `k` neighbours are a row to the area that balls around it find; `radius` is that of the ball before
-/// the first, world units.
+/// the first, world units. Without an area it becomes thin; returns whether there is one.
 #[inline(always)]
 pub(super) fn turn<S: Simd>(
     simd: S,
@@ -64,12 +66,12 @@ pub(super) fn turn<S: Simd>(
     (radius, k): (f32, u32),
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
-) {
+) -> bool {
     let row = Vec3::from(surfel.major_axis);
     let Some((plane, radius)) = area(simd, surfel.center, row, radius, (cells, view), gathered) else {
         surfel.radius *= THIN_ROW;
         surfel.major_ratio = 1.0 / THIN_ROW;
-        return;
+        return false;
     };
     let to_eye = if view.perspective { -Vec3::from(surfel.center) } else { Vec3::NEG_Z };
     let normal = if plane.axis.dot(to_eye) < 0.0 { -plane.axis } else { plane.axis };
@@ -84,6 +86,7 @@ pub(super) fn turn<S: Simd>(
     let ratio = (REACH * apart).min(FARTHEST_REACH * in_k_radii) * (0.5 * k.sqrt());
     surfel.radius *= (ratio / LONGEST).max(1.0);
     surfel.major_ratio = ratio.clamp(1.0, LONGEST);
+    true
 }
 
 /// Plane of the first ball around `center` that holds an area with the `row` in it, and the ball's radius.
@@ -104,10 +107,10 @@ fn area<S: Simd>(
         }
         (len >= LEAST_CLUSTERS).then(|| gathered.plane(simd))
     };
-    let is_area = |plane: &Plane, least: f32| plane.variances[1] >= least * plane.variances[2];
+    let is_area = |plane: &Plane, least: f32| plane.variances[1] > least * plane.variances[2];
     let is_flat = |plane: &Plane| {
         let [least, middle, _] = plane.variances;
-        (least <= FLAT * middle) & (plane.axis.dot(row).abs() <= LEAVES) & (plane.height.abs() <= APART_FROM)
+        (least <= FLAT * middle) & (plane.axis.dot(row).abs() <= ROW_TILT) & (plane.height.abs() <= OFF_ROW)
     };
     let first = (0..SCALES).find_map(|_| {
         radius *= STEP;
@@ -120,7 +123,8 @@ fn area<S: Simd>(
         let across = row.cross(eye).normalize_or_zero();
         let mut least_bend = f32::INFINITY;
         for side in [across, -across].map(Some) {
-            let Some(beside) = plane(radius, side).filter(is_flat) else { continue };
+            let beside = plane(radius, side).filter(|plane| is_area(plane, AREA_NEAR) & is_flat(plane));
+            let Some(beside) = beside else { continue };
             let bend = beside.variances[0] / beside.variances[1];
             let goes_on = plane(BEYOND * radius, side).is_some_and(|plane| is_area(&plane, AREA_BESIDE));
             if (bend < least_bend) & goes_on {

@@ -36,7 +36,7 @@ impl Case {
     /// Seen from a place `scale` times as far away.
     fn scaled(positions: &[[f32; 3]], projection: Projection, size: [u32; 2], scale: f64) -> Self {
         let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
-        Self::of(&PointCloud::new(DVec3::ZERO, positions.to_vec()), &camera, size, f32::MAX)
+        Self::of(&PointCloud::new(DVec3::ZERO, positions.to_vec()), &camera, size)
     }
 
     /// What a depth camera with coarse steps sees of a room, seen from beside the camera.
@@ -49,7 +49,7 @@ impl Case {
             up: DVec3::NEG_Y,
             projection: Projection::PerspectiveFovDeg(42.0),
         };
-        Self::of(&PointCloud::new(DVec3::ZERO, positions).with_scans(vec![scan]), &camera, [480, 360], f32::MAX)
+        Self::of(&PointCloud::new(DVec3::ZERO, positions).with_scans(vec![scan]), &camera, [480, 360])
     }
 
     /// Rings that a lidar with some noise leaves on the ground and a wall, seen from above and behind.
@@ -62,15 +62,14 @@ impl Case {
             up: DVec3::NEG_Y,
             projection: Projection::PerspectiveFovDeg(50.0),
         };
-        Self::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [960, 540], f32::MAX)
+        Self::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [960, 540])
     }
 
-    /// With ellipses up to `longest`: of circles none is a row.
-    fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2], longest: f32) -> Self {
+    fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2]) -> Self {
         let view = camera.view(DVec3::ZERO, size).expect("a view");
         let screen = Projector::default().project(cloud, &view, &ProjectRules::usual(K)).clone();
         let rules = SearchRules { k: K, outlier_expansions: Some(1), gap_factor: Some(4.0) };
-        let fit_rules = FitRules { k: K, splat_scale: 1.0, longest, keep_outliers: false };
+        let fit_rules = FitRules { k: K, splat_scale: 1.0, longest: 1.0, adaptive: true, keep_outliers: false };
         let fitted = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
             screen_grid::search(&screen, queries, &view, &rules, &mut neighborhoods);
@@ -165,10 +164,10 @@ fn the_noise_of_a_plane_is_measured() {
     for sigma in [0.005, 0.01] {
         for projection in PROJECTIONS {
             let case = Case::new(&noisy(test_clouds::plane(8000), sigma), projection, [240, 180]);
-            let Noise { factor, power } = case.noise();
+            let Noise { level, power, .. } = case.noise();
             // A quantile below the middle, of balls that hold few clusters, leans low.
-            let ratio = factor / sigma;
-            assert!(power == 0.0 && (0.75..1.1).contains(&ratio), "{sigma} {projection:?}: {factor}, {power}");
+            let ratio = level / sigma;
+            assert!(power == 0.0 && (0.75..1.1).contains(&ratio), "{sigma} {projection:?}: {level}, {power}");
         }
     }
 }
@@ -279,6 +278,52 @@ fn rings_of_a_lidar_are_ground() {
     let share = |surfels: &[Surfel]| rows.iter().filter(|&&at| closes(&surfels[at])).count() as f32 / rows.len() as f32;
     let [before, after] = [share(&fitted), share(&adapted)];
     assert!(before < 0.1 && after > 0.9, "{before} of the splats reach the next ring, then {after}");
+}
+
+/// Points half a hundredth apart along lines at these heights, before what else there is.
+fn lines(heights: &[f32], rest: test_clouds::Positions) -> Case {
+    let line = |&y: &f32| (0..400).map(move |step| [0.005 * step as f32 - 1.0, y, 0.0]);
+    let mut positions: test_clouds::Positions = heights.iter().flat_map(line).collect();
+    positions.extend(rest);
+    let camera = Camera { eye: DVec3::NEG_Z * 4.0, look_at: DVec3::ZERO, up: DVec3::Y, projection: PROJECTIONS[1] };
+    Case::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [600, 600])
+}
+
+/// Of the rows in the middle half of [`lines`], the share that finds an area.
+fn share_of_areas(case: &Case) -> f32 {
+    let (fitted, adapted) = (case.fitted.concat(), case.adapted());
+    let in_middle =
+        |surfel: &Surfel| surfel.source < 8000 && surfel.center[0].abs() < 0.5 && surfel.center[1].abs() < 0.5;
+    let rows: Vec<usize> = (0..fitted.len()).filter(|&at| is_row(&fitted[at]) && in_middle(&fitted[at])).collect();
+    assert!(rows.len() > 300, "{} rows", rows.len());
+    rows.iter().filter(|&&at| adapted[at].radius >= fitted[at].radius).count() as f32 / rows.len() as f32
+}
+
+#[test]
+fn wires_are_no_area_and_nor_is_what_is_seen_through() {
+    let many: Vec<f32> = (0..20).map(|line| 0.08 * line as f32 - 0.76).collect();
+    let surface = share_of_areas(&lines(&many, Vec::new()));
+    assert!(surface > 0.99, "of lines side by side {surface} find an area");
+    let wires = share_of_areas(&lines(&[-0.08, 0.0, 0.08], Vec::new()));
+    assert!(wires < 0.01, "of three wires {wires} do");
+    let mut random = Random::new(41);
+    let wall = (0..200_000).map(|_| [1.2 * random.signed(), 1.2 * random.signed(), 1.0]).collect();
+    let before_wall = share_of_areas(&lines(&many, wall));
+    assert!(before_wall < 0.01, "of lines before a wall {before_wall} do");
+}
+
+#[test]
+fn strewn_points_are_no_surface_however_flat_they_lie() {
+    let mut positions = test_clouds::sphere(40_000);
+    let surface = positions.len() as u32;
+    let mut random = Random::new(42);
+    positions.extend((0..1500).map(|_| [random.signed(), random.signed(), random.signed()].map(|c| 1.4 * c)));
+    let case = Case::new(&positions, PROJECTIONS[0], [400, 300]);
+    let apart =
+        |surfel: &&Surfel| surfel.source >= surface && surfel.radius > 2.0 * case.view.pixel_size(surfel.center[2]);
+    let discs = |surfels: &[Surfel]| surfels.iter().filter(apart).count();
+    let [before, after] = [discs(&case.fitted.concat()), discs(&case.adapted())];
+    assert!(before > 300 && after * 3 < before, "{before} discs, then {after}");
 }
 
 #[test]

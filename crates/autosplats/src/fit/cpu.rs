@@ -46,9 +46,10 @@ pub(super) const ROW_COUNT: f32 = 8.0;
 pub(crate) struct FitRules {
     pub(crate) k: u32,
     pub(crate) splat_scale: f32,
-    /// Longest ellipse, semi-major over semi-minor axis; 1 for circles, `f32::MAX` for what is to be adapted, which goes by
-    /// the shape.
+    /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     pub(crate) longest: f32,
+    /// Leave ellipses as long as they are: what adapts them goes by their shape.
+    pub(crate) adaptive: bool,
     /// Keep outliers: points without neighbours as dots, and those apart from all their neighbours.
     pub(crate) keep_outliers: bool,
 }
@@ -179,10 +180,14 @@ impl Fitted {
         let offset = of_lane(&block.offset, lane).map(|sum| sum / count);
         let apart = offset.iter().map(|c| c * c).sum::<f32>() > (LOPSIDED * k_radius) * (LOPSIDED * k_radius);
         let outlier = apart & (count >= LOPSIDED_COUNT) & !rules.keep_outliers;
-        let longest = if count < ROW_COUNT { rules.longest.min(LONGEST) } else { rules.longest };
-        // What is a line has no width to draw.
-        let is_drawn = (plane.major_ratio < f32::MAX) | (longest == f32::MAX);
-        let major_ratio = if is_drawn { plane.major_ratio.min(longest) } else { 1.0 };
+        let major_ratio = if rules.adaptive && count >= ROW_COUNT {
+            plane.major_ratio
+        } else if plane.major_ratio < f32::MAX {
+            plane.major_ratio.min(rules.longest)
+        } else {
+            // A line has no width to draw.
+            1.0
+        };
         let lone = if rules.keep_outliers { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
             center,

@@ -23,7 +23,6 @@
 override ROUND: u32;
 override LINE: f32;
 override LEAST_ACROSS: f32;
-override LONGEST: f32;
 override ROW_COUNT: f32;
 override LONE_RADIUS_PX: f32;
 override WIDEST_BEHIND: f32;
@@ -129,12 +128,10 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
         let widest = WIDEST_BEHIND * first_radius(cell.x, task.cell_px, center.z);
         radius = min(radius, splat_radius(widest, f32(frame.k)));
     }
+    // A line has no width to draw.
+    let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MOST);
     // What adapts it goes by its shape.
-    let told = select(frame.longest, MOST, frame.adaptive == 1u);
-    let longest = select(told, min(told, LONGEST), sums.count < ROW_COUNT);
-    // What is a line has no width to draw.
-    let is_drawn = face.major_ratio < MOST || longest == MOST;
-    let major_ratio = select(1.0, min(face.major_ratio, longest), is_drawn);
+    let major_ratio = select(drawn_ratio, face.major_ratio, frame.adaptive == 1u && sums.count >= ROW_COUNT);
     return Surfel(
         center,
         radius,

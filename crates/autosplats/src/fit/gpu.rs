@@ -1,7 +1,7 @@
 //! The fit on the GPU: an invocation per point.
 
 use super::Surfel;
-use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, LONGEST, LOPSIDED, LOPSIDED_COUNT, ROW_COUNT, WIDEST_BEHIND};
+use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, LOPSIDED, LOPSIDED_COUNT, ROW_COUNT, WIDEST_BEHIND};
 use super::eigen::SWEEPS;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -37,7 +37,6 @@ impl FitPasses {
                 ("SWEEPS", SWEEPS as f64),
                 ("LINE", LINE.into()),
                 ("LEAST_ACROSS", LEAST_ACROSS.into()),
-                ("LONGEST", LONGEST.into()),
                 ("ROW_COUNT", ROW_COUNT.into()),
                 ("LONE_RADIUS_PX", LONE_RADIUS_PX.into()),
                 ("WIDEST_BEHIND", WIDEST_BEHIND.into()),

@@ -230,7 +230,8 @@ impl Reconstruct<'_> {
             k: settings.k,
             splat_scale: settings.splat_scale,
             // What adapts them goes by their shape.
-            longest: if settings.adaptive { f32::MAX } else { settings.longest() },
+            longest: settings.longest(),
+            adaptive: settings.adaptive,
             keep_outliers: settings.outlier_expansions.is_none(),
         };
         fit(screen, queries, neighborhoods, view, &rules, surfels);

@@ -1,8 +1,8 @@
 // Which surfels of the sample a quantile is of, and what it tells. Imports: nothing.
 
 // The densest third, the sparsest, and all.
-const DENSE = 0u;
-const SPARSE = 1u;
+const DENSEST = 0u;
+const SPARSEST = 1u;
 const ALL = 2u;
 
 // Too few balls could be fitted; the quantile of all; that of those in which the surface is thin, which are enough.

@@ -7,14 +7,15 @@
 override AREA: f32;
 override AREA_BEYOND: f32;
 override AREA_BESIDE: f32;
+override AREA_NEAR: f32;
 override BEYOND: f32;
 override BESIDE: f32;
 override HALVES: f32;
 override FLAT: f32;
-override LEAVES: f32;
+override ROW_TILT: f32;
 override OFF_AREA: f32;
 override SEEN_THROUGH: f32;
-override APART_FROM: f32;
+override OFF_ROW: f32;
 override EVEN_WEIGHT: f32;
 override REACH: f32;
 override FARTHEST_REACH: f32;
@@ -30,12 +31,12 @@ struct Area {
 // Whether what a plane was fitted to is an area with the `row` in it.
 fn is_flat(plane: Plane, row: vec3f) -> bool {
     let is_thin = plane.variances.x <= FLAT * plane.variances.y;
-    return is_thin && abs(dot(plane.axis, row)) <= LEAVES && abs(plane.height) <= APART_FROM;
+    return is_thin && abs(dot(plane.axis, row)) <= ROW_TILT && abs(plane.height) <= OFF_ROW;
 }
 
 // Whether a plane was fitted to something as wide as this part of its length, by variances.
 fn is_area(plane: Plane, least: f32) -> bool {
-    return plane.len >= LEAST_CLUSTERS && plane.variances.y >= least * plane.variances.z;
+    return plane.len >= LEAST_CLUSTERS && plane.variances.y > least * plane.variances.z;
 }
 
 // Of the areas on the two sides of a `row`, the flatter.
@@ -49,7 +50,7 @@ fn area_beside(ball: Ball, row: vec3f) -> Area {
         let plane = plane_beside(ball, side, -BESIDE);
         let bend = plane.variances.x * found.plane.variances.y;
         let is_flatter = found.radius == 0.0 || bend < found.plane.variances.x * plane.variances.y;
-        if plane.len >= LEAST_CLUSTERS && is_flat(plane, row) && is_flatter {
+        if is_area(plane, AREA_NEAR) && is_flat(plane, row) && is_flatter {
             if is_area(plane_beside(beyond, side, -BESIDE), AREA_BESIDE) {
                 found = Area(plane, ball.radius);
             }
@@ -117,10 +118,9 @@ fn area(center: vec3f, row: vec3f, least_radius: f32) -> Area {
     return found;
 }
 
-// A surfel of a row, turned to its area.
-fn turned(surfel: Surfel, least_radius: f32) -> Surfel {
+// A surfel of a row, turned to its area; thin if there is none.
+fn turned(surfel: Surfel, found: Area) -> Surfel {
     var out = surfel;
-    let found = area(surfel.center, surfel.major_axis, least_radius);
     if found.radius == 0.0 {
         out.radius = surfel.radius * THIN_ROW;
         out.major_ratio = 1.0 / THIN_ROW;

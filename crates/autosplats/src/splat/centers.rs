@@ -19,7 +19,7 @@ const SUM_MASK: u32 = (1 << SUM_BITS) - 1;
 
 /// One centre in pixel (x, y).
 pub(super) fn one([x, y]: [usize; 2], center_px: [f32; 2]) -> u32 {
-    // A centre that was moved out of the picture still has the pixel of its point.
+    // It lies there but for rounding.
     let step = |center: f32, pixel: usize| (STEPS * (center - pixel as f32)).clamp(0.0, STEPS - 1.0) as u32;
     1 << (2 * SUM_BITS) | step(center_px[1], y) << SUM_BITS | step(center_px[0], x)
 }

@@ -38,13 +38,15 @@ pub(super) const OFF_PX: f32 = 0.56;
 /// Reach in pixels up to which a splat says that points are so dense: they are about two pixels apart then. By 3.5 the IoU
 /// gains another 0.0006, and gaps in noisy clouds and among sparse points open twice as far.
 pub(super) const DENSE_REACH_PX: f32 = 3.0;
-/// Fewest points around that have a border.
+/// Fewest points in the square around that have a border.
 pub(super) const FEWEST: f32 = 3.0;
 /// Pixels from the middle of an empty square of three that are the border, along an axis; in a square, but for its corners. An
 /// empty pixel alone is a gap between points, which the rule for borders would widen.
 const BORDER_PX: usize = 3;
 /// Pixels beside a tile that tell of its border.
 const MARGIN: usize = BORDER_PX + 1;
+// A row of a tile is a word.
+const _: () = assert!(TILE == 64);
 /// Directions of the eight lines.
 const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
 

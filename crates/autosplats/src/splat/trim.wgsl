@@ -30,8 +30,7 @@ override STEPS: f32;
 // Side of the square of pixels of a workgroup.
 const SQUARE = 32u;
 const GROUP = 64u;
-// Pixels from the middle of an empty square of three that are the border; one more on each side of the workgroup's square.
-const BORDER = 3u;
+// Pixels on each side of the workgroup's square that tell of its border: `MARGIN` of the CPU form; and that square.
 const MARGIN = 4u;
 const WIDE = 40u;
 

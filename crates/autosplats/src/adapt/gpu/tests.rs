@@ -42,10 +42,11 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
-    let [factor, power, k_radius, level] = read_back::<[f32; 4]>(gpu, &buffers.measured, 1).expect("noise")[0];
+    let [level, power, k_radius, sheet_level, most] =
+        read_back::<[f32; 5]>(gpu, &buffers.measured, 1).expect("noise")[0];
     Made {
         cells: read_cells(gpu, &buffers, screen.size),
-        usual: Usual { noise: Noise { factor, power }, k_radius, sheet_level: level as usize },
+        usual: Usual { noise: Noise { level, power, most }, k_radius, sheet_level: sheet_level as usize },
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }
@@ -107,7 +108,8 @@ fn compare_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
 fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
     // Where nothing scatters, what is left is the rounding of positions a few units away.
     let near = |a: f32, b: f32| (a - b).abs() <= 0.01 * b.abs() + 1e-6;
-    let same = near(device.noise.factor, host.noise.factor)
+    let same = near(device.noise.level, host.noise.level)
+        && near(device.noise.most, host.noise.most)
         && near(device.noise.power, host.noise.power)
         && device.k_radius == host.k_radius
         && device.sheet_level == host.sheet_level;
@@ -262,11 +264,12 @@ fn comparison_sees_what_is_wrong() {
 
     let usual = case.usual();
     assert!(compare_usual(usual, usual).is_ok(), "nothing is wrong yet");
-    let Usual { noise: Noise { factor, power }, k_radius, sheet_level } = usual;
-    let with = |factor: f32, power: f32, k_radius: f32| Usual { noise: Noise { factor, power }, k_radius, sheet_level };
-    assert!(compare_usual(with(1.02 * factor, power, k_radius), usual).is_err(), "more noise");
-    assert!(compare_usual(with(factor, 0.1, k_radius), usual).is_err(), "that grows with depth");
-    assert!(compare_usual(with(factor, power, 1.001 * k_radius), usual).is_err(), "points further apart");
+    let Usual { noise: Noise { level, power, most }, k_radius, sheet_level } = usual;
+    let with =
+        |level: f32, power: f32, k_radius: f32| Usual { noise: Noise { level, power, most }, k_radius, sheet_level };
+    assert!(compare_usual(with(1.02 * level, power, k_radius), usual).is_err(), "more noise");
+    assert!(compare_usual(with(level, 0.1, k_radius), usual).is_err(), "that grows");
+    assert!(compare_usual(with(level, power, 1.001 * k_radius), usual).is_err(), "points further apart");
     assert!(compare_usual(Usual { sheet_level: 3 - sheet_level, ..usual }, usual).is_err(), "sheets of other cells");
 
     let adapted = case.adapted();

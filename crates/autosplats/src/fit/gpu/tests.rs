@@ -15,7 +15,7 @@ use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE};
 
-const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, keep_outliers: false };
+const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false };
 
 /// Screen points and their neighbourhoods, of the active and of the passive ones.
 struct Case {

@@ -3,7 +3,9 @@
 //! The GPU may be any that is there, also one that is a program on the processor. Where there is none these tests say that
 //! they check nothing, and where `CI` is set they fail.
 
-#[path = "../src/test_clouds.rs"]
+mod devices;
+mod splat_communication;
+#[path = "../../src/test_clouds.rs"]
 mod test_clouds;
 
 use std::collections::HashMap;
@@ -31,6 +33,12 @@ fn gpu() -> Option<Renderer> {
             None
         }
     }
+}
+
+/// A pixel has one point, as it has where two cannot be bound and in splat communication.
+fn a_point_a_pixel() -> Settings {
+    let reconstruction = Reconstruction { points_per_pixel: 1, ..Reconstruction::default() };
+    Settings { reconstruction, ..Settings::default() }
 }
 
 /// A generated scene with its camera.
@@ -224,7 +232,7 @@ fn adapted_to_noise() {
     }
     // A device with nothing beyond WebGPU's core does it as well.
     let (cloud, camera) = noisy_scene("statue", 60_000, 0.01);
-    let (device, queue) = own_device(128 << 20).expect("a device");
+    let (device, queue) = devices::own_device(128 << 20).expect("a device");
     let mut own = Renderer::with_device(device, queue).expect("a renderer");
     let reconstruction = Reconstruction { adaptive: true, ..Reconstruction::default() };
     let settings = Settings { reconstruction, ..Settings::default() };
@@ -327,165 +335,6 @@ fn nothing_to_see_is_no_trouble() {
     assert!(refused(counts([64, 48], &coloured)).contains("no colours"), "and attributes");
 }
 
-/// A device of the caller's own: no optional feature, and bindings of no more than `binding` bytes.
-fn own_device(binding: u64) -> Option<(wgpu::Device, wgpu::Queue)> {
-    own_device_with(wgpu::Features::empty(), binding)
-}
-
-fn own_device_with(required_features: wgpu::Features, binding: u64) -> Option<(wgpu::Device, wgpu::Queue)> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).ok()?;
-    let limits = wgpu::Limits { max_storage_buffer_binding_size: binding, ..wgpu::Limits::default() };
-    let descriptor = wgpu::DeviceDescriptor { required_features, required_limits: limits, ..Default::default() };
-    Some(pollster::block_on(adapter.request_device(&descriptor)).expect("a device within WebGPU's default limits"))
-}
-
-#[test]
-fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
-    if gpu().is_none() {
-        return;
-    }
-    let (cloud, camera) = scene("statue", 1_000_000);
-    let size = [250, 170];
-    let (device, queue) = own_device(4 << 20).expect("a device");
-    let mut own = Renderer::with_device(device, queue).expect("a renderer");
-    assert!(!own.adapter().expect("a device").int64_atomics, "the device has no 64-bit atomics");
-    assert!(cloud.len() * 12 > 2 * (4 << 20), "the points take three bindings");
-    compare(&mut own, &cloud, &camera, [200, 140], &Settings::default(), "three bindings");
-    // Surfels of two points a pixel would take more than the device binds: it makes do with one.
-    compare(&mut own, &cloud, &camera, size, &a_point_a_pixel(), "a point a pixel");
-    let asked = own.render(&cloud, &camera, size, &a_point_a_pixel()).expect("a picture").image.clone();
-    let made = own.render(&cloud, &camera, size, &Settings::default()).expect("a picture").image;
-    assert_eq!(&asked, made, "no room for two points a pixel");
-    // And a picture that is too large for the device is refused, not garbage.
-    match own.render(&cloud, &camera, [2000, 2000], &Settings::default()) {
-        Err(Error::DeviceLimit { needed, allowed, .. }) => assert!(needed > allowed, "{needed} {allowed}"),
-        other => panic!("{:?}", other.map(|frame| frame.counts)),
-    }
-    compare(&mut own, &cloud, &camera, size, &a_point_a_pixel(), "after a refusal");
-}
-
-#[test]
-fn clouds_of_any_size_follow_each_other() {
-    let Some(mut gpu) = gpu() else { return };
-    let (whole, camera) = scene("statue", 60_000);
-    for points in [60_000, 30_000, 61, 45_000, 59_000, 2_000] {
-        let mut cloud = whole.clone();
-        cloud.retain(|index| index < points);
-        compare(&mut gpu, &cloud, &camera, [200, 160], &Settings::default(), &format!("{points} points"));
-    }
-    let moved = whole.positions().iter().map(|&[x, y, z]| [x + 0.05, y, z]).collect();
-    let moved = PointCloud::new(whole.origin(), moved);
-    compare(&mut gpu, &moved, &camera, [200, 160], &Settings::default(), "as many points elsewhere");
-}
-
-#[test]
-fn a_callers_texture_gets_the_same_picture() {
-    if gpu().is_none() {
-        return;
-    }
-    let (device, queue) = own_device(128 << 20).expect("a device");
-    let mut renderer = Renderer::with_device(device.clone(), queue.clone()).expect("a renderer");
-    let (cloud, camera) = scene("figure", 50_000);
-    let size = [250, 170];
-    let settings = Settings::default();
-    renderer.upload(&cloud, &settings, &|_| true).expect("an upload");
-    let expected = renderer.render(&cloud, &camera, size, &settings).expect("a picture").image.clone();
-    let texture = |format, usage| {
-        device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: &[],
-        })
-    };
-    let both = wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
-    for (format, swapped) in [(wgpu::TextureFormat::Rgba8Unorm, false), (wgpu::TextureFormat::Bgra8UnormSrgb, true)] {
-        let texture = texture(format, both);
-        renderer.render_to_texture(&cloud, &camera, &texture, &settings).expect("a picture in a texture");
-        let pixels = read_texture(&device, &queue, &texture, size);
-        let expected = expected.pixels.iter().map(|&[r, g, b, a]| if swapped { [b, g, r, a] } else { [r, g, b, a] });
-        assert!(pixels.into_iter().eq(expected), "{format:?}");
-    }
-    let wrong = [
-        texture(wgpu::TextureFormat::R32Float, both),
-        texture(wgpu::TextureFormat::Rgba8Unorm, both - wgpu::TextureUsages::COPY_DST),
-    ];
-    for texture in wrong {
-        let refused = renderer.render_to_texture(&cloud, &camera, &texture, &settings);
-        assert!(refused.is_err(), "{:?} {:?}", texture.format(), texture.usage());
-    }
-    assert!(
-        Renderer::new().render_to_texture(&cloud, &camera, &wrong_backend(&texture), &settings).is_err(),
-        "the CPU has none"
-    );
-}
-
-fn wrong_backend(texture: &impl Fn(wgpu::TextureFormat, wgpu::TextureUsages) -> wgpu::Texture) -> wgpu::Texture {
-    texture(wgpu::TextureFormat::Rgba8Unorm, wgpu::TextureUsages::COPY_DST)
-}
-
-fn read_texture(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    texture: &wgpu::Texture,
-    [width, height]: [u32; 2],
-) -> Vec<[u8; 4]> {
-    let pitch = (4 * width).next_multiple_of(256);
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size: u64::from(pitch * height),
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: None };
-    let to = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-    encoder.copy_texture_to_buffer(texture.as_image_copy(), to, texture.size());
-    queue.submit([encoder.finish()]);
-    buffer.map_async(wgpu::MapMode::Read, .., |_| {});
-    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device answers");
-    let bytes = buffer.get_mapped_range(..).expect("mapped");
-    let row = |y: u32| &bytes[(y * pitch) as usize..][..4 * width as usize];
-    (0..height).flat_map(|y| row(y).chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect::<Vec<_>>()).collect()
-}
-
-#[test]
-fn an_upload_can_be_stopped() {
-    let Some(mut gpu) = gpu() else { return };
-    // More than goes at once.
-    let cloud = PointCloud::new(DVec3::ZERO, test_clouds::plane(12_000_000));
-    let stopped = gpu.upload(&cloud, &Settings::default(), &|fraction| fraction < 0.1);
-    assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");
-    let (cloud, camera) = scene("figure", 20_000);
-    compare(&mut gpu, &cloud, &camera, SIZE, &Settings::default(), "after that");
-}
-
-#[test]
-fn a_device_that_is_lost_says_so() {
-    if gpu().is_none() {
-        return;
-    }
-    let (cloud, camera) = scene("figure", 20_000);
-    let (device, queue) = own_device(128 << 20).expect("a device");
-    let mut lost = Renderer::with_device(device.clone(), queue).expect("a renderer");
-    lost.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture");
-    device.destroy();
-    for other in [false, true] {
-        let cloud = if other { scene("statue", 20_000).0 } else { cloud.clone() };
-        match lost.render(&cloud, &camera, SIZE, &Settings::default()) {
-            Err(Error::DeviceLost(_) | Error::Device(_)) => {}
-            outcome => panic!("{:?}", outcome.map(|frame| frame.counts)),
-        }
-    }
-    let mut new = Renderer::with_backend(Backend::Gpu).expect("another device");
-    compare(&mut new, &cloud, &camera, SIZE, &Settings::default(), "on a new renderer");
-}
-
 #[test]
 fn a_picture_of_8192_pixels_a_side() {
     let Some(mut gpu) = gpu() else { return };
@@ -511,79 +360,4 @@ fn colours_come_and_go_without_the_points() {
             Settings { shading: Shading { color: color.clone(), ..Shading::default() }, ..Settings::default() };
         compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("{color:?}"));
     }
-}
-
-fn by_communication() -> Settings {
-    let engine = SearchEngine::SplatCommunication;
-    Settings { reconstruction: Reconstruction { engine, ..Reconstruction::default() }, ..Settings::default() }
-}
-
-/// What it draws: its pixels have a point each.
-fn a_point_a_pixel() -> Settings {
-    let reconstruction = Reconstruction { points_per_pixel: 1, ..Reconstruction::default() };
-    Settings { reconstruction, ..Settings::default() }
-}
-
-/// The paper's own search finds what the exact one finds, but for the thousandth of the points that it leaves unfinished, and
-/// does so in ten iterations at most.
-#[test]
-fn splat_communication_in_every_scene() {
-    let Some(mut gpu) = gpu() else { return };
-    for (name, _) in Scene::names() {
-        let (cloud, camera) = scene(name, 20_000);
-        let exact = gpu.render(&cloud, &camera, SIZE, &a_point_a_pixel()).expect("a picture").image.clone();
-        assert!(gpu.convergence().expect("none").is_empty(), "{name}: the screen grid does not iterate");
-        let radii = |gpu: &mut Renderer| -> HashMap<u32, f32> {
-            gpu.surfels().expect("surfels").iter().map(|surfel| (surfel.point, surfel.k_radius)).collect()
-        };
-        let exact_radii = radii(&mut gpu);
-        let frame = gpu.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture");
-        let (counts, unlike) = (frame.counts, unlike(&exact, frame.image));
-        assert!(unlike <= 2.0 * UNLIKE, "{name}: {unlike} of the pixels differ");
-
-        let found = radii(&mut gpu);
-        // What the last thousandth hides or lets through may be recovered or not.
-        let both: Vec<_> = found.iter().filter_map(|(point, found)| Some((found, exact_radii.get(point)?))).collect();
-        assert!(both.len() * 1000 >= 999 * exact_radii.len(), "{name}: the same points are searched for");
-        let wrong = both.iter().filter(|(found, exact)| !((*found - *exact).abs() <= 1e-5 * *exact)).count();
-        assert!(wrong * 1000 <= both.len(), "{name}: {wrong} of {} k-radii differ", both.len());
-
-        let curve = gpu.convergence().expect("a curve");
-        assert_eq!(curve[0] as usize, counts.active + counts.recovered, "{name}: what was searched for");
-        let left = curve.get(10).or(curve.last()).copied().unwrap_or_default();
-        assert!(left * 1000 <= curve[0], "{name}: after ten iterations: {curve:?}");
-        let left = curve.get(7).copied().unwrap_or_default();
-        assert!(left * 100 <= curve[0], "{name}: after seven iterations: {curve:?}");
-    }
-}
-
-#[test]
-fn splat_communication_is_refused_where_it_cannot_run() {
-    let (cloud, camera) = scene("statue", 2_000);
-    let refused = |renderer: &mut Renderer| {
-        let outcome = renderer.render(&cloud, &camera, SIZE, &by_communication()).map(|frame| frame.counts);
-        outcome.expect_err("refused").to_string()
-    };
-    let mut cpu = Renderer::new();
-    let message = refused(&mut cpu);
-    assert!(message.contains("runs on a GPU only") && message.contains("screen-grid"), "{message}");
-    assert!(cpu.convergence().expect("none").is_empty(), "nothing was searched for");
-    if gpu().is_none() {
-        return;
-    }
-    let (device, queue) = own_device(128 << 20).expect("a device");
-    let mut own = Renderer::with_device(device, queue).expect("a renderer");
-    let message = refused(&mut own);
-    assert!(message.contains("FLOAT32_BLENDABLE") && message.contains("screen-grid"), "{message}");
-    let early = own.check(&by_communication()).expect_err("refused before there is a cloud").to_string();
-    assert_eq!(early, message);
-    assert!(own.check(&Settings::default()).is_ok(), "other engines run");
-    compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
-
-    // With that one feature, and WebGPU's default limits, it runs; so it does in debug builds, which check indirect draws.
-    let (device, queue) = own_device_with(wgpu::Features::FLOAT32_BLENDABLE, 128 << 20).expect("a device");
-    let mut able = Renderer::with_device(device, queue).expect("a renderer");
-    let found = able.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture").image.clone();
-    let exact = own.render(&cloud, &camera, SIZE, &a_point_a_pixel()).expect("a picture").image;
-    assert!(unlike(&found, exact) <= 2.0 * UNLIKE, "the pictures are alike");
 }

@@ -1,0 +1,73 @@
+//! The paper's own search, on the raster pipeline.
+
+use super::devices::{own_device, own_device_with};
+use super::*;
+
+fn by_communication() -> Settings {
+    let engine = SearchEngine::SplatCommunication;
+    Settings { reconstruction: Reconstruction { engine, ..Reconstruction::default() }, ..Settings::default() }
+}
+
+/// The paper's own search finds what the exact one finds, but for the thousandth of the points that it leaves unfinished, and
+/// does so in ten iterations at most.
+#[test]
+fn splat_communication_in_every_scene() {
+    let Some(mut gpu) = gpu() else { return };
+    for (name, _) in Scene::names() {
+        let (cloud, camera) = scene(name, 20_000);
+        let exact = gpu.render(&cloud, &camera, SIZE, &a_point_a_pixel()).expect("a picture").image.clone();
+        assert!(gpu.convergence().expect("none").is_empty(), "{name}: the screen grid does not iterate");
+        let radii = |gpu: &mut Renderer| -> HashMap<u32, f32> {
+            gpu.surfels().expect("surfels").iter().map(|surfel| (surfel.point, surfel.k_radius)).collect()
+        };
+        let exact_radii = radii(&mut gpu);
+        let frame = gpu.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture");
+        let (counts, unlike) = (frame.counts, unlike(&exact, frame.image));
+        assert!(unlike <= 2.0 * UNLIKE, "{name}: {unlike} of the pixels differ");
+
+        let found = radii(&mut gpu);
+        // What the last thousandth hides or lets through may be recovered or not.
+        let both: Vec<_> = found.iter().filter_map(|(point, found)| Some((found, exact_radii.get(point)?))).collect();
+        assert!(both.len() * 1000 >= 999 * exact_radii.len(), "{name}: the same points are searched for");
+        let wrong = both.iter().filter(|(found, exact)| !((*found - *exact).abs() <= 1e-5 * *exact)).count();
+        assert!(wrong * 1000 <= both.len(), "{name}: {wrong} of {} k-radii differ", both.len());
+
+        let curve = gpu.convergence().expect("a curve");
+        assert_eq!(curve[0] as usize, counts.active + counts.recovered, "{name}: what was searched for");
+        let left = curve.get(10).or(curve.last()).copied().unwrap_or_default();
+        assert!(left * 1000 <= curve[0], "{name}: after ten iterations: {curve:?}");
+        let left = curve.get(7).copied().unwrap_or_default();
+        assert!(left * 100 <= curve[0], "{name}: after seven iterations: {curve:?}");
+    }
+}
+
+#[test]
+fn splat_communication_is_refused_where_it_cannot_run() {
+    let (cloud, camera) = scene("statue", 2_000);
+    let refused = |renderer: &mut Renderer| {
+        let outcome = renderer.render(&cloud, &camera, SIZE, &by_communication()).map(|frame| frame.counts);
+        outcome.expect_err("refused").to_string()
+    };
+    let mut cpu = Renderer::new();
+    let message = refused(&mut cpu);
+    assert!(message.contains("runs on a GPU only") && message.contains("screen-grid"), "{message}");
+    assert!(cpu.convergence().expect("none").is_empty(), "nothing was searched for");
+    if gpu().is_none() {
+        return;
+    }
+    let (device, queue) = own_device(128 << 20).expect("a device");
+    let mut own = Renderer::with_device(device, queue).expect("a renderer");
+    let message = refused(&mut own);
+    assert!(message.contains("FLOAT32_BLENDABLE") && message.contains("screen-grid"), "{message}");
+    let early = own.check(&by_communication()).expect_err("refused before there is a cloud").to_string();
+    assert_eq!(early, message);
+    assert!(own.check(&Settings::default()).is_ok(), "other engines run");
+    compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
+
+    // With that one feature, and WebGPU's default limits, it runs; so it does in debug builds, which check indirect draws.
+    let (device, queue) = own_device_with(wgpu::Features::FLOAT32_BLENDABLE, 128 << 20).expect("a device");
+    let mut able = Renderer::with_device(device, queue).expect("a renderer");
+    let found = able.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture").image.clone();
+    let exact = own.render(&cloud, &camera, SIZE, &a_point_a_pixel()).expect("a picture").image;
+    assert!(unlike(&found, exact) <= 2.0 * UNLIKE, "the pictures are alike");
+}
