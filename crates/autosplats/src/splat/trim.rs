@@ -45,8 +45,7 @@ pub(super) const FEWEST: f32 = 3.0;
 const BORDER_PX: usize = 3;
 /// Pixels beside a tile that tell of its border.
 const MARGIN: usize = BORDER_PX + 1;
-// A row of a tile is a word.
-const _: () = assert!(TILE == 64);
+const _: () = assert!(TILE == 64, "a row of a tile is a word");
 /// Directions of the eight lines.
 const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
 
