@@ -1,12 +1,12 @@
 //! Splat: surfels in, the visible surface per pixel out [Paper, §7].
-
 //!
 //! # How it works
 //! A splat is weighted by a Gaussian over its disc and drawn at least as a dot a pixel wide. First every splat writes its
 //! depth, pushed back by ε, and the nearest stays (*visibility*). Splats whose own point that map hides are artefacts of
 //! neighbourhoods cut short by occlusion; twice the map is drawn again without them (*refinement*). Then the splats left
 //! add their weighted attributes wherever they lie in front of the map, that is within ε of the surface (*attributes*),
-//! and the sums are divided by the weights (*normalize*). Last, tails that stick out of a silhouette are cut off (*trim*).
+//! and the sums are divided by the weights (*normalize*). Last, tails that stick out of a silhouette are cut off (*trim*),
+//! by the cores of splats around them and, where points are dense, by the places of those in each pixel (`centers`).
 //!
 //! Splats are sorted into tiles of [`TILE`]² pixels. A tile is drawn by one thread, in its cache, splat after splat in the
 //! order of the list, so that sums come out the same for any number of threads.

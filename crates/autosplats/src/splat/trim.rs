@@ -7,9 +7,9 @@
 //! reaches, and nothing empty in between; or if there is no core around it at all.
 //!
 //! Where points are about as dense as pixels, discs are too coarse a measure, and what ends the surface are the points
-//! themselves: close to an empty square of three pixels, one stays if the mean of the points around is close to its middle, or if the next
-//! pixel away from them stays. At the end of points they lie on one side. Lines between cores kept a row of tails wherever
-//! two cores stood out of a border; of wrong pixels along silhouettes this leaves two thirds.
+//! themselves: close to an empty square of three pixels, a pixel stays if the mean of the points around is close to its
+//! middle, or if the next pixel away from them stays. At the end of points they lie on one side. Lines between cores kept a
+//! row of tails wherever two cores stood out of a border; of wrong pixels along silhouettes this leaves two thirds.
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
 use super::centers::mean;
