@@ -1,1 +1,2 @@
-//! A window.
+//! A window that shows raw points as a lit surface.
+mod navigation;
