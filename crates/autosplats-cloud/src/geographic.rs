@@ -21,13 +21,30 @@ impl PointCloud {
     /// are wrong by one or two parts in a hundred, as on any flat map. Residuals are taken up by the new positions,
     /// scanner places are moved but not turned.
     pub fn to_local_metres(&mut self) -> bool {
+        self.local_metres(None).is_some_and(|local| self.to_metres_on(&local))
+    }
+
+    /// The flat map about the cloud's middle, if its x and y are longitude and latitude; or the one about the place that
+    /// `beside` is about, so that clouds of one map keep their places to each other.
+    pub fn local_metres(&self, beside: Option<&LocalMetres>) -> Option<LocalMetres> {
+        if self.crs.unit != Some(Unit::Degree) {
+            return None;
+        }
+        let middle = beside.map_or_else(
+            || middle(self.len(), |i| self.world_position(i) * STEPS) / STEPS,
+            |LocalMetres { middle, .. }| *middle,
+        );
+        Some(LocalMetres::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0)))
+    }
+
+    /// As [`to_local_metres`](Self::to_local_metres), on a map that is known.
+    pub fn to_metres_on(&mut self, local: &LocalMetres) -> bool {
         if self.crs.unit != Some(Unit::Degree) {
             return false;
         }
         let count = self.len();
-        let middle = middle(count, |i| self.world_position(i) * STEPS) / STEPS;
-        let local = Local::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0));
-        let origin = DVec3::new(0.0, 0.0, (middle.z * local.scale.z).round());
+        let LocalMetres { middle, scale } = *local;
+        let origin = DVec3::new(0.0, 0.0, (middle.z * scale.z).round());
         let positions: Vec<[f32; 3]> = (0..count)
             .into_par_iter()
             .map(|i| (local.metres(self.world_position(i)) - origin).as_vec3().to_array())
@@ -39,7 +56,7 @@ impl PointCloud {
         self.origin = origin;
         self.identity = Identity::default();
         self.residuals = None;
-        self.resolution = self.resolution.map(|step| step * local.scale);
+        self.resolution = self.resolution.map(|step| step * scale);
         let name = format!("metres about {:.6}° E, {:.6}° N", middle.x, middle.y);
         self.crs = Crs { name: Some(name), unit: Some(Unit::Metre), ..Crs::default() };
         true
@@ -69,14 +86,16 @@ impl PointCloud {
     }
 }
 
-/// A flat map that touches the ellipsoid at one place.
-struct Local {
+/// A flat map that touches the ellipsoid at one place: longitude and latitude to metres east and north of there, heights to
+/// metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalMetres {
     middle: DVec3,
     /// Metres per unit.
     scale: DVec3,
 }
 
-impl Local {
+impl LocalMetres {
     /// `height` is the length of z's unit in metres.
     fn at(middle: DVec3, height: f64) -> Self {
         let (sin, cos) = middle.y.clamp(-90.0, 90.0).to_radians().sin_cos();
@@ -86,10 +105,16 @@ impl Local {
         Self { middle, scale: DVec3::new(parallel.to_radians(), meridian.to_radians(), height) }
     }
 
-    fn metres(&self, degrees: DVec3) -> DVec3 {
+    /// Metres on the map of a place in degrees.
+    pub fn metres(&self, degrees: DVec3) -> DVec3 {
         // The short way round, across the 180th meridian too.
         let east = (degrees.x - self.middle.x + 180.0).rem_euclid(360.0) - 180.0;
         DVec3::new(east, degrees.y - self.middle.y, degrees.z) * self.scale
+    }
+
+    /// The place in degrees that is at some metres on the map. Longitudes go on beyond the 180th meridian.
+    pub fn degrees(&self, metres: DVec3) -> DVec3 {
+        metres / self.scale + self.middle.with_z(0.0)
     }
 }
 
@@ -124,6 +149,23 @@ mod tests {
             assert!((way(2).z - 2.5).abs() < 1e-6, "heights stay");
             assert_eq!(cloud.crs().unit, Some(Unit::Metre), "and says so");
         }
+    }
+
+    #[test]
+    fn maps_are_shared_and_go_back() {
+        let (mut first, mut second) = (cloud(&[[10.0, 50.0, 5.0], [10.01, 50.01, 5.0]]), cloud(&[[10.03, 50.0, 7.0]]));
+        let local = first.local_metres(None).expect("in degrees");
+        for index in 0..2 {
+            let place = first.world_position(index);
+            let back = local.degrees(local.metres(place));
+            // A few steps of f64 at 180.
+            assert!(back.abs_diff_eq(place, 1e-13), "{place} comes back as {back}");
+        }
+        assert_eq!(second.local_metres(Some(&local)), Some(local), "a neighbour on the same map");
+        assert!(first.to_metres_on(&local) && second.to_metres_on(&local), "both are converted");
+        let way = second.world_position(0) - first.world_position(0);
+        assert!((way - DVec3::new(2151.0, 0.0, 2.0)).abs().max_element() < 1.0, "keeps its place: {way}");
+        assert!(!first.to_metres_on(&local) && first.local_metres(None).is_none(), "metres stay");
     }
 
     #[test]

@@ -24,6 +24,7 @@ mod identity;
 mod las;
 mod memory;
 mod merge;
+mod moved;
 mod progress;
 mod read;
 mod retain;
@@ -35,6 +36,7 @@ mod write;
 pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use crs::{Crs, GeoKeys, Unit};
 pub use error::Error;
+pub use geographic::LocalMetres;
 /// The vector library of the public interface.
 pub use glam;
 pub use memory::{available_memory, check_memory};

@@ -1,5 +1,7 @@
 //! Several clouds to one.
 
+use std::ops::Range;
+
 use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
 
@@ -32,13 +34,26 @@ impl PointCloud {
         if parts.len() == 1 && parts[0].1 == DMat4::IDENTITY {
             return parts.swap_remove(0).0;
         }
+        Self::merged(&parts.iter().map(|(cloud, pose)| (cloud, *pose)).collect::<Vec<_>>())
+    }
 
-        let origin = common_origin(&parts);
+    /// As [`merge`](Self::merge), of clouds that others still need; a single part is copied.
+    #[must_use]
+    pub fn merged(parts: &[(&Self, DMat4)]) -> Self {
+        let filled: Vec<_> = parts.iter().filter(|(cloud, _)| !cloud.is_empty()).copied().collect();
+        let parts = match (&*filled, parts) {
+            ([], []) => return Self::default(),
+            ([], [(empty, _), ..]) => return (*empty).clone(),
+            ([(only, pose)], _) if *pose == DMat4::IDENTITY => return (*only).clone(),
+            (filled, _) => filled,
+        };
+
+        let origin = common_origin(parts);
         let total = parts.iter().map(|(cloud, _)| cloud.len()).sum();
         let exact = parts.iter().any(|(cloud, _)| cloud.residuals().is_some());
         let mut positions = Vec::with_capacity(total);
         let mut residuals = Vec::with_capacity(if exact { total } else { 0 });
-        for (cloud, pose) in &parts {
+        for (cloud, pose) in parts {
             if *pose == DMat4::IDENTITY && cloud.origin() == origin {
                 positions.extend_from_slice(cloud.positions());
                 match cloud.residuals() {
@@ -56,7 +71,7 @@ impl PointCloud {
         }
         let colors = parts.iter().any(|(cloud, _)| cloud.colors().is_some()).then(|| {
             let mut colors = Vec::with_capacity(total);
-            for (cloud, _) in &parts {
+            for (cloud, _) in parts {
                 match cloud.colors() {
                     Some(own) => colors.extend_from_slice(own),
                     None => colors.resize(colors.len() + cloud.len(), GREY),
@@ -64,14 +79,14 @@ impl PointCloud {
             }
             colors
         });
-        let first = &parts[0].0;
+        let first = parts[0].0;
         let mut fields: Vec<Field> =
-            first.fields().iter().filter_map(|field| common_field(&parts, &field.name)).collect();
-        turn_normals(&mut fields, &parts);
+            first.fields().iter().filter_map(|field| common_field(parts, &field.name)).collect();
+        turn_normals(&mut fields, parts);
         let agreed = |same: fn(&Self, &Self) -> bool| parts.iter().all(|(cloud, _)| same(cloud, first));
         let mut scans = Vec::new();
         let mut start = 0;
-        for (cloud, pose) in &parts {
+        for (cloud, pose) in parts {
             scans.extend(cloud.scans().iter().map(|scan| Scan {
                 name: scan.name.clone(),
                 world_from_sensor: *pose * scan.world_from_sensor,
@@ -103,36 +118,40 @@ pub(crate) fn normal_matrix(matrix: DMat3) -> DMat3 {
 }
 
 /// Has normals follow the poses of their parts.
-fn turn_normals(fields: &mut [Field], parts: &[(PointCloud, DMat4)]) {
+fn turn_normals(fields: &mut [Field], parts: &[(&PointCloud, DMat4)]) {
+    let mut start = 0;
+    for (cloud, pose) in parts {
+        let points = start..start + cloud.len();
+        start = points.end;
+        if *pose != DMat4::IDENTITY {
+            turn(fields, points, pose, |_| true);
+        }
+    }
+}
+
+/// Turns the normals of those of `points` that `which` says yes to, if there are any of floats.
+pub(crate) fn turn(fields: &mut [Field], points: Range<usize>, pose: &DMat4, which: impl Fn(usize) -> bool + Sync) {
     let find = |name: &str| {
         fields.iter().position(|Field { name: own, values }| {
             own == name && matches!(values, FieldValues::F32(_) | FieldValues::F64(_))
         })
     };
     let [Some(x), Some(y), Some(z)] = ["NormalX", "NormalY", "NormalZ"].map(find) else { return };
-    let mut start = 0;
-    for (cloud, pose) in parts {
-        let points = start..start + cloud.len();
-        start = points.end;
-        if *pose == DMat4::IDENTITY {
-            continue;
-        }
-        let matrix = normal_matrix(DMat3::from_mat4(*pose));
-        let turned = |i: usize| {
-            let normal = DVec3::from([x, y, z].map(|field| fields[field].values.get(i)));
-            (matrix * normal).normalize_or_zero() * normal.length()
-        };
-        let turned: Vec<DVec3> = points.clone().into_par_iter().map(turned).collect();
-        for (axis, field) in [x, y, z].into_iter().enumerate() {
-            match &mut fields[field].values {
-                FieldValues::F32(v) => {
-                    v[points.clone()].iter_mut().zip(&turned).for_each(|(value, normal)| *value = normal[axis] as f32);
-                }
-                FieldValues::F64(v) => {
-                    v[points.clone()].iter_mut().zip(&turned).for_each(|(value, normal)| *value = normal[axis]);
-                }
-                _ => {}
+    let matrix = normal_matrix(DMat3::from_mat4(*pose));
+    let turned = |i: usize| {
+        let normal = DVec3::from([x, y, z].map(|field| fields[field].values.get(i)));
+        if which(i) { (matrix * normal).normalize_or_zero() * normal.length() } else { normal }
+    };
+    let turned: Vec<DVec3> = points.clone().into_par_iter().map(turned).collect();
+    for (axis, field) in [x, y, z].into_iter().enumerate() {
+        match &mut fields[field].values {
+            FieldValues::F32(v) => {
+                v[points.clone()].iter_mut().zip(&turned).for_each(|(value, normal)| *value = normal[axis] as f32);
             }
+            FieldValues::F64(v) => {
+                v[points.clone()].iter_mut().zip(&turned).for_each(|(value, normal)| *value = normal[axis]);
+            }
+            _ => {}
         }
     }
 }
@@ -144,7 +163,7 @@ pub(crate) fn residual(position: DVec3) -> [f32; 3] {
     if lost.is_finite() { lost.to_array() } else { [0.0; 3] }
 }
 
-fn common_origin(parts: &[(PointCloud, DMat4)]) -> DVec3 {
+fn common_origin(parts: &[(&PointCloud, DMat4)]) -> DVec3 {
     let first = parts[0].0.origin();
     if parts.iter().all(|(cloud, pose)| *pose == DMat4::IDENTITY && cloud.origin() == first) {
         return first;
@@ -158,8 +177,8 @@ fn common_origin(parts: &[(PointCloud, DMat4)]) -> DVec3 {
 }
 
 /// The field `name` of all parts one after the other, if all have it.
-fn common_field(parts: &[(PointCloud, DMat4)], name: &str) -> Option<Field> {
-    let own = |cloud: &'_ PointCloud| cloud.fields().iter().position(|field| field.name == name);
+fn common_field(parts: &[(&PointCloud, DMat4)], name: &str) -> Option<Field> {
+    let own = |cloud: &PointCloud| cloud.fields().iter().position(|field| field.name == name);
     let all = parts.iter().map(|(cloud, _)| Some(&cloud.fields()[own(cloud)?].values)).collect::<Option<Vec<_>>>()?;
 
     macro_rules! join {

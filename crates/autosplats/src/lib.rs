@@ -41,7 +41,7 @@ mod splat;
 mod test_clouds;
 
 pub use autosplats_cloud as cloud;
-pub use camera::{Camera, Projection, ViewDirection, guess_axes};
+pub use camera::{Camera, Lens, Projection, ViewDirection, guess_axes};
 pub use error::Error;
 pub use gpu::{AdapterSummary, PassTime, adapters};
 pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};

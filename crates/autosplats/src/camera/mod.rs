@@ -5,9 +5,11 @@
 //! `0.0..1.0` in both directions; its centre is at (0.5, 0.5).
 
 mod fit;
+mod lens;
 
 pub(crate) use fit::up;
 pub use fit::{ViewDirection, guess_axes};
+pub use lens::Lens;
 
 use glam::{DVec3, Mat3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -83,26 +85,12 @@ impl Camera {
     /// # Errors
     /// [`Error::Camera`] says what is wrong with its directions or its projection.
     pub fn check(&self) -> Result<(), Error> {
-        self.view(DVec3::ZERO, [1, 1]).map(|_| ())
+        self.lens([1, 1]).map(|_| ())
     }
 
     /// Makes the camera ready for a picture of `size` pixels of a cloud about `origin`.
     pub(crate) fn view(&self, origin: DVec3, size: [u32; 2]) -> Result<View, Error> {
-        let [right, down, forward] = self.axes()?;
-        let height = f64::from(size[1]);
-        let (focal_px, perspective) = match self.projection {
-            Projection::PerspectiveFovDeg(fov) if (0.01..=170.0).contains(&fov) => {
-                (0.5 * height / (0.5 * fov.to_radians()).tan(), true)
-            }
-            Projection::PerspectiveFovDeg(fov) => {
-                return Err(Error::Camera(format!("field of view {fov} is not within 0.01 to 170 degrees")));
-            }
-            Projection::OrthographicHeight(world) if world > 0.0 && world.is_finite() => (height / world, false),
-            Projection::OrthographicHeight(world) => {
-                return Err(Error::Camera(format!("orthographic height {world} is not above 0")));
-            }
-        };
-        let distance = (self.look_at - self.eye).length();
+        let Lens { axes: [right, down, forward], focal_px, perspective, near, .. } = self.lens(size)?;
         Ok(View {
             width: size[0],
             height: size[1],
@@ -110,8 +98,7 @@ impl Camera {
             eye_local: (self.eye - origin).as_vec3(),
             focal_px: focal_px as f32,
             perspective,
-            // An orthographic eye is a plane to stand behind; a perspective one divides by depth.
-            near: if perspective { (distance * 1e-5) as f32 } else { 0.0 },
+            near: near as f32,
         })
     }
 }

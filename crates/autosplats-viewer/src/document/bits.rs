@@ -1,0 +1,150 @@
+//! Sets of points, one bit a point, shared until changed.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+/// Words that one thread does at a time.
+const LEAST: usize = 1 << 10;
+
+/// A set of points of one cloud, by index. Clones share their memory; the empty set has none.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Bits(Option<Arc<[u64]>>);
+
+impl Bits {
+    /// The points below `len` that `has` says yes to.
+    pub(crate) fn from_fn(len: usize, has: impl Fn(usize) -> bool + Sync) -> Self {
+        Self::from_words(len, |word| {
+            let points = word * 64..len.min(word * 64 + 64);
+            points.rev().fold(0, |bits, point| bits << 1 | u64::from(has(point)))
+        })
+    }
+
+    /// A set of points below `len` by its words, 64 points each, the first in the lowest bit.
+    pub(super) fn from_words(len: usize, word: impl Fn(usize) -> u64 + Sync) -> Self {
+        let words: Vec<u64> = (0..len.div_ceil(64)).into_par_iter().with_min_len(LEAST).map(&word).collect();
+        if words.iter().all(|&word| word == 0) { Self(None) } else { Self(Some(words.into())) }
+    }
+
+    /// The words, 64 points each; where they end no more points are in.
+    pub(super) fn words(&self) -> &[u64] {
+        self.0.as_deref().unwrap_or_default()
+    }
+
+    /// Word `index`.
+    pub(super) fn word(&self, index: usize) -> u64 {
+        self.words().get(index).copied().unwrap_or(0)
+    }
+
+    /// Whether a point is in.
+    #[inline(always)]
+    pub(crate) fn get(&self, point: usize) -> bool {
+        self.words().get(point / 64).is_some_and(|word| word >> (point % 64) & 1 == 1)
+    }
+
+    /// Number of points in the set.
+    pub(crate) fn count(&self) -> usize {
+        self.words().par_iter().with_min_len(LEAST).map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// Whether no point is in.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_none()
+    }
+
+    /// The points in the set, ascending.
+    pub(crate) fn points(&self) -> impl Iterator<Item = usize> + '_ {
+        self.words().iter().enumerate().flat_map(|(index, &word)| {
+            let mut left = word;
+            std::iter::from_fn(move || {
+                let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
+                left &= left - 1;
+                Some(index * 64 + bit)
+            })
+        })
+    }
+
+    /// Points of either set.
+    #[must_use]
+    pub(crate) fn or(&self, other: &Self) -> Self {
+        if other.is_empty() {
+            return self.clone();
+        }
+        if self.is_empty() {
+            return other.clone();
+        }
+        self.combine(other, |a, b| a | b)
+    }
+
+    /// Points of this set that are not in the other.
+    #[must_use]
+    pub(crate) fn without(&self, other: &Self) -> Self {
+        if self.is_empty() || other.is_empty() { self.clone() } else { self.combine(other, |a, b| a & !b) }
+    }
+
+    fn combine(&self, other: &Self, rule: impl Fn(u64, u64) -> u64 + Sync) -> Self {
+        let words = self.words().len().max(other.words().len());
+        Self::from_words(words * 64, |index| rule(self.word(index), other.word(index)))
+    }
+
+    /// Where the set lies in memory and how many bytes it takes, if any.
+    pub(super) fn memory(&self) -> Option<(usize, usize)> {
+        self.0.as_ref().map(|words| (words.as_ptr().addr(), size_of_val(&**words)))
+    }
+}
+
+/// Sets are compared by their points, fast where they share their memory. A longer run of empty words is no difference.
+impl PartialEq for Bits {
+    fn eq(&self, other: &Self) -> bool {
+        let shared = match (&self.0, &other.0) {
+            (Some(own), Some(others)) => Arc::ptr_eq(own, others),
+            (None, None) => true,
+            _ => return false,
+        };
+        let longest = self.words().len().max(other.words().len());
+        shared || (0..longest).all(|index| self.word(index) == other.word(index))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(len: usize, step: usize) -> Bits {
+        Bits::from_fn(len, |point| point.is_multiple_of(step))
+    }
+
+    #[test]
+    fn sets_hold_what_was_put_in() {
+        for len in [0, 1, 63, 64, 65, 1000, 100_000] {
+            for step in [1, 2, 7, 64, 1000] {
+                let bits = set(len, step);
+                let expected: Vec<usize> = (0..len).step_by(step).collect();
+                assert_eq!(bits.points().collect::<Vec<_>>(), expected, "every {step}th of {len}");
+                assert_eq!(bits.count(), expected.len(), "counted");
+                assert_eq!(bits.is_empty(), expected.is_empty(), "known to be empty or not");
+                assert!((0..len + 200).all(|point| bits.get(point) == expected.binary_search(&point).is_ok()), "asked");
+            }
+        }
+    }
+
+    #[test]
+    fn sets_are_joined_and_cut() {
+        for [len, other] in [[1000, 1000], [1000, 100], [100, 1000], [1000, 0], [0, 1000]] {
+            let (a, b) = (set(len, 2), set(other, 3));
+            let either: Vec<usize> = (0..1000).filter(|&point| a.get(point) || b.get(point)).collect();
+            assert_eq!(a.or(&b).points().collect::<Vec<_>>(), either, "either");
+            let first: Vec<usize> = (0..1000).filter(|&point| a.get(point) && !b.get(point)).collect();
+            assert_eq!(a.without(&b).points().collect::<Vec<_>>(), first, "the first alone");
+            assert!(a.without(&a).memory().is_none(), "nothing left takes no memory");
+        }
+    }
+
+    #[test]
+    fn equal_sets_are_equal() {
+        assert_eq!(set(1000, 5), set(1000, 5), "by their points");
+        assert_eq!(set(1, 1), set(1000, 1000), "whatever their length");
+        assert_ne!(set(1000, 5), set(1000, 6), "and by nothing else");
+        assert_ne!(set(1000, 5), Bits::default(), "none are not some");
+    }
+}

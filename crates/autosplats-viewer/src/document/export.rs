@@ -1,0 +1,209 @@
+//! Writing points to a file, with what was done to them.
+
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
+
+use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_writable, glam::DMat4, write};
+
+use super::{Document, Layer, LayerId, shown::points_where};
+
+/// Which points are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum What {
+    /// Those that can be seen.
+    Shown,
+    /// Those selected that can be seen.
+    Selected,
+    /// All of one layer that are not deleted, hidden ones too.
+    Layer(LayerId),
+    /// All that are not deleted, of all layers, hidden and invisible ones too.
+    All,
+}
+
+/// What may be replaced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Replace {
+    /// No file.
+    #[default]
+    Nothing,
+    /// A file that no layer was read from.
+    Files,
+    /// Even a file that a layer was read from.
+    Inputs,
+}
+
+/// What was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Exported {
+    /// Number of points.
+    pub(crate) points: usize,
+}
+
+/// Why nothing was written. All files are as they were.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ExportError {
+    /// There is no such point.
+    #[error("there is no point to write")]
+    Nothing,
+    /// The file is one of those open.
+    #[error("{}: the layer '{layer}' was read from it; it is replaced only if you say so", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// The layer.
+        layer: String,
+    },
+    /// The file is there already.
+    #[error("{}: is already there", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It could not be written.
+    #[error(transparent)]
+    Cloud(#[from] Error),
+}
+
+/// Writes points in the format that the extension of `path` names. Deleted points are left out, moves and poses applied;
+/// all else is as it was read: attributes, scans, coordinate system, steps. Colours are the points' own.
+///
+/// Several layers become one cloud as [merging](PointCloud::merge) has it. Layers in degrees stay so unless others are not;
+/// then they are written in metres, as they are shown. What is lost is told to `progress`. The file appears complete or not
+/// at all.
+///
+/// # Errors
+/// [`ExportError`] says why nothing was written.
+pub(crate) fn export(
+    document: &Document,
+    what: What,
+    path: &Path,
+    replace: Replace,
+    progress: &dyn Progress,
+) -> Result<Exported, ExportError> {
+    check_writable(path)?;
+    let target = check_target(document, path, replace)?;
+    let layers = document.layers.iter().filter(|layer| match what {
+        What::Shown | What::Selected => layer.visible,
+        What::Layer(id) => layer.id == id,
+        What::All => true,
+    });
+    let layers = layers.map(|layer| (layer, chosen(document, layer, what)));
+    let layers = layers.filter(|(layer, points)| points.as_ref().map_or(layer.cloud.len(), Vec::len) > 0);
+    let layers: Vec<_> = layers.collect();
+    let degrees = layers.iter().all(|(layer, _)| layer.cloud.crs().unit == Some(Unit::Degree));
+    let mut clouds: Vec<_> = layers.iter().map(|(layer, points)| layer.exact(points.as_deref(), degrees)).collect();
+    if progress.cancelled() {
+        return Err(Error::Cancelled.into());
+    }
+    let cloud = match clouds.as_mut_slice() {
+        [] => return Err(ExportError::Nothing),
+        [only] => std::mem::take(only),
+        [first, others @ ..] => {
+            if others.iter().any(|other| other.origin() != first.origin()) {
+                // One part with residuals has merging keep all digits of all.
+                with_digits(first.to_mut());
+            }
+            tell_losses(&clouds, progress);
+            Cow::Owned(PointCloud::merged(&clouds.iter().map(|cloud| (&**cloud, DMat4::IDENTITY)).collect::<Vec<_>>()))
+        }
+    };
+    write(&cloud, &target, progress)?;
+    Ok(Exported { points: cloud.len() })
+}
+
+/// The points of a layer that are to be written; nothing if all are.
+fn chosen(document: &Document, layer: &Layer, what: What) -> Option<Vec<u32>> {
+    let len = layer.cloud.len();
+    match what {
+        What::Shown => document.seen(layer),
+        What::Selected => {
+            let reached = document.reached(layer);
+            points_where(len, |point| reached.get(point))
+        }
+        What::Layer(_) | What::All => points_where(len, |point| !layer.edits.deleted.get(point)),
+    }
+}
+
+impl Layer {
+    /// Its points with the indices given, or all, moved and placed with all digits: in the file's degrees if `degrees`
+    /// says so, else in metres. A layer to which nothing was done is not copied.
+    fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
+        let moved = !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY;
+        let converted = self.local.filter(|_| !degrees);
+        if points.is_none() && !moved && converted.is_none() {
+            return Cow::Borrowed(&self.cloud);
+        }
+        let mut cloud = points.map_or_else(|| (*self.cloud).clone(), |points| self.cloud.pick(points));
+        if let Some(local) = &converted {
+            cloud.to_metres_on(local);
+        }
+        if !moved {
+            return Cow::Owned(cloud);
+        }
+        with_digits(&mut cloud);
+        self.move_points(&mut cloud, points, degrees);
+        if self.pose == DMat4::IDENTITY {
+            return Cow::Owned(cloud);
+        }
+        let Some(local) = self.local.filter(|_| degrees) else {
+            return Cow::Owned(PointCloud::merged(&[(&cloud, self.pose)]));
+        };
+        cloud.move_points(|_| true, &self.pose, Some(&local));
+        let scans = cloud.scans().iter().map(|scan| {
+            let place = local.degrees(self.pose.transform_point3(local.metres(scan.position())));
+            Scan { world_from_sensor: with_place(self.pose * scan.world_from_sensor, place), ..scan.clone() }
+        });
+        let scans = scans.collect();
+        Cow::Owned(cloud.with_scans(scans))
+    }
+}
+
+fn with_place(mut matrix: DMat4, place: autosplats::cloud::glam::DVec3) -> DMat4 {
+    matrix.w_axis = place.extend(1.0);
+    matrix
+}
+
+/// Gives a cloud room for what `f32` cannot hold.
+fn with_digits(cloud: &mut PointCloud) {
+    if cloud.residuals().is_none() {
+        let zeros = vec![[0.0; 3]; cloud.len()];
+        let own = std::mem::take(cloud);
+        *cloud = own.with_residuals(zeros).unwrap_or_else(|error| unreachable!("one each: {error}"));
+    }
+}
+
+/// Tells what one cloud cannot have because not all of its parts do.
+fn tell_losses(clouds: &[Cow<'_, PointCloud>], progress: &dyn Progress) {
+    let [first, others @ ..] = clouds else { return };
+    for cloud in clouds {
+        let missing = |name: &str| clouds.iter().any(|other| other.fields().iter().all(|field| field.name != name));
+        for field in cloud.fields().iter().filter(|field| missing(&field.name)) {
+            progress.note(&format!("not all layers have {}; it is left out", field.name));
+        }
+    }
+    if others.iter().any(|other| other.crs() != first.crs()) {
+        progress.note("the layers differ in their coordinate systems; none is kept");
+    }
+}
+
+/// Refuses what must not be replaced; says what is to be written, which for a link is what it points to.
+fn check_target(document: &Document, path: &Path, replace: Replace) -> Result<PathBuf, ExportError> {
+    let Ok(target) = path.canonicalize() else {
+        // A link to nowhere is there, too.
+        let there = path.symlink_metadata().is_ok() && replace < Replace::Files;
+        return if there { Err(ExportError::Exists { path: path.into() }) } else { Ok(path.into()) };
+    };
+    let input = document.layers.iter().find(|layer| {
+        let path = layer.path.as_ref().and_then(|path| path.canonicalize().ok());
+        path.is_some_and(|path| path == target)
+    });
+    match input {
+        Some(layer) if replace < Replace::Inputs => {
+            Err(ExportError::Input { path: path.into(), layer: layer.name.clone() })
+        }
+        None if replace < Replace::Files => Err(ExportError::Exists { path: path.into() }),
+        _ => Ok(target),
+    }
+}

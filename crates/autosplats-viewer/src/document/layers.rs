@@ -1,0 +1,86 @@
+//! The list of layers.
+
+use autosplats::cloud::glam::DMat4;
+
+use super::{Counts, Document, Layer, LayerId};
+
+impl Document {
+    /// Puts a layer at the end of the list. One in degrees goes on the map of those that are there.
+    pub(crate) fn add(&mut self, mut layer: Layer) -> LayerId {
+        let beside = self.layers.iter().find_map(|other| other.local.as_ref());
+        layer.local = layer.local.and_then(|own| layer.cloud.local_metres(Some(beside.unwrap_or(&own))));
+        let id = layer.id;
+        self.layers.push(layer);
+        id
+    }
+
+    /// The layer, if it is there.
+    pub(crate) fn layer(&self, id: LayerId) -> Option<&Layer> {
+        self.layers.iter().find(|layer| layer.id == id)
+    }
+
+    fn change(&mut self, id: LayerId, change: impl FnOnce(&mut Layer)) -> bool {
+        let layer = self.layers.iter_mut().find(|layer| layer.id == id);
+        layer.map(change).is_some()
+    }
+
+    /// Takes a layer off the list; returns it. Ask first if it has [unsaved](super::History::is_unsaved) edits.
+    pub(crate) fn remove(&mut self, id: LayerId) -> Option<Layer> {
+        let place = self.layers.iter().position(|layer| layer.id == id)?;
+        Some(self.layers.remove(place))
+    }
+
+    /// Moves a layer to a place of the list, the last one if there are fewer. Says whether there is such a layer, as do
+    /// the other changes.
+    pub(crate) fn reorder(&mut self, id: LayerId, place: usize) -> bool {
+        let Some(layer) = self.remove(id) else { return false };
+        self.layers.insert(place.min(self.layers.len()), layer);
+        true
+    }
+
+    /// Gives a layer another name.
+    pub(crate) fn rename(&mut self, id: LayerId, name: impl Into<String>) -> bool {
+        self.change(id, |layer| layer.name = name.into())
+    }
+
+    /// Shows a layer or does not.
+    pub(crate) fn set_visible(&mut self, id: LayerId, visible: bool) -> bool {
+        self.change(id, |layer| layer.visible = visible)
+    }
+
+    /// Shows a layer in one colour, or in its own.
+    pub(crate) fn set_tint(&mut self, id: LayerId, tint: Option<[u8; 3]>) -> bool {
+        self.change(id, |layer| layer.tint = tint)
+    }
+
+    /// Places a layer in the world, by an affine map that does not flatten it; others are refused.
+    pub(crate) fn set_pose(&mut self, id: LayerId, pose: DMat4) -> bool {
+        can_place(&pose) && self.change(id, |layer| layer.pose = pose)
+    }
+
+    /// Numbers of points of a layer.
+    pub(crate) fn counts_of(&self, layer: &Layer) -> Counts {
+        Counts {
+            points: layer.cloud.len(),
+            selected: self.reached(layer).count(),
+            hidden: layer.edits.hidden.without(&layer.edits.deleted).count(),
+            deleted: layer.edits.deleted.count(),
+        }
+    }
+
+    /// Numbers of points of all layers.
+    pub(crate) fn counts(&self) -> Counts {
+        self.layers.iter().map(|layer| self.counts_of(layer)).fold(Counts::default(), |all, own| Counts {
+            points: all.points + own.points,
+            selected: all.selected + own.selected,
+            hidden: all.hidden + own.hidden,
+            deleted: all.deleted + own.deleted,
+        })
+    }
+}
+
+/// Whether a matrix is an affine map that can be undone.
+pub(super) fn can_place(matrix: &DMat4) -> bool {
+    let affine = matrix.is_finite() && matrix.row(3).to_array() == [0.0, 0.0, 0.0, 1.0];
+    affine && matrix.determinant() != 0.0 && matrix.inverse().is_finite()
+}

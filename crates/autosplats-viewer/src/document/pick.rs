@@ -1,0 +1,83 @@
+//! All there is to know about one point.
+
+use std::path::PathBuf;
+
+use autosplats::cloud::{FieldValues, PointCloud, glam::DVec3};
+
+use super::{Document, LayerId, Shown};
+
+/// A point that was pointed at.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PickedPoint {
+    /// Its layer.
+    pub(crate) layer: LayerId,
+    /// The layer's name.
+    pub(crate) name: String,
+    /// The file it was read from.
+    pub(crate) path: Option<PathBuf>,
+    /// Which point of the file it is, as far as points were kept in reading, from 0.
+    pub(crate) point: usize,
+    /// World coordinates, with all that was done to it.
+    pub(crate) position: DVec3,
+    /// The file's own coordinates.
+    pub(crate) file_position: DVec3,
+    /// The file's own coordinates with the digits that the file has.
+    pub(crate) file_text: [String; 3],
+    /// Its own colour, sRGB.
+    pub(crate) color: Option<[u8; 3]>,
+    /// Name of the scan it belongs to.
+    pub(crate) scan: Option<String>,
+    /// Names and exact values of its attributes.
+    pub(crate) fields: Vec<(String, String)>,
+}
+
+impl Document {
+    /// Tells all about a shown point.
+    pub(crate) fn describe(&self, shown: &Shown, index: usize) -> Option<PickedPoint> {
+        let (id, point) = shown.point(index)?;
+        let layer = self.layer(id).filter(|layer| point < layer.cloud.len())?;
+        let cloud = &layer.cloud;
+        let scan = cloud.scans().iter().find(|scan| scan.points.contains(&point));
+        Some(PickedPoint {
+            layer: id,
+            name: layer.name.clone(),
+            path: layer.path.clone(),
+            point,
+            position: layer.position(point),
+            file_position: layer.file_position(point),
+            file_text: file_text(cloud, point),
+            color: cloud.colors().map(|colors| colors[point]),
+            scan: scan.and_then(|scan| scan.name.clone()),
+            fields: cloud.fields().iter().map(|field| (field.name.clone(), value_text(&field.values, point))).collect(),
+        })
+    }
+}
+
+/// A value with all its digits and no more.
+fn value_text(values: &FieldValues, point: usize) -> String {
+    macro_rules! each {
+        ($($variant:ident),*) => { match values { $(FieldValues::$variant(values) => values[point].to_string(),)* } };
+    }
+    each!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64)
+}
+
+/// Coordinates with the digits of the file: those of its steps, or as few as tell a number from its neighbours.
+fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
+    let place = cloud.world_position(point);
+    let single = cloud.residuals().is_none() && cloud.origin() == DVec3::ZERO;
+    [0, 1, 2].map(|axis| match cloud.resolution().and_then(|step| decimals(step[axis])) {
+        Some(decimals) => format!("{:.decimals$}", place[axis]),
+        None if single => cloud.positions()[point][axis].to_string(),
+        None => place[axis].to_string(),
+    })
+}
+
+/// Decimals that all multiples of a step can be written with.
+fn decimals(step: f64) -> Option<usize> {
+    (0..=12)
+        .find(|&decimals| {
+            let steps = step * 10_f64.powi(decimals);
+            steps >= 0.5 && (steps - steps.round()).abs() < 1e-6 * steps
+        })
+        .map(|decimals| decimals.unsigned_abs() as usize)
+}

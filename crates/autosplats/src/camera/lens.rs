@@ -1,0 +1,176 @@
+//! Where world coordinates lie in a picture and back, in `f64`: for what is drawn over a picture and for what is pointed at.
+//!
+//! The stages use the crate's own `View` in `f32` about a cloud's origin, which is made from this.
+
+use glam::{DVec2, DVec3};
+
+use super::{Camera, Projection};
+use crate::Error;
+
+/// A [`Camera`] made ready for pictures of one size.
+///
+/// Pixel coordinates are those of the picture: (0, 0) is the outer corner of the top-left pixel, whose centre is at
+/// (0.5, 0.5). Depth is the distance from the plane through the eye that the picture is parallel to, in world units, as
+/// in [`GBuffer`](crate::GBuffer).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    pub(super) eye: DVec3,
+    /// Unit vectors right, down and forward, world coordinates.
+    pub(super) axes: [DVec3; 3],
+    /// Middle of the picture in pixels.
+    pub(super) middle: DVec2,
+    /// Pixels per unit of x/z (perspective) or of x (orthographic).
+    pub(super) focal_px: f64,
+    /// Whether lines of sight meet in the eye.
+    pub(super) perspective: bool,
+    /// What is at this depth or nearer is not in the picture.
+    pub(super) near: f64,
+}
+
+impl Camera {
+    /// Makes the camera ready for pictures of `size` pixels, for those who ask about many points.
+    ///
+    /// # Errors
+    /// [`Error::Camera`] if the camera cannot see.
+    pub fn lens(&self, size: [u32; 2]) -> Result<Lens, Error> {
+        let axes = self.axes()?;
+        let [width, height] = size.map(f64::from);
+        let (focal_px, perspective) = match self.projection {
+            Projection::PerspectiveFovDeg(fov) if (0.01..=170.0).contains(&fov) => {
+                (0.5 * height / (0.5 * fov.to_radians()).tan(), true)
+            }
+            Projection::PerspectiveFovDeg(fov) => {
+                return Err(Error::Camera(format!("field of view {fov} is not within 0.01 to 170 degrees")));
+            }
+            Projection::OrthographicHeight(world) if world > 0.0 && world.is_finite() => (height / world, false),
+            Projection::OrthographicHeight(world) => {
+                return Err(Error::Camera(format!("orthographic height {world} is not above 0")));
+            }
+        };
+        // An orthographic eye is a plane to stand behind; a perspective one divides by depth.
+        let near = if perspective { (self.look_at - self.eye).length() * 1e-5 } else { 0.0 };
+        Ok(Lens { eye: self.eye, axes, middle: 0.5 * DVec2::new(width, height), focal_px, perspective, near })
+    }
+
+    /// Where `world` lies in a picture of `size` pixels, and at what depth; see [`Lens::to_pixel`].
+    ///
+    /// # Errors
+    /// [`Error::Camera`] if the camera cannot see.
+    pub fn to_pixel(&self, world: DVec3, size: [u32; 2]) -> Result<Option<(DVec2, f64)>, Error> {
+        Ok(self.lens(size)?.to_pixel(world))
+    }
+
+    /// World coordinates of what a picture of `size` pixels shows at `pixel` and `depth`; see [`Lens::unproject`].
+    ///
+    /// # Errors
+    /// [`Error::Camera`] if the camera cannot see.
+    pub fn unproject(&self, pixel: DVec2, depth: f64, size: [u32; 2]) -> Result<DVec3, Error> {
+        Ok(self.lens(size)?.unproject(pixel, depth))
+    }
+}
+
+#[allow(clippy::wrong_self_convention, reason = "the lens maps; it is not converted")]
+impl Lens {
+    /// Pixel coordinates and depth of `world`, also beyond the picture's edges; nothing for what is not in front of the
+    /// eye or not finite.
+    pub fn to_pixel(&self, world: DVec3) -> Option<(DVec2, f64)> {
+        let from_eye = world - self.eye;
+        let [x, y, depth] = self.axes.map(|axis| axis.dot(from_eye));
+        if !(depth > self.near && depth < f64::INFINITY) {
+            return None;
+        }
+        Some((self.middle + DVec2::new(x, y) / self.pixel_size(depth), depth)).filter(|(pixel, _)| pixel.is_finite())
+    }
+
+    /// World coordinates of what lies at `pixel` and `depth`.
+    pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
+        let [right, down, forward] = self.axes;
+        let aside = (pixel - self.middle) * self.pixel_size(depth);
+        self.eye + right * aside.x + down * aside.y + forward * depth
+    }
+
+    /// The line of sight through `pixel`: where it begins, and its direction as a unit vector.
+    pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {
+        if self.perspective {
+            (self.eye, (self.unproject(pixel, 1.0) - self.eye).normalize())
+        } else {
+            (self.unproject(pixel, 0.0), self.axes[2])
+        }
+    }
+
+    /// Size of a pixel in world units at `depth`.
+    pub fn pixel_size(&self, depth: f64) -> f64 {
+        if self.perspective { depth / self.focal_px } else { 1.0 / self.focal_px }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [u32; 2] = [640, 360];
+    /// A place where `f32` holds half metres.
+    const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
+
+    fn cameras() -> [Camera; 2] {
+        [Projection::PerspectiveFovDeg(50.0), Projection::OrthographicHeight(8.0)].map(|projection| Camera {
+            eye: FAR + DVec3::new(3.0, -9.0, 4.0),
+            look_at: FAR + DVec3::new(0.25, 0.5, -0.125),
+            up: DVec3::new(0.1, 0.0, 2.0),
+            projection,
+        })
+    }
+
+    /// Places about `FAR`, on a lattice that no axis of the cameras is along.
+    fn places() -> impl Iterator<Item = DVec3> {
+        (0..1000).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)) * 0.75 - 3.0)
+    }
+
+    #[test]
+    fn pixels_are_those_of_the_stages() {
+        for camera in cameras() {
+            let (lens, view) = (camera.lens(SIZE).expect("a lens"), camera.view(FAR, SIZE).expect("a view"));
+            for place in places() {
+                let (pixel, depth) = lens.to_pixel(FAR + place).expect("in front of the eye");
+                let position_view = view.to_view(place.as_vec3().to_array());
+                let [x, y] = view.to_pixel(position_view).map(f64::from);
+                // f32 at some hundred pixels and about ten units.
+                assert!((pixel - DVec2::new(x, y)).abs().max_element() < 1e-3, "{place}: {pixel} is not {x}, {y}");
+                assert!((depth - f64::from(position_view.z)).abs() < 1e-5, "{place}: depth {depth}");
+                assert!((lens.pixel_size(depth) / f64::from(view.pixel_size(depth as f32)) - 1.0).abs() < 1e-5, "size");
+                assert_eq!(camera.to_pixel(FAR + place, SIZE).expect("sees"), Some((pixel, depth)), "the same at once");
+            }
+        }
+    }
+
+    #[test]
+    fn there_and_back() {
+        for camera in cameras() {
+            let lens = camera.lens(SIZE).expect("a lens");
+            for place in places() {
+                let (pixel, depth) = lens.to_pixel(FAR + place).expect("in front of the eye");
+                let back = camera.unproject(pixel, depth, SIZE).expect("sees") - FAR;
+                // One f64 step at 5e6 is 1e-9.
+                assert!(back.abs_diff_eq(place, 1e-8), "{place}: {back}");
+                let (from, direction) = lens.ray(pixel);
+                let way = FAR + place - from;
+                assert!(way.cross(direction).length() < 1e-7 * way.length(), "{place} is on its line of sight");
+                assert!(way.dot(direction) > 0.0, "and ahead");
+            }
+            let (middle, depth) = lens.to_pixel(camera.look_at).expect("looked at");
+            assert!(middle.abs_diff_eq(DVec2::new(320.0, 180.0), 1e-6), "in the middle: {middle}");
+            assert!((depth - camera.look_at.distance(camera.eye)).abs() < 1e-8, "at its distance: {depth}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_ahead_has_no_pixel() {
+        for camera in cameras() {
+            let lens = camera.lens(SIZE).expect("a lens");
+            let behind = camera.eye - (camera.look_at - camera.eye);
+            for place in [behind, camera.eye, DVec3::NAN, DVec3::INFINITY, DVec3::NEG_INFINITY] {
+                assert_eq!(lens.to_pixel(place), None, "{place}");
+            }
+        }
+    }
+}
