@@ -97,6 +97,17 @@ impl Inputs {
         self
     }
 
+    /// The inputs as the viewer takes them.
+    #[cfg(feature = "viewer")]
+    pub(crate) fn for_viewer(self) -> Vec<autosplats_viewer::Input> {
+        let Self { list, options } = self;
+        let input = |Input { name, source, world_from_input }| {
+            let file = source.path().and_then(Path::file_name).map(|file| file.to_string_lossy().into_owned());
+            autosplats_viewer::Input { name: file.unwrap_or(name), source, options: options.clone(), world_from_input }
+        };
+        list.into_iter().map(input).collect()
+    }
+
     /// The files among the inputs.
     pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
         self.list.iter().filter_map(|input| input.source.path())

@@ -80,6 +80,12 @@ impl Ruler {
         with_unit(length, self.unit.map(symbol))
     }
 
+    /// A length of few digits with its unit, as on a scale bar.
+    pub(crate) fn round_text(&self, length: f64) -> String {
+        let digits = if length < 1e-4 || length >= 1e7 { format!("{length:e}") } else { length.to_string() };
+        self.unit.map_or_else(|| digits.clone(), |unit| format!("{digits} {}", symbol(unit)))
+    }
+
     /// An area with its unit.
     pub(crate) fn area_text(&self, area: f64) -> String {
         with_unit(area, self.unit.map(|unit| format!("{}²", symbol(unit))))

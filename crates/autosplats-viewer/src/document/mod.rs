@@ -36,7 +36,7 @@ pub(crate) use self::{
     clip::ClipBox,
     edit::about,
     export::{ExportError, Exported, Replace, What, export},
-    history::{History, label},
+    history::{History, grouped, label},
     layer::{Counts, Edits, Layer, LayerId},
     pick::PickedPoint,
     region::Region,
