@@ -72,7 +72,7 @@ impl Messages {
                 message.since.get_or_insert(now);
                 egui::Frame::popup(ui.style()).show(ui, |ui| {
                     ui.horizontal(|ui| {
-                        if ui.small_button("✕").on_hover_text("Close this message").clicked() {
+                        if ui.small_button("×").on_hover_text("Close this message").clicked() {
                             closed = Some(number);
                         }
                         let color = if message.error { ui.visuals().error_fg_color } else { ui.visuals().text_color() };

@@ -35,7 +35,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
 fn loading(app: &App, ui: &mut egui::Ui) {
     for job in app.loader.jobs() {
         ui.horizontal(|ui| {
-            if ui.small_button("✕").on_hover_text("Stop reading").clicked() {
+            if ui.small_button("×").on_hover_text("Stop reading").clicked() {
                 job.cancel();
             }
             let bar = egui::ProgressBar::new(job.fraction()).desired_width(ui.available_width());

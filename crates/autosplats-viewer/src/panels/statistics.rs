@@ -2,7 +2,7 @@
 
 use autosplats::Timings;
 use eframe::egui;
-use egui_plot::{Bar, BarChart, Legend, Plot};
+use egui_plot::{Bar, BarChart, Plot};
 
 use crate::app::App;
 use crate::document::grouped;
@@ -31,7 +31,6 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             .show_axes([false, true])
             .include_y(0.0)
             .y_axis_label("ms")
-            .legend(Legend::default().position(egui_plot::Corner::LeftTop).background_alpha(0.5))
             .show(ui, |plot| {
                 let mut below: Vec<f64> = vec![0.0; app.rate.timings.len()];
                 for (name, value, color) in STAGES {
@@ -48,8 +47,12 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         let picture = &shot.picture;
         egui::Grid::new("timings").num_columns(4).striped(true).show(ui, |ui| {
             for pair in STAGES.chunks(2) {
-                for (name, value, _) in pair {
-                    ui.label(*name);
+                for (name, value, color) in pair {
+                    ui.horizontal(|ui| {
+                        let (mark, _) = ui.allocate_exact_size(egui::vec2(9.0, 9.0), egui::Sense::hover());
+                        ui.painter().rect_filled(mark, 2.0, *color);
+                        ui.label(*name);
+                    });
                     ui.monospace(format!("{:7.2} ms", value(&picture.timings)));
                 }
                 ui.end_row();
