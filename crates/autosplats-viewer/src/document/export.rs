@@ -30,7 +30,8 @@ pub(crate) enum Replace {
     Nothing,
     /// A file that no layer was read from.
     Files,
-    /// Even a file that a layer was read from.
+    /// Even a file that a layer was read from. The layer stays as it was read, so that what is told of its points is then
+    /// about the old file until it is opened again.
     Inputs,
 }
 
@@ -61,9 +62,21 @@ pub(crate) enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// It was not to be finished.
+    #[error("cancelled")]
+    Cancelled,
     /// It could not be written.
     #[error(transparent)]
-    Cloud(#[from] Error),
+    Cloud(Error),
+}
+
+impl From<Error> for ExportError {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Cancelled => Self::Cancelled,
+            error => Self::Cloud(error),
+        }
+    }
 }
 
 /// Writes points in the format that the extension of `path` names. Deleted points are left out, moves and poses applied;
@@ -95,7 +108,7 @@ pub(crate) fn export(
     let degrees = layers.iter().all(|(layer, _)| layer.cloud.crs().unit == Some(Unit::Degree));
     let mut clouds: Vec<_> = layers.iter().map(|(layer, points)| layer.exact(points.as_deref(), degrees)).collect();
     if progress.cancelled() {
-        return Err(Error::Cancelled.into());
+        return Err(ExportError::Cancelled);
     }
     let cloud = match clouds.as_mut_slice() {
         [] => return Err(ExportError::Nothing),
@@ -129,7 +142,7 @@ fn chosen(document: &Document, layer: &Layer, what: What) -> Option<Vec<u32>> {
 impl Layer {
     /// Its points with the indices given, or all, moved and placed with all digits: in the file's degrees if `degrees`
     /// says so, else in metres. A layer to which nothing was done is not copied.
-    fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
+    pub(super) fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
         let moved = !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY;
         let converted = self.local.filter(|_| !degrees);
         if points.is_none() && !moved && converted.is_none() {

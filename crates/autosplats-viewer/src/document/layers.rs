@@ -58,7 +58,8 @@ impl Document {
         can_place(&pose) && self.change(id, |layer| layer.pose = pose)
     }
 
-    /// Numbers of points of a layer.
+    /// Numbers of points of a layer. With a clipping box all selected points are looked at: ask after edits, not in every
+    /// frame.
     pub(crate) fn counts_of(&self, layer: &Layer) -> Counts {
         Counts {
             points: layer.cloud.len(),
