@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn digits_are_as_many_as_make_sense() {
         let ruler = Ruler::new(&Crs::default(), DVec3::Z);
-        let texts = [1_234_567.8916, 123.456_78, 12.345_67, 1.234_567, 0.012_345_67, 1.5e-9, 0.0, -0.25];
+        let texts = [1_234_567.891_6, 123.456_78, 12.345_67, 1.234_567, 0.012_345_67, 1.5e-9, 0.0, -0.25];
         let wanted = ["1234567.892", "123.457", "12.346", "1.2346", "0.012346", "0.000000001500", "0.000", "-0.25000"];
         assert_eq!(texts.map(|length| ruler.length_text(length)), wanted, "three decimals, five digits");
         assert_eq!(ruler.length_text(f64::NAN), "NaN", "no number");

@@ -229,7 +229,12 @@ impl Shown {
 
 /// The least box that has all places in it that are finite; nothing if there is none.
 pub(super) fn bounds(len: usize, place: impl Fn(usize) -> Option<DVec3> + Sync) -> Option<[DVec3; 2]> {
-    let places =
-        (0..len).into_par_iter().with_min_len(1 << 10).filter_map(|index| place(index).filter(|p| p.is_finite()));
-    places.map(|place| [place; 2]).reduce_with(|[low, high], [min, max]| [low.min(min), high.max(max)])
+    let none = || [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let join = |[low, high]: [DVec3; 2], [min, max]: [DVec3; 2]| [low.min(min), high.max(max)];
+    let grow = |bounds, index| match place(index) {
+        Some(place) if place.is_finite() => join(bounds, [place; 2]),
+        _ => bounds,
+    };
+    let [low, high] = (0..len).into_par_iter().with_min_len(1 << 10).fold(none, grow).reduce(none, join);
+    low.cmple(high).all().then_some([low, high])
 }

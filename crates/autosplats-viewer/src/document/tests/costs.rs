@@ -49,7 +49,7 @@ fn ten_million_points() {
         let (sin, cos) = (i as f32 / 200.0 * std::f32::consts::TAU).sin_cos();
         [960.0 + 400.0 * cos, 540.0 + 400.0 * sin]
     };
-    let lasso = Region::lasso((0..200).map(circle).collect());
+    let lasso = Region::lasso(&(0..200).map(circle).collect::<Vec<_>>());
     time("select by a lasso of 200 corners", || document.select_region(&shown, &lasso, &lens, SelectMode::Replace));
     println!("{} selected", document.counts().selected);
     time("select all", || document.clone().select_all(&shown));

@@ -11,13 +11,16 @@ fn selected(document: &Document) -> Bits {
     document.shown().selected(document)
 }
 
+/// Whether a point is selected that was so or not and is hit or not.
+type Rule = fn(bool, bool) -> bool;
+
 #[test]
 fn modes_combine_with_what_was_selected() {
     let (mut document, [first, _]) = document();
     edit(&mut document, first, |layer| layer.edits.hidden = every(1000, 5));
     let shown = document.shown();
     let (old, hit) = (|index: usize| index.is_multiple_of(2), |index: usize| index.is_multiple_of(3));
-    let rules: [(SelectMode, fn(bool, bool) -> bool); 4] = [
+    let rules: [(SelectMode, Rule); 4] = [
         (SelectMode::Replace, |_, hit| hit),
         (SelectMode::Add, |old, hit| old || hit),
         (SelectMode::Subtract, |old, hit| old && !hit),
@@ -76,7 +79,7 @@ fn regions_hold_points_that_are_seen_in_them() {
     let projection = Projection::PerspectiveFovDeg(60.0);
     let camera = Camera { eye: centre - 1.0 * DVec3::Y, look_at: centre, up: DVec3::Z, projection };
     let lens = camera.lens([200, 100]).expect("a camera");
-    let disc = Region::brush(vec![[100.0, 50.0]], 30.0);
+    let disc = Region::brush(&[[100.0, 50.0]], 30.0);
     document.select_region(&shown, &disc, &lens, SelectMode::Replace);
     let (mut inside, mut behind) = (0, 0);
     for index in 0..shown.len() {
