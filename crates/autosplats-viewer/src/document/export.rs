@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_writable, glam::DMat4, write};
+use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, check_writable, glam::DMat4, write};
 
 use super::{Document, Layer, LayerId, shown::points_where};
 
@@ -106,6 +106,9 @@ pub(crate) fn export(
     let layers = layers.filter(|(layer, points)| points.as_ref().map_or(layer.cloud.len(), Vec::len) > 0);
     let layers: Vec<_> = layers.collect();
     let degrees = layers.iter().all(|(layer, _)| layer.cloud.crs().unit == Some(Unit::Degree));
+    let bytes: usize = layers.iter().map(|(layer, points)| layer.exact_bytes(points.as_deref(), degrees)).sum();
+    let merged: usize = layers.iter().skip(1).map(|(layer, _)| layer.cloud.byte_len()).sum();
+    check_memory("the points to be written", (bytes + 2 * merged) as u64)?;
     let mut clouds: Vec<_> = layers.iter().map(|(layer, points)| layer.exact(points.as_deref(), degrees)).collect();
     if progress.cancelled() {
         return Err(ExportError::Cancelled);
@@ -140,11 +143,27 @@ fn chosen(document: &Document, layer: &Layer, what: What) -> Option<Vec<u32>> {
 }
 
 impl Layer {
+    fn is_moved(&self) -> bool {
+        !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY
+    }
+
+    /// Bytes that [`exact`](Self::exact) takes at most.
+    fn exact_bytes(&self, points: Option<&[u32]>, degrees: bool) -> usize {
+        let copies = match (points, self.is_moved(), self.local.filter(|_| !degrees)) {
+            (None, false, None) => return 0,
+            // Placing makes another one.
+            (_, true, _) if self.pose != DMat4::IDENTITY => 2,
+            _ => 1,
+        };
+        let part = points.map_or(1.0, |points| points.len() as f64 / self.cloud.len().max(1) as f64);
+        let digits = size_of::<[f32; 3]>() * self.cloud.len();
+        (part * (copies * (self.cloud.byte_len() + digits)) as f64) as usize
+    }
+
     /// Its points with the indices given, or all, moved and placed with all digits: in the file's degrees if `degrees`
     /// says so, else in metres. A layer to which nothing was done is not copied.
     pub(super) fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
-        let moved = !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY;
-        let converted = self.local.filter(|_| !degrees);
+        let (moved, converted) = (self.is_moved(), self.local.filter(|_| !degrees));
         if points.is_none() && !moved && converted.is_none() {
             return Cow::Borrowed(&self.cloud);
         }

@@ -29,6 +29,14 @@ fn check(document: &Document, what: &str) -> Shown {
     assert_eq!(points, expected, "{what}");
     assert_eq!(shown.point(shown.len()), None, "{what}: no more");
     assert_eq!(shown.is_empty(), expected.is_empty(), "{what}: empty or not");
+    let shared = document.layers.iter().any(|layer| Arc::ptr_eq(&layer.cloud, &shown.cloud));
+    let bytes = if shared { 0 } else { shown.cloud.byte_len() };
+    assert!(document.shown_bytes() >= bytes, "{what}: takes {bytes} bytes, not {}", document.shown_bytes());
+    assert_eq!(
+        document.shown_bytes() == 0,
+        shared || document.layers.iter().all(|l| !l.visible),
+        "{what}: if it is made"
+    );
     assert!(shown.shows(document), "{what}: shows what it was made of");
     for (index, &(id, point)) in expected.iter().enumerate() {
         let layer = document.layer(id).expect("the layer is there");
