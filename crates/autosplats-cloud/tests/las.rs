@@ -492,7 +492,7 @@ fn moved_points_do_not_take_others_with_them() {
     // Not at the corner, which is turned about.
     let steps = |i: usize| DVec3::new((1 + i * 37 % 1009) as f64, (i * 11 % 997) as f64, (i % 83) as f64) * 0.01;
     // At multiples of the step, and at an odd place.
-    for corner in [DVec3::new(512_000.0, 5_400_000.0, 300.0), DVec3::new(512_000.0037, 5_400_000.0061, 300.0023)] {
+    for corner in [DVec3::new(512_000.0, 5_400_000.0, 300.0), DVec3::new(512_000.003_7, 5_400_000.006_1, 300.0023)] {
         let place = |i: usize| corner + steps(i);
         let coarse = |i: usize| steps(i).as_vec3();
         let positions = (0..1000).map(|i| coarse(i).to_array()).collect();
