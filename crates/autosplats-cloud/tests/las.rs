@@ -488,6 +488,33 @@ fn written_clouds_come_back() {
 }
 
 #[test]
+fn moved_points_do_not_take_others_with_them() {
+    // Not at the corner, which is turned about.
+    let steps = |i: usize| DVec3::new((1 + i * 37 % 1009) as f64, (i * 11 % 997) as f64, (i % 83) as f64) * 0.01;
+    // At multiples of the step, and at an odd place.
+    for corner in [DVec3::new(512_000.0, 5_400_000.0, 300.0), DVec3::new(512_000.003_7, 5_400_000.006_1, 300.0023)] {
+        let place = |i: usize| corner + steps(i);
+        let coarse = |i: usize| steps(i).as_vec3();
+        let positions = (0..1000).map(|i| coarse(i).to_array()).collect();
+        let residuals = (0..1000).map(|i| (steps(i) - coarse(i).as_dvec3()).as_vec3().to_array()).collect();
+        let mut cloud = PointCloud::new(corner, positions).with_residuals(residuals).unwrap();
+        cloud = cloud.with_resolution(DVec3::splat(0.01));
+        let turn = DMat4::from_translation(corner) * DMat4::from_rotation_z(1.0) * DMat4::from_translation(-corner);
+        let moved = |i: usize| i % 10 < 4;
+        cloud.move_points(moved, &turn, None);
+        let (bytes, notes) = written(&cloud, "a.las");
+        let back = load(&bytes).0;
+        for i in 0..1000 {
+            let off = (back.world_position(i) - cloud.world_position(i)).abs().max_element();
+            // A step or two of f64, or half a step of the file.
+            assert!(off < if moved(i) { 0.005_001 } else { 2e-9 }, "{corner}: point {i} is off by {off}");
+            assert!(moved(i) || (back.world_position(i) - place(i)).abs().max_element() < 2e-9, "point {i} stays");
+        }
+        assert!(notes.iter().any(|note| note.contains("rounded to steps of 0.01")), "{notes:?}");
+    }
+}
+
+#[test]
 fn what_las_cannot_hold() {
     let mut points = positions(100);
     points[3][1] = f32::NAN;

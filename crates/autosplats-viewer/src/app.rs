@@ -9,7 +9,7 @@ use autosplats::{AdapterSummary, Camera, Projection, ViewDirection, guess_axes};
 use eframe::egui;
 
 use crate::commands::Tool;
-use crate::document::{Document, History, Layer, LayerId, Shown, label};
+use crate::document::{Counts, Document, History, Layer, LayerId, Shown, label};
 use crate::loading::{Input, JobId, Loader, News, Watch};
 use crate::look::Look;
 use crate::messages::Messages;
@@ -56,6 +56,8 @@ pub(crate) struct App {
     growing: Option<JobId>,
     /// Grows with each change of the document.
     version: u64,
+    /// Points of the document and of each layer, as of a version.
+    counted: (u64, Counts, HashMap<LayerId, Counts>),
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
     /// Whether the first cloud has been looked at.
@@ -145,7 +147,8 @@ impl App {
             reloads: HashMap::new(),
             guessed_axes: None,
             growing: None,
-            version: 0,
+            version: 1,
+            counted: (0, Counts::default(), HashMap::new()),
             wished: None,
             placed: false,
             moved: 0.0,
@@ -171,6 +174,16 @@ impl App {
     /// What is open.
     pub(crate) fn document(&self) -> &Document {
         self.history.current()
+    }
+
+    /// Numbers of points of all that is open, and of each layer; counted anew only after changes.
+    pub(crate) fn counts(&mut self) -> &(u64, Counts, HashMap<LayerId, Counts>) {
+        if self.counted.0 != self.version {
+            let document = self.document();
+            let all = document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect();
+            self.counted = (self.version, document.counts(), all);
+        }
+        &self.counted
     }
 
     /// Changes the document in a way that can be undone.

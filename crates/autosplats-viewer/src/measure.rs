@@ -114,3 +114,85 @@ fn with_unit(value: f64, unit: Option<impl std::fmt::Display>) -> String {
     let number = format!("{value:.decimals$}");
     unit.map_or_else(|| number.clone(), |unit| format!("{number} {unit}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A place where `f32` holds half metres.
+    const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
+
+    fn crs(unit: Option<Unit>, vertical_unit: Option<Unit>) -> Crs {
+        Crs { unit, vertical_unit, ..Crs::default() }
+    }
+
+    fn near(found: f64, wanted: f64) {
+        // Some steps of f64 at 5e6.
+        assert!((found - wanted).abs() < 1e-8, "{found} is not {wanted}");
+    }
+
+    #[test]
+    fn lengths() {
+        let ruler = Ruler::new(&Crs::default(), DVec3::Z * 9.0);
+        let [a, b, c] = [FAR, FAR + dvec3(3.0, 4.0, 12.0), FAR + dvec3(3.0, 4.0, 2.0)];
+        near(ruler.distance(a, b), 13.0);
+        near(ruler.horizontal_distance(a, b), 5.0);
+        near(ruler.height_difference(a, b), 12.0);
+        near(ruler.height_difference(b, c), -10.0);
+        near(ruler.polyline(&[a, b, c]), 23.0);
+        assert_eq!([ruler.polyline(&[]), ruler.polyline(&[a])], [0.0; 2], "of no way");
+        let tilted = Ruler::new(&Crs::default(), DVec3::NEG_Y);
+        near(tilted.height_difference(a, b), -4.0);
+        near(tilted.horizontal_distance(a, b), 3.0_f64.hypot(12.0));
+    }
+
+    #[test]
+    fn angles() {
+        let ruler = Ruler::new(&Crs::default(), DVec3::Z);
+        for degrees in [0.0, 1e-3, 30.0, 90.0, 179.999, 180.0] {
+            let (sin, cos) = f64::to_radians(degrees).sin_cos();
+            let angle = ruler.angle(FAR + 2.0 * DVec3::X, FAR, FAR + 5.0 * dvec3(cos, sin, 0.0)).expect("an angle");
+            // A step of f64 at 5e6 seen over two metres.
+            assert!((angle - degrees).abs() < 1e-7, "{angle} is not {degrees}");
+        }
+        assert_eq!(ruler.angle(FAR, FAR, FAR + 1.0), None, "no way, no angle");
+        assert_eq!(ruler.angle(FAR, DVec3::NAN, FAR + 1.0), None, "no place");
+        assert_eq!(angle_text(45.0), "45.00°", "with a sign");
+    }
+
+    #[test]
+    fn areas() {
+        let ruler = Ruler::new(&Crs::default(), DVec3::Z);
+        let wall = [dvec3(0.0, 0.0, 0.0), dvec3(3.0, 4.0, 0.0), dvec3(3.0, 4.0, 2.0), dvec3(0.0, 0.0, 2.0)];
+        near(ruler.area(&wall.map(|corner| FAR + corner)), 10.0);
+        let notched = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 1.0], [0.0, 4.0]];
+        near(ruler.area(&notched.map(|[x, y]| FAR + dvec3(x, y, 0.0))), 10.0);
+        assert_eq!([ruler.area(&[]), ruler.area(&[FAR]), ruler.area(&[FAR, FAR + 1.0])], [0.0; 3], "of no polygon");
+    }
+
+    #[test]
+    fn units_are_those_of_the_coordinates() {
+        let text = |unit, vertical: Option<Unit>| {
+            let ruler = Ruler::new(&crs(unit, vertical), DVec3::Z);
+            ruler.length_text(ruler.distance(DVec3::ZERO, dvec3(3.0, 4.0, 0.0)))
+        };
+        assert_eq!(text(None, None), "5.0000", "nothing is known");
+        assert_eq!(text(Some(Unit::Metre), None), "5.0000 m", "metres");
+        assert_eq!(text(Some(Unit::Foot), Some(Unit::Foot)), "5.0000 ft", "feet");
+        assert_eq!(text(Some(Unit::UsSurveyFoot), None), "5.0000 ftUS", "other feet");
+        assert_eq!(text(Some(Unit::Degree), None), "5.0000", "no length");
+        assert_eq!(text(Some(Unit::Foot), Some(Unit::Metre)), "1.5240 m", "feet and metres are metres");
+        let mixed = Ruler::new(&crs(Some(Unit::Metre), Some(Unit::Foot)), DVec3::Z);
+        near(mixed.height_difference(DVec3::ZERO, 100.0 * DVec3::Z), 30.48);
+        assert_eq!(mixed.area_text(12.0), "12.000 m²", "areas");
+    }
+
+    #[test]
+    fn digits_are_as_many_as_make_sense() {
+        let ruler = Ruler::new(&Crs::default(), DVec3::Z);
+        let texts = [1_234_567.891_6, 123.456_78, 12.345_67, 1.234_567, 0.012_345_67, 1.5e-9, 0.0, -0.25];
+        let wanted = ["1234567.892", "123.457", "12.346", "1.2346", "0.012346", "0.000000001500", "0.000", "-0.25000"];
+        assert_eq!(texts.map(|length| ruler.length_text(length)), wanted, "three decimals, five digits");
+        assert_eq!(ruler.length_text(f64::NAN), "NaN", "no number");
+    }
+}

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_writable, glam::DMat4, write};
+use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, check_writable, glam::DMat4, write};
 
 use super::{Document, Layer, LayerId, shown::points_where};
 
@@ -30,7 +30,8 @@ pub(crate) enum Replace {
     Nothing,
     /// A file that no layer was read from.
     Files,
-    /// Even a file that a layer was read from.
+    /// Even a file that a layer was read from. The layer stays as it was read, so that what is told of its points is then
+    /// about the old file until it is opened again.
     Inputs,
 }
 
@@ -61,9 +62,21 @@ pub(crate) enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// It was not to be finished.
+    #[error("cancelled")]
+    Cancelled,
     /// It could not be written.
     #[error(transparent)]
-    Cloud(#[from] Error),
+    Cloud(Error),
+}
+
+impl From<Error> for ExportError {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Cancelled => Self::Cancelled,
+            error => Self::Cloud(error),
+        }
+    }
 }
 
 /// Writes points in the format that the extension of `path` names. Deleted points are left out, moves and poses applied;
@@ -93,9 +106,12 @@ pub(crate) fn export(
     let layers = layers.filter(|(layer, points)| points.as_ref().map_or(layer.cloud.len(), Vec::len) > 0);
     let layers: Vec<_> = layers.collect();
     let degrees = layers.iter().all(|(layer, _)| layer.cloud.crs().unit == Some(Unit::Degree));
+    let bytes: usize = layers.iter().map(|(layer, points)| layer.exact_bytes(points.as_deref(), degrees)).sum();
+    let merged: usize = layers.iter().skip(1).map(|(layer, _)| layer.cloud.byte_len()).sum();
+    check_memory("the points to be written", (bytes + 2 * merged) as u64)?;
     let mut clouds: Vec<_> = layers.iter().map(|(layer, points)| layer.exact(points.as_deref(), degrees)).collect();
     if progress.cancelled() {
-        return Err(Error::Cancelled.into());
+        return Err(ExportError::Cancelled);
     }
     let cloud = match clouds.as_mut_slice() {
         [] => return Err(ExportError::Nothing),
@@ -127,11 +143,27 @@ fn chosen(document: &Document, layer: &Layer, what: What) -> Option<Vec<u32>> {
 }
 
 impl Layer {
+    fn is_moved(&self) -> bool {
+        !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY
+    }
+
+    /// Bytes that [`exact`](Self::exact) takes at most.
+    fn exact_bytes(&self, points: Option<&[u32]>, degrees: bool) -> usize {
+        let copies = match (points, self.is_moved(), self.local.filter(|_| !degrees)) {
+            (None, false, None) => return 0,
+            // Placing makes another one.
+            (_, true, _) if self.pose != DMat4::IDENTITY => 2,
+            _ => 1,
+        };
+        let part = points.map_or(1.0, |points| points.len() as f64 / self.cloud.len().max(1) as f64);
+        let digits = size_of::<[f32; 3]>() * self.cloud.len();
+        (part * (copies * (self.cloud.byte_len() + digits)) as f64) as usize
+    }
+
     /// Its points with the indices given, or all, moved and placed with all digits: in the file's degrees if `degrees`
     /// says so, else in metres. A layer to which nothing was done is not copied.
-    fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
-        let moved = !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY;
-        let converted = self.local.filter(|_| !degrees);
+    pub(super) fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
+        let (moved, converted) = (self.is_moved(), self.local.filter(|_| !degrees));
         if points.is_none() && !moved && converted.is_none() {
             return Cow::Borrowed(&self.cloud);
         }

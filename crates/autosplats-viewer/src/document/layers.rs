@@ -105,7 +105,8 @@ impl Document {
         super::shown::bounds(cloud.len(), |index| Some(cloud.world_position(index)))
     }
 
-    /// Numbers of points of a layer.
+    /// Numbers of points of a layer. With a clipping box all selected points are looked at: ask after edits, not in every
+    /// frame.
     pub(crate) fn counts_of(&self, layer: &Layer) -> Counts {
         Counts {
             points: layer.cloud.len(),

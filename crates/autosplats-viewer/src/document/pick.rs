@@ -62,22 +62,25 @@ fn value_text(values: &FieldValues, point: usize) -> String {
 }
 
 /// Coordinates with the digits of the file: those of its steps, or as few as tell a number from its neighbours.
-fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
+pub(super) fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
     let place = cloud.world_position(point);
     let single = cloud.residuals().is_none() && cloud.origin() == DVec3::ZERO;
-    [0, 1, 2].map(|axis| match cloud.resolution().and_then(|step| decimals(step[axis])) {
-        Some(decimals) => format!("{:.decimals$}", place[axis]),
-        None if single => cloud.positions()[point][axis].to_string(),
-        None => place[axis].to_string(),
+    [0, 1, 2].map(|axis| {
+        let stepped = cloud.resolution().and_then(|step| in_steps(place[axis], step[axis]));
+        stepped.unwrap_or_else(|| {
+            if single { cloud.positions()[point][axis].to_string() } else { place[axis].to_string() }
+        })
     })
 }
 
-/// Decimals that all multiples of a step can be written with.
-fn decimals(step: f64) -> Option<usize> {
-    (0..=12)
-        .find(|&decimals| {
-            let steps = step * 10_f64.powi(decimals);
-            steps >= 0.5 && (steps - steps.round()).abs() < 1e-6 * steps
-        })
-        .map(|decimals| decimals.unsigned_abs() as usize)
+/// A number with the decimals that all multiples of a step can be written with; nothing if that is not the number, as where
+/// a file counts its steps from an odd place.
+fn in_steps(value: f64, step: f64) -> Option<String> {
+    let decimals = (0..=12).find(|&decimals| {
+        let steps = step * 10_f64.powi(decimals);
+        steps >= 0.5 && (steps - steps.round()).abs() < 1e-6 * steps
+    })?;
+    let text = format!("{value:.*}", decimals.unsigned_abs() as usize);
+    let off = text.parse::<f64>().ok()? - value;
+    (off.abs() < 1e-3 * step).then_some(text)
 }

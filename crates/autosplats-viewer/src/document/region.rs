@@ -1,46 +1,72 @@
 //! Parts of a picture that points are selected in.
 
+/// Bands that a region is cut into along y, so that only those of its lines are looked at that are as high as a place.
+const BANDS: usize = 256;
+
 /// A part of a picture, in pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Region {
     shape: Shape,
-    /// Nothing of the shape is outside.
+    /// Nothing of the region is outside.
     min: [f32; 2],
     max: [f32; 2],
+    /// For each band the lines that touch it.
+    bands: Vec<Vec<Line>>,
 }
 
-#[derive(Clone, Debug, PartialEq)]
+/// A straight line from one place to another.
+type Line = [[f32; 2]; 2];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Rectangle,
-    /// Corners in order; the last is joined to the first.
-    Lasso(Vec<[f32; 2]>),
-    /// Where a round brush went in straight lines, and the square of its radius.
-    Brush(Vec<[f32; 2]>, f32),
+    /// Lines go all the way round.
+    Lasso,
+    /// A round brush went along the lines; the square of its radius.
+    Brush(f32),
 }
 
 impl Region {
     /// The rectangle between two corners, its edges included.
     pub(crate) fn rectangle(from: [f32; 2], to: [f32; 2]) -> Self {
-        Self::around(Shape::Rectangle, &[from, to], 0.0)
+        Self::new(Shape::Rectangle, &[[from, to]], 0.0)
     }
 
-    /// What a closed line goes round an odd number of times.
-    pub(crate) fn lasso(corners: Vec<[f32; 2]>) -> Self {
-        let points = corners.clone();
-        Self::around(Shape::Lasso(corners), &points, 0.0)
+    /// What a line through some corners and back to the first goes round an odd number of times.
+    pub(crate) fn lasso(corners: &[[f32; 2]]) -> Self {
+        let next = corners.iter().cycle().skip(1);
+        let lines: Vec<Line> = corners.iter().zip(next).map(|(&from, &to)| [from, to]).collect();
+        Self::new(Shape::Lasso, &lines, 0.0)
     }
 
     /// What a round brush touches on its way.
-    pub(crate) fn brush(way: Vec<[f32; 2]>, radius: f32) -> Self {
-        let points = way.clone();
-        Self::around(Shape::Brush(way, radius * radius), &points, radius)
+    pub(crate) fn brush(way: &[[f32; 2]], radius: f32) -> Self {
+        let lines: Vec<Line> = match way {
+            [only] => vec![[*only; 2]],
+            way => way.windows(2).map(|ends| [ends[0], ends[1]]).collect(),
+        };
+        Self::new(Shape::Brush(radius * radius), &lines, radius)
     }
 
-    fn around(shape: Shape, points: &[[f32; 2]], radius: f32) -> Self {
+    fn new(shape: Shape, lines: &[Line], radius: f32) -> Self {
         let ends = |start: f32, least: fn(f32, f32) -> f32, margin: f32| {
-            [0, 1].map(|axis| points.iter().map(|point| point[axis]).fold(start, least) + margin)
+            [0, 1].map(|axis| lines.iter().flatten().map(|end| end[axis]).fold(start, least) + margin)
         };
-        Self { shape, min: ends(f32::INFINITY, f32::min, -radius), max: ends(f32::NEG_INFINITY, f32::max, radius) }
+        let (min, max) = (ends(f32::INFINITY, f32::min, -radius), ends(f32::NEG_INFINITY, f32::max, radius));
+        let mut region = Self { shape, min, max, bands: vec![Vec::new(); BANDS] };
+        for line in lines {
+            let [from, to] = line.map(|end| end[1]);
+            for band in region.band(from.min(to) - radius)..=region.band(from.max(to) + radius) {
+                region.bands[band].push(*line);
+            }
+        }
+        region
+    }
+
+    /// The band of a height; it never falls with the height.
+    fn band(&self, y: f32) -> usize {
+        let [low, high] = [self.min[1], self.max[1]];
+        (((y - low) / (high - low) * BANDS as f32) as usize).min(BANDS - 1)
     }
 
     /// Whether a place is in the region.
@@ -48,31 +74,19 @@ impl Region {
         if !(0..2).all(|axis| place[axis] >= self.min[axis] && place[axis] <= self.max[axis]) {
             return false;
         }
-        match &self.shape {
+        let lines = &self.bands[self.band(place[1])];
+        match self.shape {
             Shape::Rectangle => true,
-            Shape::Lasso(corners) => in_polygon(corners, place),
-            Shape::Brush(way, radius_2) => match way.as_slice() {
-                [only] => distance_2(*only, *only, place) <= *radius_2,
-                way => way.windows(2).any(|ends| distance_2(ends[0], ends[1], place) <= *radius_2),
-            },
+            Shape::Lasso => lines.iter().filter(|line| is_left_of(place, line)).count() % 2 == 1,
+            Shape::Brush(radius_2) => lines.iter().any(|&[from, to]| distance_2(from, to, place) <= radius_2),
         }
     }
 }
 
-/// Whether a ray to the right crosses an odd number of edges.
-fn in_polygon(corners: &[[f32; 2]], [x, y]: [f32; 2]) -> bool {
-    let Some(&last) = corners.last() else { return false };
-    let mut from = last;
-    let mut inside = false;
-    for &to in corners {
-        // Each edge has its upper end and not its lower one, so that a ray through a corner crosses one edge of the two.
-        if (from[1] > y) != (to[1] > y) {
-            let crossing = from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0]);
-            inside ^= x < crossing;
-        }
-        from = to;
-    }
-    inside
+/// Whether a ray to the right of a place crosses a line.
+fn is_left_of([x, y]: [f32; 2], &[from, to]: &Line) -> bool {
+    // Each line has its upper end and not its lower one, so that a ray through a corner crosses one line of the two.
+    (from[1] > y) != (to[1] > y) && x < from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0])
 }
 
 /// Square of the distance of a place to a stretch of a line.
@@ -135,7 +149,7 @@ mod tests {
         // Corners at the height of places, and an edge along them.
         let house = vec![[10.37, 30.61], [60.0, 5.61], [100.0, 30.61], [100.0, 90.0], [10.37, 90.0]];
         for corners in [star, scribble, house] {
-            let region = Region::lasso(corners.clone());
+            let region = Region::lasso(&corners);
             let wrong = places().filter(|&place| {
                 let on_edge = corners.iter().any(|corner| corner[1] == place[1] || corner[0] == place[0]);
                 !on_edge && region.contains(place) != (turns(&corners, place).rem_euclid(2) == 1)
@@ -144,7 +158,7 @@ mod tests {
             assert!(places().any(|place| region.contains(place)), "some are inside");
         }
         for corners in [vec![], vec![[50.0, 50.0]], vec![[0.0, 0.0], [100.0, 100.0]]] {
-            let region = Region::lasso(corners);
+            let region = Region::lasso(&corners);
             assert!(!places().any(|place| region.contains(place)), "a line goes round nothing");
         }
     }
@@ -152,7 +166,7 @@ mod tests {
     #[test]
     fn brushes_touch_what_is_near() {
         let way = vec![[20.0, 20.0], [80.0, 30.0], [80.0, 30.0], [40.0, 90.0]];
-        let region = Region::brush(way.clone(), 7.0);
+        let region = Region::brush(&way, 7.0);
         for place in places() {
             // The brush set down at many places of its way.
             let nearest = way
@@ -165,8 +179,8 @@ mod tests {
                 .fold(f32::INFINITY, f32::min);
             assert!((nearest - 7.0).abs() < 0.01 || region.contains(place) == (nearest < 7.0), "{place:?}");
         }
-        let dab = Region::brush(vec![[50.0, 50.0]], 3.0);
+        let dab = Region::brush(&[[50.0, 50.0]], 3.0);
         assert!(dab.contains([52.0, 52.0]) && !dab.contains([52.5, 52.5]), "one place is a disc");
-        assert!(!Region::brush(vec![], 3.0).contains([0.0, 0.0]), "no way");
+        assert!(!Region::brush(&[], 3.0).contains([0.0, 0.0]), "no way");
     }
 }

@@ -8,7 +8,7 @@ use autosplats::cloud::{
 };
 use rayon::prelude::*;
 
-use super::{Bits, ClipBox, Document, Edits, Layer, LayerId};
+use super::{Bits, ClipBox, Document, Layer, LayerId};
 
 /// What is to be seen of a document: one cloud, and where each of its points comes from. Clones share all that is big.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ impl Document {
     /// Those of a layer's points that can be seen, ascending; nothing if all can.
     pub(super) fn seen(&self, layer: &Layer) -> Option<Vec<u32>> {
         let clip = self.clips();
-        if clip.is_none() && layer.edits.hidden.is_empty() && layer.edits.deleted.is_empty() {
+        if clip.is_none() && !layer.is_thinned() {
             return None;
         }
         let seen = |point: usize| layer.has(point) && clip.is_none_or(|clip| clip.contains(layer.position(point)));
@@ -100,6 +100,22 @@ impl Document {
         })
     }
 
+    /// Bytes that [`shown`](Self::shown) will take at most, beyond what the document has. Systems promise memory they do not
+    /// have: [ask](autosplats::cloud::check_memory) before.
+    pub(crate) fn shown_bytes(&self) -> usize {
+        let bytes = |layer: &Layer| {
+            let sets = if self.clips().is_some() || layer.is_thinned() { 8 * layer.cloud.len() } else { 0 };
+            let colors = layer.tint.map_or(0, |_| 3 * layer.cloud.len());
+            let alone = if layer.is_changed() || sets > 0 { layer.cloud.byte_len() } else { 0 };
+            (sets + colors + alone, layer.cloud.byte_len() + colors)
+        };
+        let layers: Vec<_> = self.visible().map(|layer| (layer, bytes(layer))).collect();
+        match layers.as_slice() {
+            [(layer, (alone, _))] if layer.pose == DMat4::IDENTITY => *alone,
+            several => several.iter().map(|(_, (alone, merged))| alone + merged).sum(),
+        }
+    }
+
     /// The one cloud to be rendered: visible layers at their places, without what is hidden, deleted or clipped.
     ///
     /// Fields, coordinate system and the like are kept as [merging](PointCloud::merge) keeps them; those in degrees become
@@ -132,10 +148,19 @@ impl Document {
 }
 
 impl Layer {
+    /// Whether some of its points are not there or not to be seen.
+    fn is_thinned(&self) -> bool {
+        !self.edits.hidden.is_empty() || !self.edits.deleted.is_empty()
+    }
+
+    /// Whether some of its points look or lie otherwise than in the file, but for its pose.
+    fn is_changed(&self) -> bool {
+        !self.edits.moves.is_empty() || self.tint.is_some() || self.local.is_some()
+    }
+
     /// Its points with the indices given, or all, moved and coloured as they are shown, but not placed in the world.
     fn look(&self, points: Option<&[u32]>) -> Cow<'_, PointCloud> {
-        let Edits { moves, .. } = &self.edits;
-        if points.is_none() && moves.is_empty() && self.tint.is_none() && self.local.is_none() {
+        if points.is_none() && !self.is_changed() {
             return Cow::Borrowed(&self.cloud);
         }
         let mut cloud = points.map_or_else(|| (*self.cloud).clone(), |points| self.cloud.pick(points));
@@ -229,7 +254,12 @@ impl Shown {
 
 /// The least box that has all places in it that are finite; nothing if there is none.
 pub(super) fn bounds(len: usize, place: impl Fn(usize) -> Option<DVec3> + Sync) -> Option<[DVec3; 2]> {
-    let places =
-        (0..len).into_par_iter().with_min_len(1 << 10).filter_map(|index| place(index).filter(|p| p.is_finite()));
-    places.map(|place| [place; 2]).reduce_with(|[low, high], [min, max]| [low.min(min), high.max(max)])
+    let none = || [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let join = |[low, high]: [DVec3; 2], [min, max]: [DVec3; 2]| [low.min(min), high.max(max)];
+    let grow = |bounds, index| match place(index) {
+        Some(place) if place.is_finite() => join(bounds, [place; 2]),
+        _ => bounds,
+    };
+    let [low, high] = (0..len).into_par_iter().with_min_len(1 << 10).fold(none, grow).reduce(none, join);
+    low.cmple(high).all().then_some([low, high])
 }

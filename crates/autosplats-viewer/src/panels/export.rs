@@ -131,9 +131,9 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 }
 
 /// What can be written: what it is called, what it is, and whether there is any of it.
-fn choices(app: &App) -> Vec<(String, What, bool)> {
+fn choices(app: &mut App) -> Vec<(String, What, bool)> {
+    let counts = app.counts().1;
     let document = app.document();
-    let counts = document.counts();
     let mut choices = vec![
         ("What is shown".into(), What::Shown, counts.points > 0),
         (format!("What is selected ({})", grouped(counts.selected)), What::Selected, counts.selected > 0),

@@ -5,10 +5,10 @@ use eframe::egui;
 use crate::app::App;
 use crate::document::grouped;
 
-pub(super) fn show(app: &App, ui: &mut egui::Ui) {
+pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     egui::Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
-            let counts = app.document().counts();
+            let counts = app.counts().1;
             ui.label(format!("{} points", grouped(counts.points)));
             if counts.selected > 0 {
                 ui.separator();

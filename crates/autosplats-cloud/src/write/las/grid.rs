@@ -18,6 +18,9 @@ const FINEST: f64 = 1e-12;
 /// A part of a step by which coordinates may miss their integer, as those do that went through `f32`.
 const SLACK: f64 = 0.25;
 
+/// Points that are asked where the integers lie, if they do not lie at round places.
+const SAMPLES: usize = 5;
+
 /// Coordinates are `offset + integer * scale`.
 pub(super) struct Grid {
     pub(super) scale: DVec3,
@@ -53,26 +56,36 @@ impl Grid {
             check_spread(job, count, &world, scale)?;
         }
 
+        // How far points are from their integers along each axis: at most, and altogether in thousandths.
         let off = |offset: DVec3| {
             let miss = |i: usize| {
                 let steps = (world(i) - offset) / scale;
-                (steps - steps.round()).abs()
+                let miss = (steps - steps.round()).abs();
+                (miss, miss.to_array().map(|miss| (miss * 1000.0) as u64))
             };
-            (0..count).into_par_iter().map(miss).reduce(|| DVec3::ZERO, DVec3::max)
+            let join = |(most, sums): (DVec3, [u64; 3]), (other, others): (DVec3, [u64; 3])| {
+                (most.max(other), [0, 1, 2].map(|axis| sums[axis] + others[axis]))
+            };
+            (0..count).into_par_iter().map(miss).reduce(|| (DVec3::ZERO, [0; 3]), join)
         };
         let mut offset = DVec3::from_array([0, 1, 2].map(|axis| round_offset(low[axis], high[axis], scale[axis])));
-        let mut miss = off(offset);
-        if known.is_some() && miss.max_element() > SLACK {
-            // The file's offset was no multiple of its scale: any of its points will do.
-            let steps = ((DVec3::midpoint(low, high) - world(0)) / scale).round();
+        let (mut miss, mut sums) = off(offset);
+        for sample in (0..SAMPLES).map(|sample| (count - 1) * sample / (SAMPLES - 1)) {
+            if known.is_none() || miss.max_element() <= SLACK {
+                break;
+            }
+            // The file's offset was no multiple of its scale: any of its points will do that was not moved since.
+            let place = world(sample);
+            let steps = ((DVec3::midpoint(low, high) - place) / scale).round();
             let near = DVec3::from_array([0, 1, 2].map(|axis| {
-                let reached = (low[axis] - world(0)[axis]).abs().max((high[axis] - world(0)[axis]).abs());
-                if reached <= REACH * scale[axis] { world(0)[axis] } else { world(0)[axis] + steps[axis] * scale[axis] }
+                let reached = (low[axis] - place[axis]).abs().max((high[axis] - place[axis]).abs());
+                if reached <= REACH * scale[axis] { place[axis] } else { place[axis] + steps[axis] * scale[axis] }
             }));
-            let other = off(near);
+            let (most, others) = off(near);
             for axis in 0..3 {
-                if other[axis] < miss[axis] {
-                    (offset[axis], miss[axis]) = (near[axis], other[axis]);
+                // By all points, so that those which were moved do not take the others off their places.
+                if others[axis] < sums[axis] {
+                    (offset[axis], miss[axis], sums[axis]) = (near[axis], most[axis], others[axis]);
                 }
             }
         }
