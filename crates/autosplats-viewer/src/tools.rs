@@ -63,8 +63,8 @@ pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
     let way: Vec<[f32; 2]> = std::mem::take(&mut app.tools.way).iter().map(pixel).collect();
     let region = match app.tool {
         Tool::Rectangle => Region::rectangle(way[0], way[way.len() - 1]),
-        Tool::Lasso => Region::lasso(way),
-        _ => Region::brush(way, app.tools.brush * scale),
+        Tool::Lasso => Region::lasso(&way),
+        _ => Region::brush(&way, app.tools.brush * scale),
     };
     let modifiers = response.ctx.input(|input| input.modifiers);
     let mode = match (modifiers.shift, modifiers.command) {
