@@ -176,9 +176,14 @@ impl App {
         self.history.current()
     }
 
-    /// Numbers of points of all that is open, and of each layer; counted anew only after changes.
+    /// Grows with each change of the document.
+    pub(crate) fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Numbers of points of all that is open, and of each layer; counted anew only after changes, and after drags.
     pub(crate) fn counts(&mut self) -> &(u64, Counts, HashMap<LayerId, Counts>) {
-        if self.counted.0 != self.version {
+        if self.counted.0 != self.version && !self.tools.gizmo.is_dragging() {
             let document = self.document();
             let all = document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect();
             self.counted = (self.version, document.counts(), all);
@@ -324,7 +329,7 @@ impl App {
         let cloud = Arc::new(cloud);
         if let Some(id) = self.reloads.remove(&job) {
             if self.change(|document| document.reload(id, Arc::clone(&cloud))) {
-                self.messages.note(format!("{} has changed and was read again", input.name));
+                self.messages.note(format!("{} was read again", input.name));
             }
             return;
         }
@@ -374,14 +379,17 @@ impl App {
     fn reload(&mut self, path: &std::path::Path) {
         let layers = self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path));
         let ids: Vec<_> = layers.map(|layer| layer.id).collect();
-        for id in ids {
-            let Some(input) = self.inputs.get(&id).cloned() else { continue };
-            if self.history.is_unsaved(id) {
-                self.messages.note(format!("{} has changed; it was not read again, as it has edits here", input.name));
-            } else {
-                let job = self.loader.read(input);
-                self.reloads.insert(job, id);
-            }
+        ids.into_iter().for_each(|id| self.reload_layer(id));
+    }
+
+    /// Reads the file of an input again, unless its points have edits.
+    pub(crate) fn reload_layer(&mut self, id: LayerId) {
+        let Some(input) = self.inputs.get(&id).cloned() else { return };
+        if self.history.is_unsaved(id) {
+            self.messages.note(format!("{} has changed; it was not read again, as it has edits here", input.name));
+        } else {
+            let job = self.loader.read(input);
+            self.reloads.insert(job, id);
         }
     }
 

@@ -20,6 +20,7 @@ pub(crate) enum Command {
     ShowAll,
     DeleteSelected,
     CropToSelected,
+    Clip,
     FitAll,
     FitSelected,
     View(ViewDirection),
@@ -47,6 +48,8 @@ pub(crate) enum Tool {
     Inspect,
     /// Measures from point to point.
     Measure,
+    /// Moves and turns what is selected.
+    Move,
     /// Selects what is in a rectangle.
     Rectangle,
     /// Selects what is in a line drawn freely.
@@ -56,8 +59,8 @@ pub(crate) enum Tool {
 }
 
 impl Tool {
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Navigate, Self::Inspect, Self::Measure, Self::Rectangle, Self::Lasso, Self::Brush];
+    pub(crate) const ALL: [Self; 7] =
+        [Self::Navigate, Self::Inspect, Self::Measure, Self::Rectangle, Self::Lasso, Self::Brush, Self::Move];
 
     /// What the bar of tools calls it.
     pub(crate) fn name(self) -> &'static str {
@@ -68,6 +71,7 @@ impl Tool {
             Self::Rectangle => "Rectangle",
             Self::Lasso => "Lasso",
             Self::Brush => "Brush",
+            Self::Move => "Move",
         }
     }
 
@@ -79,7 +83,7 @@ impl Tool {
 
 impl Command {
     /// All of them, in the order of the menus.
-    pub(crate) const ALL: [Self; 41] = [
+    pub(crate) const ALL: [Self; 43] = [
         Self::Open,
         Self::Export,
         Self::Screenshot,
@@ -94,6 +98,7 @@ impl Command {
         Self::ShowAll,
         Self::DeleteSelected,
         Self::CropToSelected,
+        Self::Clip,
         Self::FitAll,
         Self::FitSelected,
         Self::View(ViewDirection::Front),
@@ -121,6 +126,7 @@ impl Command {
         Self::Tool(Tool::Rectangle),
         Self::Tool(Tool::Lasso),
         Self::Tool(Tool::Brush),
+        Self::Tool(Tool::Move),
     ];
 
     /// What menus call it.
@@ -140,6 +146,7 @@ impl Command {
             Self::ShowAll => "Show hidden",
             Self::DeleteSelected => "Delete selected",
             Self::CropToSelected => "Crop to selected",
+            Self::Clip => "Clipping box",
             Self::FitAll => "Fit all",
             Self::FitSelected => "Fit selected",
             Self::View(ViewDirection::Front) => "Front",
@@ -167,6 +174,7 @@ impl Command {
             Self::Tool(Tool::Rectangle) => "Select by rectangle",
             Self::Tool(Tool::Lasso) => "Select by lasso",
             Self::Tool(Tool::Brush) => "Select by brush",
+            Self::Tool(Tool::Move) => "Move selected",
         }
     }
 
@@ -190,6 +198,7 @@ impl Command {
             Self::ShowAll => shift(Key::H),
             Self::DeleteSelected => plain(Key::Delete),
             Self::CropToSelected => shift(Key::K),
+            Self::Clip => plain(Key::K),
             Self::FitAll => plain(Key::R),
             Self::FitSelected => plain(Key::F),
             Self::View(ViewDirection::Front) => plain(Key::Num1),
@@ -218,6 +227,7 @@ impl Command {
             Self::Tool(Tool::Rectangle) => plain(Key::B),
             Self::Tool(Tool::Lasso) => plain(Key::G),
             Self::Tool(Tool::Brush) => plain(Key::C),
+            Self::Tool(Tool::Move) => plain(Key::V),
         }
     }
 
@@ -238,6 +248,7 @@ impl Command {
             Self::ShowAll => "Show all points that were hidden",
             Self::DeleteSelected => "Take the selected points out; the files stay as they are",
             Self::CropToSelected => "Take all other points out; the files stay as they are",
+            Self::Clip => "Show only what is in a box, whose faces can be dragged",
             Self::FitAll => "Stand where everything is seen, looking the same way",
             Self::FitSelected => "Stand where the selected points are seen",
             Self::View(ViewDirection::Auto) => "Stand where the program stood when the first file was opened",
@@ -259,6 +270,7 @@ impl Command {
             Self::Tool(Tool::Rectangle) => "Drag a rectangle; Shift adds, Ctrl takes away",
             Self::Tool(Tool::Lasso) => "Draw around points; Shift adds, Ctrl takes away",
             Self::Tool(Tool::Brush) => "Paint over points; Shift adds, Ctrl takes away",
+            Self::Tool(Tool::Move) => "Drag arrows and rings to move and turn the selected points",
         }
     }
 

@@ -65,9 +65,11 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
         if input.consume_key(Modifiers::COMMAND, Key::Y) {
             pressed.push(Command::Redo);
         }
-        if input.consume_key(Modifiers::NONE, Key::Backspace) {
+        if input.consume_key(Modifiers::NONE, Key::Backspace) && app.tools.measured.pop().is_none() {
             pressed.push(Command::DeleteSelected);
         }
+        // What is in the user's hands is put down first; Escape gives it up.
+        pressed.retain(|command| *command == Command::SelectNone || !app.tools.gizmo.is_dragging());
         pressed
     });
     pressed.into_iter().for_each(|command| run(app, context, command));
@@ -113,7 +115,7 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         }
         Command::SelectNone => {
             // Escape goes back a step each time: what is being drawn, the tool, the selection.
-            if app.tools.cancel() {
+            if crate::gizmo::cancel(app) || app.tools.cancel() {
                 return;
             }
             if app.tool == Tool::Navigate {
@@ -125,6 +127,7 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::ShowAll => app.edit_points("Show", |document| document.show_all()),
         Command::DeleteSelected => app.edit_points("Delete", |document| document.delete_selected()),
         Command::CropToSelected => app.edit_points("Crop away", |document| document.crop_to_selection()),
+        Command::Clip => crate::gizmo::switch(app),
         Command::FitAll => {
             let cloud = app.document().overview();
             app.fit(&cloud);

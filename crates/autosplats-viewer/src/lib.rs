@@ -7,6 +7,7 @@ mod app;
 mod commands;
 mod document;
 mod files;
+mod gizmo;
 mod keys;
 mod loading;
 mod look;

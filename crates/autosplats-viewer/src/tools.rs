@@ -4,6 +4,7 @@ use eframe::egui::{self, Color32, Pos2, Stroke};
 
 use crate::app::App;
 use crate::commands::Tool;
+use crate::gizmo::Gizmo;
 use crate::document::{PickedPoint, Region, SelectMode};
 use crate::measure::{Ruler, angle_text};
 use crate::render::{Purpose, Seen, Task, Wish};
@@ -24,11 +25,13 @@ pub(crate) struct Tools {
     pub(crate) inspected: Option<PickedPoint>,
     /// Corners of the measurement.
     pub(crate) measured: Vec<DVec3>,
+    /// Handles in the picture.
+    pub(crate) gizmo: Gizmo,
 }
 
 impl Default for Tools {
     fn default() -> Self {
-        Self { way: Vec::new(), brush: BRUSH, through: false, inspected: None, measured: Vec::new() }
+        Self { way: Vec::new(), brush: BRUSH, through: false, inspected: None, measured: Vec::new(), gizmo: Gizmo::default() }
     }
 }
 

@@ -6,7 +6,7 @@ use eframe::egui::{self, Color32, PointerButton, Sense};
 use crate::app::App;
 use crate::commands::Tool;
 use crate::render::Purpose;
-use crate::{overlay, tools};
+use crate::{gizmo, overlay, tools};
 
 /// How much closer one line of a mouse wheel goes.
 const WHEEL: f64 = 0.0024;
@@ -32,6 +32,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
             welcome(app, ui, rect);
         }
         tools::show(app, ui, rect, size);
+        gizmo::show(app, ui, rect, size);
         if app.look.overlay {
             overlay::show(app, ui, rect);
         }
@@ -72,6 +73,9 @@ fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
 
 /// What the pointer does; says whether the view is in its hands.
 fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
+    if gizmo::handle(app, response, size) {
+        return true;
+    }
     let rect = response.rect;
     let context = &response.ctx;
     let modifiers = context.input(|input| input.modifiers);

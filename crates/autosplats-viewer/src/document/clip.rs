@@ -2,6 +2,9 @@
 
 use autosplats::cloud::glam::{DQuat, DVec3};
 
+/// Least side of a box by its longest: a face that is pushed through the opposite one stops before it.
+const LEAST_SIDE: f64 = 1e-4;
+
 /// A box in world coordinates. Points outside are not shown, so that no edit reaches them; they are not changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ClipBox {
@@ -24,6 +27,48 @@ impl ClipBox {
     /// What it turns about.
     pub(crate) fn centre(&self) -> DVec3 {
         self.min.midpoint(self.max)
+    }
+
+    /// The direction in the world that an axis of the box has.
+    pub(crate) fn axis(&self, axis: usize) -> DVec3 {
+        self.rotation * DVec3::AXES[axis]
+    }
+
+    /// The middle of a face: that with the lowest or the highest coordinates of an axis of the box.
+    pub(crate) fn face(&self, axis: usize, high: bool) -> DVec3 {
+        let half = 0.5 * (self.max - self.min)[axis];
+        self.centre() + self.axis(axis) * if high { half } else { -half }
+    }
+
+    /// The box with a face moved along its axis; the others stay where they are in the world, and the box does not turn
+    /// inside out.
+    #[must_use]
+    pub(crate) fn with_face(&self, axis: usize, high: bool, way: f64) -> Self {
+        let size = self.max - self.min;
+        let least = LEAST_SIDE * size.max_element();
+        let way = if high { way.max(least - size[axis]) } else { way.min(size[axis] - least) };
+        if !way.is_finite() {
+            return *self;
+        }
+        let mut half = 0.5 * size;
+        half[axis] += 0.5 * if high { way } else { -way };
+        let centre = self.centre() + self.axis(axis) * (0.5 * way);
+        if self.rotation == DQuat::IDENTITY {
+            // What does not move keeps all its digits.
+            let mut moved = *self;
+            let end = if high { &mut moved.max } else { &mut moved.min };
+            end[axis] += way;
+            return moved;
+        }
+        Self { min: centre - half, max: centre + half, ..*self }
+    }
+
+    /// How far it is turned about a direction, in radians.
+    pub(crate) fn angle_about(&self, up: DVec3) -> f64 {
+        let DQuat { x, y, z, w } = self.rotation;
+        let angle = 2.0 * DVec3::new(x, y, z).dot(up).atan2(w);
+        // From half a turn back to half a turn on.
+        angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
     }
 
     /// Whether a place is in the box, its faces included. What is not finite is outside.
@@ -51,6 +96,41 @@ impl ClipBox {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn faces_move_alone() {
+        let far = DVec3::new(5e5, 5e6, 100.0);
+        for rotation in [DQuat::IDENTITY, DQuat::from_rotation_z(0.7)] {
+            let clip = ClipBox { rotation, ..ClipBox::new(far, far + DVec3::new(2.0, 3.0, 4.0)) };
+            for (axis, high) in [0, 1, 2].into_iter().flat_map(|axis| [(axis, false), (axis, true)]) {
+                let moved = clip.with_face(axis, high, 0.25);
+                for other in 0..3 {
+                    for end in [false, true] {
+                        let off = (moved.face(other, end) - clip.face(other, end)).dot(clip.axis(other));
+                        let wanted = if (other, end) == (axis, high) { 0.25 } else { 0.0 };
+                        // Some steps of f64 at 5e6.
+                        assert!((off - wanted).abs() < 1e-8, "{axis} {high}: face {other} {end} moved by {off}");
+                    }
+                }
+                for way in [-100.0, 100.0] {
+                    let least = clip.with_face(axis, high, way);
+                    assert!(least.min.cmplt(least.max).all(), "{axis} {high} by {way} is no box: {least:?}");
+                }
+                assert_eq!(clip.with_face(axis, high, f64::NAN), clip, "no way, no move");
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_tell_their_angle() {
+        let up = DVec3::NEG_Y;
+        for angle in [-3.0, -0.5, 0.0, 1.0, 3.0] {
+            let clip = ClipBox { rotation: DQuat::from_axis_angle(up, angle), ..ClipBox::new(DVec3::ZERO, DVec3::ONE) };
+            assert!((clip.angle_about(up) - angle).abs() < 1e-12, "{} is not {angle}", clip.angle_about(up));
+            let turned = ClipBox { rotation: -clip.rotation, ..clip };
+            assert!((turned.angle_about(up) - angle).abs() < 1e-12, "whichever sign the numbers have");
+        }
+    }
 
     #[test]
     fn turned_boxes_hold_what_is_in_them() {

@@ -1,8 +1,25 @@
 //! What is done to points. Each edit says how many points it reached; with none, the document is as it was.
 
-use autosplats::cloud::glam::{DMat4, DVec3};
+use std::sync::Arc;
 
-use super::{Bits, Document, Layer, layers::can_place, shown::bounds};
+use autosplats::cloud::{
+    PointCloud,
+    glam::{DMat4, DVec3},
+};
+
+use super::{Bits, Document, Layer, LayerId, layers::can_place, shown::bounds};
+
+/// Points that a drag holds, and what had moved them before.
+#[derive(Clone, Debug)]
+pub(crate) struct Grip(Vec<Gripped>);
+
+#[derive(Clone, Debug)]
+struct Gripped {
+    layer: LayerId,
+    cloud: Arc<PointCloud>,
+    points: Bits,
+    moves: Vec<(Bits, DMat4)>,
+}
 
 impl Document {
     /// Hides the selected points, which are selected no longer.
@@ -44,23 +61,52 @@ impl Document {
 
     /// Moves the selected points by an affine map of world coordinates; one that flattens them is refused.
     pub(crate) fn move_selected(&mut self, matrix: &DMat4) -> usize {
-        if !can_place(matrix) || *matrix == DMat4::IDENTITY {
+        if *matrix == DMat4::IDENTITY {
             return 0;
         }
-        self.edit_reached(|layer, reached| {
+        let grip = self.grip();
+        self.move_gripped(&grip, matrix)
+    }
+
+    /// The selected points as they lie now, to be moved from there as often as a drag wants.
+    pub(crate) fn grip(&self) -> Grip {
+        let gripped = self.layers.iter().map(|layer| Gripped {
+            layer: layer.id,
+            cloud: Arc::clone(&layer.cloud),
+            points: self.reached(layer),
+            moves: layer.edits.moves.clone(),
+        });
+        Grip(gripped.filter(|gripped| !gripped.points.is_empty()).collect())
+    }
+
+    /// Moves points from where they lay when they were gripped, whatever has moved them since; by an affine map of world
+    /// coordinates, the identity to put them back. One that flattens them is refused.
+    pub(crate) fn move_gripped(&mut self, grip: &Grip, matrix: &DMat4) -> usize {
+        if !can_place(matrix) {
+            return 0;
+        }
+        let mut count = 0;
+        for Gripped { layer, cloud, points, moves: before } in &grip.0 {
+            // A layer that was read again has other points.
+            let there = |own: &&mut Layer| own.id == *layer && Arc::ptr_eq(&own.cloud, cloud);
+            let Some(layer) = self.layers.iter_mut().find(there) else { continue };
             let own = if layer.pose == DMat4::IDENTITY { *matrix } else { layer.pose.inverse() * *matrix * layer.pose };
             let moves = &mut layer.edits.moves;
+            moves.clone_from(before);
             match moves.last_mut() {
+                _ if *matrix == DMat4::IDENTITY => {}
                 // The same points once more: one move takes them all the way.
-                Some((points, before)) if points == reached => {
+                Some((moved, before)) if moved == points => {
                     *before = own * *before;
                     if *before == DMat4::IDENTITY {
                         moves.pop();
                     }
                 }
-                _ => moves.push((reached.clone(), own)),
+                _ => moves.push((points.clone(), own)),
             }
-        })
+            count += points.count();
+        }
+        count
     }
 
     /// Turns the selected points about the centre of their bounds.
@@ -75,7 +121,12 @@ impl Document {
             let reached = self.reached(layer);
             bounds(layer.cloud.len(), |point| reached.get(point).then(|| layer.position(point)))
         });
-        boxes.reduce(|[low, high], [min, max]| [low.min(min), high.max(max)])
+        boxes.reduce(join)
+    }
+
+    /// The least box along the axes that has all points in it that would be shown if no box clipped any.
+    pub(crate) fn whole_bounds(&self) -> Option<[DVec3; 2]> {
+        self.layers.iter().filter(|layer| layer.visible).filter_map(Layer::bounds).reduce(join)
     }
 
     fn edit_reached(&mut self, edit: impl Fn(&mut Layer, &Bits)) -> usize {
@@ -87,6 +138,10 @@ impl Document {
         }
         reached.iter().map(Bits::count).sum()
     }
+}
+
+fn join([low, high]: [DVec3; 2], [min, max]: [DVec3; 2]) -> [DVec3; 2] {
+    [low.min(min), high.max(max)]
 }
 
 /// A map that leaves `centre` where it is.

@@ -13,7 +13,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::Bits;
+use super::{Bits, shown::bounds};
 
 /// Tells a layer from all others of this process; clones of a layer, as undo keeps them, have the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -40,7 +40,7 @@ pub(crate) struct Layer {
     /// What was done to single points.
     pub(crate) edits: Edits,
     /// The pose it was opened with, which is no edit.
-    opened_at: DMat4,
+    pub(crate) opened_at: DMat4,
     /// The map that makes metres of the file's degrees.
     pub(super) local: Option<LocalMetres>,
 }
@@ -126,6 +126,11 @@ impl Layer {
         }
         // Infinities stay as they are where nothing is to be done.
         if self.pose == DMat4::IDENTITY { place } else { self.pose.transform_point3(place) }
+    }
+
+    /// The least box along the axes of the world that has all its points in it.
+    pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
+        bounds(self.cloud.len(), |point| self.has(point).then(|| self.position(point)))
     }
 
     /// Whether a point is neither hidden nor deleted.

@@ -30,11 +30,10 @@ mod shown;
 #[cfg(test)]
 mod tests;
 
-#[allow(unused_imports, reason = "the window that uses them is not built yet")]
 pub(crate) use self::{
     bits::Bits,
     clip::ClipBox,
-    edit::about,
+    edit::{Grip, about},
     export::{ExportError, Exported, Replace, What, export},
     history::{History, grouped, label},
     layer::{Counts, Edits, Layer, LayerId},

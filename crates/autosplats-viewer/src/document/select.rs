@@ -1,8 +1,6 @@
 //! Which points the next edit is about.
 
-use autosplats::Lens;
-
-use super::{Bits, Document, Region, Shown};
+use super::{Bits, Document, Shown};
 
 /// How what is pointed at changes what was selected before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,15 +29,6 @@ impl Document {
                 SelectMode::Intersect => selected.without(&selected.without(&hit)),
             };
         }
-    }
-
-    /// Selects the shown points that lie in a region of a picture, those behind others, too.
-    pub(crate) fn select_region(&mut self, shown: &Shown, region: &Region, lens: &Lens, mode: SelectMode) {
-        let hit = |index: usize| {
-            let pixel = lens.to_pixel(shown.cloud.world_position(index));
-            pixel.is_some_and(|(pixel, _)| region.contains(pixel.as_vec2().to_array()))
-        };
-        self.select(shown, hit, mode);
     }
 
     /// Selects all shown points and nothing else.

@@ -245,11 +245,6 @@ impl Shown {
             layer.is_some_and(|layer| layer.edits.selected.get(part.point(index - part.start)))
         })
     }
-
-    /// The least box along the axes that has all shown points in it, but for those without a place.
-    pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
-        bounds(self.len(), |index| Some(self.cloud.world_position(index)))
-    }
 }
 
 /// The least box that has all places in it that are finite; nothing if there is none.

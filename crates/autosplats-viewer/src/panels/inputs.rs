@@ -59,10 +59,16 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
             if ui.color_edit_button_srgb(&mut color).on_hover_text("One colour for all its points").changed() {
                 app.change(|document| document.set_tint(id, Some(color)));
             }
+            if super::layer::naming(app, ui, id) {
+                return;
+            }
             let text = if unsaved { format!("{name} *") } else { name.clone() };
             let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
             let file = path.map_or_else(String::new, |path| format!("\n{}", path.display()));
             let edits = if unsaved { "\nIts edits are not saved" } else { "" };
+            if label.double_clicked() {
+                super::layer::rename(app, id);
+            }
             label.on_hover_text(format!("{name}{file}{edits}")).context_menu(|ui| menu(app, ui, id));
         });
         ui.horizontal_wrapped(|ui| {
@@ -101,6 +107,9 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         app.change(|document| document.set_tint(id, None));
         ui.close();
     }
+    ui.separator();
+    super::layer::menu(app, ui, id);
+    ui.separator();
     if ui.button("Remove").on_hover_text("Take it off the list; its file stays as it is").clicked() {
         app.edit("Remove an input", |document| {
             document.remove(id);

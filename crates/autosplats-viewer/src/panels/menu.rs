@@ -59,6 +59,8 @@ fn edit(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::ShowAll, counts.hidden > 0);
     command_button(app, ui, Command::DeleteSelected, counts.selected > 0);
     command_button(app, ui, Command::CropToSelected, counts.selected > 0);
+    ui.separator();
+    command_button(app, ui, Command::Clip, any);
 }
 
 fn view(app: &mut App, ui: &mut egui::Ui) {

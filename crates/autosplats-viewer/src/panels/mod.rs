@@ -1,12 +1,17 @@
 //! Everything around the picture.
 
+mod clip;
 mod export;
 mod help;
 mod inputs;
+mod layer;
 mod look;
+mod measure;
 mod menu;
+mod moving;
 mod open;
 mod picture;
+mod pose;
 mod statistics;
 mod status;
 
@@ -22,6 +27,11 @@ pub(crate) struct Panels {
     pub(crate) look: bool,
     pub(crate) statistics: bool,
     pub(crate) help: bool,
+    /// The numbers of the clipping box, and its handles.
+    pub(crate) clip: bool,
+    pub(crate) moving: moving::Numbers,
+    pub(crate) pose: Option<pose::Pose>,
+    pub(crate) naming: Option<layer::Naming>,
     pub(crate) dialogs: open::Dialogs,
     pub(crate) export: export::Export,
     pub(crate) picture: picture::PictureDialog,
@@ -40,6 +50,10 @@ impl Default for Panels {
             look: false,
             statistics: false,
             help: false,
+            clip: false,
+            moving: moving::Numbers::default(),
+            pose: None,
+            naming: None,
             dialogs: open::Dialogs::default(),
             export: export::Export::default(),
             picture: picture::PictureDialog::default(),
@@ -70,6 +84,10 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     picture::show(app, context);
     help::show(app, context);
     inputs::inspected(app, context);
+    clip::show(app, context);
+    moving::show(app, context);
+    measure::show(app, context);
+    pose::show(app, context);
     leave(app, context);
 }
 

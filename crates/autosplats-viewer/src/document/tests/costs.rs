@@ -50,13 +50,19 @@ fn ten_million_points() {
         [960.0 + 400.0 * cos, 540.0 + 400.0 * sin]
     };
     let lasso = Region::lasso(&(0..200).map(circle).collect::<Vec<_>>());
-    time("select by a lasso of 200 corners", || document.select_region(&shown, &lasso, &lens, SelectMode::Replace));
+    time("select by a lasso of 200 corners", || {
+        let inside = |index: usize| {
+            let pixel = lens.to_pixel(shown.cloud.world_position(index));
+            pixel.is_some_and(|(pixel, _)| lasso.contains(pixel.as_vec2().to_array()))
+        };
+        document.select(&shown, inside, SelectMode::Replace);
+    });
     println!("{} selected", document.counts().selected);
     time("select all", || document.clone().select_all(&shown));
     time("invert", || document.clone().select_inverse(&shown));
     time("tell which are selected", || shown.selected(&document));
     time("count", || document.counts());
-    time("bounds of what is shown", || shown.bounds());
+    time("bounds of all", || document.whole_bounds());
     time("bounds of what is selected", || document.selected_bounds());
     let mut deleted = document.clone();
     time("delete", || deleted.delete_selected());

@@ -105,6 +105,30 @@ fn moves_are_of_the_world() {
 }
 
 #[test]
+fn drags_move_from_where_they_began() {
+    let (mut document, [first, second]) = document();
+    select_every(&mut document, 2);
+    document.move_selected(&DMat4::from_translation(DVec3::Y));
+    let before = contents(&document);
+    let grip = document.grip();
+    let mut dragged = document.clone();
+    for way in [1.0, 3.0, 2.0] {
+        assert!(dragged.move_gripped(&grip, &DMat4::from_translation(DVec3::X * way)) > 0, "by {way}");
+    }
+    let mut moved = document.clone();
+    moved.move_selected(&DMat4::from_translation(DVec3::X * 2.0));
+    assert_eq!(contents(&dragged), contents(&moved), "a drag is a move from its first place to its last");
+    assert_eq!(dragged.move_gripped(&grip, &DMat4::ZERO), 0, "nothing is flattened");
+    dragged.move_gripped(&grip, &DMat4::IDENTITY);
+    assert_eq!(contents(&dragged), before, "and can be given up");
+    dragged.remove(first);
+    dragged.reload(second, super::cloud(10, FAR));
+    let before = contents(&dragged);
+    assert_eq!(dragged.move_gripped(&grip, &DMat4::from_translation(DVec3::X)), 0, "what has gone is let go");
+    assert_eq!(contents(&dragged), before, "and nothing else is touched");
+}
+
+#[test]
 fn turning_is_about_the_centre() {
     let (mut document, [first, _]) = document();
     select_every(&mut document, 1);

@@ -1,9 +1,6 @@
 //! Which points the next edit is about.
 
-use autosplats::cloud::glam::{DVec2, DVec3};
-use autosplats::{Camera, Projection};
-
-use super::super::{Bits, ClipBox, Document, Region, SelectMode};
+use super::super::{Bits, ClipBox, Document, SelectMode};
 use super::{FAR, document, edit, every, select_every};
 
 /// The selection, as shown points.
@@ -69,25 +66,4 @@ fn a_selection_and_its_inverse_are_everything_once() {
     document.remove(first);
     document.select_all(&shown);
     assert_eq!(document.layers.len(), 1, "what was shown may be gone");
-}
-
-#[test]
-fn regions_hold_points_that_are_seen_in_them() {
-    let (mut document, _) = document();
-    let shown = document.shown();
-    let centre = FAR + 0.5;
-    let projection = Projection::PerspectiveFovDeg(60.0);
-    let camera = Camera { eye: centre - 1.0 * DVec3::Y, look_at: centre, up: DVec3::Z, projection };
-    let lens = camera.lens([200, 100]).expect("a camera");
-    let disc = Region::brush(&[[100.0, 50.0]], 30.0);
-    document.select_region(&shown, &disc, &lens, SelectMode::Replace);
-    let (mut inside, mut behind) = (0, 0);
-    for index in 0..shown.len() {
-        let pixel = lens.to_pixel(shown.cloud.world_position(index));
-        let wanted = pixel.is_some_and(|(pixel, _)| pixel.distance(DVec2::new(100.0, 50.0)) < 30.0);
-        assert_eq!(selected(&document).get(index), wanted, "point {index}");
-        inside += usize::from(wanted);
-        behind += usize::from(pixel.is_none());
-    }
-    assert!(inside > 50 && inside < shown.len() - 50, "{inside} of {}, {behind} behind the eye", shown.len());
 }

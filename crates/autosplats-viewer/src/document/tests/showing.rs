@@ -61,7 +61,7 @@ fn check(document: &Document, what: &str) -> Shown {
 fn an_untouched_layer_is_shared() {
     let mut document = Document::default();
     check(&document, "nothing");
-    assert!(document.shown().bounds().is_none(), "nothing has no bounds");
+    assert!(document.whole_bounds().is_none(), "nothing has no bounds");
     let id = document.add(Layer::new("only", None, cloud(1000, FAR)));
     edit(&mut document, id, |layer| layer.edits.selected = every(1000, 3));
     let shown = check(&document, "one layer");
@@ -111,7 +111,9 @@ fn points_are_shown_where_they_are() {
 fn bounds_are_those_of_what_is_shown() {
     let (mut document, [first, second]) = document();
     document.set_visible(second, false);
-    let [low, high] = document.shown().bounds().expect("some points");
+    document.clip = Some(ClipBox::new(FAR, FAR + 0.5));
+    let [low, high] = document.whole_bounds().expect("some points");
+    document.clip = None;
     assert!(low.abs_diff_eq(FAR, 1e-6) && high.abs_diff_eq(FAR + 1.0, 1e-6), "{low} {high}");
     edit(&mut document, first, |layer| layer.edits.selected = Bits::from_fn(1000, |point| point == 1));
     let place = document.layers[0].position(1);

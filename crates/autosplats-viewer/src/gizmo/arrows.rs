@@ -1,0 +1,199 @@
+//! What moves and turns the selection: an arrow along each axis, a ring about each, and a handle that goes with the pointer.
+
+use autosplats::cloud::glam::{DMat4, DVec3};
+use eframe::egui::{Color32, Painter, Pos2, Stroke};
+
+use super::view::{Shape, View, along, angle, on_plane};
+use super::{Handle, line};
+use crate::app::App;
+use crate::document::{Grip, about};
+use crate::measure::angle_text;
+use crate::tools::ruler;
+
+/// Where an arrow begins and ends, screen points from the middle.
+const ARROW: [f64; 2] = [16.0, 78.0];
+/// Radius of the rings, screen points.
+const RING: f64 = 96.0;
+/// Corners of a ring.
+const CORNERS: usize = 72;
+/// Degrees of a step, when turning goes in steps.
+const STEP_DEG: f64 = 15.0;
+const TAKEN: Color32 = Color32::from_rgb(255, 205, 60);
+/// Red, green and blue of the axes, as those in the corner of the picture.
+const COLORS: [Color32; 3] =
+    [Color32::from_rgb(235, 95, 85), Color32::from_rgb(150, 205, 90), Color32::from_rgb(95, 150, 255)];
+
+/// Points that are being dragged.
+pub(super) struct Drag {
+    pub(super) handle: Handle,
+    grip: Grip,
+    /// The middle of the selection when it was taken.
+    from: DVec3,
+    /// Where it was taken: along the axis, or the place in the plane.
+    grabbed: Grabbed,
+    /// Radians so far, over more than one turn.
+    turned: f64,
+    matrix: DMat4,
+}
+
+#[derive(Clone, Copy)]
+enum Grabbed {
+    Along(f64),
+    At(DVec3),
+}
+
+impl Drag {
+    pub(super) fn begin(app: &App, view: &View, handle: Handle, place: Pos2) -> Option<Self> {
+        let from = super::middle(app)?;
+        let ray = view.ray(place);
+        let grabbed = match handle {
+            Handle::Arrow(axis) => Grabbed::Along(along(from, DVec3::AXES[axis], ray)?),
+            Handle::Ring(axis) => Grabbed::At(on_plane(from, DVec3::AXES[axis], ray)?),
+            _ => Grabbed::At(on_plane(from, view.forward, ray)?),
+        };
+        let grip = app.document().grip();
+        Some(Self { handle, grip, from, grabbed, turned: 0.0, matrix: DMat4::IDENTITY })
+    }
+
+    /// Moves the points to where the pointer is.
+    pub(super) fn follow(&mut self, app: &mut App, view: &View, place: Pos2, stepped: bool) {
+        let before = self.matrix;
+        self.matrix = self.map(view, place, stepped).unwrap_or(before);
+        if self.matrix != before {
+            app.change(|document| document.move_gripped(&self.grip, &self.matrix));
+        }
+    }
+
+    fn map(&mut self, view: &View, place: Pos2, stepped: bool) -> Option<DMat4> {
+        let ray = view.ray(place);
+        Some(match (self.handle, self.grabbed) {
+            (Handle::Arrow(axis), Grabbed::Along(start)) => {
+                let axis = DVec3::AXES[axis];
+                DMat4::from_translation(axis * (along(self.from, axis, ray)? - start))
+            }
+            (Handle::Ring(axis), Grabbed::At(start)) => {
+                let axis = DVec3::AXES[axis];
+                let now = on_plane(self.from, axis, ray)?;
+                let angle = angle(axis, start - self.from, now - self.from);
+                // As near as possible to what it was, so that it goes on after half a turn.
+                let turn = std::f64::consts::TAU;
+                self.turned = angle + turn * ((self.turned - angle) / turn).round();
+                about(self.from, DMat4::from_axis_angle(axis, self.radians(stepped)))
+            }
+            (_, Grabbed::At(start)) => DMat4::from_translation(on_plane(self.from, view.forward, ray)? - start),
+            (_, Grabbed::Along(_)) => return None,
+        })
+    }
+
+    fn radians(&self, stepped: bool) -> f64 {
+        let step = STEP_DEG.to_radians();
+        if stepped { (self.turned / step).round() * step } else { self.turned }
+    }
+
+    /// Puts the points back.
+    pub(super) fn cancel(&self, app: &mut App) {
+        app.change(|document| document.move_gripped(&self.grip, &DMat4::IDENTITY));
+    }
+
+    /// Makes a step of it that can be undone.
+    pub(super) fn finish(&self, app: &mut App) {
+        self.cancel(app);
+        if self.matrix != DMat4::IDENTITY {
+            let verb = if matches!(self.handle, Handle::Ring(_)) { "Turn" } else { "Move" };
+            app.edit_points(verb, |document| document.move_gripped(&self.grip, &self.matrix));
+        }
+    }
+
+    /// Where the middle of the selection is now.
+    pub(super) fn middle(&self) -> DVec3 {
+        self.matrix.transform_point3(self.from)
+    }
+
+    /// How far it has gone.
+    pub(super) fn text(&self, app: &App) -> String {
+        match self.handle {
+            Handle::Ring(axis) => {
+                let seen = self.matrix.transform_vector3(DVec3::AXES[(axis + 1) % 3]);
+                let angle = angle(DVec3::AXES[axis], DVec3::AXES[(axis + 1) % 3], seen);
+                let turn = std::f64::consts::TAU;
+                angle_text((angle + turn * ((self.turned - angle) / turn).round()).to_degrees())
+            }
+            handle => {
+                let ruler = ruler(app);
+                let length = ruler.length_text(ruler.distance(self.from, self.middle()));
+                let way = self.middle() - self.from;
+                match handle {
+                    Handle::Arrow(axis) if way[axis] < 0.0 => format!("{} -{length}", ["X", "Y", "Z"][axis]),
+                    Handle::Arrow(axis) => format!("{} {length}", ["X", "Y", "Z"][axis]),
+                    _ => length,
+                }
+            }
+        }
+    }
+}
+
+/// The ends of an arrow, if it is seen from the side.
+fn arrow(middle: DVec3, axis: usize, view: &View) -> Option<[Pos2; 2]> {
+    let unit = view.unit(middle)?;
+    let axis = DVec3::AXES[axis];
+    along(middle, axis, view.ray(view.place(middle)?))?;
+    let [from, to] = ARROW.map(|points| view.place(middle + axis * (points * unit)));
+    Some([from?, to?])
+}
+
+/// The places of a ring, if it is not seen edge on.
+fn ring(middle: DVec3, axis: usize, view: &View) -> Option<Vec<Pos2>> {
+    let radius = RING * view.unit(middle)?;
+    let [across, along] = [1, 2].map(|next| DVec3::AXES[(axis + next) % 3] * radius);
+    on_plane(middle, DVec3::AXES[axis], view.ray(view.place(middle)?))?;
+    let corners = (0..CORNERS).map(|corner| {
+        let (sin, cos) = (corner as f64 / CORNERS as f64 * std::f64::consts::TAU).sin_cos();
+        view.place(middle + across * cos + along * sin)
+    });
+    corners.collect()
+}
+
+/// What can be taken.
+pub(super) fn handles(middle: DVec3, view: &View) -> Vec<(Handle, Shape)> {
+    let mut handles = Vec::new();
+    handles.extend(view.place(middle).map(|place| (Handle::Middle, Shape::Dot(place))));
+    for axis in 0..3 {
+        let shaft = arrow(middle, axis, view).map(|[from, to]| (Handle::Arrow(axis), Shape::Line(from, to)));
+        handles.extend(shaft);
+        handles.extend(ring(middle, axis, view).map(|places| (Handle::Ring(axis), Shape::Loop(places))));
+    }
+    handles
+}
+
+/// Draws the arrows and the rings.
+pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<Handle>) {
+    let mut handles = handles(middle, view);
+    // What is taken lies on top.
+    handles.sort_by_key(|(handle, _)| (taken == Some(*handle), !matches!(handle, Handle::Ring(_))));
+    for (handle, shape) in handles {
+        let is_taken = taken == Some(handle);
+        let own = match handle {
+            Handle::Arrow(axis) | Handle::Ring(axis) => COLORS[axis],
+            _ => Color32::WHITE,
+        };
+        let color = if is_taken { TAKEN } else { own };
+        match shape {
+            Shape::Dot(place) => {
+                painter.circle(place, 6.0, color, Stroke::new(1.5, Color32::from_black_alpha(200)));
+            }
+            Shape::Line(from, to) => {
+                line(painter, [from, to], 3.0, color);
+                let along = (to - from).normalized();
+                let aside = along.rot90() * 6.0;
+                let head = vec![to + along * 12.0, to + aside, to - aside];
+                painter.add(eframe::egui::Shape::convex_polygon(head, color, Stroke::new(1.0, Color32::from_black_alpha(160))));
+            }
+            Shape::Loop(places) => {
+                let width = if is_taken { 3.0 } else { 1.8 };
+                let faint = if is_taken { 1.0 } else { 0.75 };
+                painter.add(eframe::egui::Shape::closed_line(places.clone(), Stroke::new(width + 2.0, Color32::from_black_alpha(90))));
+                painter.add(eframe::egui::Shape::closed_line(places, Stroke::new(width, color.gamma_multiply(faint))));
+            }
+        }
+    }
+}

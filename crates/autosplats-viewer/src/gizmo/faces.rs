@@ -1,0 +1,174 @@
+//! The clipping box in the picture: its edges, and a handle on each of its faces.
+
+use autosplats::cloud::glam::DVec3;
+use eframe::egui::{Color32, Painter, Pos2, Stroke};
+
+use super::view::{Shape, View, along};
+use super::{Handle, line};
+use crate::app::App;
+use crate::document::ClipBox;
+use crate::tools::ruler;
+
+/// Pieces that an edge is cut into, to be fainter where it is behind something.
+const PIECES: usize = 48;
+/// Radius of a handle, screen points.
+const RADIUS: f32 = 6.0;
+const EDGE: Color32 = Color32::from_rgb(120, 205, 255);
+const TAKEN: Color32 = Color32::from_rgb(255, 205, 60);
+/// How much there is to be seen of what is behind.
+const FAINT: f32 = 0.28;
+
+/// A face that is being dragged.
+pub(super) struct Drag {
+    axis: usize,
+    high: bool,
+    /// The box when it was taken.
+    before: ClipBox,
+    /// How far beyond the face's middle it was taken.
+    grabbed: f64,
+}
+
+impl Drag {
+    pub(super) fn begin(app: &App, view: &View, axis: usize, high: bool, place: Pos2) -> Option<Self> {
+        let before = app.document().clip?;
+        let grabbed = along(before.face(axis, high), before.axis(axis), view.ray(place))?;
+        Some(Self { axis, high, before, grabbed })
+    }
+
+    /// Moves the face to where the pointer is.
+    pub(super) fn follow(&self, app: &mut App, view: &View, place: Pos2) {
+        let Self { axis, high, before, grabbed } = self;
+        let Some(way) = along(before.face(*axis, *high), before.axis(*axis), view.ray(place)) else { return };
+        preview(app, Some(before.with_face(*axis, *high, way - grabbed)));
+    }
+
+    /// Puts the face back.
+    pub(super) fn cancel(&self, app: &mut App) {
+        preview(app, Some(self.before));
+        settle(app);
+    }
+
+    pub(super) fn handle(&self) -> Handle {
+        Handle::Face { axis: self.axis, high: self.high }
+    }
+
+    /// How wide the box is.
+    pub(super) fn text(&self, app: &App) -> Option<String> {
+        let clip = app.document().clip?;
+        let ruler = ruler(app);
+        let width = ruler.distance(clip.face(self.axis, false), clip.face(self.axis, true));
+        Some(format!("{} wide", ruler.length_text(width)))
+    }
+}
+
+/// Clips by another box, until [`settle`] says that this is how it stays.
+pub(crate) fn preview(app: &mut App, clip: Option<ClipBox>) {
+    let before = app.document().clip;
+    if clip != before {
+        app.tools.gizmo.clip_before.get_or_insert(before);
+        app.change(|document| document.clip = clip);
+    }
+}
+
+/// Makes one step of all changes to the clipping box since the last one.
+pub(crate) fn settle(app: &mut App) {
+    let Some(before) = app.tools.gizmo.clip_before.take() else { return };
+    let clip = app.document().clip;
+    if clip == before {
+        return;
+    }
+    app.change(|document| document.clip = before);
+    app.edit("Clipping box", |document| document.clip = clip);
+}
+
+/// Clips by the box or by it no longer; one is put around everything if there is none.
+pub(crate) fn switch(app: &mut App) {
+    let clip = match app.document().clip {
+        Some(clip) => Some(ClipBox { enabled: !clip.enabled, ..clip }),
+        None => app.document().whole_bounds().map(|[min, max]| ClipBox::new(min, max)),
+    };
+    let Some(clip) = clip else {
+        app.messages.note("There are no points to clip");
+        return;
+    };
+    app.panels.clip = clip.enabled;
+    preview(app, Some(clip));
+    settle(app);
+}
+
+/// The faces that can be taken; not those that are seen from right before them, as nobody could tell where they go.
+pub(super) fn handles(clip: &ClipBox, view: &View) -> Vec<(Handle, Shape)> {
+    let faces = (0..6).filter_map(|face| {
+        let (axis, high) = (face / 2, face % 2 == 1);
+        let middle = clip.face(axis, high);
+        let (origin, direction) = (middle, clip.axis(axis));
+        let place = view.place(middle)?;
+        along(origin, direction, view.ray(place))?;
+        Some((Handle::Face { axis, high }, Shape::Dot(place)))
+    });
+    faces.collect()
+}
+
+/// Draws the box and, while it can be changed, its handles.
+pub(super) fn show(app: &App, view: &View, painter: &Painter, taken: Option<Handle>) {
+    let Some(clip) = app.document().clip else { return };
+    let corners = clip.corners();
+    for from in 0..8 {
+        for axis in 0..3 {
+            if from >> axis & 1 == 0 {
+                edge(app, &clip, view, painter, [from, from | 1 << axis].map(|corner| corners[corner]), (from, axis));
+            }
+        }
+    }
+    if super::clip(app).is_none() {
+        return;
+    }
+    for (handle, shape) in handles(&clip, view) {
+        let (Handle::Face { axis, high }, Shape::Dot(place)) = (handle, shape) else { continue };
+        let is_taken = taken == Some(handle);
+        let front = faces_eye(&clip, view, axis, high);
+        let color = if is_taken { TAKEN } else { EDGE }.gamma_multiply(if front || is_taken { 1.0 } else { 0.55 });
+        if is_taken {
+            arrow(&clip, view, painter, axis, high);
+        }
+        painter.circle(place, RADIUS, color, Stroke::new(1.5, Color32::from_black_alpha(200)));
+    }
+}
+
+/// Which way a face goes.
+fn arrow(clip: &ClipBox, view: &View, painter: &Painter, axis: usize, high: bool) {
+    let middle = clip.face(axis, high);
+    let Some(unit) = view.unit(middle) else { return };
+    let ends = [-26.0, 26.0].map(|points| view.place(middle + clip.axis(axis) * (points * unit)));
+    if let [Some(from), Some(to)] = ends {
+        line(painter, [from, to], 2.0, TAKEN);
+    }
+}
+
+/// Whether a face is seen from outside the box.
+fn faces_eye(clip: &ClipBox, view: &View, axis: usize, high: bool) -> bool {
+    let middle = clip.face(axis, high);
+    let out = clip.axis(axis) * if high { 1.0 } else { -1.0 };
+    view.sight(middle).is_some_and(|sight| sight.dot(out) < 0.0)
+}
+
+/// Draws an edge in pieces: fainter where the box or the surface is before it.
+fn edge(app: &App, clip: &ClipBox, view: &View, painter: &Painter, ends: [DVec3; 2], (corner, along): (usize, usize)) {
+    let sides = (0..3).filter(|&axis| axis != along).map(|axis| (axis, corner >> axis & 1 == 1));
+    let behind_box = sides.into_iter().all(|(axis, high)| !faces_eye(clip, view, axis, high));
+    let picture = app.shot.as_ref().map(|shot| &shot.picture);
+    let covered = |place: Pos2, depth: f64| {
+        let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, view.share(place)));
+        surface.and_then(|surface| view.seen(surface)).is_some_and(|(_, before)| before < depth)
+    };
+    let mut before: Option<(Pos2, f64)> = None;
+    for piece in 0..=PIECES {
+        let here = view.seen(ends[0].lerp(ends[1], piece as f64 / PIECES as f64));
+        if let (Some((from, _)), Some((to, depth))) = (before, here) {
+            let faint = behind_box || covered(from + (to - from) * 0.5, depth);
+            let color = EDGE.gamma_multiply(if faint { FAINT } else { 0.9 });
+            painter.line_segment([from, to], Stroke::new(1.3, color));
+        }
+        before = here;
+    }
+}

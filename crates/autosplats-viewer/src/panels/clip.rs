@@ -1,0 +1,90 @@
+//! The clipping box in numbers.
+
+use autosplats::cloud::glam::{DQuat, DVec3};
+use eframe::egui;
+
+use crate::app::App;
+use crate::document::ClipBox;
+use crate::gizmo;
+
+/// Part of the box's longest side that a number goes by while the pointer goes one point.
+const SPEED: f64 = 0.002;
+
+pub(super) fn show(app: &mut App, context: &egui::Context) {
+    if !app.panels.clip {
+        return;
+    }
+    let mut open = true;
+    let mut clip = app.document().clip;
+    let mut busy = false;
+    let place = context.content_rect().right_top() + egui::vec2(-270.0, 60.0);
+    let window = egui::Window::new("Clipping box").open(&mut open).resizable(false).default_pos(place);
+    window.show(context, |ui| {
+        if let Some(clip) = &mut clip {
+            busy = numbers(app, ui, clip);
+        }
+        buttons(app, ui, &mut clip);
+    });
+    app.panels.clip = open;
+    gizmo::preview(app, clip);
+    // A number that is dragged or typed makes one step, when it is let go.
+    if !busy && !app.tools.gizmo.is_dragging() {
+        gizmo::settle(app);
+    }
+}
+
+/// Says whether one of the numbers is in the user's hands.
+fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
+    let mut busy = false;
+    ui.checkbox(&mut clip.enabled, "Clips").on_hover_text("Without, all points are shown and the box is kept");
+    let speed = SPEED * (clip.max - clip.min).max_element().max(1e-9);
+    egui::Grid::new("clip").num_columns(3).show(ui, |ui| {
+        ui.label("");
+        ui.weak("from");
+        ui.weak("to");
+        ui.end_row();
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            ui.label(name);
+            let (low, high) = (clip.min[axis], clip.max[axis]);
+            for (value, range, what) in
+                [(&mut clip.min[axis], f64::MIN..=high, "from"), (&mut clip.max[axis], low..=f64::MAX, "to")]
+            {
+                let number = egui::DragValue::new(value).speed(speed).range(range).max_decimals(4);
+                let response = ui.add_sized([84.0, 20.0], number);
+                response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, format!("{name} {what}")));
+                busy |= response.dragged() || response.has_focus();
+            }
+            ui.end_row();
+        }
+    });
+    let up = app.up();
+    let mut angle = clip.angle_about(up).to_degrees();
+    ui.horizontal(|ui| {
+        ui.label("Turned");
+        let number = egui::DragValue::new(&mut angle).speed(0.5).range(-180.0..=180.0).max_decimals(2).suffix("°");
+        let response = ui.add(number).on_hover_text("About the upward axis");
+        if response.changed() {
+            clip.rotation = DQuat::from_axis_angle(up, angle.to_radians());
+        }
+        busy |= response.dragged() || response.has_focus();
+    });
+    busy
+}
+
+fn buttons(app: &mut App, ui: &mut egui::Ui, clip: &mut Option<ClipBox>) {
+    let around = |bounds: Option<[DVec3; 2]>| bounds.map(|[min, max]| ClipBox::new(min, max));
+    let selected = app.counts().1.selected > 0;
+    ui.horizontal(|ui| {
+        let button = ui.add_enabled(selected, egui::Button::new("Around selected"));
+        if button.on_hover_text("Show the selected points and what is beside them").clicked() {
+            *clip = around(app.document().selected_bounds()).or(*clip);
+        }
+        if ui.button("Reset").on_hover_text("Around everything, along the axes").clicked() {
+            *clip = around(app.document().whole_bounds()).or(*clip);
+        }
+        if ui.add_enabled(clip.is_some(), egui::Button::new("Remove")).on_hover_text("Clip no longer").clicked() {
+            *clip = None;
+        }
+    });
+    ui.small("Drag the dots on the faces in the picture.");
+}

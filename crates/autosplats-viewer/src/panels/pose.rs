@@ -1,0 +1,198 @@
+//! Where an input stands, in numbers.
+
+use autosplats::cloud::glam::{DMat3, DMat4, DQuat, DVec3, EulerRot};
+use eframe::egui;
+
+use crate::app::App;
+use crate::document::LayerId;
+
+/// The pose that is being edited.
+pub(crate) struct Pose {
+    layer: LayerId,
+    /// What the input turns about, in its own coordinates.
+    middle: DVec3,
+    parts: Parts,
+    /// What the parts make; another pose in the document means that it came by undo.
+    made: DMat4,
+    /// The pose before it was changed, as long as the change is not finished.
+    before: Option<DMat4>,
+}
+
+/// A pose as people say it: `place = turn · scale · rest · (own - middle) + middle + way`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Parts {
+    way: DVec3,
+    /// About x, then y, then z, degrees.
+    turn_deg: DVec3,
+    scale: f64,
+    /// What a turn and a scale leave of the matrix: identity but for mirrored, stretched or sheared inputs.
+    rest: DMat3,
+}
+
+impl Parts {
+    fn new(pose: &DMat4, middle: DVec3) -> Self {
+        let linear = DMat3::from_mat4(*pose);
+        let (_, turn, _) = pose.to_scale_rotation_translation();
+        let (z, y, x) = turn.to_euler(EulerRot::ZYX);
+        let turn_deg = DVec3::new(x, y, z).map(f64::to_degrees);
+        let stretch = DMat3::from_quat(turn).transpose() * linear;
+        let scale = stretch.determinant().abs().cbrt();
+        let rest = stretch * (1.0 / scale);
+        // What is nothing but rounding is nothing.
+        let rest = if rest.abs_diff_eq(DMat3::IDENTITY, 1e-9) { DMat3::IDENTITY } else { rest };
+        Self { way: pose.transform_point3(middle) - middle, turn_deg, scale, rest }
+    }
+
+    fn pose(&self, middle: DVec3) -> DMat4 {
+        let DVec3 { x, y, z } = self.turn_deg.map(f64::to_radians);
+        let turn = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, z, y, x));
+        let linear = turn * self.rest * self.scale;
+        let mut pose = DMat4::from_mat3(linear);
+        pose.w_axis = (middle + self.way - linear * middle).extend(1.0);
+        pose
+    }
+}
+
+/// Opens the numbers of an input's pose.
+pub(super) fn open(app: &mut App, id: LayerId) {
+    let Some(layer) = app.document().layer(id) else { return };
+    let middle = layer.bounds().map_or(DVec3::ZERO, |[low, high]| low.midpoint(high));
+    let middle = layer.pose.inverse().transform_point3(middle);
+    let parts = Parts::new(&layer.pose, middle);
+    app.panels.pose = Some(Pose { layer: id, middle, parts, made: layer.pose, before: None });
+}
+
+pub(super) fn show(app: &mut App, context: &egui::Context) {
+    let Some(mut pose) = app.panels.pose.take() else { return };
+    let Some(layer) = app.document().layer(pose.layer) else { return };
+    let (name, opened_at) = (layer.name.clone(), layer.opened_at);
+    if layer.pose != pose.made {
+        (pose.parts, pose.made) = (Parts::new(&layer.pose, pose.middle), layer.pose);
+    }
+    let mut open = true;
+    let mut busy = false;
+    let speed = (app.navigation.height_at_pivot() * 1e-3).max(1e-9);
+    let mut wanted = None;
+    let window = egui::Window::new(format!("Place of {name}")).id(egui::Id::unique("pose"));
+    let window = window.open(&mut open).resizable(false).default_pos(context.content_rect().left_top() + egui::vec2(240.0, 60.0));
+    window.show(context, |ui| {
+        let mut parts = pose.parts;
+        busy = numbers(ui, &mut parts, speed);
+        if parts != pose.parts {
+            pose.parts = parts;
+            wanted = Some(parts.pose(pose.middle));
+        }
+        ui.separator();
+        let text = text(&wanted.unwrap_or(pose.made));
+        ui.add(egui::Label::new(egui::RichText::new(&text).monospace().small()).selectable(true));
+        ui.horizontal(|ui| {
+            if ui.button("Copy").on_hover_text("The matrix, row by row").clicked() {
+                context.copy_text(text);
+            }
+            let reset = ui.add_enabled(pose.made != opened_at, egui::Button::new("Reset"));
+            if reset.on_hover_text("Where it stood when it was opened").clicked() {
+                pose.parts = Parts::new(&opened_at, pose.middle);
+                wanted = Some(opened_at);
+            }
+        });
+    });
+    if let Some(wanted) = wanted.filter(|wanted| *wanted != pose.made)
+        && app.change(|document| document.set_pose(pose.layer, wanted))
+    {
+        pose.before.get_or_insert(pose.made);
+        pose.made = wanted;
+    }
+    if !busy || !open {
+        settle(app, &mut pose);
+    }
+    app.panels.pose = open.then_some(pose);
+}
+
+/// Says whether one of the numbers is in the user's hands.
+fn numbers(ui: &mut egui::Ui, parts: &mut Parts, speed: f64) -> bool {
+    let mut busy = false;
+    egui::Grid::new("pose").num_columns(4).show(ui, |ui| {
+        for name in ["", "x", "y", "z"] {
+            ui.weak(name);
+        }
+        ui.end_row();
+        let rows = [("Moved by", &mut parts.way, speed, ""), ("Turned by", &mut parts.turn_deg, 0.5, "°")];
+        for (name, values, speed, suffix) in rows {
+            ui.label(name);
+            for axis in 0..3 {
+                let number = egui::DragValue::new(&mut values[axis]).speed(speed).max_decimals(6).suffix(suffix);
+                let response = ui.add_sized([84.0, 20.0], number);
+                let label = format!("{name} {}", ["x", "y", "z"][axis]);
+                response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, &label));
+                busy |= response.dragged() || response.has_focus();
+            }
+            ui.end_row();
+        }
+        ui.label("Scaled by");
+        let speed = 0.002 * parts.scale;
+        let number = egui::DragValue::new(&mut parts.scale).speed(speed).range(1e-9..=1e9).max_decimals(9);
+        let response = ui.add_sized([84.0, 20.0], number);
+        busy |= response.dragged() || response.has_focus();
+        ui.end_row();
+    });
+    ui.small("Turned about x, then y, then z, and about its middle.");
+    busy
+}
+
+/// Makes one step of all changes since the last one.
+fn settle(app: &mut App, pose: &mut Pose) {
+    let Some(before) = pose.before.take().filter(|before| *before != pose.made) else { return };
+    let (id, made) = (pose.layer, pose.made);
+    app.change(|document| document.set_pose(id, before));
+    app.edit("Place an input", |document| {
+        document.set_pose(id, made);
+    });
+    app.measure_scene();
+}
+
+/// A matrix, row by row.
+fn text(matrix: &DMat4) -> String {
+    let row = |row: usize| matrix.row(row).to_array().map(|value| format!("{value:.9}")).join(" ");
+    (0..4).map(row).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_make_the_pose_again() {
+        let middle = DVec3::new(5e5, 5e6, 100.0);
+        let turn = DMat4::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 2.0);
+        let poses = [
+            DMat4::IDENTITY,
+            DMat4::from_translation(DVec3::new(1.0, -2.0, 3.0)) * turn,
+            turn * DMat4::from_scale(DVec3::splat(0.001)),
+            DMat4::from_scale(DVec3::new(1.0, -1.0, 1.0)),
+            turn * DMat4::from_cols_array(&[1., 0., 0., 0., 0.5, 2., 0., 0., 0., 0., 1., 0., 7., 8., 9., 1.]),
+        ];
+        for pose in poses {
+            let again = Parts::new(&pose, middle).pose(middle);
+            for own in [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z] {
+                let [a, b] = [pose, again].map(|pose| pose.transform_point3(middle + own));
+                // Some steps of f64 at 5e6.
+                assert!(a.abs_diff_eq(b, 1e-7), "{a} is not {b} under {pose}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_mean_what_they_say() {
+        let middle = DVec3::new(10.0, 20.0, 30.0);
+        let parts = Parts::new(&DMat4::IDENTITY, middle);
+        assert_eq!(parts, Parts { way: DVec3::ZERO, turn_deg: DVec3::ZERO, scale: 1.0, rest: DMat3::IDENTITY }, "none");
+        let moved = Parts { way: DVec3::X, turn_deg: DVec3::new(0.0, 0.0, 90.0), scale: 2.0, ..parts }.pose(middle);
+        let place = moved.transform_point3(middle);
+        assert!(place.abs_diff_eq(middle + DVec3::X, 1e-12), "the middle is moved and nothing else: {place}");
+        let place = moved.transform_point3(middle + DVec3::X);
+        assert!(place.abs_diff_eq(middle + DVec3::new(1.0, 2.0, 0.0), 1e-12), "x becomes y, twice as long: {place}");
+        let both = Parts { turn_deg: DVec3::new(90.0, 0.0, 90.0), ..parts }.pose(middle);
+        let place = both.transform_point3(middle + DVec3::Y);
+        assert!(place.abs_diff_eq(middle + DVec3::Z, 1e-12), "about x first: {place}");
+    }
+}
