@@ -8,6 +8,7 @@ use autosplats::cloud::{Axes, PointCloud, Source};
 use autosplats::{AdapterSummary, Camera, Projection, ViewDirection, guess_axes};
 use eframe::egui;
 
+use crate::animation::Recording;
 use crate::commands::Tool;
 use crate::document::{Counts, Document, History, Layer, LayerId, Shown, label};
 use crate::loading::{Input, JobId, Loader, News, Watch};
@@ -65,6 +66,9 @@ pub(crate) struct App {
     /// When something moved last, seconds.
     moved: f64,
     pub(crate) quit: bool,
+    /// Cameras that a film goes through.
+    pub(crate) keys: Vec<Camera>,
+    pub(crate) recording: Option<Recording>,
 }
 
 /// The last picture, on its way to the screen.
@@ -134,7 +138,7 @@ impl App {
             tool: Tool::default(),
             tools: Tools::default(),
             panels: Panels::default(),
-            messages: Messages::default(),
+            messages: Messages::new(context.clone()),
             shot: None,
             device: None,
             up_axis: None,
@@ -153,6 +157,8 @@ impl App {
             placed: false,
             moved: 0.0,
             quit: false,
+            keys: Vec::new(),
+            recording: None,
         };
         if let Some(backend) = options.backend {
             app.look.backend = backend;
@@ -305,7 +311,7 @@ impl App {
             }
             Outcome::Picked { purpose, point } => self.picked(purpose, point),
             Outcome::Selected { shown, hits, mode } => self.change(|document| document.select(&shown, |i| hits[i], mode)),
-            Outcome::Photographed { image, path } => output::save_picture(self, &image, &path),
+            Outcome::Photographed { image, goal } => output::photographed(self, *image, goal),
         }
     }
 
@@ -525,6 +531,7 @@ impl eframe::App for App {
         panels::show(self, ui);
         viewport::show(self, ui);
         panels::over(self, &context);
+        output::record(self);
         if self.quit {
             context.send_viewport_cmd(egui::ViewportCommand::Close);
         }

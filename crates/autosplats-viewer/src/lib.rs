@@ -3,6 +3,7 @@
 //! [`run`] opens it. The window never waits: files are read ([`loading`]) and pictures made ([`render`]) by threads of their
 //! own, which send what they have; [`app`] is the round of a frame of the window.
 
+mod animation;
 mod app;
 mod commands;
 mod document;

@@ -11,6 +11,7 @@ use eframe::egui;
 use super::export::has_extension;
 use crate::app::App;
 use crate::files::ask_for_output;
+use crate::output::Goal;
 use crate::render::{Task, Wish};
 
 /// Bytes that stages and layers take for each pixel.
@@ -122,7 +123,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         } else {
             let size = dialog.size;
             let wish: Wish = app.wish(size, false);
-            app.render.task(Task::Photograph { wish: Box::new(wish), path });
+            app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
         }
     }
 }
@@ -134,5 +135,5 @@ fn arrived(app: &mut App) {
     let [width, height] = image.size.map(|side| side as u32);
     let pixels = image.pixels.iter().map(egui::Color32::to_srgba_unmultiplied).collect();
     let picture = autosplats::Image { width, height, pixels, linear: Vec::new() };
-    crate::output::save_picture(app, &picture, &path);
+    crate::output::save_picture(app, picture, path);
 }

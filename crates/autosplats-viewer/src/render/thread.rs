@@ -227,12 +227,12 @@ impl Studio {
                 let hits = (0..shown.cloud.len()).into_par_iter().map(hit).collect();
                 Ok(Outcome::Selected { shown, hits, mode })
             }
-            Task::Photograph { wish, path } => {
+            Task::Photograph { wish, goal } => {
                 let shown = self.shown(&wish);
                 let settings = settings(&wish, shown.cloud.len());
                 let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
                 let image: Box<Image> = Box::new(frame.image.clone());
-                Ok(Outcome::Photographed { image, path })
+                Ok(Outcome::Photographed { image, goal })
             }
         }
     }
