@@ -20,19 +20,21 @@ use crate::values::{self, Neighbors, Ortho};
     version,
     arg_required_else_help = true,
     args_conflicts_with_subcommands = true,
-    override_usage = "autosplats <COMMAND>",
+    override_usage = "autosplats [INPUT]... | autosplats <COMMAND>",
     after_help = EXIT_CODES
 )]
 pub(crate) struct CommandLine {
     #[command(subcommand)]
     pub(crate) command: Option<Command>,
-    /// Files without a command: a viewer's place.
+    /// Files without a command are viewed.
     #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
     pub(crate) rest: Vec<String>,
 }
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Open a window that shows the surface; the same as no command
+    View(Box<ViewArgs>),
     /// Render points to PNG pictures and EXR layers
     Render(Box<RenderArgs>),
     /// Write any input, or several as one, in another format, whole or thinned
@@ -56,6 +58,34 @@ pub(crate) enum Command {
 const INPUT_HELP: &str = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
 generated scene as scene:NAME[:COUNT], such as scene:statue or scene:herd:2M. Several inputs become one cloud.";
+
+const VIEW_EXAMPLES: &str = "\
+Examples:
+  autosplats scan.laz
+  autosplats view a.e57 b.e57 --pose b.e57=b.txt
+  autosplats view result.ply --watch
+  autosplats scene:statue:1M
+
+In the window H shows what keys and mouse do.";
+
+#[derive(Args, Debug)]
+#[command(after_help = VIEW_EXAMPLES, after_long_help = format!("{VIEW_EXAMPLES}\n\n{EXIT_CODES}"))]
+pub(crate) struct ViewArgs {
+    #[arg(value_name = "INPUT", help = "\
+A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
+generated scene as scene:NAME[:COUNT]. None opens an empty window to drop files on.")]
+    pub(crate) inputs: Vec<String>,
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    /// Read files again when they change
+    #[arg(long)]
+    pub(crate) watch: bool,
+    /// What renders; the picture is the same [default: as last time, at first auto]
+    #[arg(long, value_enum)]
+    pub(crate) backend: Option<Backend>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
 
 const RENDER_EXAMPLES: &str = "\
 Examples:

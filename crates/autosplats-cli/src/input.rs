@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
 use autosplats_cloud::{
-    Error, PointCloud, Progress, ReadOptions, Scene, check_memory, read_mesh, read_with, sample_surface,
+    Error, PointCloud, Progress, ReadOptions, Scene, Source, check_memory, read_mesh, sample_surface,
 };
 use rayon::prelude::*;
 
@@ -15,9 +15,6 @@ use crate::progress::{Bar, Part};
 
 /// What begins the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
-
-/// Bytes a generated point takes: position, and colour or class.
-const BYTES_PER_GENERATED_POINT: u64 = 16;
 
 /// Fields left out, and inputs, that are named.
 const LISTED: usize = 10;
@@ -50,20 +47,13 @@ struct Input {
     world_from_input: DMat4,
 }
 
-#[derive(Debug)]
-enum Source {
-    File(PathBuf),
-    Scene(Scene, usize),
-}
-
 impl Inputs {
     /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
     pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
         let InputArgs { poses, reading } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
-        let generated = list.iter().map(Input::generated_points).sum::<u64>();
-        check_memory(&format!("{generated} generated points"), generated * BYTES_PER_GENERATED_POINT)
-            .map_err(read_failure)?;
+        let generated = list.iter().map(|input| input.source.least_bytes()).sum();
+        check_memory("the points of generated scenes", generated).map_err(read_failure)?;
         if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
             return Err(Failure::usage("--columns: no input is text; scenes have no columns to name"));
         }
@@ -107,12 +97,20 @@ impl Inputs {
         self
     }
 
+    /// The inputs as the viewer takes them.
+    #[cfg(feature = "viewer")]
+    pub(crate) fn for_viewer(self) -> Vec<autosplats_viewer::Input> {
+        let Self { list, options } = self;
+        let input = |Input { name, source, world_from_input }| {
+            let file = source.path().and_then(Path::file_name).map(|file| file.to_string_lossy().into_owned());
+            autosplats_viewer::Input { name: file.unwrap_or(name), source, options: options.clone(), world_from_input }
+        };
+        list.into_iter().map(input).collect()
+    }
+
     /// The files among the inputs.
     pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
-        self.list.iter().filter_map(|input| match &input.source {
-            Source::File(path) => Some(path.as_path()),
-            Source::Scene(..) => None,
-        })
+        self.list.iter().filter_map(|input| input.source.path())
     }
 
     /// The names as typed, for a message.
@@ -136,7 +134,7 @@ impl Inputs {
 
     /// Reads everything into one cloud.
     pub(crate) fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
-        self.read_each(quiet, |input, progress| input.read(&self.options, progress))
+        self.read_each(quiet, |input, progress| input.source.read(&self.options, progress))
     }
 
     /// Reads meshes and strews `count` points over the surface of each, into one cloud.
@@ -147,7 +145,7 @@ impl Inputs {
         }
         self.read_each(quiet, |input, progress| match &input.source {
             Source::File(path) => sample_surface(&read_mesh(path, &self.options, progress)?, count, seed, &()),
-            Source::Scene(..) => input.read(&self.options, progress),
+            scene => scene.read(&self.options, progress),
         })
     }
 
@@ -204,12 +202,9 @@ fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
 
 impl Input {
     fn new(name: &str) -> Result<Self, Failure> {
-        let source = if name.starts_with(SCENE_PREFIX) {
-            let (scene, count) = Scene::parse(name).map_err(unknown_scene)?;
-            Source::Scene(scene, count)
-        } else {
-            let path = PathBuf::from(name);
-            let metadata = metadata(&path).map_err(|error| {
+        let source = Source::parse(name).map_err(unknown_scene)?;
+        if let Some(path) = source.path() {
+            let metadata = metadata(path).map_err(|error| {
                 let hint = if Scene::names().any(|(scene, _)| scene == name) {
                     format!("; for the scene type scene:{name}")
                 } else {
@@ -220,17 +215,8 @@ impl Input {
             if metadata.is_dir() {
                 return Err(Failure::new(Exit::Input, format!("{name}: a folder; name the files in it")));
             }
-            Source::File(path)
-        };
-        Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY })
-    }
-
-    /// Points that will be made, if it is a scene.
-    fn generated_points(&self) -> u64 {
-        match &self.source {
-            Source::File(_) => 0,
-            Source::Scene(_, count) => *count as u64,
         }
+        Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY })
     }
 
     /// What reading it is called.
@@ -240,16 +226,6 @@ impl Input {
                 format!("reading {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
             }
             Source::Scene(..) => format!("generating {}", self.name),
-        }
-    }
-
-    fn read(&self, options: &ReadOptions, progress: &dyn Progress) -> Result<PointCloud, Error> {
-        match &self.source {
-            Source::File(path) => read_with(path, options, progress),
-            Source::Scene(scene, count) => scene.sample(*count, &|done| {
-                progress.report(done);
-                !progress.cancelled()
-            }),
         }
     }
 }

@@ -22,6 +22,7 @@ mod progress;
 mod render;
 mod threads;
 mod values;
+mod view;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -68,6 +69,7 @@ fn hush_drivers() {
 
 fn run(command_line: CommandLine) -> Result<(), Failure> {
     match command_line.command {
+        Some(Command::View(args)) => view::run(&args),
         Some(Command::Render(args)) => render::run(*args),
         Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Normals(args)) => normals::run(&args),
@@ -77,20 +79,20 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
         Some(Command::Doctor(args)) => doctor::run(&args),
         Some(Command::Completions(args)) => pages::completions(&args),
         Some(Command::Man(args)) => pages::manual(&args),
-        None => Err(Failure::usage(without_command(&command_line.rest))),
+        None => without_command(command_line.rest),
     }
 }
 
-/// What to say to inputs without a command, which is a viewer's place, and to a command that is none.
-fn without_command(typed: &[String]) -> String {
+/// Inputs without a command are to be viewed; a word that is neither an input nor a command is explained.
+fn without_command(typed: Vec<String>) -> Result<(), Failure> {
     let first = typed.first().map_or("", String::as_str);
-    if first.starts_with("scene:") || first.contains('.') || Path::new(first).exists() {
-        let inputs = typed.join(" ");
-        return format!("this version has no viewer; for a picture: autosplats render {inputs} -o out.png");
+    if first.starts_with('-') || first.starts_with("scene:") || first.contains('.') || Path::new(first).exists() {
+        let words = ["autosplats".into(), "view".into()].into_iter().chain(typed);
+        return CommandLine::try_parse_from(words).map_err(|error| Failure::usage(one_line(&error))).and_then(run);
     }
     let commands = CommandLine::command();
     let names = commands.get_subcommands().map(clap::Command::get_name);
-    format!("there is no command '{first}'; {} (--help explains)", suggest(first, names))
+    Err(Failure::usage(format!("there is no command '{first}'; {} (--help explains)", suggest(first, names))))
 }
 
 /// What is wrong with the command line, without the page about its usage.

@@ -46,5 +46,8 @@ pub use read::{
     read_mesh, read_mesh_bytes, read_with,
 };
 pub use sample::sample_surface;
-pub use source::scene::{Hit, Scene, View, parse_count};
+pub use source::{
+    Source,
+    scene::{Hit, Scene, View, parse_count},
+};
 pub use write::{check_writable, write, written_formats};

@@ -3,6 +3,8 @@
 //! All of it is in `f64` world coordinates. Where the heights of a coordinate system have another unit than its plane, both
 //! become metres first, since there is no length across two units.
 
+#![allow(dead_code, reason = "not all of it has its place in the window yet")]
+
 use autosplats::cloud::{
     Crs, Unit,
     glam::{DVec3, dvec3},
@@ -78,6 +80,12 @@ impl Ruler {
     /// A length with its unit.
     pub(crate) fn length_text(&self, length: f64) -> String {
         with_unit(length, self.unit.map(symbol))
+    }
+
+    /// A length of few digits with its unit, as on a scale bar.
+    pub(crate) fn round_text(&self, length: f64) -> String {
+        let digits = if length < 1e-4 || length >= 1e7 { format!("{length:e}") } else { length.to_string() };
+        self.unit.map_or_else(|| digits.clone(), |unit| format!("{digits} {}", symbol(unit)))
     }
 
     /// An area with its unit.

@@ -156,7 +156,12 @@ impl Document {
 
 /// What was done to how many points, as a label: "Delete 1,234 points".
 pub(crate) fn label(verb: &str, points: usize) -> String {
-    let digits = points.to_string();
+    format!("{verb} {} point{}", grouped(points), if points == 1 { "" } else { "s" })
+}
+
+/// A number with commas: "1,234".
+pub(crate) fn grouped(number: usize) -> String {
+    let digits = number.to_string();
     let mut grouped = String::new();
     for (place, digit) in digits.chars().enumerate() {
         if place > 0 && (digits.len() - place).is_multiple_of(3) {
@@ -164,5 +169,5 @@ pub(crate) fn label(verb: &str, points: usize) -> String {
         }
         grouped.push(digit);
     }
-    format!("{verb} {grouped} point{}", if points == 1 { "" } else { "s" })
+    grouped
 }

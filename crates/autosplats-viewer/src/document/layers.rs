@@ -1,8 +1,16 @@
 //! The list of layers.
 
-use autosplats::cloud::glam::DMat4;
+use std::sync::Arc;
 
-use super::{Counts, Document, Layer, LayerId};
+use autosplats::cloud::{
+    PointCloud,
+    glam::{DMat4, DVec3},
+};
+
+use super::{Counts, Document, Edits, Layer, LayerId};
+
+/// Points that are enough to see how large something is.
+const OVERVIEW: usize = 100_000;
 
 impl Document {
     /// Puts a layer at the end of the list. One in degrees goes on the map of those that are there.
@@ -56,6 +64,46 @@ impl Document {
     /// Places a layer in the world, by an affine map that does not flatten it; others are refused.
     pub(crate) fn set_pose(&mut self, id: LayerId, pose: DMat4) -> bool {
         can_place(&pose) && self.change(id, |layer| layer.pose = pose)
+    }
+
+    /// Gives a layer the points that its file has now; what was done to single points is forgotten, as they may be others.
+    pub(crate) fn reload(&mut self, id: LayerId, cloud: Arc<PointCloud>) -> bool {
+        self.change(id, |layer| {
+            // On the map as before, if it is in degrees still.
+            layer.local = cloud.local_metres(layer.local.as_ref());
+            (layer.cloud, layer.edits) = (cloud, Edits::default());
+        })
+    }
+
+    /// A part of what is shown, for looking at it as a whole: points taken evenly from all of it.
+    pub(crate) fn overview(&self) -> PointCloud {
+        self.part_of(|layer, point| layer.has(point))
+    }
+
+    /// The like of the selected points.
+    pub(crate) fn selected_overview(&self) -> PointCloud {
+        self.part_of(|layer, point| layer.has(point) && layer.edits.selected.get(point))
+    }
+
+    fn part_of(&self, has: impl Fn(&Layer, usize) -> bool) -> PointCloud {
+        let visible = || self.layers.iter().filter(|layer| layer.visible);
+        let total: usize = visible().map(|layer| layer.cloud.len()).sum();
+        let step = total.div_ceil(OVERVIEW).max(1);
+        let clip = self.clip.as_ref().filter(|clip| clip.enabled);
+        let mut places = Vec::new();
+        for layer in visible() {
+            let points = (0..layer.cloud.len()).step_by(step).filter(|&point| has(layer, point));
+            let own = points.map(|point| layer.position(point));
+            places.extend(own.filter(|place| place.is_finite() && clip.is_none_or(|clip| clip.contains(*place))));
+        }
+        let origin = places.first().map_or(DVec3::ZERO, |place: &DVec3| place.round());
+        PointCloud::new(origin, places.into_iter().map(|place| (place - origin).as_vec3().to_array()).collect())
+    }
+
+    /// The box around most of what is shown, by a part of the points.
+    pub(crate) fn shown_bounds(&self) -> Option<[DVec3; 2]> {
+        let cloud = self.overview();
+        super::shown::bounds(cloud.len(), |index| Some(cloud.world_position(index)))
     }
 
     /// Numbers of points of a layer. With a clipping box all selected points are looked at: ask after edits, not in every

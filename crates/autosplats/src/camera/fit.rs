@@ -95,8 +95,23 @@ impl Camera {
             ViewDirection::Top => (up, -front),
             ViewDirection::Bottom => (-up, front),
         };
-        let mut camera = Self { eye: to_viewer, look_at: DVec3::ZERO, up: picture_up, projection };
-        let from_sensor = axes == Axes::Camera && direction == ViewDirection::Auto;
+        let camera = Self { eye: to_viewer, look_at: DVec3::ZERO, up: picture_up, projection };
+        camera.place(cloud, aspect, axes == Axes::Camera && direction == ViewDirection::Auto)
+    }
+
+    /// This camera, moved without being turned to where it sees all of `cloud`, but for a few points far from the others.
+    /// `aspect` is width over height; a perspective camera keeps its field of view, an orthographic one takes the height
+    /// that fits.
+    ///
+    /// # Errors
+    /// Those of [`fit`](Self::fit).
+    pub fn showing(self, cloud: &PointCloud, aspect: f64) -> Result<Self, Error> {
+        self.place(cloud, aspect, false)
+    }
+
+    /// Moves the camera to where it sees all of `cloud`; `from_sensor` to where the sensor stood, if that was the origin.
+    fn place(mut self, cloud: &PointCloud, aspect: f64, from_sensor: bool) -> Result<Self, Error> {
+        let camera = &mut self;
         let axes = camera.axes()?;
         let forward = axes[2];
         let samples = samples(cloud, axes);
@@ -116,7 +131,7 @@ impl Camera {
         let half_room = 0.5 - BORDER;
         camera.look_at = to_world(middle);
 
-        if from_sensor && let Some(camera) = from_origin(&kept, axes, cloud.origin(), picture_up, aspect)? {
+        if from_sensor && let Some(camera) = from_origin(&kept, axes, cloud.origin(), camera.up, aspect)? {
             return Ok(camera);
         }
         let distance = match &mut camera.projection {
@@ -136,7 +151,7 @@ impl Camera {
             }
         };
         camera.eye = camera.look_at - forward * distance;
-        Ok(camera)
+        Ok(self)
     }
 }
 
@@ -243,5 +258,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_moved_camera_looks_the_same_way_and_sees_everything() {
+        let cloud = ball(&[]);
+        let before = Camera {
+            eye: DVec3::new(30.0, 40.0, 5.0),
+            look_at: DVec3::new(29.0, 38.0, 5.5),
+            up: DVec3::new(0.2, 0.0, 1.0),
+            projection: Projection::PerspectiveFovDeg(30.0),
+        };
+        let after = before.showing(&cloud, 1.0).expect("a place");
+        let turned = |camera: &Camera| camera.axes().expect("a camera that sees");
+        for (a, b) in turned(&before).into_iter().zip(turned(&after)) {
+            assert!(a.abs_diff_eq(b, 1e-9), "{a} became {b}");
+        }
+        let view = after.view(DVec3::ZERO, [100, 100]).expect("a view");
+        let inside = |&p: &[f32; 3]| view.to_pixel(view.to_view(p)).into_iter().all(|c| (0.0..100.0).contains(&c));
+        assert!(cloud.positions().iter().all(inside), "all points are seen");
     }
 }

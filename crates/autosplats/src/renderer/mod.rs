@@ -77,7 +77,8 @@ pub struct Timings {
 }
 
 /// Where frames are made. Pictures are the same within a step of brightness here and there.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Backend {
     /// A hardware GPU where there is one, else the CPU.
     #[default]

@@ -6,7 +6,8 @@ use crate::search::SearchEngine;
 use crate::shade::Shading;
 
 /// Everything about a picture but the cloud, the camera and the size.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Settings {
     /// How points become splats.
     pub reconstruction: Reconstruction,
@@ -18,7 +19,8 @@ pub struct Settings {
 
 /// How points become splats. The default goes beyond [the paper's](Self::paper) in
 /// [`points_per_pixel`](Self::points_per_pixel) and [`adaptive`](Self::adaptive).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Reconstruction {
     /// Neighbours per point, 1 to 64.
     pub k: u32,

@@ -26,7 +26,8 @@ pub(crate) mod splat_communication;
 mod tests;
 
 /// An implementation of the k-radius search.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SearchEngine {
     /// Buckets of screen points read outwards from each point; exact, in one pass.

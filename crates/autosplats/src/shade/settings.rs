@@ -1,7 +1,8 @@
 //! What shading can be asked for.
 
 /// How splats become an image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Shading {
     /// What the surface is coloured by.
     pub color: ColorMode,
@@ -30,7 +31,8 @@ impl Shading {
 
 /// How the back of a surface is shown: the side that its sensor did not see. It is known where the cloud says from where it
 /// was [scanned](autosplats_cloud::PointCloud::scans).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Backs {
     /// Darker and with less colour than the front; only with [lighting](Shading::lighting).
     #[default]
@@ -40,7 +42,8 @@ pub enum Backs {
 }
 
 /// What the surface is coloured by.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ColorMode {
     /// The points' own colours where they have any, else one light clay tone.
@@ -69,7 +72,8 @@ pub enum ColorMode {
 }
 
 /// Colours for scalar values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ColorMap {
     /// Dark violet over green to yellow: perceptually uniform, readable for the colour-blind. The usual one.
@@ -85,7 +89,8 @@ pub enum ColorMap {
 }
 
 /// What is seen where no surface is. Colours are sRGB, 8 bits a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Background {
     /// One colour.
     Color([u8; 3]),

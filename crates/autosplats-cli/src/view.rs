@@ -1,0 +1,26 @@
+//! `autosplats view`: the window.
+
+use crate::args::ViewArgs;
+use crate::exit::Failure;
+
+/// Opens the window and returns when it is closed.
+#[cfg(feature = "viewer")]
+pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
+    use autosplats_viewer::Options;
+
+    use crate::exit::Exit;
+    use crate::input::Inputs;
+
+    crate::threads::start_threads(&args.run)?;
+    let ViewArgs { inputs, input, watch, backend, run: _ } = args;
+    let inputs = Inputs::new(inputs, input)?.for_viewer();
+    let options = Options { inputs, watch: *watch, backend: backend.map(Into::into) };
+    autosplats_viewer::run(options).map_err(|error| Failure::new(Exit::Device, error))
+}
+
+/// This build has no window.
+#[cfg(not(feature = "viewer"))]
+pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
+    let inputs = args.inputs.join(" ");
+    Err(Failure::usage(format!("this build has no viewer; for a picture: autosplats render {inputs} -o out.png")))
+}

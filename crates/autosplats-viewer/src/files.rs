@@ -1,0 +1,58 @@
+//! The one place that asks the system for files, as a browser has none.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+
+use eframe::egui;
+
+use crate::threads::spawn;
+
+/// The path of a dropped file, where files have paths.
+pub(crate) fn dropped(file: &dyn egui::DroppedFile) -> Option<PathBuf> {
+    Some(file.path()).filter(|path| path.is_absolute()).map(Path::to_path_buf)
+}
+
+/// Asks for files to open, beside the window; they arrive when the user has chosen.
+pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Vec<PathBuf>> {
+    let (sender, receiver) = channel();
+    let context = context.clone();
+    spawn("dialog", move || {
+        let extensions: Vec<&str> =
+            autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
+        let dialog =
+            rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
+        let files = dialog.add_filter("All files", &["*"]).pick_files();
+        let _ = sender.send(files.unwrap_or_default());
+        context.request_repaint();
+    });
+    receiver
+}
+
+/// Asks where to write a file.
+pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -> Receiver<Option<PathBuf>> {
+    let (sender, receiver) = channel();
+    let context = context.clone();
+    let (title, name) = (title.to_owned(), name.to_owned());
+    spawn("dialog", move || {
+        let _ = sender.send(rfd::FileDialog::new().set_title(title).set_file_name(name).save_file());
+        context.request_repaint();
+    });
+    receiver
+}
+
+/// Writes a file so that it appears complete or not at all.
+pub(crate) fn write(
+    path: &Path,
+    content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    use std::io::Write as _;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new().prefix(".autosplats").tempfile_in(folder)?;
+    {
+        let mut writer = std::io::BufWriter::new(file.as_file_mut());
+        content(&mut writer)?;
+        writer.flush()?;
+    }
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}

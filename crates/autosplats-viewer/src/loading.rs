@@ -1,0 +1,295 @@
+//! Reading beside the window: points are shown as they arrive, and changed files read again.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use autosplats::cloud::glam::DMat4;
+use autosplats::cloud::{Error, PointCloud, Progress, ReadOptions, Source};
+use eframe::egui;
+
+use crate::threads::spawn;
+
+/// Most points that are shown before a file is read to its end.
+const PREVIEW_POINTS: usize = 4_000_000;
+/// Time between two looks at a file that is watched; it is read again when two looks in a row find it changed and the same.
+const WATCH: Duration = Duration::from_millis(400);
+
+/// Names a piece of work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct JobId(u64);
+
+/// Something to be opened.
+#[derive(Clone, Debug)]
+pub struct Input {
+    /// What the list calls it.
+    pub name: String,
+    /// Where its points come from.
+    pub source: Source,
+    /// How to read it.
+    pub options: ReadOptions,
+    /// From its own to world coordinates.
+    pub world_from_input: DMat4,
+}
+
+impl Input {
+    /// What a name means: a scene or a file, read in the usual way and left where it is.
+    ///
+    /// # Errors
+    /// [`Error::UnknownScene`] and [`Error::BadScene`].
+    pub fn parse(name: &str) -> Result<Self, Error> {
+        let source = Source::parse(name)?;
+        let name = source.path().and_then(Path::file_name).map_or(name.into(), |file| file.to_string_lossy().into());
+        Ok(Self { name, source, options: ReadOptions::default(), world_from_input: DMat4::IDENTITY })
+    }
+
+    /// A file that was dropped or chosen.
+    pub(crate) fn file(path: PathBuf) -> Self {
+        let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
+        let options = ReadOptions::default();
+        Self { name, source: Source::File(path), options, world_from_input: DMat4::IDENTITY }
+    }
+}
+
+/// What happens to a job.
+pub(crate) enum News {
+    /// Some of the points, to be shown until all are there.
+    Preview(Box<PointCloud>),
+    /// All points, and what the reader has to say.
+    Read(Box<PointCloud>, Vec<String>),
+    /// Why there are none.
+    Failed(String),
+    /// Nothing was wanted any more.
+    Cancelled,
+}
+
+/// A file that is being read.
+pub(crate) struct Job {
+    pub(crate) id: JobId,
+    pub(crate) input: Input,
+    state: Arc<State>,
+}
+
+/// What reader and window share.
+#[derive(Default)]
+struct State {
+    /// Part that is done, in 65,536ths.
+    done: AtomicU32,
+    cancelled: AtomicBool,
+}
+
+impl Job {
+    /// Part that is done, 0 to 1.
+    pub(crate) fn fraction(&self) -> f32 {
+        self.state.done.load(Ordering::Relaxed) as f32 / 65_536.0
+    }
+
+    /// Ends it as soon as the reader notices.
+    pub(crate) fn cancel(&self) {
+        self.state.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Reads files, one after the other, as each is read by all cores.
+pub(crate) struct Loader {
+    context: egui::Context,
+    orders: Sender<Order>,
+    receiver: Receiver<(JobId, News)>,
+    changes: (Sender<PathBuf>, Receiver<PathBuf>),
+    jobs: Vec<Job>,
+    next: u64,
+}
+
+struct Order {
+    id: JobId,
+    input: Input,
+    state: Arc<State>,
+}
+
+impl Loader {
+    /// Starts the thread that reads; `context` is asked to draw again with each piece of news.
+    pub(crate) fn start(context: egui::Context) -> Self {
+        let (orders, queue) = channel::<Order>();
+        let (sender, receiver) = channel();
+        let asked = context.clone();
+        spawn("read", move || {
+            for order in queue {
+                let news = read(&order, &sender, &asked);
+                let _ = sender.send((order.id, news));
+                asked.request_repaint();
+            }
+        });
+        Self { context, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
+    }
+
+    /// Reads something; what comes of it arrives under the number returned.
+    pub(crate) fn read(&mut self, input: Input) -> JobId {
+        self.next += 1;
+        let id = JobId(self.next);
+        let state = Arc::new(State::default());
+        self.jobs.push(Job { id, input: input.clone(), state: Arc::clone(&state) });
+        let _ = self.orders.send(Order { id, input, state });
+        id
+    }
+
+    /// What is being read or waits for it, in order.
+    pub(crate) fn jobs(&self) -> &[Job] {
+        &self.jobs
+    }
+
+    /// Ends all jobs.
+    pub(crate) fn cancel_all(&self) {
+        self.jobs.iter().for_each(Job::cancel);
+    }
+
+    /// What has happened since; jobs that have ended are forgotten, and handed over for the last time.
+    pub(crate) fn news(&mut self) -> Vec<(Input, JobId, News)> {
+        let news: Vec<_> = self.receiver.try_iter().collect();
+        let mut told = Vec::new();
+        for (id, news) in news {
+            let Some(at) = self.jobs.iter().position(|job| job.id == id) else { continue };
+            let input = self.jobs[at].input.clone();
+            if matches!(news, News::Read(..) | News::Failed(_) | News::Cancelled) {
+                self.jobs.remove(at);
+            }
+            told.push((input, id, news));
+        }
+        told
+    }
+
+    /// Notices when a file changes, until what is returned is dropped.
+    pub(crate) fn watch(&self, path: PathBuf) -> Watch {
+        let alive = Arc::new(());
+        let watched = Arc::downgrade(&alive);
+        let (sender, context) = (self.changes.0.clone(), self.context.clone());
+        spawn("watch", move || {
+            let stamp = || std::fs::metadata(&path).ok().map(|data| (data.modified().ok(), data.len()));
+            let mut known = stamp();
+            let mut pending = None;
+            while watched.upgrade().is_some() {
+                std::thread::sleep(WATCH);
+                let now = stamp();
+                if now == known || now.is_none() {
+                    pending = None;
+                } else if pending != Some(now) {
+                    // It may still be written: the next look decides.
+                    pending = Some(now);
+                } else {
+                    known = now;
+                    pending = None;
+                    let _ = sender.send(path.clone());
+                    context.request_repaint();
+                }
+            }
+        });
+        Watch { _alive: alive }
+    }
+
+    /// Files that have changed since this was asked last.
+    pub(crate) fn changed(&self) -> impl Iterator<Item = PathBuf> + '_ {
+        self.changes.1.try_iter()
+    }
+}
+
+/// A file is watched as long as this lives.
+pub(crate) struct Watch {
+    _alive: Arc<()>,
+}
+
+fn read(order: &Order, sender: &Sender<(JobId, News)>, context: &egui::Context) -> News {
+    if order.state.cancelled.load(Ordering::Relaxed) {
+        return News::Cancelled;
+    }
+    let follower = Follower { order, sender, context, notes: Mutex::default(), preview: Mutex::default() };
+    let options = ReadOptions { exact: true, ..order.input.options.clone() };
+    match order.input.source.read(&options, &follower) {
+        Ok(cloud) if cloud.is_empty() => News::Failed(format!("{}: there is no point in it", order.input.name)),
+        Ok(cloud) => {
+            let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
+            News::Read(Box::new(cloud), notes)
+        }
+        Err(Error::Cancelled) => News::Cancelled,
+        Err(error) => News::Failed(error.to_string()),
+    }
+}
+
+/// Listens to a reader.
+struct Follower<'a> {
+    order: &'a Order,
+    sender: &'a Sender<(JobId, News)>,
+    context: &'a egui::Context,
+    notes: Mutex<Vec<String>>,
+    preview: Mutex<Preview>,
+}
+
+/// The points so far.
+#[derive(Default)]
+struct Preview {
+    parts: Vec<PointCloud>,
+    /// Points in `parts`.
+    points: usize,
+    /// Points of them that were shown last.
+    shown: usize,
+    /// Every so many points one is kept.
+    step: usize,
+}
+
+impl Preview {
+    /// Takes points in, and gives all so far where there are enough more than were shown last: each time half as many again,
+    /// so that putting them together costs no more than reading them.
+    fn add(&mut self, mut points: PointCloud) -> Option<PointCloud> {
+        self.step = self.step.max(1);
+        let step = self.step;
+        points.retain(|index| index % step == 0);
+        self.points += points.len();
+        self.parts.push(points);
+        if self.points > PREVIEW_POINTS {
+            self.step *= 2;
+            self.parts.iter_mut().for_each(|part| part.retain(|index| index % 2 == 0));
+            self.points = self.parts.iter().map(PointCloud::len).sum();
+            self.shown /= 2;
+        }
+        if self.points * 2 < self.shown * 3 {
+            return None;
+        }
+        self.shown = self.points;
+        let whole = PointCloud::merge(
+            std::mem::take(&mut self.parts).into_iter().map(|part| (part, DMat4::IDENTITY)).collect(),
+        );
+        self.parts.push(whole.clone());
+        Some(whole)
+    }
+}
+
+impl Progress for Follower<'_> {
+    fn report(&self, fraction: f32) {
+        let done = (fraction.clamp(0.0, 1.0) * 65_536.0) as u32;
+        let before = self.order.state.done.swap(done, Ordering::Relaxed);
+        // A bar a hundred pixels long moves a hundred times.
+        if before / 656 != done / 656 {
+            self.context.request_repaint();
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.order.state.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn note(&self, note: &str) {
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(note.into());
+    }
+
+    fn wants_chunks(&self) -> bool {
+        true
+    }
+
+    fn chunk(&self, points: PointCloud) {
+        let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cloud) = preview.add(points) {
+            let _ = self.sender.send((self.order.id, News::Preview(Box::new(cloud))));
+            self.context.request_repaint();
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! What the user is told, in place: errors stay until they are closed, notes go by themselves.
+
+use eframe::egui;
+
+/// Seconds that a note is shown.
+const NOTE: f64 = 8.0;
+/// Messages kept; older ones go first.
+const KEPT: usize = 6;
+
+/// What is being told.
+#[derive(Debug, Default)]
+pub(crate) struct Messages {
+    list: Vec<Message>,
+    /// Why the last picture could not be made.
+    failure: Option<String>,
+}
+
+#[derive(Debug)]
+struct Message {
+    text: String,
+    error: bool,
+    /// When it was shown first, seconds.
+    since: Option<f64>,
+}
+
+impl Messages {
+    /// Tells what is worth knowing.
+    pub(crate) fn note(&mut self, text: impl Into<String>) {
+        self.push(text.into(), false);
+    }
+
+    /// Tells what went wrong.
+    pub(crate) fn error(&mut self, text: impl Into<String>) {
+        self.push(text.into(), true);
+    }
+
+    fn push(&mut self, text: String, error: bool) {
+        self.list.retain(|message| message.text != text);
+        self.list.push(Message { text, error, since: None });
+        let surplus = self.list.len().saturating_sub(KEPT);
+        self.list.drain(..surplus);
+    }
+
+    /// Tells why there is no picture, until there is one.
+    pub(crate) fn failure(&mut self, text: String) {
+        self.failure = Some(text);
+    }
+
+    /// There is a picture again.
+    pub(crate) fn forget_failure(&mut self) {
+        self.failure = None;
+    }
+
+    /// Draws the messages in the lower left corner of `rect`.
+    pub(crate) fn show(&mut self, context: &egui::Context, rect: egui::Rect) {
+        let now = context.input(|input| input.time);
+        self.list.retain(|message| message.error || message.since.is_none_or(|since| now - since < NOTE));
+        if self.list.is_empty() && self.failure.is_none() {
+            return;
+        }
+        let corner = rect.left_bottom() + egui::vec2(10.0, -44.0);
+        let area = egui::Area::new(egui::Id::unique("messages")).fixed_pos(corner).pivot(egui::Align2::LEFT_BOTTOM);
+        area.order(egui::Order::Foreground).show(context, |ui| {
+            ui.set_max_width((rect.width() - 20.0).clamp(100.0, 520.0));
+            if let Some(failure) = &self.failure {
+                egui::Frame::popup(ui.style()).show(ui, |ui| {
+                    ui.colored_label(ui.visuals().error_fg_color, failure);
+                });
+            }
+            let mut closed = None;
+            for (number, message) in self.list.iter_mut().enumerate() {
+                message.since.get_or_insert(now);
+                egui::Frame::popup(ui.style()).show(ui, |ui| {
+                    ui.horizontal(|ui| {
+                        if ui.small_button("×").on_hover_text("Close this message").clicked() {
+                            closed = Some(number);
+                        }
+                        let color = if message.error { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+                        ui.add(egui::Label::new(egui::RichText::new(&message.text).color(color)).wrap());
+                    });
+                });
+            }
+            if let Some(number) = closed {
+                self.list.remove(number);
+            }
+        });
+        if self.list.iter().any(|message| !message.error) {
+            context.request_repaint_after(std::time::Duration::from_millis(500));
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! Where the eye is and how it gets elsewhere: orbit, pan, zoom, fly, fit.
+//!
+//! # How it works
+//! Input moves a *goal*; what is shown follows it by a share of the way for each piece of time, so that movement is equally
+//! smooth and equally fast at any frame rate. A pose is a pivot, a distance and an orientation: the eye looks at the pivot.
+//! Nothing can turn the picture inside out, as distances stay above 0 and the eye tilts no further than to look straight
+//! down or up.
+
+use autosplats::cloud::glam::{DMat3, DQuat, DVec2, DVec3};
+use autosplats::{Camera, Projection};
+
+/// Time in which the eye goes 63 % of its way, seconds.
+const LAG: f64 = 0.06;
+/// Part of what is left to go below which the eye has arrived: a twentieth of a pixel.
+const ARRIVED: f64 = 5e-5;
+/// Field of view of the perspective camera unless it is told, degrees.
+const FOV_DEG: f64 = 40.0;
+/// Radians that a drag over the height of the picture turns.
+const TURN: f64 = std::f64::consts::PI;
+/// Radians a second that the arrow keys turn.
+const KEY_TURN: f64 = 1.2;
+/// Distances from the pivot a second that keys fly.
+const FLY: f64 = 0.8;
+/// How much faster Shift flies.
+const FAST: f64 = 5.0;
+/// Least and greatest distance from the pivot in sizes of the scene.
+const DISTANCES: [f64; 2] = [1e-6, 1e3];
+
+/// Where the eye is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pose {
+    /// What it looks at, and turns about.
+    pivot: DVec3,
+    /// From the eye to the pivot. With an orthographic projection what a perspective one would have.
+    distance: f64,
+    /// From view space (x right, y down, z forward) to world.
+    world_from_view: DQuat,
+}
+
+/// The camera under the user's hands.
+#[derive(Clone, Debug)]
+pub(crate) struct Navigation {
+    shown: Pose,
+    goal: Pose,
+    fov_deg: f64,
+    orthographic: bool,
+    /// World direction that is up.
+    up: DVec3,
+    /// Middle and radius of what is there.
+    scene: (DVec3, f64),
+}
+
+/// Which keys fly, each -1, 0 or 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Flight {
+    /// D less A.
+    pub(crate) right: f64,
+    /// E less Q.
+    pub(crate) up: f64,
+    /// W less S.
+    pub(crate) forward: f64,
+    /// Turning right, by arrow keys.
+    pub(crate) turn_right: f64,
+    /// Turning up, by arrow keys.
+    pub(crate) turn_up: f64,
+    /// Shift.
+    pub(crate) fast: bool,
+}
+
+impl Flight {
+    fn still(&self) -> bool {
+        [self.right, self.up, self.forward, self.turn_right, self.turn_up] == [0.0; 5]
+    }
+}
+
+impl Pose {
+    fn axis(&self, axis: DVec3) -> DVec3 {
+        self.world_from_view * axis
+    }
+
+    fn forward(&self) -> DVec3 {
+        self.axis(DVec3::Z)
+    }
+
+    fn eye(&self) -> DVec3 {
+        self.pivot - self.forward() * self.distance
+    }
+
+    /// Whether nobody could tell the two apart.
+    fn is_near(&self, other: &Self) -> bool {
+        self.pivot.distance(other.pivot) < ARRIVED * other.distance
+            && (self.distance / other.distance).ln().abs() < ARRIVED
+            && self.world_from_view.angle_between(other.world_from_view) < ARRIVED
+    }
+
+    /// A part of the way to another, 0 to 1.
+    fn toward(&self, goal: &Self, part: f64) -> Self {
+        Self {
+            pivot: self.pivot.lerp(goal.pivot, part),
+            distance: self.distance * (goal.distance / self.distance).powf(part),
+            world_from_view: self.world_from_view.slerp(goal.world_from_view, part).normalize(),
+        }
+    }
+}
+
+impl Navigation {
+    /// Looks at the origin from 3 units away.
+    pub(crate) fn new() -> Self {
+        let pose = Pose { pivot: DVec3::ZERO, distance: 3.0, world_from_view: orientation(DVec3::Y, DVec3::Z) };
+        Self { shown: pose, goal: pose, fov_deg: FOV_DEG, orthographic: false, up: DVec3::Z, scene: (DVec3::ZERO, 1.0) }
+    }
+
+    /// Says what there is to be looked at, by the middle and the radius of a ball around it, and which way is up.
+    pub(crate) fn set_scene(&mut self, middle: DVec3, radius: f64, up: DVec3) {
+        if middle.is_finite() && radius.is_finite() {
+            self.scene = (middle, radius.max(1e-9));
+        }
+        self.up = up.try_normalize().unwrap_or(DVec3::Z);
+    }
+
+    /// Which way is up.
+    pub(crate) fn up(&self) -> DVec3 {
+        self.up
+    }
+
+    /// Goes where `camera` is, at once or smoothly.
+    pub(crate) fn go_to(&mut self, camera: &Camera, at_once: bool) {
+        let Ok([right, down, forward]) = camera.axes() else { return };
+        let world_from_view = DQuat::from_mat3(&DMat3::from_cols(right, down, forward)).normalize();
+        let mut distance = camera.eye.distance(camera.look_at);
+        match camera.projection {
+            Projection::PerspectiveFovDeg(fov) => {
+                self.fov_deg = fov;
+                self.orthographic = false;
+            }
+            Projection::OrthographicHeight(height) => {
+                distance = height / self.height_at_one();
+                self.orthographic = true;
+            }
+        }
+        self.goal = Pose { pivot: camera.look_at, distance, world_from_view };
+        if at_once {
+            self.shown = self.goal;
+        }
+    }
+
+    /// The camera that is shown now.
+    pub(crate) fn camera(&self) -> Camera {
+        self.camera_at(&self.shown)
+    }
+
+    /// The camera when the eye has arrived.
+    pub(crate) fn goal_camera(&self) -> Camera {
+        self.camera_at(&self.goal)
+    }
+
+    fn camera_at(&self, pose: &Pose) -> Camera {
+        let forward = pose.forward();
+        let (distance, projection) = if self.orthographic {
+            // The eye of an orthographic camera is a plane to stand behind: before all there is.
+            let (middle, radius) = self.scene;
+            let before_all = forward.dot(pose.pivot - middle) + 1.5 * radius;
+            let height = pose.distance * self.height_at_one();
+            (pose.distance.max(before_all), Projection::OrthographicHeight(height))
+        } else {
+            (pose.distance, Projection::PerspectiveFovDeg(self.fov_deg))
+        };
+        Camera { eye: pose.pivot - forward * distance, look_at: pose.pivot, up: pose.axis(DVec3::NEG_Y), projection }
+    }
+
+    /// World units that the picture is high at a distance of 1.
+    fn height_at_one(&self) -> f64 {
+        2.0 * (0.5 * self.fov_deg).to_radians().tan()
+    }
+
+    /// Whether the picture is an orthographic one.
+    pub(crate) fn is_orthographic(&self) -> bool {
+        self.orthographic
+    }
+
+    /// Changes between perspective and orthographic; what is at the pivot keeps its size.
+    pub(crate) fn toggle_projection(&mut self) {
+        self.orthographic = !self.orthographic;
+    }
+
+    /// Vertical field of view in degrees.
+    pub(crate) fn fov_deg(&self) -> f64 {
+        self.fov_deg
+    }
+
+    /// Changes the field of view; what is at the pivot keeps its size.
+    pub(crate) fn set_fov_deg(&mut self, fov_deg: f64) {
+        let before = self.height_at_one();
+        self.fov_deg = fov_deg.clamp(1.0, 150.0);
+        let factor = before / self.height_at_one();
+        if !self.orthographic {
+            self.goal.distance *= factor;
+            self.shown.distance *= factor;
+        }
+    }
+
+    /// Lets `seconds` go by. Whether the picture has changed.
+    pub(crate) fn advance(&mut self, seconds: f64, flight: Flight) -> bool {
+        let seconds = seconds.clamp(0.0, 0.25);
+        if !flight.still() {
+            let step = seconds * FLY * self.goal.distance * if flight.fast { FAST } else { 1.0 };
+            let [right, forward] = [DVec3::X, DVec3::Z].map(|axis| self.goal.axis(axis));
+            self.goal.pivot += (right * flight.right + forward * flight.forward + self.up * flight.up) * step;
+            let turn = seconds * KEY_TURN;
+            self.look(DVec2::new(flight.turn_right, -flight.turn_up) * (turn / TURN));
+        }
+        if self.shown == self.goal {
+            return false;
+        }
+        let next = self.shown.toward(&self.goal, 1.0 - (-seconds / LAG).exp());
+        self.shown = if next.is_near(&self.goal) { self.goal } else { next };
+        true
+    }
+
+    /// Whether the eye is on its way.
+    pub(crate) fn is_moving(&self) -> bool {
+        self.shown != self.goal
+    }
+
+    /// Goes to the goal at once.
+    pub(crate) fn arrive(&mut self) {
+        self.shown = self.goal;
+    }
+
+    /// Turns about the pivot. `drag` is in heights of the picture, right and down.
+    pub(crate) fn orbit(&mut self, drag: DVec2) {
+        self.turn(drag);
+    }
+
+    /// Turns the head: the eye stays, the pivot moves. `drag` is in heights of the picture.
+    pub(crate) fn look(&mut self, drag: DVec2) {
+        let eye = self.goal.eye();
+        // As if the world were pulled: the other way round than an orbit, and by the angle that the pixels cover.
+        let scale = self.fov_deg.to_radians() / TURN;
+        self.turn(-drag * scale.min(1.0));
+        self.goal.pivot = eye + self.goal.forward() * self.goal.distance;
+    }
+
+    fn turn(&mut self, drag: DVec2) {
+        if !drag.is_finite() {
+            return;
+        }
+        let turn = drag * TURN;
+        // By both axes, so that a step too far over the top is seen as one and taken back.
+        let pitch = self.goal.forward().dot(self.up).atan2(self.goal.axis(DVec3::NEG_Y).dot(self.up));
+        // Down means that the eye rises, and looks further down.
+        let most = std::f64::consts::FRAC_PI_2;
+        let tilt = (pitch - turn.y).clamp(-most, most) - pitch;
+        let right = self.goal.axis(DVec3::X);
+        let about_up = DQuat::from_axis_angle(self.up, -turn.x);
+        let about_right = DQuat::from_axis_angle(right, tilt);
+        self.goal.world_from_view = (about_up * about_right * self.goal.world_from_view).normalize();
+    }
+
+    /// Moves the eye and the pivot so that what lies at `depth` follows a drag of so many heights of the picture.
+    pub(crate) fn pan(&mut self, drag: DVec2, depth: Option<f64>) {
+        let depth = if self.orthographic { self.goal.distance } else { depth.unwrap_or(self.goal.distance) };
+        let step = drag * (depth * self.height_at_one());
+        if step.is_finite() {
+            self.goal.pivot -= self.goal.axis(DVec3::X) * step.x + self.goal.axis(DVec3::Y) * step.y;
+        }
+    }
+
+    /// Goes so many times as close to `target`, a point that stays where it is in the picture: above 1 is closer.
+    pub(crate) fn zoom(&mut self, factor: f64, target: Option<DVec3>) {
+        let scale = 1.0 / factor;
+        let [least, most] = DISTANCES.map(|part| part * self.scene.1);
+        let distance = (self.goal.distance * scale).clamp(least, most);
+        let scale = distance / self.goal.distance;
+        if !(scale > 0.0 && scale.is_finite()) {
+            return;
+        }
+        let target = target.filter(|target| target.is_finite()).unwrap_or(self.goal.pivot);
+        let fixed = if self.orthographic { self.goal.pivot } else { self.goal.eye() };
+        let moved = target + (fixed - target) * scale;
+        self.goal.distance = distance;
+        self.goal.pivot = if self.orthographic { moved } else { moved + self.goal.forward() * distance };
+    }
+
+    /// Turns about `pivot` from now on; the eye goes sideways until it is in the middle.
+    pub(crate) fn set_pivot(&mut self, pivot: DVec3) {
+        if !pivot.is_finite() {
+            return;
+        }
+        if !self.orthographic {
+            let depth = self.goal.forward().dot(pivot - self.goal.eye());
+            if depth > 0.0 {
+                self.goal.distance = depth;
+            }
+        }
+        self.goal.pivot = pivot;
+    }
+
+    /// Stands the picture upright again after a camera with a tilted horizon, or when another way is up.
+    pub(crate) fn level(&mut self) {
+        let forward = self.goal.forward();
+        if forward.cross(self.up).length() > 1e-3 {
+            self.goal.world_from_view = orientation(forward, self.up);
+        }
+    }
+
+    /// How the view stands to the world, for the little axes: the view-space directions of world x, y and z.
+    pub(crate) fn world_axes_in_view(&self) -> [DVec3; 3] {
+        let view_from_world = self.shown.world_from_view.inverse();
+        [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| view_from_world * axis)
+    }
+
+    /// World units that a picture's height covers at the pivot.
+    pub(crate) fn height_at_pivot(&self) -> f64 {
+        self.shown.distance * self.height_at_one()
+    }
+}
+
+/// Looks along `forward` with `up` upward.
+fn orientation(forward: DVec3, up: DVec3) -> DQuat {
+    let forward = forward.try_normalize().unwrap_or(DVec3::Y);
+    let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+    DQuat::from_mat3(&DMat3::from_cols(right, forward.cross(right), forward)).normalize()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,40 @@
+//! What keys and mouse do.
+
+use eframe::egui;
+
+use crate::app::App;
+use crate::commands::Command;
+
+const MOUSE: [(&str, &str); 9] = [
+    ("Left drag", "Turn about the pivot"),
+    ("Right drag, Shift + left drag", "Move sideways"),
+    ("Wheel, pinch", "Zoom to the cursor"),
+    ("Ctrl + left drag", "Look around"),
+    ("Double click", "Turn about this place from now on"),
+    ("W A S D, Q E", "Fly forward, left, back, right, down and up"),
+    ("Shift", "Fly faster"),
+    ("Arrow keys", "Turn the head"),
+    ("Alt + left drag", "Turn the view while selecting"),
+];
+
+pub(super) fn show(app: &mut App, context: &egui::Context) {
+    let mut open = app.panels.help;
+    let window = egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).resizable(false);
+    window.anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
+        egui::ScrollArea::vertical().max_height(context.content_rect().height() - 140.0).show(ui, |ui| {
+            egui::Grid::new("help").num_columns(2).striped(true).spacing([24.0, 4.0]).show(ui, |ui| {
+                for (keys, what) in MOUSE {
+                    ui.strong(keys);
+                    ui.label(what);
+                    ui.end_row();
+                }
+                for command in Command::ALL {
+                    ui.strong(command.key(context));
+                    ui.label(command.label()).on_hover_text(command.tooltip());
+                    ui.end_row();
+                }
+            });
+        });
+    });
+    app.panels.help = open;
+}

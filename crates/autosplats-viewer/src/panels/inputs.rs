@@ -1,0 +1,156 @@
+//! The list of what is open, and what is known of a point.
+
+use eframe::egui;
+
+use crate::app::App;
+use crate::document::{Document, LayerId, grouped};
+
+pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
+    egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0).show(ui, |ui| {
+        ui.add_space(4.0);
+        ui.horizontal(|ui| {
+            ui.strong("Inputs");
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui.small_button("+").on_hover_text("Open more").clicked() {
+                    let context = ui.ctx().clone();
+                    app.panels.dialogs.open(&context);
+                }
+            });
+        });
+        ui.separator();
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            loading(app, ui);
+            let ids: Vec<LayerId> = app.document().layers.iter().map(|layer| layer.id).collect();
+            for id in ids {
+                layer(app, ui, id);
+            }
+            if app.document().layers.is_empty() && app.loader.jobs().is_empty() {
+                ui.weak("Nothing is open.");
+            }
+        });
+    });
+}
+
+/// What is being read.
+fn loading(app: &App, ui: &mut egui::Ui) {
+    for job in app.loader.jobs() {
+        ui.horizontal(|ui| {
+            if ui.small_button("×").on_hover_text("Stop reading").clicked() {
+                job.cancel();
+            }
+            let bar = egui::ProgressBar::new(job.fraction()).desired_width(ui.available_width());
+            ui.add(bar.text(&*job.input.name));
+        });
+    }
+}
+
+fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
+    let Some(layer) = app.document().layer(id) else { return };
+    let (name, visible, tint, path) = (layer.name.clone(), layer.visible, layer.tint, layer.path.clone());
+    let counts = app.document().counts_of(layer);
+    let unsaved = app.history.is_unsaved(id);
+    ui.push_id(id, |ui| {
+        ui.horizontal(|ui| {
+            let mut shown = visible;
+            if ui.checkbox(&mut shown, "").on_hover_text("Show this input").changed() {
+                app.change(|document| document.set_visible(id, shown));
+            }
+            let mut color = tint.unwrap_or([200, 200, 200]);
+            if ui.color_edit_button_srgb(&mut color).on_hover_text("One colour for all its points").changed() {
+                app.change(|document| document.set_tint(id, Some(color)));
+            }
+            let text = if unsaved { format!("{name} *") } else { name.clone() };
+            let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
+            let file = path.map_or_else(String::new, |path| format!("\n{}", path.display()));
+            let edits = if unsaved { "\nIts edits are not saved" } else { "" };
+            label.on_hover_text(format!("{name}{file}{edits}")).context_menu(|ui| menu(app, ui, id));
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.add_space(22.0);
+            let mut figures = format!("{} points", grouped(counts.points));
+            for (count, what) in [(counts.selected, "selected"), (counts.hidden, "hidden"), (counts.deleted, "deleted")]
+            {
+                if count > 0 {
+                    figures += &format!(", {} {what}", grouped(count));
+                }
+            }
+            ui.small(figures);
+            ui.menu_button("…", |ui| menu(app, ui, id)).response.on_hover_text("What can be done with it");
+        });
+    });
+    ui.add_space(4.0);
+}
+
+fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
+    if ui.button("Fit").on_hover_text("Stand where all of it is seen").clicked() {
+        let mut alone = Document::default();
+        alone.layers.extend(app.document().layer(id).cloned());
+        let cloud = alone.overview();
+        app.fit(&cloud);
+        ui.close();
+    }
+    if ui.button("Show it alone").clicked() {
+        app.change(|document| {
+            let ids: Vec<_> = document.layers.iter().map(|layer| layer.id).collect();
+            for other in ids {
+                document.set_visible(other, other == id);
+            }
+        });
+        ui.close();
+    }
+    if ui.button("Its own colours").clicked() {
+        app.change(|document| document.set_tint(id, None));
+        ui.close();
+    }
+    if ui.button("Remove").on_hover_text("Take it off the list; its file stays as it is").clicked() {
+        app.edit("Remove an input", |document| {
+            document.remove(id);
+        });
+        ui.close();
+    }
+}
+
+/// Takes everything off the list; undo brings it back.
+pub(crate) fn close_all(app: &mut App) {
+    app.loader.cancel_all();
+    app.edit("Close all", |document| document.layers.clear());
+}
+
+/// What is known of the point that was asked about.
+pub(super) fn inspected(app: &mut App, context: &egui::Context) {
+    let Some(point) = app.tools.inspected.clone() else { return };
+    let mut open = true;
+    let window = egui::Window::new("Point").open(&mut open).resizable(true).default_width(260.0);
+    window.default_pos(context.content_rect().right_top() + egui::vec2(-300.0, 60.0)).show(context, |ui| {
+        egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
+            egui::Grid::new("point").num_columns(2).striped(true).show(ui, |ui| {
+                let mut row = |name: &str, value: &str| {
+                    ui.label(name);
+                    ui.add(egui::Label::new(egui::RichText::new(value).monospace()).selectable(true).wrap());
+                    ui.end_row();
+                };
+                row("Input", &point.name);
+                row("Index", &point.point.to_string());
+                for (axis, value) in ["x", "y", "z"].into_iter().zip(&point.file_text) {
+                    row(axis, value);
+                }
+                if point.position != point.file_position {
+                    let place = point.position;
+                    row("shown at", &format!("{} {} {}", place.x, place.y, place.z));
+                }
+                if let Some([r, g, b]) = point.color {
+                    row("Colour", &format!("{r} {g} {b}"));
+                }
+                if let Some(scan) = &point.scan {
+                    row("Scan", scan);
+                }
+                for (name, value) in &point.fields {
+                    row(name, value);
+                }
+            });
+        });
+    });
+    if !open {
+        app.tools.inspected = None;
+    }
+}

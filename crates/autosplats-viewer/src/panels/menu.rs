@@ -1,0 +1,120 @@
+//! The menus and the tools.
+
+use autosplats::ViewDirection;
+use eframe::egui;
+
+use super::command_button;
+use crate::app::App;
+use crate::commands::{Command, Tool};
+use crate::loading::Input;
+
+pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
+    egui::Panel::top("menu").show(ui, |ui| {
+        egui::MenuBar::new().ui(ui, |ui| {
+            ui.menu_button("File", |ui| file(app, ui));
+            ui.menu_button("Edit", |ui| edit(app, ui));
+            ui.menu_button("View", |ui| view(app, ui));
+            ui.menu_button("Window", |ui| window(app, ui));
+            ui.separator();
+            tools(app, ui);
+        });
+    });
+}
+
+fn file(app: &mut App, ui: &mut egui::Ui) {
+    command_button(app, ui, Command::Open, true);
+    let recent = app.recent.clone();
+    ui.add_enabled_ui(!recent.is_empty(), |ui| {
+        ui.menu_button("Open lately", |ui| {
+            for path in recent {
+                let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+                if ui.button(file).on_hover_text(path.display().to_string()).clicked() {
+                    app.open(Input::file(path));
+                    ui.close();
+                }
+            }
+        });
+    });
+    let any = !app.document().layers.is_empty();
+    ui.separator();
+    command_button(app, ui, Command::Export, any);
+    command_button(app, ui, Command::Screenshot, any);
+    ui.separator();
+    command_button(app, ui, Command::CloseAll, any);
+    command_button(app, ui, Command::Quit, true);
+}
+
+fn edit(app: &mut App, ui: &mut egui::Ui) {
+    let steps = [app.history.undo_label(), app.history.redo_label()].map(|label| label.is_some());
+    command_button(app, ui, Command::Undo, steps[0]);
+    command_button(app, ui, Command::Redo, steps[1]);
+    ui.separator();
+    let counts = app.document().counts();
+    let any = counts.points > 0;
+    command_button(app, ui, Command::SelectAll, any);
+    command_button(app, ui, Command::SelectNone, counts.selected > 0);
+    command_button(app, ui, Command::InvertSelection, any);
+    ui.separator();
+    command_button(app, ui, Command::HideSelected, counts.selected > 0);
+    command_button(app, ui, Command::ShowAll, counts.hidden > 0);
+    command_button(app, ui, Command::DeleteSelected, counts.selected > 0);
+    command_button(app, ui, Command::CropToSelected, counts.selected > 0);
+}
+
+fn view(app: &mut App, ui: &mut egui::Ui) {
+    let any = !app.document().layers.is_empty();
+    command_button(app, ui, Command::FitAll, any);
+    command_button(app, ui, Command::FitSelected, any);
+    ui.separator();
+    for direction in [
+        ViewDirection::Front,
+        ViewDirection::Back,
+        ViewDirection::Right,
+        ViewDirection::Left,
+        ViewDirection::Top,
+        ViewDirection::Bottom,
+        ViewDirection::Iso,
+        ViewDirection::Auto,
+    ] {
+        command_button(app, ui, Command::View(direction), any);
+    }
+    command_button(app, ui, Command::OppositeView, any);
+    ui.separator();
+    command_button(app, ui, Command::Projection, true);
+    command_button(app, ui, Command::UpAxis, any);
+    command_button(app, ui, Command::Level, any);
+    ui.separator();
+    command_button(app, ui, Command::CopyView, any);
+    command_button(app, ui, Command::PasteView, true);
+    ui.separator();
+    command_button(app, ui, Command::Dots, any);
+}
+
+fn window(app: &mut App, ui: &mut egui::Ui) {
+    for command in [Command::Inputs, Command::Look, Command::Statistics, Command::Help] {
+        command_button(app, ui, command, true);
+    }
+    ui.separator();
+    ui.checkbox(&mut app.look.overlay, "Axes and scale bar");
+    ui.separator();
+    egui::global_theme_preference_buttons(ui);
+}
+
+fn tools(app: &mut App, ui: &mut egui::Ui) {
+    let context = ui.ctx().clone();
+    for tool in Tool::ALL {
+        let command = Command::Tool(tool);
+        let tooltip = format!("{} ({})", command.tooltip(), command.key(&context));
+        if ui.selectable_label(app.tool == tool, tool.name()).on_hover_text(tooltip).clicked() {
+            crate::keys::run(app, &context, command);
+        }
+    }
+    if app.tool.selects() {
+        ui.separator();
+        ui.checkbox(&mut app.tools.through, "Through").on_hover_text("Select what is behind the surface, too");
+    }
+    if app.tool == Tool::Brush {
+        let radius = egui::DragValue::new(&mut app.tools.brush).range(2.0..=300.0).suffix(" px");
+        ui.add(radius).on_hover_text("Radius of the brush");
+    }
+}

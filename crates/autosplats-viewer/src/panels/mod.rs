@@ -1,0 +1,119 @@
+//! Everything around the picture.
+
+mod export;
+mod help;
+mod inputs;
+mod look;
+mod menu;
+mod open;
+mod picture;
+mod statistics;
+mod status;
+
+use eframe::egui;
+
+pub(crate) use self::inputs::close_all;
+use crate::app::App;
+use crate::commands::Command;
+
+/// What is open around the picture.
+pub(crate) struct Panels {
+    pub(crate) inputs: bool,
+    pub(crate) look: bool,
+    pub(crate) statistics: bool,
+    pub(crate) help: bool,
+    pub(crate) dialogs: open::Dialogs,
+    pub(crate) export: export::Export,
+    pub(crate) picture: picture::PictureDialog,
+    /// Commands whose keys were taken from egui.
+    pub(crate) claimed: Vec<Command>,
+    /// Depth of what a drag took hold of.
+    pub(crate) grabbed: Option<f64>,
+    /// Whether the user wants to leave though something is not saved.
+    leave: bool,
+}
+
+impl Default for Panels {
+    fn default() -> Self {
+        Self {
+            inputs: true,
+            look: false,
+            statistics: false,
+            help: false,
+            dialogs: open::Dialogs::default(),
+            export: export::Export::default(),
+            picture: picture::PictureDialog::default(),
+            claimed: Vec::new(),
+            grabbed: None,
+            leave: false,
+        }
+    }
+}
+
+/// Shows the panels that lie beside the picture.
+pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
+    menu::show(app, ui);
+    status::show(app, ui);
+    if app.panels.inputs {
+        inputs::show(app, ui);
+    }
+    if app.panels.look {
+        look::show(app, ui);
+    }
+}
+
+/// Shows the windows that lie over the picture.
+pub(crate) fn over(app: &mut App, context: &egui::Context) {
+    open::show(app, context);
+    statistics::show(app, context);
+    export::show(app, context);
+    picture::show(app, context);
+    help::show(app, context);
+    inputs::inspected(app, context);
+    leave(app, context);
+}
+
+/// Asks before edits are lost.
+fn leave(app: &mut App, context: &egui::Context) {
+    let asked = context.input(|input| input.viewport().close_requested());
+    if asked && !app.quit && app.history.is_changed_since_saved() {
+        context.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+        app.panels.leave = true;
+    }
+    if !app.panels.leave {
+        return;
+    }
+    let names: Vec<String> =
+        app.history.unsaved().filter_map(|id| app.document().layer(id)).map(|layer| layer.name.clone()).collect();
+    let modal = egui::Modal::new(egui::Id::unique("leave")).show(context, |ui| {
+        ui.heading("Edits are not saved");
+        ui.label(format!("Those of {} would be lost.", names.join(", ")));
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            if ui.button("Export…").clicked() {
+                app.panels.leave = false;
+                app.panels.export.open = true;
+            }
+            if ui.button("Leave without saving").clicked() {
+                app.quit = true;
+                app.panels.leave = false;
+            }
+            if ui.button("Stay").clicked() {
+                app.panels.leave = false;
+            }
+        });
+    });
+    if modal.should_close() {
+        app.panels.leave = false;
+    }
+}
+
+/// A button for a command, with its key and its tooltip.
+pub(crate) fn command_button(app: &mut App, ui: &mut egui::Ui, command: Command, enabled: bool) {
+    let context = ui.ctx().clone();
+    let button = egui::Button::new(command.label()).shortcut_text(command.key(&context));
+    if ui.add_enabled(enabled, button).on_hover_text(command.tooltip()).clicked() {
+        ui.close();
+        crate::keys::run(app, &context, command);
+    }
+}

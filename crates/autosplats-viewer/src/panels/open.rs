@@ -1,0 +1,73 @@
+//! Opening files: the system's dialog, and a line to type a path or a scene where there is none.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, TryRecvError};
+
+use eframe::egui;
+
+use crate::app::App;
+use crate::files::ask_for_inputs;
+use crate::loading::Input;
+
+/// What is being asked.
+#[derive(Default)]
+pub(crate) struct Dialogs {
+    chosen: Option<Receiver<Vec<PathBuf>>>,
+    /// What is typed, while it can be.
+    typed: Option<String>,
+}
+
+impl Dialogs {
+    /// Asks for files.
+    pub(crate) fn open(&mut self, context: &egui::Context) {
+        if self.chosen.is_none() {
+            self.chosen = Some(ask_for_inputs(context));
+        }
+    }
+}
+
+pub(super) fn show(app: &mut App, context: &egui::Context) {
+    match app.panels.dialogs.chosen.as_ref().map(Receiver::try_recv) {
+        // No system dialog, or nothing chosen in it: a path can be typed.
+        Some(Ok(paths)) if paths.is_empty() => {
+            app.panels.dialogs.chosen = None;
+            app.panels.dialogs.typed.get_or_insert_default();
+        }
+        Some(Ok(paths)) => {
+            app.panels.dialogs.chosen = None;
+            paths.into_iter().for_each(|path| app.open(Input::file(path)));
+        }
+        Some(Err(TryRecvError::Disconnected)) => app.panels.dialogs.chosen = None,
+        Some(Err(TryRecvError::Empty)) | None => {}
+    }
+    let Some(typed) = &mut app.panels.dialogs.typed else { return };
+    let mut input = None;
+    let mut closed = false;
+    let modal = egui::Modal::new(egui::Id::unique("open")).show(context, |ui| {
+        ui.set_width(420.0);
+        ui.label("Path of a file, or a scene such as scene:statue");
+        let line = ui.add(egui::TextEdit::singleline(typed).desired_width(f32::INFINITY));
+        let enter = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if !enter {
+            line.request_focus();
+        }
+        ui.horizontal(|ui| {
+            if (ui.button("Open").clicked() || enter) && !typed.trim().is_empty() {
+                input = Some(typed.trim().to_owned());
+            }
+            closed = ui.button("Cancel").clicked();
+        });
+    });
+    if let Some(name) = input {
+        match Input::parse(&name) {
+            Ok(input) => {
+                app.open(input);
+                closed = true;
+            }
+            Err(error) => app.messages.error(error.to_string()),
+        }
+    }
+    if closed || modal.should_close() {
+        app.panels.dialogs.typed = None;
+    }
+}

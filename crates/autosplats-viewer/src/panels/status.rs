@@ -1,0 +1,43 @@
+//! The line below the picture.
+
+use eframe::egui;
+
+use crate::app::App;
+use crate::document::grouped;
+
+pub(super) fn show(app: &App, ui: &mut egui::Ui) {
+    egui::Panel::bottom("status").show(ui, |ui| {
+        ui.horizontal(|ui| {
+            let counts = app.document().counts();
+            ui.label(format!("{} points", grouped(counts.points)));
+            if counts.selected > 0 {
+                ui.separator();
+                let color = ui.visuals().warn_fg_color;
+                ui.colored_label(color, format!("{} selected", grouped(counts.selected)));
+            }
+            if let Some(shot) = &app.shot {
+                let picture = &shot.picture;
+                ui.separator();
+                ui.label(format!("{} visible", grouped(picture.counts.visible)))
+                    .on_hover_text("Points that own a pixel or half of one");
+                ui.separator();
+                ui.label(format!("{:.0} ms", picture.milliseconds))
+                    .on_hover_text("What the last picture took (P tells more)");
+                if let Some(rate) = app.rate.per_second() {
+                    ui.label(format!("{rate:.0} fps"));
+                }
+                if !picture.whole {
+                    ui.weak("moving").on_hover_text("Coarser while the view moves");
+                }
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let device = app.device.as_ref().map_or("CPU", |device| &*device.name);
+                ui.weak(device).on_hover_text("Where pictures are made");
+                let bytes: usize = app.document().layers.iter().map(|layer| layer.cloud.byte_len()).sum();
+                let old = app.history.old_bytes();
+                ui.weak(format!("{:.0} MB", (bytes + old) as f64 * 1e-6))
+                    .on_hover_text(format!("Points, and {:.0} MB for undo", old as f64 * 1e-6));
+            });
+        });
+    });
+}

@@ -1,0 +1,97 @@
+//! How large a picture may be, and of how many points, to come in time.
+
+/// Least size of a picture on its way, by its sides.
+const LEAST_SCALE: f64 = 0.25;
+/// Share of the time that projecting all points may take before some are left out.
+const PROJECT: f64 = 0.4;
+/// How much a scale has to differ from the last one to be taken, so that pictures do not breathe.
+const STEP: f64 = 0.08;
+
+/// What a picture is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pace {
+    /// Sides by those of the window's picture, 0.25 to 1.
+    pub(super) scale: f64,
+    /// Points are halved so many times.
+    pub(super) halvings: u32,
+}
+
+impl Pace {
+    pub(super) const WHOLE: Self = Self { scale: 1.0, halvings: 0 };
+}
+
+/// What pictures cost, by the last one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Costs {
+    /// Milliseconds per million points; 0 while unknown.
+    points: f64,
+    /// Milliseconds per million pixels; 0 while unknown.
+    pixels: f64,
+    last: Option<Pace>,
+}
+
+impl Costs {
+    /// Learns from a picture of so many points and pixels: what its points took, and what its pixels.
+    pub(super) fn learn(&mut self, points: usize, pixels: usize, point_ms: f64, pixel_ms: f64) {
+        let blend = |old: f64, new: f64| if old > 0.0 { 0.6 * old + 0.4 * new } else { new };
+        self.points = blend(self.points, point_ms / (points.max(1) as f64 * 1e-6));
+        self.pixels = blend(self.pixels, pixel_ms / (pixels.max(1) as f64 * 1e-6));
+    }
+
+    /// What a picture of so many points and pixels should be made of to take `budget_ms`.
+    pub(super) fn pace(&mut self, points: usize, pixels: usize, budget_ms: f64) -> Pace {
+        let all_points = self.points * points as f64 * 1e-6;
+        let all_pixels = self.pixels * pixels as f64 * 1e-6;
+        let halvings = (all_points / (PROJECT * budget_ms)).log2().ceil().clamp(0.0, 16.0) as u32;
+        let left = budget_ms - all_points / f64::from(1 << halvings);
+        let mut scale = (left / all_pixels.max(1e-9)).sqrt().clamp(LEAST_SCALE, 1.0);
+        if let Some(last) = self.last
+            && (last.scale / scale).ln().abs() < STEP
+        {
+            scale = last.scale;
+        }
+        let pace = Pace { scale, halvings };
+        self.last = Some(pace);
+        pace
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_are_fast_enough_stay_whole() {
+        let mut costs = Costs::default();
+        costs.learn(100_000, 1_000_000, 2.0, 10.0);
+        assert_eq!(costs.pace(100_000, 1_000_000, 33.0), Pace::WHOLE, "12 of 33 ms");
+    }
+
+    #[test]
+    fn slow_pictures_shrink_until_they_fit() {
+        let mut costs = Costs::default();
+        costs.learn(1_000_000, 1_000_000, 10.0, 90.0);
+        let pace = costs.pace(1_000_000, 1_000_000, 33.0);
+        assert_eq!(pace.halvings, 0, "10 of 33 ms for the points are well");
+        let predicted = 10.0 + 90.0 * pace.scale * pace.scale;
+        assert!((predicted - 33.0).abs() < 1.0, "{predicted} ms at {pace:?}");
+    }
+
+    #[test]
+    fn huge_clouds_lose_points() {
+        let mut costs = Costs::default();
+        costs.learn(100_000_000, 1_000_000, 1500.0, 90.0);
+        let pace = costs.pace(100_000_000, 1_000_000, 33.0);
+        assert!(1500.0 / f64::from(1 << pace.halvings) <= 0.4 * 33.0, "{pace:?}");
+        assert!(pace.scale >= LEAST_SCALE, "{pace:?}");
+    }
+
+    #[test]
+    fn the_size_does_not_breathe() {
+        let mut costs = Costs::default();
+        costs.learn(1_000_000, 1_000_000, 10.0, 90.0);
+        let first = costs.pace(1_000_000, 1_000_000, 33.0);
+        costs.learn(1_000_000, 1_000_000, 10.0, 94.0);
+        assert_eq!(costs.pace(1_000_000, 1_000_000, 33.0), first, "a little slower is no reason");
+    }
+}

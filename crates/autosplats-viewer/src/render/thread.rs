@@ -1,0 +1,281 @@
+//! What the thread does: wait for news, do what has to be done, make the picture that is wanted by then.
+
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
+
+use autosplats::cloud::glam::DVec2;
+use autosplats::cloud::{Axes, PointCloud};
+use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings, guess_axes};
+use eframe::egui;
+use rayon::prelude::*;
+
+use super::pace::{Costs, Pace};
+use super::task::{Outcome, Seen};
+use super::{Answer, Depths, Outbox, Picture, Shared, Task, Wish};
+use crate::document::Shown;
+
+/// What selected points are mixed with, sRGB.
+const SELECTED: [u16; 3] = [255, 140, 20];
+/// How far behind the surface, in splat radii, a point still counts as seen.
+const SEEN: f32 = 2.0;
+
+pub(super) fn run(shared: &Shared, outbox: &Outbox) {
+    let mut studio = Studio::default();
+    loop {
+        let (task, wish) = {
+            let mut post = shared.lock();
+            loop {
+                if post.closed {
+                    return;
+                }
+                if let Some(task) = post.tasks.pop_front() {
+                    break (Some(task), None);
+                }
+                if let Some(wish) = post.wish.take() {
+                    break (None, Some(wish));
+                }
+                post = shared.news.wait(post).unwrap_or_else(PoisonError::into_inner);
+            }
+        };
+        let answer = match (task, wish) {
+            (Some(task), _) => studio.perform(task, outbox).map(Answer::Done),
+            (None, Some(wish)) => studio.draw(&wish, outbox),
+            (None, None) => continue,
+        };
+        outbox.send(answer.unwrap_or_else(|error| {
+            if matches!(error, Error::DeviceLost(_)) {
+                studio.renderer = None;
+            }
+            Answer::Failed(error.to_string())
+        }));
+    }
+}
+
+/// What is kept from picture to picture.
+#[derive(Default)]
+struct Studio {
+    renderer: Option<(Backend, Renderer)>,
+    costs: Costs,
+    shown: Option<(Axes, Arc<Shown>)>,
+    sparse: Option<Sparse>,
+}
+
+/// A part of the points, for pictures in haste.
+struct Sparse {
+    /// Of which cloud.
+    identity: u64,
+    halvings: u32,
+    cloud: PointCloud,
+    /// Of each point among all of them.
+    indices: Vec<u32>,
+}
+
+impl Sparse {
+    /// Points taken by chance, but the same ones each time.
+    fn new(cloud: &PointCloud, halvings: u32) -> Self {
+        let kept = |index: usize| {
+            let mixed = (index as u32).wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
+            mixed >> (32 - halvings) == 0
+        };
+        let all = (0..cloud.len()).into_par_iter();
+        let indices: Vec<u32> = all.filter(|&index| kept(index)).map(|index| index as u32).collect();
+        Self { identity: cloud.identity(), halvings, cloud: cloud.pick(&indices), indices }
+    }
+}
+
+impl Studio {
+    /// The points that a wish is about, made again only if they have changed.
+    fn shown(&mut self, wish: &Wish) -> Arc<Shown> {
+        if let Some((axes, shown)) = &self.shown
+            && *axes == wish.axes
+            && shown.shows(&wish.document)
+        {
+            return Arc::clone(shown);
+        }
+        let mut shown = wish.document.shown();
+        if guess_axes(&shown.cloud) != wish.axes {
+            shown.cloud = Arc::new(PointCloud::clone(&shown.cloud).with_axes(wish.axes));
+        }
+        let shown = Arc::new(shown);
+        self.shown = Some((wish.axes, Arc::clone(&shown)));
+        self.sparse = None;
+        shown
+    }
+
+    fn renderer(&mut self, backend: Backend, outbox: &Outbox) -> Result<&mut Renderer, Error> {
+        if self.renderer.as_ref().is_none_or(|(known, _)| *known != backend) {
+            self.renderer = None;
+            self.costs = Costs::default();
+            let renderer = Renderer::with_backend(backend)?;
+            outbox.send(Answer::Device(renderer.adapter()));
+            self.renderer = Some((backend, renderer));
+        }
+        let (_, renderer) = self.renderer.as_mut().expect("it was made above");
+        Ok(renderer)
+    }
+
+    fn draw(&mut self, wish: &Wish, outbox: &Outbox) -> Result<Answer, Error> {
+        let started = Instant::now();
+        let shown = self.shown(wish);
+        if shown.cloud.len() < 2 {
+            return Ok(Answer::Empty);
+        }
+        let pixels = wish.size[0] as usize * wish.size[1] as usize;
+        let pace = match wish.budget_ms {
+            Some(budget) => self.costs.pace(shown.cloud.len(), pixels, budget),
+            None => Pace::WHOLE,
+        };
+        let mut sparse = self.sparse.take();
+        if pace.halvings > 0 {
+            let fits = |sparse: &Sparse| (sparse.identity, sparse.halvings) == (shown.cloud.identity(), pace.halvings);
+            sparse = sparse.filter(fits).or_else(|| Some(Sparse::new(&shown.cloud, pace.halvings)));
+        }
+        let part = sparse.as_ref().filter(|_| pace.halvings > 0);
+        let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
+        let dots = wish.dots.unwrap_or(1).max(1);
+        let size = wish.size.map(|side| ((f64::from(side) * pace.scale / f64::from(dots)) as u32).max(1));
+        let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
+        let mut settings = settings(wish, cloud.len());
+        settings.all_layers = selected.is_some();
+        let renderer = self.renderer(wish.backend, outbox)?;
+        let gpu = renderer.adapter().is_some();
+        let Frame { image, layers, counts, timings, .. } = renderer.render(cloud, &wish.camera, size, &settings)?;
+        let mut image = to_egui(image);
+        if let Some(selected) = &selected {
+            let is_selected = |point: u32| {
+                let index = part.map_or(point, |sparse| sparse.indices[point as usize]);
+                selected.get(index as usize)
+            };
+            for y in 0..size[1] as usize {
+                for x in 0..size[0] as usize {
+                    let point = layers.point[layers.index(x, y)];
+                    if point != u32::MAX && is_selected(point) {
+                        let pixel = &mut image.pixels[y * size[0] as usize + x];
+                        let mixed = [0, 1, 2].map(|i| ((2 * u16::from(pixel[i]) + 3 * SELECTED[i]) / 5) as u8);
+                        *pixel = egui::Color32::from_rgb(mixed[0], mixed[1], mixed[2]);
+                    }
+                }
+            }
+        }
+        let depths = if gpu { Depths::default() } else { Depths::new(layers) };
+        let points = cloud.len();
+        self.costs.learn(
+            points,
+            size[0] as usize * size[1] as usize,
+            timings.project + timings.upload,
+            timings.frame - timings.project,
+        );
+        self.sparse = sparse;
+        Ok(Answer::Picture(Box::new(Picture {
+            image,
+            camera: wish.camera,
+            size: wish.size,
+            whole: pace == Pace::WHOLE,
+            dots: wish.dots.is_some(),
+            counts,
+            timings,
+            milliseconds: started.elapsed().as_secs_f64() * 1e3,
+            depths,
+            shown,
+        })))
+    }
+
+    fn perform(&mut self, task: Task, outbox: &Outbox) -> Result<Outcome, Error> {
+        match task {
+            Task::Pick { wish, pixel, purpose } => {
+                let shown = self.shown(&wish);
+                if shown.cloud.len() < 2 {
+                    return Ok(Outcome::Picked { purpose, point: None });
+                }
+                let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
+                let layers = self
+                    .renderer(wish.backend, outbox)?
+                    .render(&shown.cloud, &wish.camera, wish.size, &settings)?
+                    .layers;
+                let [x, y] = [0, 1].map(|i| (pixel[i].max(0.0) as usize).min(wish.size[i] as usize - 1));
+                // A click beside a thin thing means the thing.
+                let reach = 4isize;
+                let near = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
+                let covered = near.filter_map(|(dx, dy)| {
+                    let x = x.checked_add_signed(dx).filter(|&x| x < wish.size[0] as usize)?;
+                    let y = y.checked_add_signed(dy).filter(|&y| y < wish.size[1] as usize)?;
+                    let at = layers.index(x, y);
+                    (layers.point[at] != u32::MAX).then_some((dx * dx + dy * dy, x, y, at))
+                });
+                let point = covered.min_by_key(|&(distance, ..)| distance).and_then(|(_, x, y, at)| {
+                    let depth = f64::from(layers.depth[at]);
+                    let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                    let surface = wish.camera.unproject(pixel, depth, wish.size).ok()?;
+                    Some(Seen { index: layers.point[at] as usize, shown: Arc::clone(&shown), surface })
+                });
+                Ok(Outcome::Picked { purpose, point })
+            }
+            Task::Select { wish, region, through, mode } => {
+                let shown = self.shown(&wish);
+                let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
+                let lens = wish.camera.lens(wish.size)?;
+                let layers = if through {
+                    None
+                } else {
+                    Some(
+                        self.renderer(wish.backend, outbox)?
+                            .render(&shown.cloud, &wish.camera, wish.size, &settings)?
+                            .layers,
+                    )
+                };
+                let hit = |index: usize| {
+                    let Some((pixel, depth)) = lens.to_pixel(shown.cloud.world_position(index)) else { return false };
+                    let pixel = [pixel.x as f32, pixel.y as f32];
+                    if !region.contains(pixel) {
+                        return false;
+                    }
+                    let inside = (0..2).all(|i| pixel[i] >= 0.0 && pixel[i] < wish.size[i] as f32);
+                    inside
+                        && layers.is_none_or(|layers| {
+                            let at = layers.index(pixel[0] as usize, pixel[1] as usize);
+                            let margin = SEEN * layers.radius.get(at).copied().unwrap_or(0.0);
+                            layers.weight[at] > 0.0 && depth as f32 <= layers.depth[at] + margin
+                        })
+                };
+                let hits = (0..shown.cloud.len()).into_par_iter().map(hit).collect();
+                Ok(Outcome::Selected { shown, hits, mode })
+            }
+            Task::Photograph { wish, path } => {
+                let shown = self.shown(&wish);
+                let settings = settings(&wish, shown.cloud.len());
+                let frame =
+                    self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
+                let image: Box<Image> = Box::new(frame.image.clone());
+                Ok(Outcome::Photographed { image, path })
+            }
+        }
+    }
+}
+
+/// What is asked of the renderer.
+fn settings(wish: &Wish, points: usize) -> Settings {
+    let mut settings = wish.settings.clone();
+    let most = points.saturating_sub(1).clamp(1, 64) as u32;
+    if wish.dots.is_some() {
+        // A search for one neighbour is all that dots cost.
+        settings.reconstruction = Reconstruction {
+            k: 1,
+            splat_scale: 0.01,
+            outlier_expansions: None,
+            gap_factor: None,
+            depth_refinement: false,
+            engine: autosplats::SearchEngine::ScreenGrid,
+            ..Reconstruction::paper()
+        };
+        settings.shading.lighting = false;
+        settings.shading.occlusion = 0.0;
+    }
+    settings.reconstruction.k = settings.reconstruction.k.min(most);
+    settings
+}
+
+fn to_egui(image: &Image) -> egui::ColorImage {
+    let size = [image.width as usize, image.height as usize];
+    let pixels = image.pixels.iter().map(|&[r, g, b, a]| egui::Color32::from_rgba_unmultiplied(r, g, b, a)).collect();
+    egui::ColorImage::new(size, pixels)
+}

@@ -1,0 +1,23 @@
+//! What is kept between starts.
+
+use std::path::PathBuf;
+
+use crate::app::App;
+use crate::look::Look;
+
+const LOOK: &str = "look";
+const RECENT: &str = "recent";
+
+/// Keeps the look and the names of files.
+pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
+    eframe::set_value(storage, LOOK, &app.look);
+    eframe::set_value(storage, RECENT, &app.recent);
+}
+
+/// What was kept, as far as this version understands it.
+pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> (Look, Vec<PathBuf>) {
+    let Some(storage) = storage else { return (Look::default(), Vec::new()) };
+    let look: Look = eframe::get_value(storage, LOOK).unwrap_or_default();
+    let look = if look.settings.check().is_ok() { look } else { Look::default() };
+    (look, eframe::get_value(storage, RECENT).unwrap_or_default())
+}

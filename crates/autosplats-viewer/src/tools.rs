@@ -1,0 +1,174 @@
+//! What the left button does besides turning the view: points are inspected, measured and selected.
+
+use eframe::egui::{self, Color32, Pos2, Stroke};
+
+use crate::app::App;
+use crate::commands::Tool;
+use crate::document::{PickedPoint, Region, SelectMode};
+use crate::measure::{Ruler, angle_text};
+use crate::render::{Purpose, Seen, Task, Wish};
+use autosplats::cloud::glam::DVec3;
+
+/// Points a brush is wide at first, screen points.
+const BRUSH: f32 = 24.0;
+
+/// What the tools have in work.
+pub(crate) struct Tools {
+    /// The way of the pointer since the button went down, screen points.
+    way: Vec<Pos2>,
+    /// Radius of the brush, screen points.
+    pub(crate) brush: f32,
+    /// Selects what is behind the surface, too.
+    pub(crate) through: bool,
+    /// The point that was asked about.
+    pub(crate) inspected: Option<PickedPoint>,
+    /// Corners of the measurement.
+    pub(crate) measured: Vec<DVec3>,
+}
+
+impl Default for Tools {
+    fn default() -> Self {
+        Self { way: Vec::new(), brush: BRUSH, through: false, inspected: None, measured: Vec::new() }
+    }
+}
+
+impl Tools {
+    /// Gives up what is being done; says whether there was anything.
+    pub(crate) fn cancel(&mut self) -> bool {
+        let any = !self.way.is_empty() || self.inspected.is_some() || !self.measured.is_empty();
+        self.way.clear();
+        self.inspected = None;
+        self.measured.clear();
+        any
+    }
+}
+
+/// Selection by a drag with the left button.
+pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
+    let Some(place) = response.interact_pointer_pos() else { return };
+    if response.drag_started_by(egui::PointerButton::Primary) {
+        app.tools.way.clear();
+        // The pointer has moved already when a drag is known to be one.
+        let start = response.ctx.input(|input| input.pointer.press_origin());
+        app.tools.way.extend(start);
+    }
+    if response.dragged_by(egui::PointerButton::Primary) && app.tools.way.last() != Some(&place) {
+        app.tools.way.push(place);
+    }
+    if !response.drag_stopped_by(egui::PointerButton::Primary) || app.tools.way.is_empty() {
+        return;
+    }
+    let scale = size[0] as f32 / response.rect.width();
+    let pixel = |place: &Pos2| [(place.x - response.rect.left()) * scale, (place.y - response.rect.top()) * scale];
+    let way: Vec<[f32; 2]> = std::mem::take(&mut app.tools.way).iter().map(pixel).collect();
+    let region = match app.tool {
+        Tool::Rectangle => Region::rectangle(way[0], way[way.len() - 1]),
+        Tool::Lasso => Region::lasso(&way),
+        _ => Region::brush(&way, app.tools.brush * scale),
+    };
+    let modifiers = response.ctx.input(|input| input.modifiers);
+    let mode = match (modifiers.shift, modifiers.command) {
+        (true, true) => SelectMode::Intersect,
+        (true, false) => SelectMode::Add,
+        (false, true) => SelectMode::Subtract,
+        (false, false) => SelectMode::Replace,
+    };
+    let wish = Box::new(Wish { dots: None, ..app.wish(size, false) });
+    app.render.task(Task::Select { wish, region, through: app.tools.through, mode });
+}
+
+impl App {
+    /// A point was found where somebody clicked.
+    pub(crate) fn picked(&mut self, purpose: Purpose, point: Option<Seen>) {
+        let Some(seen) = point else {
+            if purpose == Purpose::Inspect {
+                self.tools.inspected = None;
+            }
+            return;
+        };
+        let described = self.document().describe(&seen.shown, seen.index);
+        match (purpose, described) {
+            (Purpose::Inspect, described) => self.tools.inspected = described,
+            (Purpose::Measure, Some(described)) => self.tools.measured.push(described.position),
+            _ => {}
+        }
+    }
+}
+
+/// Draws what the tools have in work over the picture.
+pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
+    let painter = ui.painter_at(rect);
+    let accent = Color32::from_rgb(255, 160, 40);
+    let line = Stroke::new(1.5, accent);
+    let way = &app.tools.way;
+    match app.tool {
+        Tool::Rectangle => {
+            if let (Some(&from), Some(&to)) = (way.first(), way.last()) {
+                painter.rect(
+                    egui::Rect::from_two_pos(from, to),
+                    0.0,
+                    accent.gamma_multiply(0.15),
+                    line,
+                    egui::StrokeKind::Middle,
+                );
+            }
+        }
+        Tool::Lasso if way.len() > 1 => {
+            painter.add(egui::Shape::closed_line(way.clone(), line));
+        }
+        Tool::Brush => {
+            for &place in way {
+                painter.circle_filled(place, app.tools.brush, accent.gamma_multiply(0.08));
+            }
+            if let Some(place) = ui.ctx().pointer_hover_pos().filter(|place| rect.contains(*place)) {
+                painter.circle_stroke(place, app.tools.brush, line);
+            }
+        }
+        _ => {}
+    }
+    let Ok(lens) = app.navigation.camera().lens(size) else { return };
+    let scale = rect.width() / size[0] as f32;
+    let place = |world: DVec3| {
+        let (pixel, _) = lens.to_pixel(world)?;
+        Some(rect.min + egui::vec2(pixel.x as f32, pixel.y as f32) * scale)
+    };
+    if let Some(point) = &app.tools.inspected
+        && let Some(at) = place(point.position)
+    {
+        painter.circle_stroke(at, 6.0, Stroke::new(2.0, Color32::BLACK));
+        painter.circle_stroke(at, 6.0, line);
+    }
+    let corners = &app.tools.measured;
+    let ruler = ruler(app);
+    let text = |at: Pos2, text: String| {
+        let galley = painter.layout_no_wrap(text, egui::FontId::proportional(13.0), Color32::WHITE);
+        let frame = egui::Rect::from_center_size(at, galley.size() + egui::vec2(8.0, 4.0));
+        painter.rect_filled(frame, 3.0, Color32::from_black_alpha(190));
+        painter.galley(frame.min + egui::vec2(4.0, 2.0), galley, Color32::WHITE);
+    };
+    for ends in corners.windows(2) {
+        if let (Some(a), Some(b)) = (place(ends[0]), place(ends[1])) {
+            painter.line_segment([a, b], Stroke::new(3.5, Color32::from_black_alpha(160)));
+            painter.line_segment([a, b], line);
+            text(a + (b - a) * 0.5, ruler.length_text(ruler.distance(ends[0], ends[1])));
+        }
+    }
+    for way in corners.windows(3) {
+        if let (Some(at), Some(angle)) = (place(way[1]), ruler.angle(way[0], way[1], way[2])) {
+            text(at + egui::vec2(0.0, 16.0), angle_text(angle));
+        }
+    }
+    for &corner in corners {
+        if let Some(at) = place(corner) {
+            painter.circle_filled(at, 4.0, Color32::BLACK);
+            painter.circle_filled(at, 3.0, accent);
+        }
+    }
+}
+
+/// Measures in the unit of what is open.
+pub(crate) fn ruler(app: &App) -> Ruler {
+    let layers = &app.document().layers;
+    let crs = layers.first().map(|layer| layer.cloud.crs().clone()).unwrap_or_default();
+    Ruler::new(&crs, app.up())
+}

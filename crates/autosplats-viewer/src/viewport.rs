@@ -1,0 +1,156 @@
+//! The picture in the window, and what the mouse does to it.
+
+use autosplats::cloud::glam::{DVec2, DVec3};
+use eframe::egui::{self, Color32, PointerButton, Sense};
+
+use crate::app::App;
+use crate::commands::Tool;
+use crate::render::Purpose;
+use crate::{overlay, tools};
+
+/// How much closer one line of a mouse wheel goes.
+const WHEEL: f64 = 0.0024;
+
+/// Shows the picture and lets it be moved.
+pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
+    egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
+        let rect = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Surface of the points"));
+        let scale = ui.ctx().pixels_per_point();
+        let side = |points: f32| ((points * scale).round() as u32).clamp(1, autosplats::MAX_SIDE);
+        let size = [side(rect.width()), side(rect.height())];
+        app.aspect = f64::from(size[0]) / f64::from(size[1]);
+        let busy = handle(app, &response, size);
+        app.ask(ui.ctx(), size, busy);
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
+        if let Some(shot) = &app.shot {
+            let whole = egui::Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
+            painter.image(shot.texture.id(), rect, whole, Color32::WHITE);
+        } else if app.document().layers.is_empty() && app.loader.jobs().is_empty() {
+            welcome(app, ui, rect);
+        }
+        tools::show(app, ui, rect, size);
+        if app.look.overlay {
+            overlay::show(app, ui, rect);
+        }
+        app.messages.show(ui.ctx(), rect);
+    });
+}
+
+/// What an empty window says.
+fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
+    let mut chosen = None;
+    let middle = egui::Rect::from_center_size(rect.center(), egui::vec2(360.0_f32.min(rect.width()), 320.0));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(middle), |ui| {
+        ui.vertical_centered(|ui| {
+            ui.heading("Drop point clouds here");
+            ui.label("or open them with Ctrl+O. H shows what keys and mouse do.");
+            ui.add_space(12.0);
+            if ui.button("Open…").clicked() {
+                chosen = Some(None);
+            }
+            if !app.recent.is_empty() {
+                ui.add_space(12.0);
+                ui.weak("Opened lately");
+            }
+            for path in app.recent.iter().take(8) {
+                let name =
+                    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
+                if ui.link(name).on_hover_text(path.display().to_string()).clicked() {
+                    chosen = Some(Some(path.clone()));
+                }
+            }
+        });
+    });
+    match chosen {
+        Some(Some(path)) => app.open(crate::loading::Input::file(path)),
+        Some(None) => crate::keys::run(app, &ui.ctx().clone(), crate::commands::Command::Open),
+        None => {}
+    }
+}
+
+/// What the pointer does; says whether the view is in its hands.
+fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
+    let rect = response.rect;
+    let context = &response.ctx;
+    let modifiers = context.input(|input| input.modifiers);
+    let drag = response.drag_delta();
+    let drag = DVec2::new(drag.x.into(), drag.y.into()) / f64::from(rect.height().max(1.0));
+    let mut busy = false;
+    if response.drag_started() {
+        let pressed = context.input(|input| input.pointer.press_origin()).or(response.interact_pointer_pos());
+        app.panels.grabbed = pressed.and_then(|place| under(app, rect, place)).map(|(_, depth)| depth);
+        response.request_focus();
+        response.surrender_focus();
+    }
+    let left = response.dragged_by(PointerButton::Primary);
+    let turns = app.tool == Tool::Navigate || !app.tool.selects() || modifiers.alt;
+    if left && turns && !modifiers.shift && !modifiers.command {
+        app.navigation.orbit(drag);
+        busy = true;
+    } else if left && turns && modifiers.command {
+        app.navigation.look(drag);
+        busy = true;
+    } else if response.dragged_by(PointerButton::Secondary) || left && turns && modifiers.shift {
+        app.navigation.pan(drag, app.panels.grabbed);
+        busy = true;
+    } else if response.dragged_by(PointerButton::Middle) {
+        if app.tool.selects() {
+            app.navigation.orbit(drag);
+        } else {
+            app.navigation.pan(drag, app.panels.grabbed);
+        }
+        busy = true;
+    } else if app.tool.selects() {
+        tools::drag(app, response, size);
+    }
+    let pixel = |place: egui::Pos2| {
+        let scale = size[0] as f32 / rect.width();
+        [(place.x - rect.left()) * scale, (place.y - rect.top()) * scale]
+    };
+    if let Some(place) = response.interact_pointer_pos() {
+        if response.double_clicked() && app.tool != Tool::Measure {
+            app.pick(size, pixel(place), Purpose::Pivot);
+        } else if response.clicked() {
+            match app.tool {
+                Tool::Inspect => app.pick(size, pixel(place), Purpose::Inspect),
+                Tool::Measure => app.pick(size, pixel(place), Purpose::Measure),
+                _ => {}
+            }
+        }
+    }
+    if response.hovered() {
+        let (scroll, pinch) = context.input(|input| (input.smooth_scroll_delta(), input.zoom_delta()));
+        let factor = (f64::from(scroll.y) * WHEEL).exp() * f64::from(pinch);
+        if factor != 1.0 {
+            let target = context.pointer_hover_pos().and_then(|place| under(app, rect, place));
+            app.navigation.zoom(factor, target.map(|(world, _)| world));
+            busy = true;
+        }
+    }
+    if let Some(touch) = context.multi_touch().filter(|_| response.contains_pointer()) {
+        let drag = touch.translation_delta / rect.height();
+        app.navigation.pan(DVec2::new(drag.x.into(), drag.y.into()), app.panels.grabbed);
+        busy = true;
+    }
+    busy
+}
+
+/// The place in the world under a place of the window and its depth: of the surface where there is one, else as far away
+/// as the pivot.
+fn under(app: &App, rect: egui::Rect, place: egui::Pos2) -> Option<(DVec3, f64)> {
+    let share =
+        DVec2::new(((place.x - rect.left()) / rect.width()).into(), ((place.y - rect.top()) / rect.height()).into());
+    let camera = app.navigation.camera();
+    let picture = app.shot.as_ref().map(|shot| &shot.picture);
+    let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, share));
+    let [_, _, forward] = camera.axes().ok()?;
+    let world = surface.or_else(|| {
+        let depth = forward.dot(camera.look_at - camera.eye);
+        let size = [1000.0 * app.aspect, 1000.0].map(|side| side.round().max(1.0) as u32);
+        camera.unproject(share * DVec2::new(size[0].into(), size[1].into()), depth, size).ok()
+    })?;
+    Some((world, forward.dot(world - camera.eye)))
+}
