@@ -18,8 +18,10 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Vec<PathBuf>> 
     let (sender, receiver) = channel();
     let context = context.clone();
     spawn("dialog", move || {
-        let extensions: Vec<&str> = autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
-        let dialog = rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
+        let extensions: Vec<&str> =
+            autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
+        let dialog =
+            rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
         let files = dialog.add_filter("All files", &["*"]).pick_files();
         let _ = sender.send(files.unwrap_or_default());
         context.request_repaint();
@@ -48,7 +50,10 @@ pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> st
 }
 
 /// Writes a file so that it appears complete or not at all.
-pub(crate) fn write(path: &Path, content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>) -> std::io::Result<()> {
+pub(crate) fn write(
+    path: &Path,
+    content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     use std::io::Write as _;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::Builder::new().prefix(".autosplats").tempfile_in(folder)?;

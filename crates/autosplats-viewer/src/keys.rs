@@ -57,7 +57,8 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
         });
         let clipboard = [Command::CopyView, Command::PasteView];
         let hit = |command: &Command| command.shortcut().is_some_and(|shortcut| input.consume_shortcut(&shortcut));
-        let mut pressed: Vec<_> = commands.into_iter().filter(|command| !clipboard.contains(command)).filter(hit).collect();
+        let mut pressed: Vec<_> =
+            commands.into_iter().filter(|command| !clipboard.contains(command)).filter(hit).collect();
         // '?' needs Shift on most keyboards.
         if input.events.iter().any(|event| matches!(event, Event::Text(text) if text == "?")) {
             pressed.push(Command::Help);

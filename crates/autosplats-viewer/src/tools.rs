@@ -104,7 +104,13 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
     match app.tool {
         Tool::Rectangle => {
             if let (Some(&from), Some(&to)) = (way.first(), way.last()) {
-                painter.rect(egui::Rect::from_two_pos(from, to), 0.0, accent.gamma_multiply(0.15), line, egui::StrokeKind::Middle);
+                painter.rect(
+                    egui::Rect::from_two_pos(from, to),
+                    0.0,
+                    accent.gamma_multiply(0.15),
+                    line,
+                    egui::StrokeKind::Middle,
+                );
             }
         }
         Tool::Lasso if way.len() > 1 => {

@@ -16,6 +16,8 @@
 //! Clouds in degrees are shown in metres on a [map](autosplats::cloud::LocalMetres) that all of a document's share; poses
 //! and moves are in these metres, and what is exported is in degrees again.
 
+#![allow(dead_code, reason = "not all of it has its place in the window yet")]
+
 mod bits;
 mod clip;
 mod edit;
@@ -30,7 +32,7 @@ mod shown;
 #[cfg(test)]
 mod tests;
 
-#[allow(unused_imports, reason = "the window that uses them is not built yet")]
+#[allow(unused_imports, reason = "not all of it has its place in the window yet")]
 pub(crate) use self::{
     bits::Bits,
     clip::ClipBox,

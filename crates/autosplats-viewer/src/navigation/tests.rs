@@ -79,7 +79,10 @@ fn the_eye_arrives_and_rests() {
     }
     assert!(!navigation.is_moving(), "it rests");
     let eye = navigation.camera().eye;
-    assert!(eye.distance(DVec3::new(-20.0, 0.0, 0.0)) < 1e-9, "a quarter turn to the right pulls the west to the front: {eye}");
+    assert!(
+        eye.distance(DVec3::new(-20.0, 0.0, 0.0)) < 1e-9,
+        "a quarter turn to the right pulls the west to the front: {eye}"
+    );
 }
 
 #[test]

@@ -130,7 +130,9 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 
 /// Writes the picture of the window that was asked for.
 fn arrived(app: &mut App) {
-    let Some(image) = app.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else { return };
+    let Some(image) = app.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else {
+        return;
+    };
     let Some((_, path)) = app.panels.picture.expected.take() else { return };
     let [width, height] = image.size.map(|side| side as u32);
     let pixels = image.pixels.iter().map(egui::Color32::to_srgba_unmultiplied).collect();

@@ -3,9 +3,9 @@
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
+use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud};
 use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings, guess_axes};
-use autosplats::cloud::glam::DVec2;
 use eframe::egui;
 use rayon::prelude::*;
 
@@ -159,7 +159,12 @@ impl Studio {
         }
         let depths = if gpu { Depths::default() } else { Depths::new(layers) };
         let points = cloud.len();
-        self.costs.learn(points, size[0] as usize * size[1] as usize, timings.project + timings.upload, timings.frame - timings.project);
+        self.costs.learn(
+            points,
+            size[0] as usize * size[1] as usize,
+            timings.project + timings.upload,
+            timings.frame - timings.project,
+        );
         self.sparse = sparse;
         Ok(Answer::Picture(Box::new(Picture {
             image,
@@ -183,7 +188,10 @@ impl Studio {
                     return Ok(Outcome::Picked { purpose, point: None });
                 }
                 let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
-                let layers = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?.layers;
+                let layers = self
+                    .renderer(wish.backend, outbox)?
+                    .render(&shown.cloud, &wish.camera, wish.size, &settings)?
+                    .layers;
                 let [x, y] = [0, 1].map(|i| (pixel[i].max(0.0) as usize).min(wish.size[i] as usize - 1));
                 // A click beside a thin thing means the thing.
                 let reach = 4isize;
@@ -209,7 +217,11 @@ impl Studio {
                 let layers = if through {
                     None
                 } else {
-                    Some(self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?.layers)
+                    Some(
+                        self.renderer(wish.backend, outbox)?
+                            .render(&shown.cloud, &wish.camera, wish.size, &settings)?
+                            .layers,
+                    )
                 };
                 let hit = |index: usize| {
                     let Some((pixel, depth)) = lens.to_pixel(shown.cloud.world_position(index)) else { return false };
@@ -218,11 +230,12 @@ impl Studio {
                         return false;
                     }
                     let inside = (0..2).all(|i| pixel[i] >= 0.0 && pixel[i] < wish.size[i] as f32);
-                    inside && layers.is_none_or(|layers| {
-                        let at = layers.index(pixel[0] as usize, pixel[1] as usize);
-                        let margin = SEEN * layers.radius.get(at).copied().unwrap_or(0.0);
-                        layers.weight[at] > 0.0 && depth as f32 <= layers.depth[at] + margin
-                    })
+                    inside
+                        && layers.is_none_or(|layers| {
+                            let at = layers.index(pixel[0] as usize, pixel[1] as usize);
+                            let margin = SEEN * layers.radius.get(at).copied().unwrap_or(0.0);
+                            layers.weight[at] > 0.0 && depth as f32 <= layers.depth[at] + margin
+                        })
                 };
                 let hits = (0..shown.cloud.len()).into_par_iter().map(hit).collect();
                 Ok(Outcome::Selected { shown, hits, mode })
@@ -230,7 +243,8 @@ impl Studio {
             Task::Photograph { wish, goal } => {
                 let shown = self.shown(&wish);
                 let settings = settings(&wish, shown.cloud.len());
-                let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
+                let frame =
+                    self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
                 let image: Box<Image> = Box::new(frame.image.clone());
                 Ok(Outcome::Photographed { image, goal })
             }
