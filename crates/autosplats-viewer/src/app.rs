@@ -17,6 +17,7 @@ use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
 use crate::panels::Panels;
 use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
+use crate::state::State;
 use crate::tools::Tools;
 use crate::{Options, keys, output, panels, storage, viewport};
 
@@ -46,10 +47,14 @@ pub(crate) struct App {
     /// Width over height of the picture in the window.
     pub(crate) aspect: f64,
     pub(crate) recent: Vec<std::path::PathBuf>,
+    /// Where the session is kept.
+    pub(crate) state: Option<std::path::PathBuf>,
     watch: bool,
     watches: HashMap<LayerId, Watch>,
     /// What each layer was read from.
     inputs: HashMap<LayerId, Input>,
+    /// Whether what is being read is to be seen, and in which colour.
+    looks: HashMap<JobId, (bool, Option<[u8; 3]>)>,
     /// Files that are read again, and whose points they are.
     reloads: HashMap<JobId, LayerId>,
     guessed_axes: Option<Axes>,
@@ -63,6 +68,8 @@ pub(crate) struct App {
     wished: Option<WishKey>,
     /// Whether the first cloud has been looked at.
     placed: bool,
+    /// Whether something else than the mouse moves the view.
+    stirred: bool,
     /// When something moved last, seconds.
     moved: f64,
     pub(crate) quit: bool,
@@ -145,6 +152,8 @@ impl App {
             rate: Rate::default(),
             aspect: 1.5,
             recent,
+            state: options.state,
+            looks: HashMap::new(),
             watch: options.watch,
             watches: HashMap::new(),
             inputs: HashMap::new(),
@@ -155,6 +164,7 @@ impl App {
             counted: (0, Counts::default(), HashMap::new()),
             wished: None,
             placed: false,
+            stirred: false,
             moved: 0.0,
             quit: false,
             keys: Vec::new(),
@@ -175,6 +185,32 @@ impl App {
             self.recent.truncate(12);
         }
         self.loader.read(input);
+    }
+
+    /// Begins to read something that is shown in a certain way.
+    pub(crate) fn open_as(&mut self, input: Input, visible: bool, tint: Option<[u8; 3]>) {
+        let job = self.loader.read(input);
+        self.looks.insert(job, (visible, tint));
+    }
+
+    /// Stands at a place whatever is opened.
+    pub(crate) fn stand_at(&mut self, camera: &Camera) {
+        self.navigation.go_to(camera, true);
+        self.placed = true;
+    }
+
+    /// Says that the view moves, so that pictures have to hurry.
+    pub(crate) fn stir(&mut self) {
+        self.stirred = true;
+    }
+
+    /// What a layer was read from, as it could be typed.
+    pub(crate) fn source_name(&self, id: LayerId) -> Option<String> {
+        let input = self.inputs.get(&id)?;
+        Some(match &input.source {
+            Source::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
+            Source::Scene(..) => input.name.clone(),
+        })
     }
 
     /// What is open.
@@ -349,19 +385,25 @@ impl App {
         let first = !self.placed;
         let cloud = Arc::clone(&layer.cloud);
         let before = self.loading.insert(job, layer.id);
+        let look = self.looks.remove(&job);
         self.change(|document| {
             let place = before.and_then(|id| document.layers.iter().position(|layer| layer.id == id));
             let visible = before.and_then(|id| document.remove(id)).is_none_or(|layer| layer.visible);
             let mut layer = layer;
             layer.visible = visible;
+            if let Some((visible, tint)) = look {
+                (layer.visible, layer.tint) = (visible, tint);
+            }
             let id = document.add(layer);
             if let Some(place) = place {
                 document.reorder(id, place);
             }
         });
+        if self.guessed_axes.is_none() || self.growing == Some(job) {
+            self.guessed_axes = Some(guess_axes(&cloud));
+        }
         if first || self.growing == Some(job) {
             // A preview that grows keeps being fitted until somebody moves.
-            self.guessed_axes = Some(guess_axes(&cloud));
             self.first_view();
             self.growing = Some(job);
             self.placed = true;
@@ -464,6 +506,7 @@ impl App {
     pub(crate) fn ask(&mut self, context: &egui::Context, size: [u32; 2], busy: bool) {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
+        let busy = busy || std::mem::take(&mut self.stirred);
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
             if busy || flight != Flight::default() {
@@ -539,5 +582,13 @@ impl eframe::App for App {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         storage::save(self, storage);
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(path) = &self.state
+            && let Err(error) = State::of(self).write(path)
+        {
+            eprintln!("error: {error}");
+        }
     }
 }

@@ -39,6 +39,8 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     command_button(app, ui, Command::Export, any);
     command_button(app, ui, Command::Screenshot, any);
+    command_button(app, ui, Command::Film, any);
+    command_button(app, ui, Command::SaveState, any);
     ui.separator();
     command_button(app, ui, Command::CloseAll, any);
     command_button(app, ui, Command::Quit, true);

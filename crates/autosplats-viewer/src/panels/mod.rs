@@ -1,6 +1,7 @@
 //! Everything around the picture.
 
 mod export;
+mod film;
 mod help;
 mod inputs;
 mod look;
@@ -25,6 +26,7 @@ pub(crate) struct Panels {
     pub(crate) dialogs: open::Dialogs,
     pub(crate) export: export::Export,
     pub(crate) picture: picture::PictureDialog,
+    pub(crate) film: film::Film,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
     /// Depth of what a drag took hold of.
@@ -43,6 +45,7 @@ impl Default for Panels {
             dialogs: open::Dialogs::default(),
             export: export::Export::default(),
             picture: picture::PictureDialog::default(),
+            film: film::Film::default(),
             claimed: Vec::new(),
             grabbed: None,
             leave: false,
@@ -68,6 +71,7 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     statistics::show(app, context);
     export::show(app, context);
     picture::show(app, context);
+    film::show(app, context);
     help::show(app, context);
     inputs::inspected(app, context);
     leave(app, context);
