@@ -165,11 +165,13 @@ impl Outline<'_> {
         }
         let points = self.sixteenths.around([x, y]);
         let count = (points & DISC).count_ones();
-        if count >= FEWEST_POINTS && !are_around(points) {
-            // What is thin, or alone, has points in a pixel and no other to be seen in: it would be gone.
-            let mut others = (y - 1..=y + 1).flat_map(|y| (x - 1..=x + 1).map(move |x| [x, y]));
-            let stays = |at| self.rims[self.index(at)] != EMPTY && are_around(self.sixteenths.around(at));
-            return Some(points & OWN == 0 || others.any(stays));
+        if let Some(side) = open_side(points).filter(|_| count >= FEWEST_POINTS) {
+            // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
+            let back = if side < LINES.len() { -1 } else { 1 };
+            let [dx, dy] = LINES[side % LINES.len()].map(|along| back * along.signum());
+            let behind = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy)];
+            let stays = self.rims[self.index(behind)] != EMPTY && open_side(self.sixteenths.around(behind)).is_none();
+            return Some(points & OWN == 0 || stays);
         }
         if count >= MANY_POINTS {
             return Some(false);
@@ -239,10 +241,11 @@ impl Outline<'_> {
     }
 }
 
-/// Whether the sixteenths around a pixel that hold points lie on all sides of its middle.
-fn are_around(points: u64) -> bool {
-    let all = (points & DISC).count_ones();
-    all > 0 && SIDES.iter().all(|side| LEAST_SHARE * (points & side).count_ones() >= all)
+/// The side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface.
+fn open_side(points: u64) -> Option<usize> {
+    let count = |side: u64| (points & side).count_ones();
+    let least = (0..SIDES.len()).min_by_key(|&side| count(SIDES[side]))?;
+    (LEAST_SHARE * count(SIDES[least]) < count(DISC).max(1)).then_some(least)
 }
 
 fn square([x, y]: [f32; 2]) -> f32 {
@@ -367,7 +370,7 @@ mod tests {
         // Evenly strewn points below a slanted line, so many a pixel. Two of each pixel are drawn.
         let size = [TILE, 40];
         let below = |x: f32, y: f32| y - (12.0 + 0.27 * x);
-        for (density, most) in [(1.5, 22), (4.0, 12), (40.0, 5)] {
+        for (density, most) in [(1.5, 24), (4.0, 18), (40.0, 5)] {
             let mut random = Random::new(51);
             let strewn = (0..(density * (size[0] * size[1]) as f32) as usize)
                 .map(|_| size.map(|side| random.unit() * side as f32));
@@ -391,7 +394,6 @@ mod tests {
                 pixels.filter(is_wrong).count()
             };
             let (all, some) = (wrong(&points), wrong(&drawn));
-            eprintln!("{density} {all} {some}");
             assert!(all <= most, "{density} points a pixel: {all} wrong over {} columns", size[0]);
             // Where there are many, the outermost are seldom drawn.
             assert!(
@@ -403,16 +405,21 @@ mod tests {
 
     #[test]
     fn what_is_thin_stays() {
-        // A row of points, one a pixel, none in the middle of one; and a point alone.
+        // A wire a fifth of a pixel thick, which passes by the middles of most pixels; and a point alone.
         let size = [TILE, 40];
-        let mut points: Vec<_> = (5..50).map(|x| [x as f32 + 0.4, 12.2 + 0.05 * x as f32]).collect();
+        let mut random = Random::new(53);
+        let wire = |_| {
+            let x = 5.0 + 45.0 * random.unit();
+            [x, 12.2 + 0.05 * x + 0.2 * random.unit()]
+        };
+        let mut points: Vec<_> = (0..1000).map(wire).collect();
         points.push([30.1, 30.1]);
         let stays = stays(size, &points, &points);
-        for [x, y] in &points {
-            assert!(stays(*x as usize, *y as usize), "that of the point at {x}, {y}");
+        for x in 6..49 {
+            let height = (5..25).filter(|&y| stays(x, y)).count();
+            assert!((1..=2).contains(&height), "{height} pixels in column {x}");
         }
-        let count = (0..40).flat_map(|y| (0..TILE).map(move |x| (x, y))).filter(|&(x, y)| stays(x, y)).count();
-        assert_eq!(count, points.len(), "and nothing else");
+        assert!(stays(30, 30), "that of a point alone");
     }
 
     #[test]

@@ -191,18 +191,17 @@ fn is_beside(pixel: vec2u) -> u32 {
     }
     let points = around(pixel);
     let of_disc = count(points & (sides[0] | sides[8]));
-    if of_disc >= FEWEST_POINTS && !are_around(points) {
-        // What is thin, or alone, has points in a pixel and no other to be seen in: it would be gone.
+    let open = open_side(points);
+    if of_disc >= FEWEST_POINTS && open < 16u {
+        // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
         if all((points & OWN) == vec2u(0u)) {
             return YES;
         }
-        for (var at = 0u; at < 9u; at++) {
-            let other = pixel + vec2u(at % 3u, at / 3u) - 1u;
-            if cover[other.y * frame.size.x + other.x].rim != EMPTY_RIM && are_around(around(other)) {
-                return YES;
-            }
-        }
-        return NO;
+        var lines = LINES;
+        let along = sign(lines[open % 8u]);
+        let behind = vec2u(vec2i(pixel) + select(along, -along, open < 8u));
+        let is_drawn = cover[behind.y * frame.size.x + behind.x].rim != EMPTY_RIM;
+        return select(NO, YES, is_drawn && open_side(around(behind)) == 16u);
     }
     if of_disc >= MANY_POINTS {
         return NO;
@@ -214,14 +213,20 @@ fn count(bits: vec2u) -> u32 {
     return countOneBits(bits.x) + countOneBits(bits.y);
 }
 
-// Whether the sixteenths around a pixel that hold points lie on all sides of its middle.
-fn are_around(points: vec2u) -> bool {
-    let all = count(points & (sides[0] | sides[8]));
-    var least = all;
-    for (var which = 0u; which < 16u; which++) {
-        least = min(least, count(points & sides[which]));
+// The side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface;
+// else 16.
+fn open_side(points: vec2u) -> u32 {
+    var side = 0u;
+    var least = count(points & sides[0]);
+    for (var which = 1u; which < 16u; which++) {
+        let there = count(points & sides[which]);
+        if there < least {
+            side = which;
+            least = there;
+        }
     }
-    return all > 0u && LEAST_SHARE * least >= all;
+    let all = count(points & (sides[0] | sides[8]));
+    return select(16u, side, LEAST_SHARE * least < max(all, 1u));
 }
 
 // The sixteenths no farther than a pixel from the middle of one that hold points: eight rows of eight.
