@@ -12,9 +12,9 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     use crate::input::Inputs;
 
     crate::threads::start_threads(&args.run)?;
-    let ViewArgs { inputs, input, watch, backend, run: _ } = args;
+    let ViewArgs { inputs, input, state, watch, backend, run: _ } = args;
     let inputs = Inputs::new(inputs, input)?.for_viewer();
-    let options = Options { inputs, watch: *watch, backend: backend.map(Into::into) };
+    let options = Options { inputs, state: state.clone(), watch: *watch, backend: backend.map(Into::into) };
     autosplats_viewer::run(options).map_err(|error| Failure::new(Exit::Device, error))
 }
 

@@ -8,6 +8,7 @@ use autosplats::cloud::{Axes, PointCloud, Source};
 use autosplats::{AdapterSummary, Camera, Projection, ViewDirection, guess_axes};
 use eframe::egui;
 
+use crate::animation::Recording;
 use crate::commands::Tool;
 use crate::document::{Counts, Document, History, Layer, LayerId, Shown, label};
 use crate::loading::{Input, JobId, Loader, News, Watch};
@@ -16,6 +17,7 @@ use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
 use crate::panels::Panels;
 use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
+use crate::state::State;
 use crate::tools::Tools;
 use crate::{Options, keys, output, panels, storage, viewport};
 
@@ -45,10 +47,14 @@ pub(crate) struct App {
     /// Width over height of the picture in the window.
     pub(crate) aspect: f64,
     pub(crate) recent: Vec<std::path::PathBuf>,
+    /// Where the session is kept.
+    pub(crate) state: Option<std::path::PathBuf>,
     watch: bool,
     watches: HashMap<LayerId, Watch>,
     /// What each layer was read from.
     inputs: HashMap<LayerId, Input>,
+    /// Whether what is being read is to be seen, and in which colour.
+    looks: HashMap<JobId, (bool, Option<[u8; 3]>)>,
     /// Files that are read again, and whose points they are.
     reloads: HashMap<JobId, LayerId>,
     guessed_axes: Option<Axes>,
@@ -62,9 +68,14 @@ pub(crate) struct App {
     wished: Option<WishKey>,
     /// Whether the first cloud has been looked at.
     placed: bool,
+    /// Whether something else than the mouse moves the view.
+    stirred: bool,
     /// When something moved last, seconds.
     moved: f64,
     pub(crate) quit: bool,
+    /// Cameras that a film goes through.
+    pub(crate) keys: Vec<Camera>,
+    pub(crate) recording: Option<Recording>,
 }
 
 /// The last picture, on its way to the screen.
@@ -134,13 +145,15 @@ impl App {
             tool: Tool::default(),
             tools: Tools::default(),
             panels: Panels::default(),
-            messages: Messages::default(),
+            messages: Messages::new(context.clone()),
             shot: None,
             device: None,
             up_axis: None,
             rate: Rate::default(),
             aspect: 1.5,
             recent,
+            state: options.state,
+            looks: HashMap::new(),
             watch: options.watch,
             watches: HashMap::new(),
             inputs: HashMap::new(),
@@ -151,8 +164,11 @@ impl App {
             counted: (0, Counts::default(), HashMap::new()),
             wished: None,
             placed: false,
+            stirred: false,
             moved: 0.0,
             quit: false,
+            keys: Vec::new(),
+            recording: None,
         };
         if let Some(backend) = options.backend {
             app.look.backend = backend;
@@ -169,6 +185,32 @@ impl App {
             self.recent.truncate(12);
         }
         self.loader.read(input);
+    }
+
+    /// Begins to read something that is shown in a certain way.
+    pub(crate) fn open_as(&mut self, input: Input, visible: bool, tint: Option<[u8; 3]>) {
+        let job = self.loader.read(input);
+        self.looks.insert(job, (visible, tint));
+    }
+
+    /// Stands at a place whatever is opened.
+    pub(crate) fn stand_at(&mut self, camera: &Camera) {
+        self.navigation.go_to(camera, true);
+        self.placed = true;
+    }
+
+    /// Says that the view moves, so that pictures have to hurry.
+    pub(crate) fn stir(&mut self) {
+        self.stirred = true;
+    }
+
+    /// What a layer was read from, as it could be typed.
+    pub(crate) fn source_name(&self, id: LayerId) -> Option<String> {
+        let input = self.inputs.get(&id)?;
+        Some(match &input.source {
+            Source::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
+            Source::Scene(..) => input.name.clone(),
+        })
     }
 
     /// What is open.
@@ -309,8 +351,10 @@ impl App {
                 }
             }
             Outcome::Picked { purpose, point } => self.picked(purpose, point),
-            Outcome::Selected { shown, hits, mode } => self.change(|document| document.select(&shown, |i| hits[i], mode)),
-            Outcome::Photographed { image, path } => output::save_picture(self, &image, &path),
+            Outcome::Selected { shown, hits, mode } => {
+                self.change(|document| document.select(&shown, |i| hits[i], mode));
+            }
+            Outcome::Photographed { image, goal } => output::photographed(self, *image, goal),
         }
     }
 
@@ -337,7 +381,9 @@ impl App {
         let id = layer.id;
         self.put(job, layer);
         self.loading.remove(&job);
-        if self.watch && let Some(path) = path {
+        if self.watch
+            && let Some(path) = path
+        {
             self.watches.insert(id, self.loader.watch(path));
         }
         self.inputs.insert(id, input);
@@ -348,19 +394,25 @@ impl App {
         let first = !self.placed;
         let cloud = Arc::clone(&layer.cloud);
         let before = self.loading.insert(job, layer.id);
+        let look = self.looks.remove(&job);
         self.change(|document| {
             let place = before.and_then(|id| document.layers.iter().position(|layer| layer.id == id));
             let visible = before.and_then(|id| document.remove(id)).is_none_or(|layer| layer.visible);
             let mut layer = layer;
             layer.visible = visible;
+            if let Some((visible, tint)) = look {
+                (layer.visible, layer.tint) = (visible, tint);
+            }
             let id = document.add(layer);
             if let Some(place) = place {
                 document.reorder(id, place);
             }
         });
+        if self.guessed_axes.is_none() || self.growing == Some(job) {
+            self.guessed_axes = Some(guess_axes(&cloud));
+        }
         if first || self.growing == Some(job) {
             // A preview that grows keeps being fitted until somebody moves.
-            self.guessed_axes = Some(guess_axes(&cloud));
             self.first_view();
             self.growing = Some(job);
             self.placed = true;
@@ -404,12 +456,13 @@ impl App {
 
     /// Stands where a picture of the first input stands that names no camera.
     pub(crate) fn first_view(&mut self) {
-        let scene = self.loader.jobs().iter().map(|job| &job.input).chain(self.inputs.values()).find_map(|input| {
-            match &input.source {
+        let scene =
+            self.loader.jobs().iter().map(|job| &job.input).chain(self.inputs.values()).find_map(|input| match &input
+                .source
+            {
                 Source::Scene(scene, _) => Some(scene.view()),
                 Source::File(_) => None,
-            }
-        });
+            });
         match scene {
             Some(view) if self.document().layers.len() == 1 => {
                 let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
@@ -466,6 +519,7 @@ impl App {
     pub(crate) fn ask(&mut self, context: &egui::Context, size: [u32; 2], busy: bool) {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
+        let busy = busy || std::mem::take(&mut self.stirred);
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
             if busy || flight != Flight::default() {
@@ -533,6 +587,7 @@ impl eframe::App for App {
         panels::show(self, ui);
         viewport::show(self, ui);
         panels::over(self, &context);
+        output::record(self);
         if self.quit {
             context.send_viewport_cmd(egui::ViewportCommand::Close);
         }
@@ -540,5 +595,13 @@ impl eframe::App for App {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         storage::save(self, storage);
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(path) = &self.state
+            && let Err(error) = State::of(self).write(path)
+        {
+            eprintln!("error: {error}");
+        }
     }
 }

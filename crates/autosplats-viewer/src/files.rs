@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
+use autosplats::Image;
 use eframe::egui;
 
 use crate::threads::spawn;
@@ -17,8 +18,10 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Vec<PathBuf>> 
     let (sender, receiver) = channel();
     let context = context.clone();
     spawn("dialog", move || {
-        let extensions: Vec<&str> = autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
-        let dialog = rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
+        let extensions: Vec<&str> =
+            autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
+        let dialog =
+            rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
         let files = dialog.add_filter("All files", &["*"]).pick_files();
         let _ = sender.send(files.unwrap_or_default());
         context.request_repaint();
@@ -38,8 +41,19 @@ pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -
     receiver
 }
 
+/// Encodes a picture.
+pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> std::io::Result<()> {
+    let encoder = image::codecs::png::PngEncoder::new(writer);
+    let (width, height) = (picture.width, picture.height);
+    image::ImageEncoder::write_image(encoder, picture.pixels.as_flattened(), width, height, image::ExtendedColorType::Rgba8)
+        .map_err(std::io::Error::other)
+}
+
 /// Writes a file so that it appears complete or not at all.
-pub(crate) fn write(path: &Path, content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>) -> std::io::Result<()> {
+pub(crate) fn write(
+    path: &Path,
+    content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     use std::io::Write as _;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::Builder::new().prefix(".autosplats").tempfile_in(folder)?;

@@ -57,7 +57,8 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
         });
         let clipboard = [Command::CopyView, Command::PasteView];
         let hit = |command: &Command| command.shortcut().is_some_and(|shortcut| input.consume_shortcut(&shortcut));
-        let mut pressed: Vec<_> = commands.into_iter().filter(|command| !clipboard.contains(command)).filter(hit).collect();
+        let mut pressed: Vec<_> =
+            commands.into_iter().filter(|command| !clipboard.contains(command)).filter(hit).collect();
         // '?' needs Shift on most keyboards.
         if input.events.iter().any(|event| matches!(event, Event::Text(text) if text == "?")) {
             pressed.push(Command::Help);
@@ -92,6 +93,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::Open => app.panels.dialogs.open(context),
         Command::Export => app.panels.export.open = true,
         Command::Screenshot => app.panels.picture.open = true,
+        Command::Film => app.panels.film.open = !app.panels.film.open,
+        Command::SaveState => app.panels.dialogs.save_state(context),
         Command::CloseAll => crate::panels::close_all(app),
         Command::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
         Command::Undo => match app.undo() {

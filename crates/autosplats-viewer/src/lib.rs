@@ -3,6 +3,7 @@
 //! [`run`] opens it. The window never waits: files are read ([`loading`]) and pictures made ([`render`]) by threads of their
 //! own, which send what they have; [`app`] is the round of a frame of the window.
 
+mod animation;
 mod app;
 mod commands;
 mod document;
@@ -18,10 +19,13 @@ mod output;
 mod overlay;
 mod panels;
 mod render;
+mod state;
 mod storage;
 mod threads;
 mod tools;
 mod viewport;
+
+use std::path::PathBuf;
 
 use autosplats::Backend;
 use eframe::egui;
@@ -33,6 +37,8 @@ pub use self::loading::Input;
 pub struct Options {
     /// What is opened.
     pub inputs: Vec<Input>,
+    /// Where the session is kept: had again if it is there, and written at the end.
+    pub state: Option<PathBuf>,
     /// Read files again when they change.
     pub watch: bool,
     /// Where pictures are made; as last time if it is not said.
@@ -46,13 +52,18 @@ pub enum Error {
     /// There is no display, or nothing that draws on it.
     #[error("no window can be opened: {0}; 'autosplats render' makes pictures without one")]
     Window(String),
+    /// The file of a session cannot be had again.
+    #[error("{0}")]
+    State(String),
 }
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`Error::Window`].
+/// [`Error::Window`], and [`Error::State`] if there is a file of a session that cannot be understood.
 pub fn run(options: Options) -> Result<(), Error> {
+    let path = options.state.as_deref().filter(|path| path.exists());
+    let state = path.map(state::State::read).transpose().map_err(Error::State)?;
     let viewport = egui::ViewportBuilder::default()
         .with_app_id("autosplats")
         .with_title("autosplats")
@@ -62,7 +73,12 @@ pub fn run(options: Options) -> Result<(), Error> {
     let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         let (look, recent) = storage::load(creation.storage);
-        Ok(Box::new(app::App::new(options, look, recent, &creation.egui_ctx)))
+        let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
+        if let Some(state) = state {
+            let folder = app.state.as_deref().map(state::folder).unwrap_or_default();
+            state.restore(&mut app, &folder);
+        }
+        Ok(Box::new(app))
     });
     eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))
 }

@@ -255,7 +255,9 @@ impl Preview {
             return None;
         }
         self.shown = self.points;
-        let whole = PointCloud::merge(std::mem::take(&mut self.parts).into_iter().map(|part| (part, DMat4::IDENTITY)).collect());
+        let whole = PointCloud::merge(
+            std::mem::take(&mut self.parts).into_iter().map(|part| (part, DMat4::IDENTITY)).collect(),
+        );
         self.parts.push(whole.clone());
         Some(whole)
     }

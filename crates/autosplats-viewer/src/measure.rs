@@ -3,6 +3,8 @@
 //! All of it is in `f64` world coordinates. Where the heights of a coordinate system have another unit than its plane, both
 //! become metres first, since there is no length across two units.
 
+#![allow(dead_code, reason = "not all of it has its place in the window yet")]
+
 use autosplats::cloud::{
     Crs, Unit,
     glam::{DVec3, dvec3},
@@ -82,7 +84,7 @@ impl Ruler {
 
     /// A length of few digits with its unit, as on a scale bar.
     pub(crate) fn round_text(&self, length: f64) -> String {
-        let digits = if length < 1e-4 || length >= 1e7 { format!("{length:e}") } else { length.to_string() };
+        let digits = if (1e-4..1e7).contains(&length) { length.to_string() } else { format!("{length:e}") };
         self.unit.map_or_else(|| digits.clone(), |unit| format!("{digits} {}", symbol(unit)))
     }
 

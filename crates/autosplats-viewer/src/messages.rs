@@ -1,5 +1,7 @@
 //! What the user is told, in place: errors stay until they are closed, notes go by themselves.
 
+use std::sync::mpsc::{Receiver, Sender, channel};
+
 use eframe::egui;
 
 /// Seconds that a note is shown.
@@ -8,14 +10,29 @@ const NOTE: f64 = 8.0;
 const KEPT: usize = 6;
 
 /// What is being told.
-#[derive(Debug, Default)]
 pub(crate) struct Messages {
     list: Vec<Message>,
+    /// From threads.
+    post: (Mail, Receiver<Result<String, String>>),
     /// Why the last picture could not be made.
     failure: Option<String>,
 }
 
-#[derive(Debug)]
+/// Sends messages from a thread: notes, or what went wrong.
+#[derive(Clone)]
+pub(crate) struct Mail {
+    sender: Sender<Result<String, String>>,
+    context: egui::Context,
+}
+
+impl Mail {
+    /// Tells what came of some work.
+    pub(crate) fn send(&self, message: Result<String, String>) {
+        let _ = self.sender.send(message);
+        self.context.request_repaint();
+    }
+}
+
 struct Message {
     text: String,
     error: bool,
@@ -24,6 +41,17 @@ struct Message {
 }
 
 impl Messages {
+    /// Nothing is told yet; `context` is asked to draw again when a thread has something to say.
+    pub(crate) fn new(context: egui::Context) -> Self {
+        let (sender, receiver) = channel();
+        Self { list: Vec::new(), post: (Mail { sender, context }, receiver), failure: None }
+    }
+
+    /// For a thread that will have something to say.
+    pub(crate) fn sender(&self) -> Mail {
+        self.post.0.clone()
+    }
+
     /// Tells what is worth knowing.
     pub(crate) fn note(&mut self, text: impl Into<String>) {
         self.push(text.into(), false);
@@ -53,6 +81,13 @@ impl Messages {
 
     /// Draws the messages in the lower left corner of `rect`.
     pub(crate) fn show(&mut self, context: &egui::Context, rect: egui::Rect) {
+        let posted: Vec<_> = self.post.1.try_iter().collect();
+        for message in posted {
+            match message {
+                Ok(note) => self.note(note),
+                Err(error) => self.error(error),
+            }
+        }
         let now = context.input(|input| input.time);
         self.list.retain(|message| message.error || message.since.is_none_or(|since| now - since < NOTE));
         if self.list.is_empty() && self.failure.is_none() {

@@ -118,11 +118,6 @@ impl Navigation {
         self.up = up.try_normalize().unwrap_or(DVec3::Z);
     }
 
-    /// Which way is up.
-    pub(crate) fn up(&self) -> DVec3 {
-        self.up
-    }
-
     /// Goes where `camera` is, at once or smoothly.
     pub(crate) fn go_to(&mut self, camera: &Camera, at_once: bool) {
         let Ok([right, down, forward]) = camera.axes() else { return };
@@ -215,16 +210,6 @@ impl Navigation {
         let next = self.shown.toward(&self.goal, 1.0 - (-seconds / LAG).exp());
         self.shown = if next.is_near(&self.goal) { self.goal } else { next };
         true
-    }
-
-    /// Whether the eye is on its way.
-    pub(crate) fn is_moving(&self) -> bool {
-        self.shown != self.goal
-    }
-
-    /// Goes to the goal at once.
-    pub(crate) fn arrive(&mut self) {
-        self.shown = self.goal;
     }
 
     /// Turns about the pivot. `drag` is in heights of the picture, right and down.

@@ -1,22 +1,68 @@
-//! What is written: pictures.
+//! What is written: pictures, one or many.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use autosplats::Image;
 
+use crate::animation::Recording;
 use crate::app::App;
 use crate::files;
+use crate::render::{Task, Wish};
+use crate::threads::spawn;
 
-/// Writes a picture and says so.
-pub(crate) fn save_picture(app: &mut App, picture: &Image, path: &Path) {
-    let pixels: Vec<u8> = picture.pixels.iter().flatten().copied().collect();
-    let written = files::write(path, |writer| {
-        let encoder = image::codecs::png::PngEncoder::new(writer);
-        image::ImageEncoder::write_image(encoder, &pixels, picture.width, picture.height, image::ExtendedColorType::Rgba8)
-            .map_err(std::io::Error::other)
+/// What a picture of any size is made for.
+pub(crate) enum Goal {
+    /// A file.
+    File(PathBuf),
+    /// The film in the making.
+    Film,
+}
+
+/// Does with a picture what it was made for.
+pub(crate) fn photographed(app: &mut App, picture: Image, goal: Goal) {
+    match goal {
+        Goal::File(path) => save_picture(app, picture, path),
+        Goal::Film => {
+            if let Some(recording) = &mut app.recording {
+                recording.arrived(picture);
+            }
+        }
+    }
+}
+
+/// Writes a picture beside the window, and says so.
+pub(crate) fn save_picture(app: &mut App, picture: Image, path: PathBuf) {
+    let messages = app.messages.sender();
+    spawn("picture", move || {
+        let written = files::write(&path, |writer| files::encode_png(&picture, writer));
+        messages.send(match written {
+            Ok(()) => Ok(format!("{} was written", path.display())),
+            Err(error) => Err(format!("{}: {error}", path.display())),
+        });
     });
-    match written {
-        Ok(()) => app.messages.note(format!("{} was written", path.display())),
-        Err(error) => app.messages.error(format!("{}: {error}", path.display())),
+}
+
+/// Goes on with the film in the making.
+pub(crate) fn record(app: &mut App) {
+    let Some(recording) = &mut app.recording else { return };
+    if let Some(result) = recording.ended() {
+        app.recording = None;
+        match result {
+            Ok(note) => app.messages.note(note),
+            Err(error) => app.messages.error(error),
+        }
+        return;
+    }
+    let size = recording.size;
+    if let Some(camera) = recording.wanted() {
+        let wish = Wish { camera, ..app.wish(size, false) };
+        app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film });
+    }
+}
+
+/// Stops the film in the making.
+pub(crate) fn stop(recording: &mut Option<Recording>) {
+    if let Some(recording) = recording {
+        recording.stop();
     }
 }

@@ -6,8 +6,11 @@ use crate::app::App;
 use crate::tools::ruler;
 
 /// Red, green and blue of the axes, that colour-blind people can tell apart by brightness.
-const AXES: [(&str, Color32); 3] =
-    [("X", Color32::from_rgb(235, 95, 85)), ("Y", Color32::from_rgb(150, 205, 90)), ("Z", Color32::from_rgb(95, 150, 255))];
+const AXES: [(&str, Color32); 3] = [
+    ("X", Color32::from_rgb(235, 95, 85)),
+    ("Y", Color32::from_rgb(150, 205, 90)),
+    ("Z", Color32::from_rgb(95, 150, 255)),
+];
 
 /// Draws both.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect) {
@@ -68,7 +71,9 @@ fn round(length: f64) -> f64 {
 mod tests {
     #[test]
     fn bars_have_round_lengths() {
-        for (length, expected) in [(1.0, 1.0), (1.9, 1.0), (2.5, 2.0), (7.0, 5.0), (9.99, 5.0), (10.0, 10.0), (0.034, 0.02)] {
+        for (length, expected) in
+            [(1.0, 1.0), (1.9, 1.0), (2.5, 2.0), (7.0, 5.0), (9.99, 5.0), (10.0, 10.0), (0.034, 0.02)]
+        {
             let round = super::round(length);
             assert!((round / expected - 1.0).abs() < 1e-9, "{length}: {round} is not {expected}");
         }

@@ -4,8 +4,8 @@ use eframe::egui::{self, Color32, Pos2, Stroke};
 
 use crate::app::App;
 use crate::commands::Tool;
-use crate::gizmo::Gizmo;
 use crate::document::{PickedPoint, Region, SelectMode};
+use crate::gizmo::Gizmo;
 use crate::measure::{Ruler, angle_text};
 use crate::render::{Purpose, Seen, Task, Wish};
 use autosplats::cloud::glam::DVec3;
@@ -31,7 +31,14 @@ pub(crate) struct Tools {
 
 impl Default for Tools {
     fn default() -> Self {
-        Self { way: Vec::new(), brush: BRUSH, through: false, inspected: None, measured: Vec::new(), gizmo: Gizmo::default() }
+        Self {
+            way: Vec::new(),
+            brush: BRUSH,
+            through: false,
+            inspected: None,
+            measured: Vec::new(),
+            gizmo: Gizmo::default(),
+        }
     }
 }
 
@@ -107,7 +114,13 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
     match app.tool {
         Tool::Rectangle => {
             if let (Some(&from), Some(&to)) = (way.first(), way.last()) {
-                painter.rect(egui::Rect::from_two_pos(from, to), 0.0, accent.gamma_multiply(0.15), line, egui::StrokeKind::Middle);
+                painter.rect(
+                    egui::Rect::from_two_pos(from, to),
+                    0.0,
+                    accent.gamma_multiply(0.15),
+                    line,
+                    egui::StrokeKind::Middle,
+                );
             }
         }
         Tool::Lasso if way.len() > 1 => {

@@ -57,7 +57,8 @@ fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
                 ui.weak("Opened lately");
             }
             for path in app.recent.iter().take(8) {
-                let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
+                let name =
+                    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
                 if ui.link(name).on_hover_text(path.display().to_string()).clicked() {
                     chosen = Some(Some(path.clone()));
                 }
@@ -144,7 +145,8 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
 /// The place in the world under a place of the window and its depth: of the surface where there is one, else as far away
 /// as the pivot.
 fn under(app: &App, rect: egui::Rect, place: egui::Pos2) -> Option<(DVec3, f64)> {
-    let share = DVec2::new(((place.x - rect.left()) / rect.width()).into(), ((place.y - rect.top()) / rect.height()).into());
+    let share =
+        DVec2::new(((place.x - rect.left()) / rect.width()).into(), ((place.y - rect.top()) / rect.height()).into());
     let camera = app.navigation.camera();
     let picture = app.shot.as_ref().map(|shot| &shot.picture);
     let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, share));

@@ -7,7 +7,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Counts, Document, Layer, LayerId};
+use super::{Counts, Document, Layer, LayerId, layer::Edits};
 
 /// Points that are enough to see how large something is.
 const OVERVIEW: usize = 100_000;
@@ -69,8 +69,9 @@ impl Document {
     /// Gives a layer the points that its file has now; what was done to single points is forgotten, as they may be others.
     pub(crate) fn reload(&mut self, id: LayerId, cloud: Arc<PointCloud>) -> bool {
         self.change(id, |layer| {
-            let fresh = Layer::new(&*layer.name, layer.path.clone(), cloud);
-            (layer.cloud, layer.edits) = (fresh.cloud, fresh.edits);
+            // On the map as before, if it is in degrees still.
+            layer.local = cloud.local_metres(layer.local.as_ref());
+            (layer.cloud, layer.edits) = (cloud, Edits::default());
         })
     }
 

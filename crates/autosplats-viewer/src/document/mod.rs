@@ -16,6 +16,8 @@
 //! Clouds in degrees are shown in metres on a [map](autosplats::cloud::LocalMetres) that all of a document's share; poses
 //! and moves are in these metres, and what is exported is in degrees again.
 
+#![allow(dead_code, reason = "not all of it has its place in the window yet")]
+
 mod bits;
 mod clip;
 mod edit;
@@ -36,7 +38,7 @@ pub(crate) use self::{
     edit::{Grip, about},
     export::{ExportError, Exported, Replace, What, export},
     history::{History, grouped, label},
-    layer::{Counts, Edits, Layer, LayerId},
+    layer::{Counts, Layer, LayerId},
     pick::PickedPoint,
     region::Region,
     select::SelectMode,

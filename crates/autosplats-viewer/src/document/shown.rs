@@ -206,25 +206,11 @@ impl Shown {
         self.cloud.len()
     }
 
-    /// Whether there is nothing to be seen.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.cloud.is_empty()
-    }
-
     /// The layer of a shown point, and which of the layer's points it is.
     pub(crate) fn point(&self, index: usize) -> Option<(LayerId, usize)> {
         let part = &self.parts[self.parts.partition_point(|part| part.start <= index).checked_sub(1)?];
         let within = index - part.start;
         (within < part.len).then(|| (part.layer, part.point(within)))
-    }
-
-    /// Where a layer's point is among the shown ones, if it is.
-    pub(crate) fn index_of(&self, layer: LayerId, point: usize) -> Option<usize> {
-        let part = self.part(layer)?;
-        match &part.points {
-            None => (point < part.len).then_some(part.start + point),
-            Some(points) => Some(part.start + points.binary_search(&u32::try_from(point).ok()?).ok()?),
-        }
     }
 
     pub(super) fn part(&self, layer: LayerId) -> Option<&Part> {

@@ -186,12 +186,19 @@ pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<
                 let along = (to - from).normalized();
                 let aside = along.rot90() * 6.0;
                 let head = vec![to + along * 12.0, to + aside, to - aside];
-                painter.add(eframe::egui::Shape::convex_polygon(head, color, Stroke::new(1.0, Color32::from_black_alpha(160))));
+                painter.add(eframe::egui::Shape::convex_polygon(
+                    head,
+                    color,
+                    Stroke::new(1.0, Color32::from_black_alpha(160)),
+                ));
             }
             Shape::Loop(places) => {
                 let width = if is_taken { 3.0 } else { 1.8 };
                 let faint = if is_taken { 1.0 } else { 0.75 };
-                painter.add(eframe::egui::Shape::closed_line(places.clone(), Stroke::new(width + 2.0, Color32::from_black_alpha(90))));
+                painter.add(eframe::egui::Shape::closed_line(
+                    places.clone(),
+                    Stroke::new(width + 2.0, Color32::from_black_alpha(90)),
+                ));
                 painter.add(eframe::egui::Shape::closed_line(places, Stroke::new(width, color.gamma_multiply(faint))));
             }
         }

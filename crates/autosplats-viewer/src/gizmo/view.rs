@@ -204,7 +204,11 @@ mod tests {
             assert!((angle(DVec3::NEG_Z, from - FAR, to - FAR).to_degrees() + 90.0).abs() < 0.3, "backward from below");
             let sight = view.sight(FAR).expect("before the eye");
             let place = view.place(FAR).expect("before the eye");
-            assert_eq!(on_plane(FAR, sight.any_orthonormal_vector(), view.ray(place)), None, "edge on no plane is seen");
+            assert_eq!(
+                on_plane(FAR, sight.any_orthonormal_vector(), view.ray(place)),
+                None,
+                "edge on no plane is seen"
+            );
         }
     }
 

@@ -51,7 +51,8 @@ fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
             {
                 let number = egui::DragValue::new(value).speed(speed).range(range).max_decimals(4);
                 let response = ui.add_sized([84.0, 20.0], number);
-                response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, format!("{name} {what}")));
+                response
+                    .widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, format!("{name} {what}")));
                 busy |= response.dragged() || response.has_focus();
             }
             ui.end_row();

@@ -197,7 +197,9 @@ fn saved_layers(document: &Document, what: What) -> Vec<LayerId> {
     let complete = |layer: &&crate::document::Layer| match what {
         What::All => true,
         What::Layer(id) => layer.id == id,
-        What::Shown => layer.visible && layer.edits.hidden.is_empty() && !document.clip.as_ref().is_some_and(|clip| clip.enabled),
+        What::Shown => {
+            layer.visible && layer.edits.hidden.is_empty() && !document.clip.as_ref().is_some_and(|clip| clip.enabled)
+        }
         What::Selected => false,
     };
     document.layers.iter().filter(complete).map(|layer| layer.id).collect()

@@ -74,7 +74,8 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         ui.horizontal_wrapped(|ui| {
             ui.add_space(22.0);
             let mut figures = format!("{} points", grouped(counts.points));
-            for (count, what) in [(counts.selected, "selected"), (counts.hidden, "hidden"), (counts.deleted, "deleted")] {
+            for (count, what) in [(counts.selected, "selected"), (counts.hidden, "hidden"), (counts.deleted, "deleted")]
+            {
                 if count > 0 {
                     figures += &format!(", {} {what}", grouped(count));
                 }

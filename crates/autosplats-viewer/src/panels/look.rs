@@ -157,7 +157,11 @@ fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
         reconstruction.outlier_expansions = removed.then(|| given.outlier_expansions.unwrap_or(1));
     }
     let mut open = reconstruction.gap_factor.is_some();
-    if ui.checkbox(&mut open, "Gaps stay open").on_hover_text("Otherwise all neighbours are taken across any gap").changed() {
+    if ui
+        .checkbox(&mut open, "Gaps stay open")
+        .on_hover_text("Otherwise all neighbours are taken across any gap")
+        .changed()
+    {
         reconstruction.gap_factor = open.then(|| given.gap_factor.unwrap_or(4.0));
     }
     if let Some(factor) = &mut reconstruction.gap_factor {

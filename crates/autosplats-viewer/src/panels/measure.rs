@@ -17,7 +17,8 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let report = Report::new(&ruler(app), &app.tools.measured);
     let mut open = true;
     let place = context.content_rect().right_top() + egui::vec2(-320.0, 60.0);
-    let window = egui::Window::new("Measurement").open(&mut open).resizable(true).default_width(290.0).default_pos(place);
+    let window =
+        egui::Window::new("Measurement").open(&mut open).resizable(true).default_width(290.0).default_pos(place);
     window.show(context, |ui| {
         egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
             for (number, rows) in report.parts().into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {
@@ -128,7 +129,11 @@ mod tests {
 
     #[test]
     fn one_corner_is_a_place() {
-        assert_eq!(report(&[DVec3::new(1.0, 2.5, 3.0)]), "Corner 1\t1.000000  2.500000  3.000000\n", "and nothing else");
+        assert_eq!(
+            report(&[DVec3::new(1.0, 2.5, 3.0)]),
+            "Corner 1\t1.000000  2.500000  3.000000\n",
+            "and nothing else"
+        );
         assert_eq!(report(&[]), "", "none is nothing");
     }
 
@@ -144,8 +149,12 @@ mod tests {
     #[test]
     fn more_corners_have_angles_and_an_area() {
         let text = report(&[DVec3::ZERO, DVec3::X * 4.0, DVec3::new(4.0, 3.0, 0.0)]);
-        let lines =
-            ["Total length\t7.0000 m", "Straight from first to last\t5.0000 m", "Area, if closed\t6.0000 m²", "2 to 3\t3.0000 m"];
+        let lines = [
+            "Total length\t7.0000 m",
+            "Straight from first to last\t5.0000 m",
+            "Area, if closed\t6.0000 m²",
+            "2 to 3\t3.0000 m",
+        ];
         for line in lines.into_iter().chain(["Angle at 2\t90.00°", "Corner 3\t4.0000  3.0000  0.0000"]) {
             assert!(text.lines().any(|own| own == line), "'{line}' is not in:\n{text}");
         }

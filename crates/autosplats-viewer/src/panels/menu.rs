@@ -39,6 +39,8 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     command_button(app, ui, Command::Export, any);
     command_button(app, ui, Command::Screenshot, any);
+    command_button(app, ui, Command::Film, any);
+    command_button(app, ui, Command::SaveState, any);
     ui.separator();
     command_button(app, ui, Command::CloseAll, any);
     command_button(app, ui, Command::Quit, true);
@@ -83,6 +85,15 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::OppositeView, any);
     ui.separator();
     command_button(app, ui, Command::Projection, true);
+    ui.horizontal(|ui| {
+        let mut fov = app.navigation.fov_deg();
+        let number = egui::DragValue::new(&mut fov).range(5.0..=120.0).max_decimals(1).suffix("°");
+        if ui.add(number).on_hover_text("From the upper to the lower edge; what is looked at keeps its size").changed()
+        {
+            app.navigation.set_fov_deg(fov);
+        }
+        ui.label("Field of view");
+    });
     command_button(app, ui, Command::UpAxis, any);
     command_button(app, ui, Command::Level, any);
     ui.separator();

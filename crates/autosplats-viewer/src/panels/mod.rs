@@ -2,6 +2,7 @@
 
 mod clip;
 mod export;
+mod film;
 mod help;
 mod inputs;
 mod layer;
@@ -35,6 +36,7 @@ pub(crate) struct Panels {
     pub(crate) dialogs: open::Dialogs,
     pub(crate) export: export::Export,
     pub(crate) picture: picture::PictureDialog,
+    pub(crate) film: film::Film,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
     /// Depth of what a drag took hold of.
@@ -57,6 +59,7 @@ impl Default for Panels {
             dialogs: open::Dialogs::default(),
             export: export::Export::default(),
             picture: picture::PictureDialog::default(),
+            film: film::Film::default(),
             claimed: Vec::new(),
             grabbed: None,
             leave: false,
@@ -82,6 +85,7 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     statistics::show(app, context);
     export::show(app, context);
     picture::show(app, context);
+    film::show(app, context);
     help::show(app, context);
     inputs::inspected(app, context);
     clip::show(app, context);
@@ -94,7 +98,8 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
 /// Asks before edits are lost.
 fn leave(app: &mut App, context: &egui::Context) {
     let asked = context.input(|input| input.viewport().close_requested());
-    if asked && !app.quit && app.history.is_changed_since_saved() {
+    let writing = app.panels.export.is_writing();
+    if asked && !app.quit && (writing || app.history.is_changed_since_saved()) {
         context.send_viewport_cmd(egui::ViewportCommand::CancelClose);
         app.panels.leave = true;
     }
@@ -104,8 +109,14 @@ fn leave(app: &mut App, context: &egui::Context) {
     let names: Vec<String> =
         app.history.unsaved().filter_map(|id| app.document().layer(id)).map(|layer| layer.name.clone()).collect();
     let modal = egui::Modal::new(egui::Id::unique("leave")).show(context, |ui| {
-        ui.heading("Edits are not saved");
-        ui.label(format!("Those of {} would be lost.", names.join(", ")));
+        if writing {
+            ui.heading("A file is being written");
+            ui.label("It would stay as it was.");
+        }
+        if !names.is_empty() {
+            ui.heading("Edits are not saved");
+            ui.label(format!("Those of {} would be lost.", names.join(", ")));
+        }
         ui.add_space(8.0);
         ui.horizontal(|ui| {
             if ui.button("Export…").clicked() {

@@ -11,6 +11,7 @@ use eframe::egui;
 use super::export::has_extension;
 use crate::app::App;
 use crate::files::ask_for_output;
+use crate::output::Goal;
 use crate::render::{Task, Wish};
 
 /// Bytes that stages and layers take for each pixel.
@@ -122,17 +123,19 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         } else {
             let size = dialog.size;
             let wish: Wish = app.wish(size, false);
-            app.render.task(Task::Photograph { wish: Box::new(wish), path });
+            app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
         }
     }
 }
 
 /// Writes the picture of the window that was asked for.
 fn arrived(app: &mut App) {
-    let Some(image) = app.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else { return };
+    let Some(image) = app.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else {
+        return;
+    };
     let Some((_, path)) = app.panels.picture.expected.take() else { return };
     let [width, height] = image.size.map(|side| side as u32);
     let pixels = image.pixels.iter().map(egui::Color32::to_srgba_unmultiplied).collect();
     let picture = autosplats::Image { width, height, pixels, linear: Vec::new() };
-    crate::output::save_picture(app, &picture, &path);
+    crate::output::save_picture(app, picture, path);
 }

@@ -7,8 +7,11 @@ use egui_plot::{Bar, BarChart, Plot};
 use crate::app::App;
 use crate::document::grouped;
 
+/// What a stage is called, its milliseconds and its colour.
+type Stage = (&'static str, fn(&Timings) -> f64, egui::Color32);
+
 /// The stages, with colours that colour-blind people can tell apart (Okabe and Ito 2008).
-const STAGES: [(&str, fn(&Timings) -> f64, egui::Color32); 6] = [
+const STAGES: [Stage; 6] = [
     ("project", |t| t.project, egui::Color32::from_rgb(0, 114, 178)),
     ("search", |t| t.search, egui::Color32::from_rgb(230, 159, 0)),
     ("fit", |t| t.fit, egui::Color32::from_rgb(0, 158, 115)),

@@ -1,12 +1,12 @@
 //! What is done in order, besides pictures.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use autosplats::Image;
 use autosplats::cloud::glam::DVec3;
 
 use super::Wish;
+use crate::output::Goal;
 use crate::document::{Region, SelectMode, Shown};
 
 /// Something to be done as soon as the picture in work is finished.
@@ -16,7 +16,7 @@ pub(crate) enum Task {
     /// Finds the points in a region of the picture wished for: those seen, or those behind them too.
     Select { wish: Box<Wish>, region: Region, through: bool, mode: SelectMode },
     /// Makes a picture of any size and hands it over.
-    Photograph { wish: Box<Wish>, path: PathBuf },
+    Photograph { wish: Box<Wish>, goal: Goal },
 }
 
 /// What a point is picked for.
@@ -36,8 +36,8 @@ pub(crate) enum Outcome {
     Picked { purpose: Purpose, point: Option<Seen> },
     /// Which of the points shown are in the region.
     Selected { shown: Arc<Shown>, hits: Vec<bool>, mode: SelectMode },
-    /// A picture for a file.
-    Photographed { image: Box<Image>, path: PathBuf },
+    /// A picture of the size that was asked for.
+    Photographed { image: Box<Image>, goal: Goal },
 }
 
 /// A point that is seen at a pixel.

@@ -3,9 +3,9 @@
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
-use autosplats::cloud::{Axes, PointCloud};
-use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings, guess_axes};
 use autosplats::cloud::glam::DVec2;
+use autosplats::cloud::{Axes, PointCloud, check_memory};
+use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings, guess_axes};
 use eframe::egui;
 use rayon::prelude::*;
 
@@ -85,13 +85,15 @@ impl Sparse {
 
 impl Studio {
     /// The points that a wish is about, made again only if they have changed.
-    fn shown(&mut self, wish: &Wish) -> Arc<Shown> {
+    fn shown(&mut self, wish: &Wish) -> Result<Arc<Shown>, Error> {
         if let Some((axes, shown)) = &self.shown
             && *axes == wish.axes
             && shown.shows(&wish.document)
         {
-            return Arc::clone(shown);
+            return Ok(Arc::clone(shown));
         }
+        check_memory("what is shown", wish.document.shown_bytes() as u64)
+            .map_err(|error| Error::NothingVisible(error.to_string()))?;
         let mut shown = wish.document.shown();
         if guess_axes(&shown.cloud) != wish.axes {
             shown.cloud = Arc::new(PointCloud::clone(&shown.cloud).with_axes(wish.axes));
@@ -99,7 +101,7 @@ impl Studio {
         let shown = Arc::new(shown);
         self.shown = Some((wish.axes, Arc::clone(&shown)));
         self.sparse = None;
-        shown
+        Ok(shown)
     }
 
     fn renderer(&mut self, backend: Backend, outbox: &Outbox) -> Result<&mut Renderer, Error> {
@@ -116,7 +118,7 @@ impl Studio {
 
     fn draw(&mut self, wish: &Wish, outbox: &Outbox) -> Result<Answer, Error> {
         let started = Instant::now();
-        let shown = self.shown(wish);
+        let shown = self.shown(wish)?;
         if shown.cloud.len() < 2 {
             return Ok(Answer::Empty);
         }
@@ -159,7 +161,12 @@ impl Studio {
         }
         let depths = if gpu { Depths::default() } else { Depths::new(layers) };
         let points = cloud.len();
-        self.costs.learn(points, size[0] as usize * size[1] as usize, timings.project + timings.upload, timings.frame - timings.project);
+        self.costs.learn(
+            points,
+            size[0] as usize * size[1] as usize,
+            timings.project + timings.upload,
+            timings.frame - timings.project,
+        );
         self.sparse = sparse;
         Ok(Answer::Picture(Box::new(Picture {
             image,
@@ -178,12 +185,15 @@ impl Studio {
     fn perform(&mut self, task: Task, outbox: &Outbox) -> Result<Outcome, Error> {
         match task {
             Task::Pick { wish, pixel, purpose } => {
-                let shown = self.shown(&wish);
+                let shown = self.shown(&wish)?;
                 if shown.cloud.len() < 2 {
                     return Ok(Outcome::Picked { purpose, point: None });
                 }
                 let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
-                let layers = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?.layers;
+                let layers = self
+                    .renderer(wish.backend, outbox)?
+                    .render(&shown.cloud, &wish.camera, wish.size, &settings)?
+                    .layers;
                 let [x, y] = [0, 1].map(|i| (pixel[i].max(0.0) as usize).min(wish.size[i] as usize - 1));
                 // A click beside a thin thing means the thing.
                 let reach = 4isize;
@@ -203,13 +213,17 @@ impl Studio {
                 Ok(Outcome::Picked { purpose, point })
             }
             Task::Select { wish, region, through, mode } => {
-                let shown = self.shown(&wish);
+                let shown = self.shown(&wish)?;
                 let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
                 let lens = wish.camera.lens(wish.size)?;
                 let layers = if through {
                     None
                 } else {
-                    Some(self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?.layers)
+                    Some(
+                        self.renderer(wish.backend, outbox)?
+                            .render(&shown.cloud, &wish.camera, wish.size, &settings)?
+                            .layers,
+                    )
                 };
                 let hit = |index: usize| {
                     let Some((pixel, depth)) = lens.to_pixel(shown.cloud.world_position(index)) else { return false };
@@ -218,21 +232,23 @@ impl Studio {
                         return false;
                     }
                     let inside = (0..2).all(|i| pixel[i] >= 0.0 && pixel[i] < wish.size[i] as f32);
-                    inside && layers.is_none_or(|layers| {
-                        let at = layers.index(pixel[0] as usize, pixel[1] as usize);
-                        let margin = SEEN * layers.radius.get(at).copied().unwrap_or(0.0);
-                        layers.weight[at] > 0.0 && depth as f32 <= layers.depth[at] + margin
-                    })
+                    inside
+                        && layers.is_none_or(|layers| {
+                            let at = layers.index(pixel[0] as usize, pixel[1] as usize);
+                            let margin = SEEN * layers.radius.get(at).copied().unwrap_or(0.0);
+                            layers.weight[at] > 0.0 && depth as f32 <= layers.depth[at] + margin
+                        })
                 };
                 let hits = (0..shown.cloud.len()).into_par_iter().map(hit).collect();
                 Ok(Outcome::Selected { shown, hits, mode })
             }
-            Task::Photograph { wish, path } => {
-                let shown = self.shown(&wish);
+            Task::Photograph { wish, goal } => {
+                let shown = self.shown(&wish)?;
                 let settings = settings(&wish, shown.cloud.len());
-                let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
+                let frame =
+                    self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
                 let image: Box<Image> = Box::new(frame.image.clone());
-                Ok(Outcome::Photographed { image, path })
+                Ok(Outcome::Photographed { image, goal })
             }
         }
     }

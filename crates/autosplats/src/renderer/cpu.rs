@@ -155,7 +155,7 @@ impl CpuRenderer {
             splatter.refine(surfels, &view);
         }
         splatter.attributes(surfels, &view, &attributes);
-        let (layers, covered) = splatter.trim(&view);
+        let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
         clock.lap(|timings| &mut timings.splat);
 
         let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };

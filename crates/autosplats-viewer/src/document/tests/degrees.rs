@@ -45,6 +45,20 @@ fn neighbours_keep_their_places_to_each_other() {
 }
 
 #[test]
+fn a_file_read_again_stays_on_the_map() {
+    let (mut document, [_, second]) = neighbours();
+    let place = document.layers[1].position(3);
+    let shown = document.shown();
+    document.select_all(&shown);
+    document.delete_selected();
+    assert!(document.reload(second, degrees(DVec3::new(10.0625, 50.0, 100.0))), "it is there");
+    assert_eq!(document.layers[1].position(3), place, "where it was");
+    assert_eq!(document.counts_of(&document.layers[1]).deleted, 0, "with all its points");
+    document.reload(second, cloud(10, DVec3::ZERO));
+    assert_eq!(document.layers[1].position(3), document.layers[1].file_position(3), "metres are on no map");
+}
+
+#[test]
 fn edits_in_metres_are_written_in_degrees() {
     let (mut document, [first, second]) = neighbours();
     let folder = tempfile::tempdir().expect("a folder");

@@ -19,7 +19,7 @@ fn exact_values_of_the_point_that_is_shown() {
         layer.edits.moves = vec![(every(700, 3), DMat4::from_translation(DVec3::new(1e-7, 0.0, 0.0)))];
     });
     let shown = document.shown();
-    let index = shown.index_of(second, 9).expect("it is shown");
+    let index = (0..shown.len()).find(|&index| shown.point(index) == Some((second, 9))).expect("it is shown");
     document.rename(second, "renamed");
     let picked = document.describe(&shown, index).expect("a point");
     assert_eq!((picked.layer, picked.point, &*picked.name), (second, 9, "renamed"), "of its layer");

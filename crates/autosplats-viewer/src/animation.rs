@@ -1,0 +1,348 @@
+//! Ways of the camera, and what makes films of them.
+//!
+//! # How it works
+//! A way is a list of cameras, one a picture. The render thread is asked for one after the other, so that the window goes on
+//! in between; a thread of its own writes them, as PNG files or to ffmpeg, which makes a film.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+
+use autosplats::cloud::glam::{DQuat, DVec3};
+use autosplats::{Camera, Image, Projection};
+use eframe::egui;
+
+use crate::files;
+use crate::threads::spawn;
+
+/// Pictures that wait to be written.
+const QUEUE: usize = 3;
+
+/// Cameras of a turn about the vertical through the pivot, `pictures` of them, `degrees` in all; the last one is not where
+/// the first one is, so that the film can be played in a loop.
+pub(crate) fn turntable(camera: &Camera, up: DVec3, degrees: f64, pictures: usize) -> Vec<Camera> {
+    let turned = |picture: usize| {
+        let turn = DQuat::from_axis_angle(up, (degrees * picture as f64 / pictures.max(1) as f64).to_radians());
+        Camera { eye: camera.look_at + turn * (camera.eye - camera.look_at), up: turn * camera.up, ..*camera }
+    };
+    (0..pictures).map(turned).collect()
+}
+
+/// Cameras of a smooth way through `keys`, `pictures` of them, the first and the last at the first and the last key.
+pub(crate) fn path(keys: &[Camera], pictures: usize) -> Vec<Camera> {
+    match keys {
+        [] => Vec::new(),
+        [only] => vec![*only; pictures],
+        keys => {
+            let spans = (keys.len() - 1) as f64;
+            let last = pictures.saturating_sub(1).max(1) as f64;
+            (0..pictures).map(|picture| at(keys, spans * picture as f64 / last)).collect()
+        }
+    }
+}
+
+/// The camera at `time`, counted in keys.
+fn at(keys: &[Camera], time: f64) -> Camera {
+    let span = (time.floor() as usize).min(keys.len() - 2);
+    let part = (time - span as f64).clamp(0.0, 1.0);
+    let around = [span.saturating_sub(1), span, span + 1, (span + 2).min(keys.len() - 1)].map(|key| keys[key]);
+    let smooth = |value: fn(&Camera) -> DVec3| {
+        let [a, b, c, d] = around.map(|key| value(&key));
+        // Catmull and Rom: through b and c, in b parallel to the way from a to c.
+        let t = part;
+        0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t * t + (3.0 * b - a - 3.0 * c + d) * t * t * t)
+    };
+    let [_, from, to, _] = around;
+    let eye = smooth(|camera| camera.eye);
+    let look_at = smooth(|camera| camera.look_at);
+    let up = from.up.normalize_or(DVec3::Z).lerp(to.up.normalize_or(DVec3::Z), part);
+    let projection = match (from.projection, to.projection) {
+        (Projection::PerspectiveFovDeg(a), Projection::PerspectiveFovDeg(b)) => {
+            Projection::PerspectiveFovDeg(a + (b - a) * part)
+        }
+        (Projection::OrthographicHeight(a), Projection::OrthographicHeight(b)) => {
+            Projection::OrthographicHeight(a * (b / a).powf(part))
+        }
+        (from, to) => if part < 0.5 { from } else { to },
+    };
+    let camera = Camera { eye, look_at, up, projection };
+    // Where the smooth way runs through itself, the nearer key will do.
+    if camera.check().is_ok() { camera } else if part < 0.5 { from } else { to }
+}
+
+/// Where pictures go.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Target {
+    /// A PNG file each: what is before and after the number in its name.
+    Frames(PathBuf, String, String),
+    /// A film.
+    Film(PathBuf),
+}
+
+impl Target {
+    /// What a path means: a film by its extension, otherwise numbered PNG files.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(crate) fn new(path: &Path) -> Result<Self, String> {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        match path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).as_deref() {
+            Some("mp4" | "mkv" | "webm" | "mov") => Ok(Self::Film(path.into())),
+            Some("png") => {
+                let stem = name[..name.len() - 4].to_owned();
+                let (before, after) = stem.split_once("%05d").map_or((stem.clone() + "_", ""), |(a, b)| (a.into(), b));
+                Ok(Self::Frames(folder, before, format!("{after}.png")))
+            }
+            _ => Err("The name has to end in .mp4, .mkv, .webm, .mov or .png".into()),
+        }
+    }
+
+    /// The file of a picture.
+    fn frame(folder: &Path, before: &str, after: &str, number: usize) -> PathBuf {
+        folder.join(format!("{before}{number:05}{after}"))
+    }
+
+    /// What would be replaced.
+    pub(crate) fn existing(&self, pictures: usize) -> Option<PathBuf> {
+        match self {
+            Self::Film(path) => Some(path.clone()).filter(|path| path.exists()),
+            Self::Frames(folder, before, after) => {
+                (0..pictures).map(|number| Self::frame(folder, before, after, number)).find(|path| path.exists())
+            }
+        }
+    }
+}
+
+/// Whether films can be made.
+pub(crate) fn has_ffmpeg() -> bool {
+    let mut probe = Command::new("ffmpeg");
+    probe.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    probe.status().is_ok_and(|status| status.success())
+}
+
+/// A film in the making.
+pub(crate) struct Recording {
+    cameras: Vec<Camera>,
+    /// Picture that is asked for next.
+    next: usize,
+    pub(crate) size: [u32; 2],
+    /// To the thread that writes.
+    pictures: Option<SyncSender<Image>>,
+    /// One that the writer had no room for yet.
+    waiting: Option<Image>,
+    /// Whether a picture is being made.
+    asked: bool,
+    result: Receiver<Result<String, String>>,
+}
+
+impl Recording {
+    /// Begins to write pictures of `cameras`, so many a second, to `target`.
+    pub(crate) fn start(
+        cameras: Vec<Camera>,
+        size: [u32; 2],
+        rate: u32,
+        target: Target,
+        context: &egui::Context,
+    ) -> Self {
+        let (pictures, queue) = sync_channel::<Image>(QUEUE);
+        let (sender, result) = sync_channel(1);
+        let context = context.clone();
+        let total = cameras.len();
+        spawn("film", move || {
+            let written = match target {
+                Target::Frames(folder, before, after) => write_frames(&queue, &folder, &before, &after, total, &context),
+                Target::Film(path) => write_film(&queue, &path, size, rate, total, &context),
+            };
+            let _ = sender.send(written);
+            context.request_repaint();
+        });
+        Self { cameras, next: 0, size, pictures: Some(pictures), waiting: None, asked: false, result }
+    }
+
+    /// Part that is done, 0 to 1.
+    pub(crate) fn fraction(&self) -> f32 {
+        self.next as f32 / self.cameras.len().max(1) as f32
+    }
+
+    /// The camera of the picture to be made now, if it is time.
+    pub(crate) fn wanted(&mut self) -> Option<Camera> {
+        if let Some(image) = self.waiting.take() {
+            self.hand_over(image);
+        }
+        if self.asked || self.waiting.is_some() || self.pictures.is_none() {
+            return None;
+        }
+        let camera = self.cameras.get(self.next).copied();
+        match camera {
+            Some(_) => {
+                self.asked = true;
+                self.next += 1;
+            }
+            // The writer ends when nobody can send any more.
+            None => self.pictures = None,
+        }
+        camera
+    }
+
+    /// Takes in the picture that was wanted.
+    pub(crate) fn arrived(&mut self, image: Image) {
+        self.asked = false;
+        self.hand_over(image);
+    }
+
+    fn hand_over(&mut self, image: Image) {
+        let Some(pictures) = &self.pictures else { return };
+        match pictures.try_send(image) {
+            Ok(()) => {}
+            Err(TrySendError::Full(image)) => self.waiting = Some(image),
+            Err(TrySendError::Disconnected(_)) => self.pictures = None,
+        }
+    }
+
+    /// Makes no more pictures.
+    pub(crate) fn stop(&mut self) {
+        self.pictures = None;
+    }
+
+    /// How it ended, once it has: what was written, or why not.
+    pub(crate) fn ended(&self) -> Option<Result<String, String>> {
+        self.result.try_recv().ok()
+    }
+}
+
+/// Writes PNG files; those complete stay if the rest is not wanted any more.
+fn write_frames(
+    queue: &Receiver<Image>,
+    folder: &Path,
+    before: &str,
+    after: &str,
+    total: usize,
+    context: &egui::Context,
+) -> Result<String, String> {
+    let mut count = 0;
+    for image in queue {
+        let path = Target::frame(folder, before, after, count);
+        files::write(&path, |writer| files::encode_png(&image, writer)).map_err(|error| format!("{}: {error}", path.display()))?;
+        count += 1;
+        context.request_repaint();
+    }
+    let place = folder.join(format!("{before}…{after}"));
+    if count < total { Err(format!("{count} of {total} pictures were written: {}", place.display())) } else {
+        Ok(format!("{count} pictures were written: {}", place.display()))
+    }
+}
+
+/// Hands pictures to ffmpeg. The film appears complete or not at all.
+fn write_film(
+    queue: &Receiver<Image>,
+    path: &Path,
+    size: [u32; 2],
+    rate: u32,
+    total: usize,
+    context: &egui::Context,
+) -> Result<String, String> {
+    let extension = path.extension().unwrap_or_default();
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut suffix = std::ffi::OsString::from(".");
+    suffix.push(extension);
+    let part = tempfile::Builder::new().prefix(".autosplats").suffix(&suffix).tempfile_in(folder);
+    let part = part.map_err(|error| format!("{}: {error}", path.display()))?.into_temp_path();
+    let mut child = ffmpeg(&part, size, rate).map_err(|error| format!("ffmpeg does not start: {error}"))?;
+    let mut input = child.stdin.take();
+    let mut count = 0;
+    for image in queue {
+        let Some(pipe) = &mut input else { break };
+        if pipe.write_all(image.pixels.as_flattened()).is_err() {
+            // It has ended; its own words say why.
+            input = None;
+        }
+        count += 1;
+        context.request_repaint();
+    }
+    drop(input);
+    let output = child.wait_with_output().map_err(|error| format!("ffmpeg: {error}"))?;
+    if count < total {
+        return Err("The film was stopped; nothing was written".into());
+    }
+    if !output.status.success() {
+        let words = String::from_utf8_lossy(&output.stderr);
+        return Err(format!("ffmpeg: {}", words.lines().last().unwrap_or("it failed without a word")));
+    }
+    part.persist(path).map_err(|error| format!("{}: {}", path.display(), error.error))?;
+    Ok(format!("{count} pictures were written as {}", path.display()))
+}
+
+fn ffmpeg(path: &Path, [width, height]: [u32; 2], rate: u32) -> std::io::Result<Child> {
+    let mut command = Command::new("ffmpeg");
+    command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
+    command.args(["-s", &format!("{width}x{height}"), "-r", &rate.to_string(), "-i", "-"]);
+    // Most players want even sides and this kind of colour.
+    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(path);
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(x: f64) -> Camera {
+        Camera {
+            eye: DVec3::new(x, -10.0, 3.0),
+            look_at: DVec3::new(x, 0.0, 0.0),
+            up: DVec3::Z,
+            projection: Projection::PerspectiveFovDeg(40.0),
+        }
+    }
+
+    #[test]
+    fn a_turntable_goes_round_and_does_not_repeat_itself() {
+        let cameras = turntable(&camera(0.0), DVec3::Z, 360.0, 8);
+        assert_eq!(cameras.len(), 8, "one a picture");
+        assert!(cameras[0].eye.distance(DVec3::new(0.0, -10.0, 3.0)) < 1e-9, "begins where the eye is");
+        assert!(cameras[2].eye.distance(DVec3::new(10.0, 0.0, 3.0)) < 1e-9, "a quarter: {}", cameras[2].eye);
+        assert!(cameras[7].eye.distance(cameras[0].eye) > 1.0, "the last is not the first");
+    }
+
+    #[test]
+    fn a_path_goes_through_its_keys() {
+        let keys = [camera(0.0), camera(5.0), camera(7.0)];
+        let cameras = path(&keys, 41);
+        for (key, picture) in keys.iter().zip([0, 20, 40]) {
+            assert!(cameras[picture].eye.distance(key.eye) < 1e-9, "picture {picture}: {}", cameras[picture].eye);
+        }
+        let steps = cameras.windows(2).map(|ends| ends[0].eye.distance(ends[1].eye));
+        assert!(steps.fold(0.0, f64::max) < 0.5, "it does not jump");
+        assert!(path(&[], 5).is_empty() && path(&keys[..1], 5).len() == 5, "few keys are no harm");
+    }
+
+    #[test]
+    fn names_tell_what_is_written() {
+        let target = |path: &str| Target::new(Path::new(path));
+        assert_eq!(target("a/film.MP4"), Ok(Target::Film("a/film.MP4".into())), "a film");
+        assert_eq!(target("a/f.png"), Ok(Target::Frames("a".into(), "f_".into(), ".png".into())), "numbered");
+        assert_eq!(target("f%05d_x.png"), Ok(Target::Frames("".into(), "f".into(), "_x.png".into())), "where it is told");
+        assert!(target("film").is_err() && target("film.gif").is_err(), "others are not known");
+    }
+
+    #[test]
+    fn pictures_are_written_one_by_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = Target::new(&folder.path().join("t.png")).expect("pictures");
+        let context = egui::Context::default();
+        let mut recording = Recording::start(vec![camera(0.0), camera(1.0)], [2, 1], 25, target.clone(), &context);
+        let result = loop {
+            if recording.wanted().is_some() {
+                recording.arrived(Image { width: 2, height: 1, pixels: vec![[1, 2, 3, 255]; 2], linear: Vec::new() });
+            }
+            if let Some(result) = recording.ended() {
+                break result;
+            }
+            std::thread::yield_now();
+        };
+        assert!(result.is_ok(), "{result:?}");
+        assert_eq!(target.existing(2), Some(folder.path().join("t_00000.png")), "the first is there");
+        assert!(folder.path().join("t_00001.png").exists(), "and the second");
+    }
+}
