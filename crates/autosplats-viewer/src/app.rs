@@ -58,8 +58,9 @@ pub(crate) struct App {
     /// Files that are read again, and whose points they are.
     reloads: HashMap<JobId, LayerId>,
     guessed_axes: Option<Axes>,
-    /// The first file, as long as its preview grows and nobody has moved.
-    growing: Option<JobId>,
+    /// Where the program stood by itself, for a picture so much wider than high. As long as nobody has moved, it stands
+    /// anew when points arrive and when the picture changes its shape.
+    first_camera: Option<(Camera, f64)>,
     /// Grows with each change of the document.
     version: u64,
     /// Points of the document and of each layer, as of a version.
@@ -159,7 +160,7 @@ impl App {
             inputs: HashMap::new(),
             reloads: HashMap::new(),
             guessed_axes: None,
-            growing: None,
+            first_camera: None,
             version: 1,
             counted: (0, Counts::default(), HashMap::new()),
             wished: None,
@@ -399,13 +400,11 @@ impl App {
                 document.reorder(id, place);
             }
         });
-        if self.guessed_axes.is_none() || self.growing == Some(job) {
+        if self.guessed_axes.is_none() || before.is_some() && self.document().layers.len() == 1 {
             self.guessed_axes = Some(guess_axes(&cloud));
         }
-        if first || self.growing == Some(job) {
-            // A preview that grows keeps being fitted until somebody moves.
+        if first || self.stands_by_itself() {
             self.first_view();
-            self.growing = Some(job);
             self.placed = true;
         }
         self.measure_scene();
@@ -442,6 +441,11 @@ impl App {
         }
     }
 
+    /// Whether nobody has moved since the program chose where to stand.
+    fn stands_by_itself(&self) -> bool {
+        self.first_camera.is_some_and(|(camera, _)| camera == self.navigation.goal_camera())
+    }
+
     /// Stands where a picture of the first input stands that names no camera.
     pub(crate) fn first_view(&mut self) {
         let scene = self.loader.jobs().iter().map(|job| &job.input).chain(self.inputs.values()).find_map(|input| {
@@ -457,10 +461,9 @@ impl App {
                 self.measure_scene();
                 self.navigation.go_to(&camera, true);
             }
-            _ => {
-                self.look_from(ViewDirection::Auto, true);
-            }
+            _ => self.look_from(ViewDirection::Auto, true),
         }
+        self.first_camera = Some((self.navigation.goal_camera(), self.aspect));
     }
 
     /// Looks at everything from one side.
@@ -509,9 +512,9 @@ impl App {
         let busy = busy || std::mem::take(&mut self.stirred);
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
-            if busy || flight != Flight::default() {
-                self.growing = None;
-            }
+        }
+        if self.first_camera.is_some_and(|(_, aspect)| aspect != self.aspect) && self.stands_by_itself() {
+            self.first_view();
         }
         let moving = now - self.moved < REST;
         if moving {
