@@ -63,8 +63,7 @@ pub(crate) struct App {
     first_camera: Option<(Camera, f64)>,
     /// Grows with each change of the document.
     version: u64,
-    /// Points of the document and of each layer, as of a version.
-    counted: (u64, Counts, HashMap<LayerId, Counts>),
+    counted: Counted,
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
     /// Whether the first cloud has been looked at.
@@ -77,6 +76,20 @@ pub(crate) struct App {
     /// Cameras that a film goes through.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
+}
+
+/// What panels say of the document, as of a version of it.
+#[derive(Default)]
+pub(crate) struct Counted {
+    version: u64,
+    /// Points of all layers.
+    pub(crate) all: Counts,
+    /// Points of each layer.
+    pub(crate) layers: HashMap<LayerId, Counts>,
+    /// Bytes of all points.
+    pub(crate) bytes: usize,
+    /// Bytes that undo keeps besides.
+    pub(crate) old_bytes: usize,
 }
 
 /// The last picture, on its way to the screen.
@@ -162,7 +175,7 @@ impl App {
             guessed_axes: None,
             first_camera: None,
             version: 1,
-            counted: (0, Counts::default(), HashMap::new()),
+            counted: Counted::default(),
             wished: None,
             placed: false,
             stirred: false,
@@ -220,11 +233,16 @@ impl App {
     }
 
     /// Numbers of points of all that is open, and of each layer; counted anew only after changes.
-    pub(crate) fn counts(&mut self) -> &(u64, Counts, HashMap<LayerId, Counts>) {
-        if self.counted.0 != self.version {
+    pub(crate) fn counts(&mut self) -> &Counted {
+        if self.counted.version != self.version {
             let document = self.document();
-            let all = document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect();
-            self.counted = (self.version, document.counts(), all);
+            self.counted = Counted {
+                version: self.version,
+                all: document.counts(),
+                layers: document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect(),
+                bytes: document.layers.iter().map(|layer| layer.cloud.byte_len()).sum(),
+                old_bytes: self.history.old_bytes(),
+            };
         }
         &self.counted
     }
@@ -500,7 +518,7 @@ impl App {
             settings: self.look.settings.clone(),
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
-            axes: self.axes(),
+            axes: self.up_axis,
             budget_ms: moving.then_some(self.look.moving_ms),
         }
     }

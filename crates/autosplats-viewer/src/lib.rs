@@ -80,6 +80,10 @@ pub fn run(options: Options) -> Result<(), Error> {
         }
         Ok(Box::new(app))
     });
+    let screens = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    if cfg!(target_os = "linux") && screens.iter().all(|name| std::env::var_os(name).is_none()) {
+        return Err(Error::Window("there is no screen, as neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
+    }
     eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))
 }
 
