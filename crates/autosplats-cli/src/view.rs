@@ -6,7 +6,7 @@ use crate::exit::Failure;
 /// Opens the window and returns when it is closed.
 #[cfg(feature = "viewer")]
 pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
-    use autosplats_viewer::Options;
+    use autosplats_viewer::{Error, Options};
 
     use crate::exit::Exit;
     use crate::input::Inputs;
@@ -15,7 +15,10 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
     let ViewArgs { inputs, input, state, watch, backend, run: _ } = args;
     let inputs = Inputs::new(inputs, input)?.for_viewer();
     let options = Options { inputs, state: state.clone(), watch: *watch, backend: backend.map(Into::into) };
-    autosplats_viewer::run(options).map_err(|error| Failure::new(Exit::Device, error))
+    autosplats_viewer::run(options).map_err(|error| {
+        let exit = if matches!(error, Error::State(_)) { Exit::Input } else { Exit::Device };
+        Failure::new(exit, error)
+    })
 }
 
 /// This build has no window.

@@ -58,12 +58,12 @@ pub(crate) struct App {
     /// Files that are read again, and whose points they are.
     reloads: HashMap<JobId, LayerId>,
     guessed_axes: Option<Axes>,
-    /// The first file, as long as its preview grows and nobody has moved.
-    growing: Option<JobId>,
+    /// Where the program stood by itself, for a picture so much wider than high. As long as nobody has moved, it stands
+    /// anew when points arrive and when the picture changes its shape.
+    first_camera: Option<(Camera, f64)>,
     /// Grows with each change of the document.
     version: u64,
-    /// Points of the document and of each layer, as of a version.
-    counted: (u64, Counts, HashMap<LayerId, Counts>),
+    counted: Counted,
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
     /// Whether the first cloud has been looked at.
@@ -76,6 +76,20 @@ pub(crate) struct App {
     /// Cameras that a film goes through.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
+}
+
+/// What panels say of the document, as of a version of it.
+#[derive(Default)]
+pub(crate) struct Counted {
+    version: u64,
+    /// Points of all layers.
+    pub(crate) all: Counts,
+    /// Points of each layer.
+    pub(crate) layers: HashMap<LayerId, Counts>,
+    /// Bytes of all points.
+    pub(crate) bytes: usize,
+    /// Bytes that undo keeps besides.
+    pub(crate) old_bytes: usize,
 }
 
 /// The last picture, on its way to the screen.
@@ -159,9 +173,9 @@ impl App {
             inputs: HashMap::new(),
             reloads: HashMap::new(),
             guessed_axes: None,
-            growing: None,
+            first_camera: None,
             version: 1,
-            counted: (0, Counts::default(), HashMap::new()),
+            counted: Counted::default(),
             wished: None,
             placed: false,
             stirred: false,
@@ -224,11 +238,16 @@ impl App {
     }
 
     /// Numbers of points of all that is open, and of each layer; counted anew only after changes, and after drags.
-    pub(crate) fn counts(&mut self) -> &(u64, Counts, HashMap<LayerId, Counts>) {
-        if self.counted.0 != self.version && !self.tools.gizmo.is_dragging() {
+    pub(crate) fn counts(&mut self) -> &Counted {
+        if self.counted.version != self.version && !self.tools.gizmo.is_dragging() {
             let document = self.document();
-            let all = document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect();
-            self.counted = (self.version, document.counts(), all);
+            self.counted = Counted {
+                version: self.version,
+                all: document.counts(),
+                layers: document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect(),
+                bytes: document.layers.iter().map(|layer| layer.cloud.byte_len()).sum(),
+                old_bytes: self.history.old_bytes(),
+            };
         }
         &self.counted
     }
@@ -408,13 +427,11 @@ impl App {
                 document.reorder(id, place);
             }
         });
-        if self.guessed_axes.is_none() || self.growing == Some(job) {
+        if self.guessed_axes.is_none() || before.is_some() && self.document().layers.len() == 1 {
             self.guessed_axes = Some(guess_axes(&cloud));
         }
-        if first || self.growing == Some(job) {
-            // A preview that grows keeps being fitted until somebody moves.
+        if first || self.stands_by_itself() {
             self.first_view();
-            self.growing = Some(job);
             self.placed = true;
         }
         self.measure_scene();
@@ -454,6 +471,11 @@ impl App {
         }
     }
 
+    /// Whether nobody has moved since the program chose where to stand.
+    fn stands_by_itself(&self) -> bool {
+        self.first_camera.is_some_and(|(camera, _)| camera == self.navigation.goal_camera())
+    }
+
     /// Stands where a picture of the first input stands that names no camera.
     pub(crate) fn first_view(&mut self) {
         let scene =
@@ -470,10 +492,9 @@ impl App {
                 self.measure_scene();
                 self.navigation.go_to(&camera, true);
             }
-            _ => {
-                self.look_from(ViewDirection::Auto, true);
-            }
+            _ => self.look_from(ViewDirection::Auto, true),
         }
+        self.first_camera = Some((self.navigation.goal_camera(), self.aspect));
     }
 
     /// Looks at everything from one side.
@@ -510,7 +531,7 @@ impl App {
             settings: self.look.settings.clone(),
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
-            axes: self.axes(),
+            axes: self.up_axis,
             budget_ms: moving.then_some(self.look.moving_ms),
         }
     }
@@ -522,9 +543,9 @@ impl App {
         let busy = busy || std::mem::take(&mut self.stirred);
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
-            if busy || flight != Flight::default() {
-                self.growing = None;
-            }
+        }
+        if self.first_camera.is_some_and(|(_, aspect)| aspect != self.aspect) && self.stands_by_itself() {
+            self.first_view();
         }
         let moving = now - self.moved < REST;
         if moving {

@@ -72,6 +72,7 @@ pub fn run(options: Options) -> Result<(), Error> {
         .with_drag_and_drop(true);
     let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
+        colors(&creation.egui_ctx);
         let (look, recent) = storage::load(creation.storage);
         let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
         if let Some(state) = state {
@@ -80,5 +81,23 @@ pub fn run(options: Options) -> Result<(), Error> {
         }
         Ok(Box::new(app))
     });
+    let screens = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    if cfg!(target_os = "linux") && screens.iter().all(|name| std::env::var_os(name).is_none()) {
+        return Err(Error::Window("there is no screen, as neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
+    }
     eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))
+}
+
+/// Colours that can be read: egui's own red is too dark on a dark ground.
+fn colors(context: &egui::Context) {
+    let red = |dark: bool| if dark { [255, 128, 118] } else { [176, 24, 16] };
+    let amber = |dark: bool| if dark { [255, 180, 70] } else { [150, 84, 0] };
+    for theme in [egui::Theme::Dark, egui::Theme::Light] {
+        context.style_mut_of(theme, |style| {
+            let dark = theme == egui::Theme::Dark;
+            let color = |[r, g, b]: [u8; 3]| egui::Color32::from_rgb(r, g, b);
+            style.visuals.error_fg_color = color(red(dark));
+            style.visuals.warn_fg_color = color(amber(dark));
+        });
+    }
 }

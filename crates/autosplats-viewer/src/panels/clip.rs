@@ -74,7 +74,7 @@ fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
 
 fn buttons(app: &mut App, ui: &mut egui::Ui, clip: &mut Option<ClipBox>) {
     let around = |bounds: Option<[DVec3; 2]>| bounds.map(|[min, max]| ClipBox::new(min, max));
-    let selected = app.counts().1.selected > 0;
+    let selected = app.counts().all.selected > 0;
     ui.horizontal(|ui| {
         let button = ui.add_enabled(selected, egui::Button::new("Around selected"));
         if button.on_hover_text("Show the selected points and what is beside them").clicked() {

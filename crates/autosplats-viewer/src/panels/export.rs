@@ -132,7 +132,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 
 /// What can be written: what it is called, what it is, and whether there is any of it.
 fn choices(app: &mut App) -> Vec<(String, What, bool)> {
-    let counts = app.counts().1;
+    let counts = app.counts().all;
     let document = app.document();
     let mut choices = vec![
         ("What is shown".into(), What::Shown, counts.points > 0),

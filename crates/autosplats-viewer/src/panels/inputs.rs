@@ -47,7 +47,7 @@ fn loading(app: &App, ui: &mut egui::Ui) {
 fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     let Some(layer) = app.document().layer(id) else { return };
     let (name, visible, tint, path) = (layer.name.clone(), layer.visible, layer.tint, layer.path.clone());
-    let counts = app.counts().2.get(&id).copied().unwrap_or_default();
+    let counts = app.counts().layers.get(&id).copied().unwrap_or_default();
     let unsaved = app.history.is_unsaved(id);
     ui.push_id(id, |ui| {
         ui.horizontal(|ui| {

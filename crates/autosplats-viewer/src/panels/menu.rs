@@ -51,7 +51,7 @@ fn edit(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::Undo, steps[0]);
     command_button(app, ui, Command::Redo, steps[1]);
     ui.separator();
-    let counts = app.counts().1;
+    let counts = app.counts().all;
     let any = counts.points > 0;
     command_button(app, ui, Command::SelectAll, any);
     command_button(app, ui, Command::SelectNone, counts.selected > 0);

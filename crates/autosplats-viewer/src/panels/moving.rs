@@ -19,7 +19,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     if app.tool != Tool::Move {
         return;
     }
-    let selected = app.counts().1.selected;
+    let selected = app.counts().all.selected;
     let mut act = None;
     let place = context.content_rect().right_top() + egui::vec2(-270.0, 60.0);
     egui::Window::new("Move").resizable(false).default_pos(place).show(context, |ui| {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud, check_memory};
-use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings, guess_axes};
+use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings};
 use eframe::egui;
 use rayon::prelude::*;
 
@@ -56,7 +56,7 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
 struct Studio {
     renderer: Option<(Backend, Renderer)>,
     costs: Costs,
-    shown: Option<(Axes, Arc<Shown>)>,
+    shown: Option<(Option<Axes>, Arc<Shown>)>,
     sparse: Option<Sparse>,
 }
 
@@ -95,8 +95,8 @@ impl Studio {
         check_memory("what is shown", wish.document.shown_bytes() as u64)
             .map_err(|error| Error::NothingVisible(error.to_string()))?;
         let mut shown = wish.document.shown();
-        if guess_axes(&shown.cloud) != wish.axes {
-            shown.cloud = Arc::new(PointCloud::clone(&shown.cloud).with_axes(wish.axes));
+        if let Some(axes) = wish.axes.filter(|axes| shown.cloud.axes() != Some(*axes)) {
+            shown.cloud = Arc::new(PointCloud::clone(&shown.cloud).with_axes(axes));
         }
         let shown = Arc::new(shown);
         self.shown = Some((wish.axes, Arc::clone(&shown)));
