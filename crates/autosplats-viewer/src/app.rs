@@ -239,7 +239,7 @@ impl App {
 
     /// Numbers of points of all that is open, and of each layer; counted anew only after changes, and after drags.
     pub(crate) fn counts(&mut self) -> &Counted {
-        if self.counted.version != self.version && !self.tools.gizmo.is_dragging() {
+        if self.counted.version != self.version && !self.tools.gizmo.is_busy() {
             let document = self.document();
             self.counted = Counted {
                 version: self.version,

@@ -44,15 +44,12 @@ impl ClipBox {
     /// inside out.
     #[must_use]
     pub(crate) fn with_face(&self, axis: usize, high: bool, way: f64) -> Self {
-        let size = self.max - self.min;
-        let least = LEAST_SIDE * size.max_element();
-        let way = if high { way.max(least - size[axis]) } else { way.min(size[axis] - least) };
         if !way.is_finite() {
             return *self;
         }
-        let mut half = 0.5 * size;
-        half[axis] += 0.5 * if high { way } else { -way };
-        let centre = self.centre() + self.axis(axis) * (0.5 * way);
+        let size = self.max - self.min;
+        let least = LEAST_SIDE * size.max_element();
+        let way = if high { way.max(least - size[axis]) } else { way.min(size[axis] - least) };
         if self.rotation == DQuat::IDENTITY {
             // What does not move keeps all its digits.
             let mut moved = *self;
@@ -60,6 +57,9 @@ impl ClipBox {
             end[axis] += way;
             return moved;
         }
+        let mut half = 0.5 * size;
+        half[axis] += 0.5 * if high { way } else { -way };
+        let centre = self.centre() + self.axis(axis) * (0.5 * way);
         Self { min: centre - half, max: centre + half, ..*self }
     }
 

@@ -44,14 +44,16 @@ enum Grabbed {
 
 impl Drag {
     pub(super) fn begin(app: &App, view: &View, handle: Handle, place: Pos2) -> Option<Self> {
-        let from = super::middle(app)?;
+        Self::of(app.document().grip(), super::middle(app)?, view, handle, place)
+    }
+
+    fn of(grip: Grip, from: DVec3, view: &View, handle: Handle, place: Pos2) -> Option<Self> {
         let ray = view.ray(place);
         let grabbed = match handle {
             Handle::Arrow(axis) => Grabbed::Along(along(from, DVec3::AXES[axis], ray)?),
             Handle::Ring(axis) => Grabbed::At(on_plane(from, DVec3::AXES[axis], ray)?),
             _ => Grabbed::At(on_plane(from, view.forward, ray)?),
         };
-        let grip = app.document().grip();
         Some(Self { handle, grip, from, grabbed, turned: 0.0, matrix: DMat4::IDENTITY })
     }
 
@@ -201,6 +203,65 @@ pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<
                 ));
                 painter.add(eframe::egui::Shape::closed_line(places, Stroke::new(width, color.gamma_multiply(faint))));
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::view::tests::{FAR, views};
+    use super::*;
+    use crate::document::Document;
+
+    fn drag(view: &View, handle: Handle, place: Pos2) -> Drag {
+        Drag::of(Document::default().grip(), FAR, view, handle, place).expect("it is seen well")
+    }
+
+    #[test]
+    fn points_follow_the_pointer() {
+        for view in views() {
+            assert_eq!(handles(FAR, &view).len(), 7, "a dot, three arrows and three rings");
+            let taken = FAR + 0.1;
+            let place = view.place(taken).expect("before the eye");
+            for axis in 0..3 {
+                let way = DVec3::AXES[axis] * -0.75;
+                let map =
+                    drag(&view, Handle::Arrow(axis), place).map(&view, view.place(taken + way).expect("seen"), false);
+                let moved = map.expect("seen from the side").transform_point3(FAR) - FAR;
+                // What is taken lies beside the arrow, where it follows the pointer less exactly.
+                assert!(moved.distance(way) < 0.05, "along {axis} by {moved}, not {way}");
+                assert_eq!(moved.reject_from(way), DVec3::ZERO, "and along nothing else");
+            }
+            let aside = view.forward.any_orthonormal_vector() * 0.5;
+            let to = view.place(taken + aside).expect("before the eye");
+            let moved =
+                drag(&view, Handle::Middle, place).map(&view, to, false).expect("seen").transform_point3(FAR) - FAR;
+            assert!(moved.distance(aside) < 0.02, "in the plane of the picture by {moved}, not {aside}");
+        }
+    }
+
+    #[test]
+    fn rings_turn_as_far_as_the_pointer_goes_round() {
+        for view in views() {
+            let at = |degrees: f64| {
+                let (sin, cos) = degrees.to_radians().sin_cos();
+                view.place(FAR + DVec3::new(cos, sin, 0.0)).expect("before the eye")
+            };
+            let mut drag = drag(&view, Handle::Ring(2), at(0.0));
+            for step in 1..=50 {
+                let degrees = f64::from(step) * 10.0;
+                let map = drag.map(&view, at(degrees), false).expect("seen from above");
+                // Half a pixel, seen from the side.
+                assert!(
+                    (drag.turned.to_degrees() - degrees).abs() < 0.5,
+                    "{} is not {degrees}",
+                    drag.turned.to_degrees()
+                );
+                assert!(map.transform_point3(FAR).distance(FAR) < 1e-8, "the middle stays");
+            }
+            let stepped = drag.map(&view, at(500.0 + 12.0), true).expect("seen from above");
+            let turned = angle(DVec3::Z, DVec3::X, stepped.transform_vector3(DVec3::X)).to_degrees();
+            assert!((turned - 150.0).abs() < 1e-6, "512 degrees in steps of 15 are 510, not {turned}");
         }
     }
 }

@@ -30,16 +30,26 @@ pub(super) struct Drag {
 
 impl Drag {
     pub(super) fn begin(app: &App, view: &View, axis: usize, high: bool, place: Pos2) -> Option<Self> {
-        let before = app.document().clip?;
+        Self::of(app.document().clip?, view, axis, high, place)
+    }
+
+    fn of(before: ClipBox, view: &View, axis: usize, high: bool, place: Pos2) -> Option<Self> {
         let grabbed = along(before.face(axis, high), before.axis(axis), view.ray(place))?;
         Some(Self { axis, high, before, grabbed })
     }
 
+    /// The box with the face where the pointer is.
+    fn dragged(&self, view: &View, place: Pos2) -> Option<ClipBox> {
+        let Self { axis, high, before, grabbed } = self;
+        let way = along(before.face(*axis, *high), before.axis(*axis), view.ray(place))?;
+        Some(before.with_face(*axis, *high, way - grabbed))
+    }
+
     /// Moves the face to where the pointer is.
     pub(super) fn follow(&self, app: &mut App, view: &View, place: Pos2) {
-        let Self { axis, high, before, grabbed } = self;
-        let Some(way) = along(before.face(*axis, *high), before.axis(*axis), view.ray(place)) else { return };
-        preview(app, Some(before.with_face(*axis, *high, way - grabbed)));
+        if let Some(clip) = self.dragged(view, place) {
+            preview(app, Some(clip));
+        }
     }
 
     /// Puts the face back.
@@ -170,5 +180,37 @@ fn edge(app: &App, clip: &ClipBox, view: &View, painter: &Painter, ends: [DVec3;
             painter.line_segment([from, to], Stroke::new(1.3, color));
         }
         before = here;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::view::tests::{FAR, views};
+    use super::*;
+    use autosplats::cloud::glam::DQuat;
+
+    #[test]
+    fn faces_follow_the_pointer() {
+        for view in views() {
+            let rotation = DQuat::from_rotation_z(0.4);
+            let clip = ClipBox { rotation, ..ClipBox::new(FAR - DVec3::new(1.0, 1.5, 0.5), FAR + DVec3::ONE) };
+            let handles = handles(&clip, &view);
+            assert_eq!(handles.len(), 6, "all faces are seen from the side");
+            for (handle, shape) in handles {
+                let (Handle::Face { axis, high }, Shape::Dot(dot)) = (handle, shape) else { panic!("no face") };
+                let there = view.place(clip.face(axis, high) + clip.axis(axis) * 0.25).expect("before the eye");
+                // Taken beside its middle, it stays beside the pointer.
+                let grip = eframe::egui::vec2(3.0, -2.0);
+                let drag = Drag::of(clip, &view, axis, high, dot + grip).expect("seen from the side");
+                assert_eq!(drag.dragged(&view, dot + grip), Some(clip), "{handle:?} has not gone anywhere yet");
+                let dragged = drag.dragged(&view, there + grip).expect("seen from the side");
+                let way = (dragged.face(axis, high) - clip.face(axis, high)).dot(clip.axis(axis));
+                assert!((way - 0.25).abs() < 0.02, "{handle:?} went {way}");
+                let seen = view.place(dragged.face(axis, high)).expect("before the eye");
+                assert!(seen.distance(there) < 2.0, "{handle:?} is seen at {seen}, not {there}");
+                let opposite = dragged.face(axis, !high).distance(clip.face(axis, !high));
+                assert!(opposite < 1e-8, "the face opposite to {handle:?} went {opposite}");
+            }
+        }
     }
 }

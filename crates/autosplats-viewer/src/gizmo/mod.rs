@@ -55,6 +55,11 @@ impl Gizmo {
     pub(crate) fn is_dragging(&self) -> bool {
         self.drag.is_some()
     }
+
+    /// Whether the document is in the user's hands: dragged, or a number of the clipping box is.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.is_dragging() || self.clip_before.is_some()
+    }
 }
 
 /// What the pointer does to handles; says whether it is taken up by one.

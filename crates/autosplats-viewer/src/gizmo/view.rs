@@ -138,14 +138,16 @@ pub(super) fn angle(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use autosplats::Projection;
     use eframe::egui::pos2;
 
-    const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
+    /// A place where `f32` holds half metres.
+    pub(in crate::gizmo) const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
-    fn views() -> impl Iterator<Item = View> {
+    /// A perspective and an orthographic picture of [`FAR`].
+    pub(in crate::gizmo) fn views() -> impl Iterator<Item = View> {
         let rect = Rect::from_min_size(pos2(200.0, 30.0), vec2(600.0, 400.0));
         [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(8.0)].into_iter().map(move |projection| {
             let camera = Camera { eye: FAR + DVec3::new(4.0, -10.0, 5.0), look_at: FAR, up: DVec3::Z, projection };

@@ -17,8 +17,13 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let mut open = true;
     let mut clip = app.document().clip;
     let mut busy = false;
-    let place = context.content_rect().right_top() + egui::vec2(-270.0, 60.0);
-    let window = egui::Window::new("Clipping box").open(&mut open).resizable(false).default_pos(place);
+    let place = context.content_rect().right_top() + egui::vec2(-16.0, 60.0);
+    let window = egui::Window::new("Clipping box")
+        .open(&mut open)
+        .resizable(false)
+        .default_width(250.0)
+        .pivot(egui::Align2::RIGHT_TOP)
+        .default_pos(place);
     window.show(context, |ui| {
         if let Some(clip) = &mut clip {
             busy = numbers(app, ui, clip);
@@ -28,8 +33,10 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     app.panels.clip = open;
     gizmo::preview(app, clip);
     // A number that is dragged or typed makes one step, when it is let go.
-    if !busy && !app.tools.gizmo.is_dragging() {
+    if !busy && app.tools.gizmo.is_busy() && !app.tools.gizmo.is_dragging() {
         gizmo::settle(app);
+        // The figures beside the picture waited for it.
+        context.request_repaint();
     }
 }
 
@@ -87,5 +94,5 @@ fn buttons(app: &mut App, ui: &mut egui::Ui, clip: &mut Option<ClipBox>) {
             *clip = None;
         }
     });
-    ui.small("Drag the dots on the faces in the picture.");
+    ui.small(if clip.is_some() { "Drag the dots on the faces in the picture." } else { "There is no box." });
 }

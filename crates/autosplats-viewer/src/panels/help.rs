@@ -5,7 +5,7 @@ use eframe::egui;
 use crate::app::App;
 use crate::commands::Command;
 
-const MOUSE: [(&str, &str); 9] = [
+const MOUSE: [(&str, &str); 10] = [
     ("Left drag", "Turn about the pivot"),
     ("Right drag, Shift + left drag", "Move sideways"),
     ("Wheel, pinch", "Zoom to the cursor"),
@@ -15,6 +15,7 @@ const MOUSE: [(&str, &str); 9] = [
     ("Shift", "Fly faster"),
     ("Arrow keys", "Turn the head"),
     ("Alt + left drag", "Turn the view while selecting"),
+    ("Drag dots, arrows, rings", "Move the faces of the clipping box, or the selection; Escape gives it up"),
 ];
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {

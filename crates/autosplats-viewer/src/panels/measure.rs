@@ -16,9 +16,13 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let report = Report::new(&ruler(app), &app.tools.measured);
     let mut open = true;
-    let place = context.content_rect().right_top() + egui::vec2(-320.0, 60.0);
-    let window =
-        egui::Window::new("Measurement").open(&mut open).resizable(true).default_width(290.0).default_pos(place);
+    let place = context.content_rect().right_top() + egui::vec2(-16.0, 60.0);
+    let window = egui::Window::new("Measurement")
+        .open(&mut open)
+        .resizable(true)
+        .default_width(290.0)
+        .pivot(egui::Align2::RIGHT_TOP)
+        .default_pos(place);
     window.show(context, |ui| {
         egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
             for (number, rows) in report.parts().into_iter().enumerate().filter(|(_, rows)| !rows.is_empty()) {

@@ -21,41 +21,46 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let selected = app.counts().all.selected;
     let mut act = None;
-    let place = context.content_rect().right_top() + egui::vec2(-270.0, 60.0);
-    egui::Window::new("Move").resizable(false).default_pos(place).show(context, |ui| {
-        if selected == 0 {
-            ui.label("Nothing is selected.");
-            ui.small("Select points by rectangle (B), lasso (G) or brush (C),\nor all of them with Ctrl+A.");
-            return;
-        }
-        let speed = speed(app);
-        let numbers = &mut app.panels.moving;
-        egui::Grid::new("move").num_columns(2).show(ui, |ui| {
-            for (axis, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
-                ui.label(name);
-                let number = egui::DragValue::new(&mut numbers.way[axis]).speed(speed).max_decimals(6);
-                let response = ui.add_sized([110.0, 20.0], number);
-                response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, name));
-                ui.end_row();
+    let place = context.content_rect().right_top() + egui::vec2(-16.0, 310.0);
+    egui::Window::new("Move")
+        .resizable(false)
+        .default_width(250.0)
+        .pivot(egui::Align2::RIGHT_TOP)
+        .default_pos(place)
+        .show(context, |ui| {
+            if selected == 0 {
+                ui.label("Nothing is selected.");
+                ui.small("Select points by rectangle (B), lasso (G) or brush (C),\nor all of them with Ctrl+A.");
+                return;
             }
-        });
-        let enabled = numbers.way != DVec3::ZERO && numbers.way.is_finite();
-        if ui.add_enabled(enabled, egui::Button::new("Move")).clicked() {
-            act = Some(Act::Move);
-        }
-        ui.separator();
-        ui.horizontal(|ui| {
-            ui.add(egui::DragValue::new(&mut numbers.degrees).speed(0.5).max_decimals(4).suffix("°"));
-            ui.label("about");
-            for (axis, name) in [(None, "up"), (Some(0), "x"), (Some(1), "y"), (Some(2), "z")] {
-                ui.selectable_value(&mut numbers.axis, axis, name);
+            let speed = speed(app);
+            let numbers = &mut app.panels.moving;
+            egui::Grid::new("move").num_columns(2).show(ui, |ui| {
+                for (axis, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
+                    ui.label(name);
+                    let number = egui::DragValue::new(&mut numbers.way[axis]).speed(speed).max_decimals(6);
+                    let response = ui.add_sized([110.0, 20.0], number);
+                    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, name));
+                    ui.end_row();
+                }
+            });
+            let enabled = numbers.way != DVec3::ZERO && numbers.way.is_finite();
+            if ui.add_enabled(enabled, egui::Button::new("Move")).clicked() {
+                act = Some(Act::Move);
             }
+            ui.separator();
+            ui.horizontal(|ui| {
+                ui.add(egui::DragValue::new(&mut numbers.degrees).speed(0.5).max_decimals(4).suffix("°"));
+                ui.label("about");
+                for (axis, name) in [(None, "up"), (Some(0), "x"), (Some(1), "y"), (Some(2), "z")] {
+                    ui.selectable_value(&mut numbers.axis, axis, name);
+                }
+            });
+            if ui.add_enabled(numbers.degrees != 0.0, egui::Button::new("Turn")).clicked() {
+                act = Some(Act::Turn);
+            }
+            ui.small("Or drag the arrows and rings in the picture;\nwith Ctrl they turn by steps of 15°.");
         });
-        if ui.add_enabled(numbers.degrees != 0.0, egui::Button::new("Turn")).clicked() {
-            act = Some(Act::Turn);
-        }
-        ui.small("Or drag the arrows and rings in the picture;\nwith Ctrl they turn by steps of 15°.");
-    });
     let Some(act) = act else { return };
     let (way, radians) = (app.panels.moving.way, app.panels.moving.degrees.to_radians());
     let axis = app.panels.moving.axis.map_or(app.up(), |axis| DVec3::AXES[axis]);

@@ -32,10 +32,14 @@ struct Parts {
 impl Parts {
     fn new(pose: &DMat4, middle: DVec3) -> Self {
         let linear = DMat3::from_mat4(*pose);
-        let (_, turn, _) = pose.to_scale_rotation_translation();
+        // The turn that keeps x and the plane of x and y where they are, so that there is one for sheared inputs, too.
+        let x = linear.x_axis.normalize();
+        let y = linear.y_axis.reject_from_normalized(x).normalize();
+        let turn = DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y)));
         let (z, y, x) = turn.to_euler(EulerRot::ZYX);
-        let turn_deg = DVec3::new(x, y, z).map(f64::to_degrees);
-        let stretch = DMat3::from_quat(turn).transpose() * linear;
+        // Nothing is added, so that -0 becomes 0.
+        let turn_deg = DVec3::new(x, y, z).map(f64::to_degrees) + 0.0;
+        let stretch = DMat3::from_euler(EulerRot::ZYX, z, y, x).transpose() * linear;
         let scale = stretch.determinant().abs().cbrt();
         let rest = stretch * (1.0 / scale);
         // What is nothing but rounding is nothing.
@@ -45,7 +49,7 @@ impl Parts {
 
     fn pose(&self, middle: DVec3) -> DMat4 {
         let DVec3 { x, y, z } = self.turn_deg.map(f64::to_radians);
-        let turn = DMat3::from_quat(DQuat::from_euler(EulerRot::ZYX, z, y, x));
+        let turn = DMat3::from_euler(EulerRot::ZYX, z, y, x);
         let linear = turn * self.rest * self.scale;
         let mut pose = DMat4::from_mat3(linear);
         pose.w_axis = (middle + self.way - linear * middle).extend(1.0);
