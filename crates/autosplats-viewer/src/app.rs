@@ -46,6 +46,8 @@ pub(crate) struct App {
     pub(crate) rate: Rate,
     /// Width over height of the picture in the window.
     pub(crate) aspect: f64,
+    /// Where the picture is in the window.
+    pub(crate) view_rect: egui::Rect,
     pub(crate) recent: Vec<std::path::PathBuf>,
     /// Where the session is kept.
     pub(crate) state: Option<std::path::PathBuf>,
@@ -165,6 +167,7 @@ impl App {
             up_axis: None,
             rate: Rate::default(),
             aspect: 1.5,
+            view_rect: egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(800.0, 600.0)),
             recent,
             state: options.state,
             looks: HashMap::new(),

@@ -117,8 +117,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             }
         }
         Command::SelectNone => {
-            // Escape goes back a step each time: what is being drawn, the tool, the selection.
-            if crate::gizmo::cancel(app) || app.tools.cancel() {
+            // Escape goes back a step each time: what is dragged, a window, what is being drawn, the tool, the selection.
+            if crate::gizmo::cancel(app) || app.panels.close_window() || app.tools.cancel() {
                 return;
             }
             if app.tool == Tool::Navigate {

@@ -81,7 +81,11 @@ impl State {
     /// What is wrong with the file, by its name and place.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let state: Self = serde_json::from_str(&text).map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
+        // A list would be taken for the fields in their order.
+        let fields: serde_json::Map<String, serde_json::Value> =
+            serde_json::from_str(&text).map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
+        let state: Self = serde_json::from_value(fields.into())
+            .map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
         state.look.settings.check().map_err(|error| format!("{}: {error}", path.display()))?;
         for camera in state.camera.iter().chain(&state.keys) {
             camera.check().map_err(|error| format!("{}: {error}", path.display()))?;

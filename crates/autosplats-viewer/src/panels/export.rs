@@ -88,7 +88,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         app.panels.export.what = What::Shown;
     }
     let window = egui::Window::new("Export points").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(context.content_rect().center() - egui::vec2(210.0, 140.0)).show(context, |ui| {
+    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
         ui.set_width(420.0);
         let export = &mut app.panels.export;
         if let Some(work) = &export.work {

@@ -59,7 +59,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let mut open = true;
     let window = egui::Window::new("Film").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(context.content_rect().right_top() + egui::vec2(-420.0, 60.0)).show(context, |ui| {
+    window.default_pos(app.view_rect.right_top() + egui::vec2(-410.0, 10.0)).show(context, |ui| {
         ui.set_width(380.0);
         if let Some(recording) = &app.recording {
             ui.add(egui::ProgressBar::new(recording.fraction()).show_percentage());

@@ -130,7 +130,7 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
     let Some(point) = app.tools.inspected.clone() else { return };
     let mut open = true;
     let window = egui::Window::new("Point").open(&mut open).resizable(true).default_width(260.0);
-    window.default_pos(context.content_rect().right_top() + egui::vec2(-300.0, 60.0)).show(context, |ui| {
+    window.default_pos(app.view_rect.right_top() + egui::vec2(-290.0, 10.0)).show(context, |ui| {
         egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
             egui::Grid::new("point").num_columns(2).striped(true).show(ui, |ui| {
                 let mut row = |name: &str, value: &str| {

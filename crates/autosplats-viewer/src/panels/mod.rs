@@ -67,6 +67,14 @@ impl Default for Panels {
     }
 }
 
+impl Panels {
+    /// Closes a window that lies over the picture; says whether there was one.
+    pub(crate) fn close_window(&mut self) -> bool {
+        let windows = [&mut self.help, &mut self.export.open, &mut self.picture.open, &mut self.film.open];
+        windows.into_iter().find(|open| **open).map(|open| *open = false).is_some()
+    }
+}
+
 /// Shows the panels that lie beside the picture.
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     menu::show(app, ui);
