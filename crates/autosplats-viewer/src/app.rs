@@ -397,6 +397,10 @@ impl App {
             if self.change(|document| document.reload(id, Arc::clone(&cloud))) {
                 self.messages.note(format!("{} was read again", input.name));
             }
+            if self.stands_by_itself() {
+                self.first_view();
+            }
+            self.measure_scene();
             return;
         }
         let layer = Layer::new(&*input.name, path.clone(), cloud).opened_at(input.world_from_input);

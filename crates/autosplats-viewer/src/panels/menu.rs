@@ -110,7 +110,17 @@ fn window(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     ui.checkbox(&mut app.look.overlay, "Axes and scale bar");
     ui.separator();
-    egui::global_theme_preference_buttons(ui);
+    let mut theme = ui.ctx().options(|options| options.theme_preference);
+    let themes = [
+        (egui::ThemePreference::Dark, "Dark"),
+        (egui::ThemePreference::Light, "Light"),
+        (egui::ThemePreference::System, "As the system"),
+    ];
+    for (preference, label) in themes {
+        if ui.radio_value(&mut theme, preference, label).changed() {
+            ui.ctx().set_theme(preference);
+        }
+    }
 }
 
 fn tools(app: &mut App, ui: &mut egui::Ui) {
