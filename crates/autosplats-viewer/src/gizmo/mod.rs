@@ -7,6 +7,8 @@
 
 mod arrows;
 mod faces;
+#[cfg(test)]
+mod tests;
 mod view;
 
 use autosplats::cloud::glam::DVec3;

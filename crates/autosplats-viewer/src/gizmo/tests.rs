@@ -1,0 +1,101 @@
+//! Drags of a whole application that has no window.
+
+use std::sync::Arc;
+
+use autosplats::cloud::PointCloud;
+use autosplats::cloud::glam::DVec3;
+use eframe::egui::{Rect, pos2, vec2};
+
+use super::view::View;
+use super::*;
+use crate::Options;
+use crate::document::{Layer, SelectMode};
+use crate::look::Look;
+
+/// An application with 1,000 points in the unit cube, a clipping box and everything selected; and its picture.
+fn app() -> (App, View) {
+    let context = egui::Context::default();
+    let mut app = App::new(Options::default(), Look::default(), Vec::new(), &context);
+    let position = |i: usize| [7, 13, 29].map(|step| (i * step % 101) as f32 / 100.0);
+    let cloud = Arc::new(PointCloud::new(DVec3::ZERO, (0..1000).map(position).collect()));
+    app.change(|document| {
+        document.add(Layer::new("cube", None, cloud));
+        let shown = document.shown();
+        document.select(&shown, |_| true, SelectMode::Replace);
+    });
+    app.look_from(autosplats::ViewDirection::Iso, true);
+    switch(&mut app);
+    app.tool = Tool::Move;
+    find_middle(&mut app);
+    let rect = Rect::from_min_size(pos2(0.0, 0.0), vec2(600.0, 400.0));
+    let view = View::new(&app.navigation.camera(), rect, [600, 400]).expect("a camera that sees");
+    (app, view)
+}
+
+/// What undoing takes back, newest first.
+fn steps(app: &mut App) -> Vec<String> {
+    std::iter::from_fn(|| app.undo()).collect()
+}
+
+fn begin(app: &mut App, view: &View, handle: Handle) -> Pos2 {
+    let middle = middle(app).expect("some points are selected");
+    let place = match handle {
+        Handle::Face { axis, high } => view.place(app.document().clip.expect("a box").face(axis, high)),
+        _ => view.place(middle),
+    };
+    let place = place.expect("before the eye");
+    app.tools.gizmo.drag = match handle {
+        Handle::Face { axis, high } => faces::Drag::begin(app, view, axis, high, place).map(Drag::Face),
+        handle => arrows::Drag::begin(app, view, handle, place).map(Drag::Points),
+    };
+    assert!(app.tools.gizmo.is_dragging(), "{handle:?} is taken");
+    place
+}
+
+#[test]
+fn a_drag_is_one_step() {
+    for handle in [Handle::Face { axis: 0, high: true }, Handle::Middle, Handle::Arrow(2)] {
+        let (mut app, view) = app();
+        let place = begin(&mut app, &view, handle);
+        for step in 1..=5 {
+            follow(&mut app, &view, place + vec2(-4.0, -4.0) * step as f32, false);
+        }
+        finish(&mut app);
+        assert!(!app.tools.gizmo.is_busy(), "{handle:?} is let go");
+        let wanted = if matches!(handle, Handle::Face { .. }) { "Clipping box" } else { "Move 1,000 points" };
+        assert_eq!(steps(&mut app), [wanted, "Clipping box"], "{handle:?}, after the box was put up");
+    }
+}
+
+#[test]
+fn a_drag_can_be_given_up() {
+    for handle in [Handle::Face { axis: 1, high: false }, Handle::Middle] {
+        let (mut app, view) = app();
+        let before = app.document().clone();
+        let place = begin(&mut app, &view, handle);
+        follow(&mut app, &view, place + vec2(20.0, -20.0), false);
+        assert!(cancel(&mut app), "{handle:?} was dragged");
+        follow(&mut app, &view, place + vec2(40.0, -40.0), false);
+        finish(&mut app);
+        assert!(!cancel(&mut app), "and is no longer");
+        assert_eq!(app.document().clip, before.clip, "the box is where it was");
+        assert!(before.layers[0].edits.moves == app.document().layers[0].edits.moves, "and so are the points");
+        assert_eq!(steps(&mut app), ["Clipping box"], "nothing was done with {handle:?}");
+    }
+}
+
+#[test]
+fn what_arrives_during_a_drag_stays() {
+    for handle in [Handle::Face { axis: 0, high: true }, Handle::Middle] {
+        let (mut app, view) = app();
+        let place = begin(&mut app, &view, handle);
+        follow(&mut app, &view, place + vec2(-10.0, -10.0), false);
+        let cloud = Arc::new(PointCloud::new(DVec3::ZERO, vec![[0.5; 3]; 10]));
+        app.change(|document| document.add(Layer::new("late", None, cloud)));
+        follow(&mut app, &view, place + vec2(-20.0, -20.0), false);
+        finish(&mut app);
+        assert_eq!(app.document().layers.len(), 2, "{handle:?}: the file is there");
+        app.undo();
+        assert_eq!(app.document().layers.len(), 2, "{handle:?}: also when the drag is undone");
+    }
+}
