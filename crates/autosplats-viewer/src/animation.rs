@@ -51,7 +51,10 @@ fn at(keys: &[Camera], time: f64) -> Camera {
         let [a, b, c, d] = around.map(|key| value(&key));
         // Catmull and Rom: through b and c, in b parallel to the way from a to c.
         let t = part;
-        0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t * t + (3.0 * b - a - 3.0 * c + d) * t * t * t)
+        0.5 * (2.0 * b
+            + (c - a) * t
+            + (2.0 * a - 5.0 * b + 4.0 * c - d) * t * t
+            + (3.0 * b - a - 3.0 * c + d) * t * t * t)
     };
     let [_, from, to, _] = around;
     let eye = smooth(|camera| camera.eye);
@@ -64,11 +67,23 @@ fn at(keys: &[Camera], time: f64) -> Camera {
         (Projection::OrthographicHeight(a), Projection::OrthographicHeight(b)) => {
             Projection::OrthographicHeight(a * (b / a).powf(part))
         }
-        (from, to) => if part < 0.5 { from } else { to },
+        (from, to) => {
+            if part < 0.5 {
+                from
+            } else {
+                to
+            }
+        }
     };
     let camera = Camera { eye, look_at, up, projection };
     // Where the smooth way runs through itself, the nearer key will do.
-    if camera.check().is_ok() { camera } else if part < 0.5 { from } else { to }
+    if camera.check().is_ok() {
+        camera
+    } else if part < 0.5 {
+        from
+    } else {
+        to
+    }
 }
 
 /// Where pictures go.
@@ -152,7 +167,9 @@ impl Recording {
         let total = cameras.len();
         spawn("film", move || {
             let written = match target {
-                Target::Frames(folder, before, after) => write_frames(&queue, &folder, &before, &after, total, &context),
+                Target::Frames(folder, before, after) => {
+                    write_frames(&queue, &folder, &before, &after, total, &context)
+                }
                 Target::Film(path) => write_film(&queue, &path, size, rate, total, &context),
             };
             let _ = sender.send(written);
@@ -224,12 +241,15 @@ fn write_frames(
     let mut count = 0;
     for image in queue {
         let path = Target::frame(folder, before, after, count);
-        files::write(&path, |writer| files::encode_png(&image, writer)).map_err(|error| format!("{}: {error}", path.display()))?;
+        files::write(&path, |writer| files::encode_png(&image, writer))
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         count += 1;
         context.request_repaint();
     }
     let place = folder.join(format!("{before}…{after}"));
-    if count < total { Err(format!("{count} of {total} pictures were written: {}", place.display())) } else {
+    if count < total {
+        Err(format!("{count} of {total} pictures were written: {}", place.display()))
+    } else {
         Ok(format!("{count} pictures were written: {}", place.display()))
     }
 }
@@ -322,7 +342,11 @@ mod tests {
         let target = |path: &str| Target::new(Path::new(path));
         assert_eq!(target("a/film.MP4"), Ok(Target::Film("a/film.MP4".into())), "a film");
         assert_eq!(target("a/f.png"), Ok(Target::Frames("a".into(), "f_".into(), ".png".into())), "numbered");
-        assert_eq!(target("f%05d_x.png"), Ok(Target::Frames("".into(), "f".into(), "_x.png".into())), "where it is told");
+        assert_eq!(
+            target("f%05d_x.png"),
+            Ok(Target::Frames("".into(), "f".into(), "_x.png".into())),
+            "where it is told"
+        );
         assert!(target("film").is_err() && target("film.gif").is_err(), "others are not known");
     }
 

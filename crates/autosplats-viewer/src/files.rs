@@ -45,8 +45,14 @@ pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -
 pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> std::io::Result<()> {
     let encoder = image::codecs::png::PngEncoder::new(writer);
     let (width, height) = (picture.width, picture.height);
-    image::ImageEncoder::write_image(encoder, picture.pixels.as_flattened(), width, height, image::ExtendedColorType::Rgba8)
-        .map_err(std::io::Error::other)
+    image::ImageEncoder::write_image(
+        encoder,
+        picture.pixels.as_flattened(),
+        width,
+        height,
+        image::ExtendedColorType::Rgba8,
+    )
+    .map_err(std::io::Error::other)
 }
 
 /// Writes a file so that it appears complete or not at all.

@@ -151,7 +151,13 @@ mod tests {
     fn what_is_no_state_is_told() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("state.json");
-        for text in ["", "[]", "{\"inputs\": 3}", "{\"unknown\": 1}", "{\"look\": {\"settings\": {\"reconstruction\": {\"k\": 0}}}}"] {
+        for text in [
+            "",
+            "[]",
+            "{\"inputs\": 3}",
+            "{\"unknown\": 1}",
+            "{\"look\": {\"settings\": {\"reconstruction\": {\"k\": 0}}}}",
+        ] {
             std::fs::write(&path, text).expect("written");
             let error = State::read(&path).expect_err(text);
             assert!(error.contains("state.json"), "names the file: {error}");

@@ -168,7 +168,9 @@ fn target(app: &mut App, ui: &mut egui::Ui, cameras: Vec<Camera>) {
             Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
         }
         Ok(_) if cameras.is_empty() => Some("There is no way to go yet".into()),
-        Ok(target) if !film.replace => target.existing(cameras.len()).map(|path| format!("{} is there already", path.display())),
+        Ok(target) if !film.replace => {
+            target.existing(cameras.len()).map(|path| format!("{} is there already", path.display()))
+        }
         Ok(_) => None,
     };
     let mut start = false;

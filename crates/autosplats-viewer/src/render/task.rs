@@ -6,8 +6,8 @@ use autosplats::Image;
 use autosplats::cloud::glam::DVec3;
 
 use super::Wish;
-use crate::output::Goal;
 use crate::document::{Region, SelectMode, Shown};
+use crate::output::Goal;
 
 /// Something to be done as soon as the picture in work is finished.
 pub(crate) enum Task {
