@@ -16,6 +16,7 @@ use eframe::egui;
 pub(crate) use self::inputs::close_all;
 use crate::app::App;
 use crate::commands::Command;
+use crate::document::LayerId;
 
 /// What is open around the picture.
 pub(crate) struct Panels {
@@ -33,6 +34,8 @@ pub(crate) struct Panels {
     pub(crate) grabbed: Option<f64>,
     /// Whether the user wants to leave though something is not saved.
     leave: bool,
+    /// Layers with edits that are in no file, which the user wants to remove.
+    removal: Vec<LayerId>,
 }
 
 impl Default for Panels {
@@ -49,6 +52,7 @@ impl Default for Panels {
             claimed: Vec::new(),
             grabbed: None,
             leave: false,
+            removal: Vec::new(),
         }
     }
 }
@@ -82,6 +86,7 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     film::show(app, context);
     help::show(app, context);
     inputs::inspected(app, context);
+    inputs::removal(app, context);
     leave(app, context);
 }
 
