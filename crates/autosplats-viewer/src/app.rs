@@ -358,7 +358,11 @@ impl App {
                 }
                 Answer::Empty => self.shot = None,
                 Answer::Device(device) => self.device = device,
-                Answer::Failed(why) => self.messages.failure(why),
+                Answer::Failed(why) => {
+                    // The picture that failed may have been the film's.
+                    output::stop(&mut self.recording);
+                    self.messages.failure(why);
+                }
                 Answer::Done(outcome) => self.done(outcome),
             }
         }

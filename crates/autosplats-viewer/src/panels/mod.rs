@@ -21,6 +21,7 @@ use eframe::egui;
 pub(crate) use self::inputs::close_all;
 use crate::app::App;
 use crate::commands::Command;
+use crate::document::LayerId;
 
 /// What is open around the picture.
 pub(crate) struct Panels {
@@ -43,6 +44,8 @@ pub(crate) struct Panels {
     pub(crate) grabbed: Option<f64>,
     /// Whether the user wants to leave though something is not saved.
     leave: bool,
+    /// Layers with edits that are in no file, which the user wants to remove.
+    removal: Vec<LayerId>,
 }
 
 impl Default for Panels {
@@ -63,6 +66,7 @@ impl Default for Panels {
             claimed: Vec::new(),
             grabbed: None,
             leave: false,
+            removal: Vec::new(),
         }
     }
 }
@@ -100,6 +104,7 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     moving::show(app, context);
     measure::show(app, context);
     pose::show(app, context);
+    inputs::removal(app, context);
     leave(app, context);
 }
 
