@@ -3,8 +3,6 @@
 //! All of it is in `f64` world coordinates. Where the heights of a coordinate system have another unit than its plane, both
 //! become metres first, since there is no length across two units.
 
-#![allow(dead_code, reason = "not all of it has its place in the window yet")]
-
 use autosplats::cloud::{
     Crs, Unit,
     glam::{DVec3, dvec3},

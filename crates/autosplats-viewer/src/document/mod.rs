@@ -16,8 +16,6 @@
 //! Clouds in degrees are shown in metres on a [map](autosplats::cloud::LocalMetres) that all of a document's share; poses
 //! and moves are in these metres, and what is exported is in degrees again.
 
-#![allow(dead_code, reason = "not all of it has its place in the window yet")]
-
 mod bits;
 mod clip;
 mod edit;
