@@ -1,17 +1,18 @@
 //! The application: what is open, what is shown, and the round of each frame of the window.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use autosplats::cloud::glam::DVec3;
-use autosplats::cloud::{Axes, PointCloud, Source};
-use autosplats::{AdapterSummary, Camera, Projection, ViewDirection, guess_axes};
+use autosplats::cloud::Axes;
+use autosplats::{AdapterSummary, Camera};
 use eframe::egui;
 
 use crate::animation::Recording;
 use crate::commands::Tool;
-use crate::document::{Counts, Document, History, Layer, LayerId, Shown, label};
-use crate::loading::{Input, JobId, Loader, News, Watch};
+use crate::document::{Counts, Document, History, LayerId, Shown, label};
+use crate::loading::{Input, JobId, Loader, Watch};
 use crate::look::Look;
 use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
@@ -23,8 +24,6 @@ use crate::{Options, keys, output, panels, storage, viewport};
 
 /// Seconds after the last movement until the picture is made whole.
 const REST: f64 = 0.12;
-/// Vertical field of view of the first picture, degrees.
-const FOV_DEG: f64 = 40.0;
 
 /// The viewer.
 pub(crate) struct App {
@@ -48,28 +47,31 @@ pub(crate) struct App {
     pub(crate) aspect: f64,
     /// Where the picture is in the window.
     pub(crate) view_rect: egui::Rect,
-    pub(crate) recent: Vec<std::path::PathBuf>,
+    pub(crate) recent: Vec<PathBuf>,
     /// Where the session is kept.
-    pub(crate) state: Option<std::path::PathBuf>,
-    watch: bool,
-    watches: HashMap<LayerId, Watch>,
+    pub(crate) state: Option<PathBuf>,
+    /// Files are read again when they change.
+    pub(crate) watch: bool,
+    pub(crate) watches: HashMap<PathBuf, Watch>,
     /// What each layer was read from.
-    inputs: HashMap<LayerId, Input>,
+    pub(crate) inputs: HashMap<LayerId, Input>,
     /// Whether what is being read is to be seen, and in which colour.
-    looks: HashMap<JobId, (bool, Option<[u8; 3]>)>,
+    pub(crate) looks: HashMap<JobId, (bool, Option<[u8; 3]>)>,
     /// Files that are read again, and whose points they are.
-    reloads: HashMap<JobId, LayerId>,
-    guessed_axes: Option<Axes>,
+    pub(crate) reloads: HashMap<JobId, LayerId>,
+    pub(crate) guessed_axes: Option<Axes>,
     /// Where the program stood by itself, for a picture so much wider than high. As long as nobody has moved, it stands
     /// anew when points arrive and when the picture changes its shape.
-    first_camera: Option<(Camera, f64)>,
+    pub(crate) first_camera: Option<(Camera, f64)>,
     /// Grows with each change of the document.
     version: u64,
     counted: Counted,
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
-    /// Whether the first cloud has been looked at.
-    placed: bool,
+    /// Whether the first input is not to be fitted into the picture, as a camera was given.
+    pub(crate) camera_given: bool,
+    /// Inputs that could not be read, which a session keeps.
+    pub(crate) failed: Vec<Input>,
     /// Whether something else than the mouse moves the view.
     stirred: bool,
     /// When something moved last, seconds.
@@ -150,7 +152,7 @@ struct WishKey {
 
 impl App {
     /// An application that begins to read its inputs; `context` is the window's.
-    pub(crate) fn new(options: Options, look: Look, recent: Vec<std::path::PathBuf>, context: &egui::Context) -> Self {
+    pub(crate) fn new(options: Options, look: Look, recent: Vec<PathBuf>, context: &egui::Context) -> Self {
         let mut app = Self {
             history: History::default(),
             loader: Loader::start(context.clone()),
@@ -180,7 +182,8 @@ impl App {
             version: 1,
             counted: Counted::default(),
             wished: None,
-            placed: false,
+            camera_given: false,
+            failed: Vec::new(),
             stirred: false,
             moved: 0.0,
             quit: false,
@@ -194,40 +197,9 @@ impl App {
         app
     }
 
-    /// Begins to read something.
-    pub(crate) fn open(&mut self, input: Input) {
-        if let Some(path) = input.source.path() {
-            self.recent.retain(|known| known != path);
-            self.recent.insert(0, path.into());
-            self.recent.truncate(12);
-        }
-        self.loader.read(input);
-    }
-
-    /// Begins to read something that is shown in a certain way.
-    pub(crate) fn open_as(&mut self, input: Input, visible: bool, tint: Option<[u8; 3]>) {
-        let job = self.loader.read(input);
-        self.looks.insert(job, (visible, tint));
-    }
-
-    /// Stands at a place whatever is opened.
-    pub(crate) fn stand_at(&mut self, camera: &Camera) {
-        self.navigation.go_to(camera, true);
-        self.placed = true;
-    }
-
     /// Says that the view moves, so that pictures have to hurry.
     pub(crate) fn stir(&mut self) {
         self.stirred = true;
-    }
-
-    /// What a layer was read from, as it could be typed.
-    pub(crate) fn source_name(&self, id: LayerId) -> Option<String> {
-        let input = self.inputs.get(&id)?;
-        Some(match &input.source {
-            Source::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
-            Source::Scene(..) => input.name.clone(),
-        })
     }
 
     /// What is open.
@@ -282,6 +254,18 @@ impl App {
         result
     }
 
+    /// Changes the document in a way that outlasts undo: files come and go, inputs are shown or not.
+    pub(crate) fn settle(&mut self, change: impl Fn(&mut Document)) {
+        self.history.everywhere(change);
+        self.version += 1;
+    }
+
+    /// Gives a layer other points.
+    pub(crate) fn fill(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
+        self.history.reload(id, cloud);
+        self.version += 1;
+    }
+
     /// Takes back the last edit; says which it was.
     pub(crate) fn undo(&mut self) -> Option<String> {
         self.version += 1;
@@ -316,27 +300,7 @@ impl App {
 
     /// Takes in what the threads have to say.
     fn receive(&mut self, context: &egui::Context) {
-        for (input, job, news) in self.loader.news() {
-            match news {
-                News::Preview(cloud) => self.preview(&input, job, *cloud),
-                News::Read(cloud, notes) => {
-                    notes.into_iter().for_each(|note| self.messages.note(format!("{}: {note}", input.name)));
-                    self.read(input, job, *cloud);
-                }
-                News::Failed(why) => {
-                    self.drop_preview(job);
-                    self.messages.error(why);
-                }
-                News::Cancelled => {
-                    self.drop_preview(job);
-                    self.messages.note(format!("{}: not read to its end", input.name));
-                }
-            }
-        }
-        let changed: Vec<_> = self.loader.changed().collect();
-        for path in changed {
-            self.reload(&path);
-        }
+        self.follow_files();
         let now = context.input(|input| input.time);
         let answers: Vec<_> = self.render.answers().collect();
         for answer in answers {
@@ -384,155 +348,6 @@ impl App {
         }
     }
 
-    /// Shows the first points of a file.
-    fn preview(&mut self, input: &Input, job: JobId, cloud: PointCloud) {
-        if self.reloads.contains_key(&job) {
-            return;
-        }
-        let layer = Layer::new(&*input.name, None, Arc::new(cloud)).opened_at(input.world_from_input);
-        self.put(job, layer);
-    }
-
-    /// Shows a file that has been read.
-    fn read(&mut self, input: Input, job: JobId, cloud: PointCloud) {
-        let path = input.source.path().map(std::path::Path::to_path_buf);
-        let cloud = Arc::new(cloud);
-        if let Some(id) = self.reloads.remove(&job) {
-            if self.change(|document| document.reload(id, Arc::clone(&cloud))) {
-                self.messages.note(format!("{} was read again", input.name));
-            }
-            if self.stands_by_itself() {
-                self.first_view();
-            }
-            self.measure_scene();
-            return;
-        }
-        let layer = Layer::new(&*input.name, path.clone(), cloud).opened_at(input.world_from_input);
-        let id = layer.id;
-        self.put(job, layer);
-        self.loading.remove(&job);
-        if self.watch
-            && let Some(path) = path
-        {
-            self.watches.insert(id, self.loader.watch(path));
-        }
-        self.inputs.insert(id, input);
-    }
-
-    /// Puts a layer in the place of the one that had the points of `job` so far, or at the end.
-    fn put(&mut self, job: JobId, layer: Layer) {
-        let first = !self.placed;
-        let cloud = Arc::clone(&layer.cloud);
-        let before = self.loading.insert(job, layer.id);
-        let look = self.looks.remove(&job);
-        self.change(|document| {
-            let place = before.and_then(|id| document.layers.iter().position(|layer| layer.id == id));
-            let visible = before.and_then(|id| document.remove(id)).is_none_or(|layer| layer.visible);
-            let mut layer = layer;
-            layer.visible = visible;
-            if let Some((visible, tint)) = look {
-                (layer.visible, layer.tint) = (visible, tint);
-            }
-            let id = document.add(layer);
-            if let Some(place) = place {
-                document.reorder(id, place);
-            }
-        });
-        if self.guessed_axes.is_none() || before.is_some() && self.document().layers.len() == 1 {
-            self.guessed_axes = Some(guess_axes(&cloud));
-        }
-        if first || self.stands_by_itself() {
-            self.first_view();
-            self.placed = true;
-        }
-        self.measure_scene();
-    }
-
-    fn drop_preview(&mut self, job: JobId) {
-        self.reloads.remove(&job);
-        if let Some(id) = self.loading.remove(&job) {
-            self.change(|document| document.remove(id));
-        }
-    }
-
-    /// Reads a file again that has changed; one with edits is only told about, as they are of the points it had.
-    fn reload(&mut self, path: &std::path::Path) {
-        let layers = self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path));
-        let ids: Vec<_> = layers.map(|layer| layer.id).collect();
-        ids.into_iter().for_each(|id| self.reload_layer(id));
-    }
-
-    /// Reads the file of an input again, unless its points have edits.
-    pub(crate) fn reload_layer(&mut self, id: LayerId) {
-        let Some(input) = self.inputs.get(&id).cloned() else { return };
-        if self.history.is_unsaved(id) {
-            self.messages.note(format!("{} has changed; it was not read again, as it has edits here", input.name));
-        } else {
-            let job = self.loader.read(input);
-            self.reloads.insert(job, id);
-        }
-    }
-
-    /// Tells the navigation how large everything is.
-    pub(crate) fn measure_scene(&mut self) {
-        let bounds = self.document().shown_bounds();
-        let up = self.up();
-        if let Some([low, high]) = bounds {
-            self.navigation.set_scene(low.midpoint(high), 0.5 * low.distance(high), up);
-        }
-    }
-
-    /// Whether nobody has moved since the program chose where to stand.
-    fn stands_by_itself(&self) -> bool {
-        self.first_camera.is_some_and(|(camera, _)| camera == self.navigation.goal_camera())
-    }
-
-    /// Stands where a picture of the first input stands that names no camera.
-    pub(crate) fn first_view(&mut self) {
-        let scene =
-            self.loader.jobs().iter().map(|job| &job.input).chain(self.inputs.values()).find_map(|input| match &input
-                .source
-            {
-                Source::Scene(scene, _) => Some(scene.view()),
-                Source::File(_) => None,
-            });
-        match scene {
-            Some(view) if self.document().layers.len() == 1 => {
-                let projection = Projection::PerspectiveFovDeg(view.fov_degrees);
-                let camera = Camera { eye: view.eye, look_at: view.look_at, up: view.up, projection };
-                self.measure_scene();
-                self.navigation.go_to(&camera, true);
-            }
-            _ => self.look_from(ViewDirection::Auto, true),
-        }
-        self.first_camera = Some((self.navigation.goal_camera(), self.aspect));
-    }
-
-    /// Looks at everything from one side.
-    pub(crate) fn look_from(&mut self, direction: ViewDirection, at_once: bool) {
-        let cloud = self.document().overview();
-        let fov = if direction == ViewDirection::Auto { FOV_DEG } else { self.navigation.fov_deg() };
-        let projection = if self.navigation.is_orthographic() {
-            Projection::OrthographicHeight(1.0)
-        } else {
-            Projection::PerspectiveFovDeg(fov)
-        };
-        self.measure_scene();
-        match Camera::fit(&cloud, self.axes(), direction, self.aspect, projection) {
-            Ok(camera) => self.navigation.go_to(&camera, at_once),
-            Err(error) => self.messages.note(error.to_string()),
-        }
-    }
-
-    /// Stands where all points of a cloud are seen, looking the same way.
-    pub(crate) fn fit(&mut self, cloud: &PointCloud) {
-        self.measure_scene();
-        match self.navigation.goal_camera().showing(cloud, self.aspect) {
-            Ok(camera) => self.navigation.go_to(&camera, false),
-            Err(error) => self.messages.note(error.to_string()),
-        }
-    }
-
     /// What a picture of the present view is made of.
     pub(crate) fn wish(&self, size: [u32; 2], moving: bool) -> Wish {
         Wish {
@@ -564,7 +379,10 @@ impl App {
         }
         if self.document().layers.is_empty() {
             self.shot = None;
-            self.wished = None;
+            if self.wished.take().is_some() {
+                // Lets go of the points.
+                self.render.wish(self.wish(size, false));
+            }
             return;
         }
         let key = WishKey {

@@ -15,6 +15,7 @@ mod look;
 mod measure;
 mod messages;
 mod navigation;
+mod opening;
 mod output;
 mod overlay;
 mod panels;

@@ -116,7 +116,11 @@ impl Loader {
         let asked = context.clone();
         spawn("read", move || {
             for order in queue {
-                let news = read(&order, &sender, &asked);
+                let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| read(&order, &sender, &asked)));
+                // What goes wrong in one file must not keep the next from being read.
+                let news = read.unwrap_or_else(|_| {
+                    News::Failed(format!("{}: reading it failed, which is a bug of this program", order.input.name))
+                });
                 let _ = sender.send((order.id, news));
                 asked.request_repaint();
             }
@@ -139,6 +143,11 @@ impl Loader {
         &self.jobs
     }
 
+    /// Ends a job.
+    pub(crate) fn cancel(&self, id: JobId) {
+        self.jobs.iter().filter(|job| job.id == id).for_each(Job::cancel);
+    }
+
     /// Ends all jobs.
     pub(crate) fn cancel_all(&self) {
         self.jobs.iter().for_each(Job::cancel);
@@ -151,10 +160,16 @@ impl Loader {
         for (id, news) in news {
             let Some(at) = self.jobs.iter().position(|job| job.id == id) else { continue };
             let input = self.jobs[at].input.clone();
+            let cancelled = self.jobs[at].state.cancelled.load(Ordering::Relaxed);
             if matches!(news, News::Read(..) | News::Failed(_) | News::Cancelled) {
                 self.jobs.remove(at);
             }
-            told.push((input, id, news));
+            // What was finished before the reader heard of it is not wanted either.
+            match news {
+                News::Preview(_) if cancelled => {}
+                News::Read(..) if cancelled => told.push((input, id, News::Cancelled)),
+                news => told.push((input, id, news)),
+            }
         }
         told
     }

@@ -88,7 +88,9 @@ impl Pose {
 
     /// Whether nobody could tell the two apart.
     fn is_near(&self, other: &Self) -> bool {
-        self.pivot.distance(other.pivot) < ARRIVED * other.distance
+        // Far from the origin numbers are coarse.
+        let coarse = 4.0 * f64::EPSILON * other.pivot.abs().max_element();
+        self.pivot.distance(other.pivot) < ARRIVED * other.distance + coarse
             && (self.distance / other.distance).ln().abs() < ARRIVED
             && self.world_from_view.angle_between(other.world_from_view) < ARRIVED
     }
@@ -201,8 +203,9 @@ impl Navigation {
             let step = seconds * FLY * self.goal.distance * if flight.fast { FAST } else { 1.0 };
             let [right, forward] = [DVec3::X, DVec3::Z].map(|axis| self.goal.axis(axis));
             self.goal.pivot += (right * flight.right + forward * flight.forward + self.up * flight.up) * step;
-            let turn = seconds * KEY_TURN;
-            self.look(DVec2::new(flight.turn_right, -flight.turn_up) * (turn / TURN));
+            let eye = self.goal.eye();
+            self.turn(DVec2::new(flight.turn_right, -flight.turn_up) * (seconds * KEY_TURN / TURN));
+            self.goal.pivot = eye + self.goal.forward() * self.goal.distance;
         }
         if self.shown == self.goal {
             return false;

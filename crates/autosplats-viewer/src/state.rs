@@ -55,20 +55,31 @@ enum Up {
 }
 
 impl State {
-    /// What is open in `app`. Inputs that are still being read are not in it.
+    /// What is open in `app`, or was to be.
     pub(crate) fn of(app: &App) -> Self {
-        let inputs = app.document().layers.iter().filter_map(|layer| {
-            let source = app.source_name(layer.id)?;
+        let layers = app.document().layers.iter().filter_map(|layer| {
+            let source = App::source_name(app.inputs.get(&layer.id)?);
             Some(InputState { source, visible: layer.visible, tint: layer.tint, pose: layer.pose })
         });
+        // What could not be read this time, or is still being read, is no less a part of the session.
+        let started = |id| app.loading.contains_key(&id) || app.reloads.contains_key(&id);
+        let waiting = app.loader.jobs().iter().filter(|job| !started(job.id)).map(|job| {
+            let (visible, tint) = app.looks.get(&job.id).copied().unwrap_or((true, None));
+            (&job.input, visible, tint)
+        });
+        let absent = waiting.chain(app.failed.iter().map(|input| (input, true, None)));
+        let absent = absent.map(|(input, visible, tint)| {
+            InputState { source: App::source_name(input), visible, tint, pose: input.world_from_input }
+        });
+        let inputs: Vec<InputState> = layers.chain(absent).collect();
         let up = app.up_axis.map(|axes| match axes {
             Axes::ZUp => Up::Z,
             Axes::YUp => Up::Y,
             Axes::Camera => Up::Camera,
         });
         Self {
-            inputs: inputs.collect(),
-            camera: (!app.document().layers.is_empty()).then(|| app.navigation.goal_camera()),
+            camera: (!inputs.is_empty()).then(|| app.navigation.goal_camera()),
+            inputs,
             up,
             look: app.look.clone(),
             keys: app.keys.clone(),
@@ -118,6 +129,8 @@ impl State {
         for InputState { source, visible, tint, pose } in inputs {
             let name = if source.starts_with("scene:") { source } else { folder.join(source).display().to_string() };
             match Input::parse(&name) {
+                // Named when the program was started, too.
+                Ok(input) if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input)) => {}
                 Ok(input) => app.open_as(Input { world_from_input: pose, ..input }, visible, tint),
                 Err(error) => app.messages.error(error.to_string()),
             }

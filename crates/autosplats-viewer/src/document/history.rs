@@ -3,6 +3,8 @@
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::Arc;
 
+use autosplats::cloud::PointCloud;
+
 use super::{Document, LayerId, layer::Changes};
 
 /// A document with those it was before, newest last, and those that were undone.
@@ -71,6 +73,20 @@ impl History {
         self.forget();
     }
 
+    /// Changes the document and all it was and would be again: for what is no step, as a file that has been read, and has to
+    /// outlast undoing those that are.
+    pub(crate) fn everywhere(&mut self, change: impl Fn(&mut Document)) {
+        let steps = self.past.iter_mut().chain(&mut self.future).map(|step| &mut step.document);
+        steps.chain([&mut self.current]).for_each(change);
+    }
+
+    /// Gives a layer the points that its file has now; what was done to single points, ever, is forgotten, as they may be
+    /// others.
+    pub(crate) fn reload(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
+        self.everywhere(|document| document.reload(id, cloud));
+        self.saved.remove(&id);
+    }
+
     /// Takes back the last step; says which.
     pub(crate) fn undo(&mut self) -> Option<String> {
         let Step { label, document } = self.past.pop_back()?;
@@ -107,7 +123,10 @@ impl History {
     }
 
     fn forget(&mut self) {
-        while self.past.len() + self.future.len() > self.most_steps || self.old_bytes() > self.most_bytes {
+        // The newest step is kept whatever it takes: it has just been done, and may have been a mistake.
+        while self.past.len() + self.future.len() > 1
+            && (self.past.len() + self.future.len() > self.most_steps || self.old_bytes() > self.most_bytes)
+        {
             let far = if self.past.len() >= self.future.len() { &mut self.past } else { &mut self.future };
             if far.pop_front().is_none() {
                 return;

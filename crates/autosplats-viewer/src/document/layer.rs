@@ -32,6 +32,8 @@ pub(crate) struct Layer {
     pub(crate) cloud: Arc<PointCloud>,
     /// Whether it is shown.
     pub(crate) visible: bool,
+    /// Whether more points are still to come. Its points can be seen, but not selected or edited, as they are not the file's.
+    pub(crate) incomplete: bool,
     /// One colour for all its points instead of their own.
     pub(crate) tint: Option<[u8; 3]>,
     /// Where it stands: maps its own coordinates, in metres where the file has degrees, to world coordinates, after the
@@ -90,6 +92,7 @@ impl Layer {
             local: cloud.local_metres(None),
             cloud,
             visible: true,
+            incomplete: false,
             tint: None,
             pose: DMat4::IDENTITY,
             edits: Edits::default(),

@@ -67,12 +67,17 @@ impl Document {
     }
 
     /// Gives a layer the points that its file has now; what was done to single points is forgotten, as they may be others.
-    pub(crate) fn reload(&mut self, id: LayerId, cloud: Arc<PointCloud>) -> bool {
+    pub(super) fn reload(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
         self.change(id, |layer| {
             // On the map as before, if it is in degrees still.
             layer.local = cloud.local_metres(layer.local.as_ref());
-            (layer.cloud, layer.edits) = (cloud, Edits::default());
-        })
+            (layer.cloud, layer.edits) = (Arc::clone(cloud), Edits::default());
+        });
+    }
+
+    /// Says that all points of a layer are there now: it can be edited.
+    pub(crate) fn complete(&mut self, id: LayerId) {
+        self.change(id, |layer| layer.incomplete = false);
     }
 
     /// A part of what is shown, for looking at it as a whole: points taken evenly from all of it.

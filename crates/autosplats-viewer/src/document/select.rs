@@ -20,7 +20,8 @@ impl Document {
     /// Selects the shown points that `hits` says yes to, by their index. What is not shown is not hit.
     pub(crate) fn select(&mut self, shown: &Shown, hits: impl Fn(usize) -> bool + Sync, mode: SelectMode) {
         for layer in &mut self.layers {
-            let hit = shown.part(layer.id).map(|part| part.bits(layer.cloud.len(), &hits)).unwrap_or_default();
+            let part = shown.part(layer.id).filter(|_| !layer.incomplete);
+            let hit = part.map(|part| part.bits(layer.cloud.len(), &hits)).unwrap_or_default();
             let selected = &mut layer.edits.selected;
             *selected = match mode {
                 SelectMode::Replace => hit,

@@ -74,7 +74,7 @@ impl Document {
 
     /// Those of a layer's points that an edit of the selection is about: selected, and to be seen.
     pub(super) fn reached(&self, layer: &Layer) -> Bits {
-        if !layer.visible {
+        if !layer.visible || layer.incomplete {
             return Bits::default();
         }
         let there = layer.edits.selected.without(&layer.edits.hidden).without(&layer.edits.deleted);
@@ -89,7 +89,7 @@ impl Document {
 
     /// Those of a layer's points that can be seen and are not selected.
     pub(super) fn others(&self, layer: &Layer) -> Bits {
-        if !layer.visible {
+        if !layer.visible || layer.incomplete {
             return Bits::default();
         }
         let clip = self.clips();

@@ -174,3 +174,29 @@ fn orthographic_shows_the_pivot_in_the_same_size_and_hides_nothing() {
     assert!(before.distance(on_screen(&camera, point)) < 1e-9, "same size");
     assert!(camera.eye.y < -10.0, "the eye is before the scene: {}", camera.eye);
 }
+
+#[test]
+fn arrow_keys_turn_the_head_where_they_point() {
+    let mut navigation = south();
+    let before = navigation.goal_camera();
+    navigation.advance(0.1, Flight { turn_right: 1.0, turn_up: 1.0, ..Flight::default() });
+    let after = navigation.goal_camera();
+    assert!(after.eye.distance(before.eye) < 1e-9, "the eye stays: {}", after.eye);
+    let [_, _, forward] = after.axes().expect("a camera");
+    assert!(forward.x > 0.05 && forward.z > 0.05, "to the east and up: {forward}");
+    let angle = forward.angle_between(DVec3::Y);
+    assert!((0.1..0.2).contains(&angle), "as fast as stated in both directions: {angle}");
+}
+
+#[test]
+fn the_eye_arrives_far_from_the_origin_too() {
+    let mut navigation = south();
+    let far = DVec3::new(512_345.678, 5_412_345.678, 321.0);
+    navigation.set_scene(far, 100.0, DVec3::Z);
+    let projection = Projection::PerspectiveFovDeg(40.0);
+    let camera = Camera { eye: far - DVec3::Y * 0.001, look_at: far, up: DVec3::Z, projection };
+    navigation.go_to(&camera, true);
+    navigation.pan(DVec2::new(0.3, 0.2), None);
+    let frames = (0..600).take_while(|_| navigation.advance(1.0 / 60.0, Flight::default())).count();
+    assert!(frames < 300, "it rests after {frames} frames");
+}

@@ -53,11 +53,15 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         ui.horizontal(|ui| {
             let mut shown = visible;
             if ui.checkbox(&mut shown, "").on_hover_text("Show this input").changed() {
-                app.change(|document| document.set_visible(id, shown));
+                app.settle(|document| {
+                    document.set_visible(id, shown);
+                });
             }
             let mut color = tint.unwrap_or([200, 200, 200]);
             if ui.color_edit_button_srgb(&mut color).on_hover_text("One colour for all its points").changed() {
-                app.change(|document| document.set_tint(id, Some(color)));
+                app.settle(|document| {
+                    document.set_tint(id, Some(color));
+                });
             }
             if super::layer::naming(app, ui, id) {
                 return;
@@ -96,7 +100,7 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         ui.close();
     }
     if ui.button("Show it alone").clicked() {
-        app.change(|document| {
+        app.settle(|document| {
             let ids: Vec<_> = document.layers.iter().map(|layer| layer.id).collect();
             for other in ids {
                 document.set_visible(other, other == id);
@@ -105,7 +109,9 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         ui.close();
     }
     if ui.button("Its own colours").clicked() {
-        app.change(|document| document.set_tint(id, None));
+        app.settle(|document| {
+            document.set_tint(id, None);
+        });
         ui.close();
     }
     ui.separator();
@@ -134,7 +140,13 @@ fn remove(app: &mut App, ids: Vec<LayerId>) {
 }
 
 fn remove_now(app: &mut App, ids: &[LayerId]) {
-    let label = if let [_] = ids { "Remove an input" } else { "Close all" };
+    let incomplete = |id: &LayerId| app.document().layer(*id).is_some_and(|layer| layer.incomplete);
+    let (unread, ids): (Vec<LayerId>, Vec<LayerId>) = ids.iter().copied().partition(incomplete);
+    unread.into_iter().for_each(|id| app.give_up(id));
+    if ids.is_empty() {
+        return;
+    }
+    let label = if let [_] = ids[..] { "Remove an input" } else { "Close all" };
     app.edit(label, |document| {
         ids.iter().for_each(|&id| {
             document.remove(id);

@@ -37,10 +37,16 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
                 post = shared.news.wait(post).unwrap_or_else(PoisonError::into_inner);
             }
         };
-        let answer = match (task, wish) {
+        let work = std::panic::AssertUnwindSafe(|| match (task, wish) {
             (Some(task), _) => studio.perform(task, outbox).map(Answer::Done),
             (None, Some(wish)) => studio.draw(&wish, outbox),
-            (None, None) => continue,
+            (None, None) => Ok(Answer::Empty),
+        });
+        // A bug in one picture must not end all pictures, with edits in the window that are not saved.
+        let Ok(answer) = std::panic::catch_unwind(work) else {
+            studio = Studio::default();
+            outbox.send(Answer::Failed("this picture failed, which is a bug of this program".into()));
+            continue;
         };
         outbox.send(answer.unwrap_or_else(|error| {
             if matches!(error, Error::DeviceLost(_)) {
