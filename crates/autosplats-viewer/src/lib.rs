@@ -19,6 +19,8 @@ mod overlay;
 mod panels;
 mod render;
 mod storage;
+#[cfg(test)]
+mod tests;
 mod threads;
 mod tools;
 mod viewport;

@@ -97,7 +97,17 @@ fn window(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     ui.checkbox(&mut app.look.overlay, "Axes and scale bar");
     ui.separator();
-    egui::global_theme_preference_buttons(ui);
+    // egui's own buttons for this have signs that no font here has.
+    let mut theme = ui.options(|options| options.theme_preference);
+    for (name, preference) in [
+        ("Light or dark as the system", egui::ThemePreference::System),
+        ("Light", egui::ThemePreference::Light),
+        ("Dark", egui::ThemePreference::Dark),
+    ] {
+        if ui.radio_value(&mut theme, preference, name).changed() {
+            ui.set_theme(theme);
+        }
+    }
 }
 
 fn tools(app: &mut App, ui: &mut egui::Ui) {
