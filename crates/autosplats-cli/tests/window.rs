@@ -13,8 +13,11 @@ use std::time::Duration;
 
 use screen::{Picture, Screen, keys};
 
-/// The surface's opinion of how much two pictures may differ: the figures of time in the line below change.
+/// How much two pictures of the same may differ, of 1: half a level.
 const SAME: f64 = 0.002;
+
+/// Where the dialog for pictures has its button.
+const SAVE: [i16; 2] = [458, 410];
 
 /// What is opened: the bunny where the data is, else a sphere.
 fn input(folder: &common::Folder) -> PathBuf {
@@ -35,7 +38,8 @@ fn a_session_in_a_window() {
     let folder = common::Folder::new();
     let Some(mut screen) = Screen::start([1280, 800]) else { return };
     let mut command = folder.command(&["view"]);
-    command.arg(input(&folder)).args(["--backend", "cpu"]);
+    let input = input(&folder);
+    command.arg(&input).args(["--backend", "cpu"]);
     screen.run(command, &folder.path("home"));
 
     // The picture's part of the window: right of the list, below the menu, above the status line.
@@ -68,13 +72,12 @@ fn a_session_in_a_window() {
     screen.key(keys::ESCAPE);
 
     screen.key(keys::M);
-    screen.click([x, y - 60]);
+    screen.click([x, y - 10]);
     screen.settled("6-first-corner", |picture| picture.crop(view).difference(&back.crop(view)) > 1e-6);
     screen.click([x, y + 80]);
-    let line = [x - 60, y - 70, x + 60, y + 90];
-    let measured = screen.settled("7-measured", |picture| {
-        picture.crop(line).share(|pixel| pixel == [255, 160, 40]) > 0.003
-    });
+    let line = [x - 60, y - 20, x + 60, y + 90];
+    let measured =
+        screen.settled("7-measured", |picture| picture.crop(line).share(|pixel| pixel == [255, 160, 40]) > 0.003);
     assert!(back.crop(line).share(|pixel| pixel == [255, 160, 40]) < 1e-4, "the line is drawn by measuring");
     let dark = |picture: &Picture| picture.crop(line).share(|[r, g, b]| r.max(g).max(b) < 80);
     assert!(dark(&measured) > dark(&back) + 0.01, "with a dark label: {} {}", dark(&measured), dark(&back));
@@ -96,15 +99,29 @@ fn a_session_in_a_window() {
     screen.key(keys::ESCAPE);
     screen.key(keys::ESCAPE);
     let rest = [left, top, right, bottom - 130];
-    let undone =
-        screen.settled("10-undone", |picture| picture.crop(rest).difference(&back.crop(rest)) < SAME);
+    let undone = screen.settled("10-undone", |picture| picture.crop(rest).difference(&back.crop(rest)) < SAME);
     assert!(undone.crop(rest).difference(&deleted.crop(rest)) > SAME, "the comparison can tell");
 
+    screen.keys_with(keys::CTRL, keys::C);
+    let copied = screen.clipboard().expect("a view is on the clipboard");
+    folder.write("view.json", &copied);
     screen.keys_with(keys::CTRL, keys::S);
     screen.settled("11-dialog", |picture| picture.crop(view).difference(&undone.crop(view)) > 0.02);
+    screen.click(SAVE);
+    let saved = folder.path("picture.png");
+    // It appears as a whole.
+    screen.wait("12-saved", Duration::from_secs(120), |_| saved.is_file()).expect("the picture is written");
     screen.keys_with(keys::CTRL, keys::Q);
     let code = screen.finish();
     assert_eq!(code, Some(0), "the window closes as it should: {}", screen.words());
+
+    let path = input.to_str().expect("the path is text");
+    let view = ["--camera", "view.json", "--size", "1920x1080", "--backend", "cpu", "-o", "rendered.png"];
+    folder.succeed(&[&["render", path][..], &view].concat());
+    let [seen, rendered] = ["picture.png", "rendered.png"].map(|name| Picture::read(&folder.path(name)));
+    // The same camera to the last bit; what differs is how the two choose what they do not say.
+    assert!(seen.spread() > 20.0, "something is seen");
+    assert!(seen.difference(&rendered) < SAME, "render makes the same picture: {}", seen.difference(&rendered));
 }
 
 /// What the screen shows without a program.

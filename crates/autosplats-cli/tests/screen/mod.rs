@@ -6,7 +6,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use x11rb::connection::{Connection as _, RequestConnection as _};
-use x11rb::protocol::xproto::{ConnectionExt as _, ImageFormat, InputFocus, MapState, Window};
+use x11rb::protocol::Event;
+use x11rb::protocol::xproto::{
+    AtomEnum, ConnectionExt as _, CreateWindowAux, ImageFormat, InputFocus, MapState, Window, WindowClass,
+};
 use x11rb::rust_connection::RustConnection;
 
 /// What a machine with much else to do may take for a step.
@@ -21,6 +24,7 @@ pub(crate) mod keys {
     pub(crate) const DELETE: u32 = 0xffff;
     pub(crate) const CTRL: u32 = 0xffe3;
     pub(crate) const B: u32 = 'b' as u32;
+    pub(crate) const C: u32 = 'c' as u32;
     pub(crate) const M: u32 = 'm' as u32;
     pub(crate) const Q: u32 = 'q' as u32;
     pub(crate) const S: u32 = 's' as u32;
@@ -75,6 +79,12 @@ impl Picture {
     /// Share of the pixels that are so.
     pub(crate) fn share(&self, is: impl Fn([u8; 3]) -> bool) -> f64 {
         self.pixels.iter().filter(|&&pixel| is(pixel)).count() as f64 / self.pixels.len() as f64
+    }
+
+    /// A picture from a file.
+    pub(crate) fn read(path: &Path) -> Self {
+        let picture = image::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).to_rgb8();
+        Self { width: picture.width() as usize, pixels: picture.pixels().map(|pixel| pixel.0).collect() }
     }
 
     fn write(&self, path: &Path) {
@@ -298,5 +308,32 @@ impl Screen {
         self.fake(2, held, [0, 0]);
         self.key(symbol);
         self.fake(3, held, [0, 0]);
+    }
+
+    /// The text on the clipboard, if it comes in time.
+    pub(crate) fn clipboard(&self) -> Option<String> {
+        let atom = |name: &str| {
+            let asked = self.connection.intern_atom(false, name.as_bytes()).expect("asked");
+            asked.reply().expect("a name has a number").atom
+        };
+        let (clipboard, text, place) = (atom("CLIPBOARD"), atom("UTF8_STRING"), atom("AUTOSPLATS_TEST"));
+        let window = self.connection.generate_id().expect("there are numbers");
+        let (class, aux) = (WindowClass::INPUT_ONLY, CreateWindowAux::new());
+        let made =
+            self.connection.create_window(0, window, self.root, 0, 0, 1, 1, 0, class, x11rb::COPY_FROM_PARENT, &aux);
+        made.expect("asked").check().expect("a window that nobody sees");
+        let start = Instant::now();
+        while start.elapsed() < WAIT {
+            let asked = self.connection.convert_selection(window, clipboard, text, place, x11rb::CURRENT_TIME);
+            asked.expect("asked").check().expect("the screen has a clipboard");
+            std::thread::sleep(LOOK);
+            while let Some(event) = self.connection.poll_for_event().expect("the screen is there") {
+                if matches!(&event, Event::SelectionNotify(answer) if answer.property == place) {
+                    let asked = self.connection.get_property(true, window, place, AtomEnum::ANY, 0, u32::MAX / 4);
+                    return String::from_utf8(asked.expect("asked").reply().expect("it was told of").value).ok();
+                }
+            }
+        }
+        None
     }
 }
