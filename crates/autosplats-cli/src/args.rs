@@ -65,6 +65,7 @@ Examples:
   autosplats view a.e57 b.e57 --pose b.e57=b.txt
   autosplats view result.ply --watch
   autosplats scene:statue:1M
+  autosplats --state survey.json survey.laz
 
 In the window H shows what keys and mouse do.";
 
@@ -77,6 +78,9 @@ generated scene as scene:NAME[:COUNT]. None opens an empty window to drop files 
     pub(crate) inputs: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,
+    /// File that keeps the session, what is open and how it is seen: had again if it is there, written at the end
+    #[arg(long, value_name = "FILE")]
+    pub(crate) state: Option<PathBuf>,
     /// Read files again when they change
     #[arg(long)]
     pub(crate) watch: bool,

@@ -17,6 +17,7 @@ use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
 use crate::panels::Panels;
 use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
+use crate::state::State;
 use crate::tools::Tools;
 use crate::{Options, keys, output, panels, storage, viewport};
 
@@ -45,30 +46,52 @@ pub(crate) struct App {
     pub(crate) rate: Rate,
     /// Width over height of the picture in the window.
     pub(crate) aspect: f64,
+    /// Where the picture is in the window.
+    pub(crate) view_rect: egui::Rect,
     pub(crate) recent: Vec<std::path::PathBuf>,
+    /// Where the session is kept.
+    pub(crate) state: Option<std::path::PathBuf>,
     watch: bool,
     watches: HashMap<LayerId, Watch>,
     /// What each layer was read from.
     inputs: HashMap<LayerId, Input>,
+    /// Whether what is being read is to be seen, and in which colour.
+    looks: HashMap<JobId, (bool, Option<[u8; 3]>)>,
     /// Files that are read again, and whose points they are.
     reloads: HashMap<JobId, LayerId>,
     guessed_axes: Option<Axes>,
-    /// The first file, as long as its preview grows and nobody has moved.
-    growing: Option<JobId>,
+    /// Where the program stood by itself, for a picture so much wider than high. As long as nobody has moved, it stands
+    /// anew when points arrive and when the picture changes its shape.
+    first_camera: Option<(Camera, f64)>,
     /// Grows with each change of the document.
     version: u64,
-    /// Points of the document and of each layer, as of a version.
-    counted: (u64, Counts, HashMap<LayerId, Counts>),
+    counted: Counted,
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
     /// Whether the first cloud has been looked at.
     placed: bool,
+    /// Whether something else than the mouse moves the view.
+    stirred: bool,
     /// When something moved last, seconds.
     moved: f64,
     pub(crate) quit: bool,
     /// Cameras that a film goes through.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
+}
+
+/// What panels say of the document, as of a version of it.
+#[derive(Default)]
+pub(crate) struct Counted {
+    version: u64,
+    /// Points of all layers.
+    pub(crate) all: Counts,
+    /// Points of each layer.
+    pub(crate) layers: HashMap<LayerId, Counts>,
+    /// Bytes of all points.
+    pub(crate) bytes: usize,
+    /// Bytes that undo keeps besides.
+    pub(crate) old_bytes: usize,
 }
 
 /// The last picture, on its way to the screen.
@@ -144,17 +167,21 @@ impl App {
             up_axis: None,
             rate: Rate::default(),
             aspect: 1.5,
+            view_rect: egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(800.0, 600.0)),
             recent,
+            state: options.state,
+            looks: HashMap::new(),
             watch: options.watch,
             watches: HashMap::new(),
             inputs: HashMap::new(),
             reloads: HashMap::new(),
             guessed_axes: None,
-            growing: None,
+            first_camera: None,
             version: 1,
-            counted: (0, Counts::default(), HashMap::new()),
+            counted: Counted::default(),
             wished: None,
             placed: false,
+            stirred: false,
             moved: 0.0,
             quit: false,
             keys: Vec::new(),
@@ -177,17 +204,48 @@ impl App {
         self.loader.read(input);
     }
 
+    /// Begins to read something that is shown in a certain way.
+    pub(crate) fn open_as(&mut self, input: Input, visible: bool, tint: Option<[u8; 3]>) {
+        let job = self.loader.read(input);
+        self.looks.insert(job, (visible, tint));
+    }
+
+    /// Stands at a place whatever is opened.
+    pub(crate) fn stand_at(&mut self, camera: &Camera) {
+        self.navigation.go_to(camera, true);
+        self.placed = true;
+    }
+
+    /// Says that the view moves, so that pictures have to hurry.
+    pub(crate) fn stir(&mut self) {
+        self.stirred = true;
+    }
+
+    /// What a layer was read from, as it could be typed.
+    pub(crate) fn source_name(&self, id: LayerId) -> Option<String> {
+        let input = self.inputs.get(&id)?;
+        Some(match &input.source {
+            Source::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
+            Source::Scene(..) => input.name.clone(),
+        })
+    }
+
     /// What is open.
     pub(crate) fn document(&self) -> &Document {
         self.history.current()
     }
 
     /// Numbers of points of all that is open, and of each layer; counted anew only after changes.
-    pub(crate) fn counts(&mut self) -> &(u64, Counts, HashMap<LayerId, Counts>) {
-        if self.counted.0 != self.version {
+    pub(crate) fn counts(&mut self) -> &Counted {
+        if self.counted.version != self.version {
             let document = self.document();
-            let all = document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect();
-            self.counted = (self.version, document.counts(), all);
+            self.counted = Counted {
+                version: self.version,
+                all: document.counts(),
+                layers: document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect(),
+                bytes: document.layers.iter().map(|layer| layer.cloud.byte_len()).sum(),
+                old_bytes: self.history.old_bytes(),
+            };
         }
         &self.counted
     }
@@ -295,7 +353,11 @@ impl App {
                 }
                 Answer::Empty => self.shot = None,
                 Answer::Device(device) => self.device = device,
-                Answer::Failed(why) => self.messages.failure(why),
+                Answer::Failed(why) => {
+                    // The picture that failed may have been the film's.
+                    output::stop(&mut self.recording);
+                    self.messages.failure(why);
+                }
                 Answer::Done(outcome) => self.done(outcome),
             }
         }
@@ -332,6 +394,10 @@ impl App {
             if self.change(|document| document.reload(id, Arc::clone(&cloud))) {
                 self.messages.note(format!("{} has changed and was read again", input.name));
             }
+            if self.stands_by_itself() {
+                self.first_view();
+            }
+            self.measure_scene();
             return;
         }
         let layer = Layer::new(&*input.name, path.clone(), cloud).opened_at(input.world_from_input);
@@ -349,21 +415,25 @@ impl App {
         let first = !self.placed;
         let cloud = Arc::clone(&layer.cloud);
         let before = self.loading.insert(job, layer.id);
+        let look = self.looks.remove(&job);
         self.change(|document| {
             let place = before.and_then(|id| document.layers.iter().position(|layer| layer.id == id));
             let visible = before.and_then(|id| document.remove(id)).is_none_or(|layer| layer.visible);
             let mut layer = layer;
             layer.visible = visible;
+            if let Some((visible, tint)) = look {
+                (layer.visible, layer.tint) = (visible, tint);
+            }
             let id = document.add(layer);
             if let Some(place) = place {
                 document.reorder(id, place);
             }
         });
-        if first || self.growing == Some(job) {
-            // A preview that grows keeps being fitted until somebody moves.
+        if self.guessed_axes.is_none() || before.is_some() && self.document().layers.len() == 1 {
             self.guessed_axes = Some(guess_axes(&cloud));
+        }
+        if first || self.stands_by_itself() {
             self.first_view();
-            self.growing = Some(job);
             self.placed = true;
         }
         self.measure_scene();
@@ -400,6 +470,11 @@ impl App {
         }
     }
 
+    /// Whether nobody has moved since the program chose where to stand.
+    fn stands_by_itself(&self) -> bool {
+        self.first_camera.is_some_and(|(camera, _)| camera == self.navigation.goal_camera())
+    }
+
     /// Stands where a picture of the first input stands that names no camera.
     pub(crate) fn first_view(&mut self) {
         let scene = self.loader.jobs().iter().map(|job| &job.input).chain(self.inputs.values()).find_map(|input| {
@@ -415,10 +490,9 @@ impl App {
                 self.measure_scene();
                 self.navigation.go_to(&camera, true);
             }
-            _ => {
-                self.look_from(ViewDirection::Auto, true);
-            }
+            _ => self.look_from(ViewDirection::Auto, true),
         }
+        self.first_camera = Some((self.navigation.goal_camera(), self.aspect));
     }
 
     /// Looks at everything from one side.
@@ -455,7 +529,7 @@ impl App {
             settings: self.look.settings.clone(),
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
-            axes: self.axes(),
+            axes: self.up_axis,
             budget_ms: moving.then_some(self.look.moving_ms),
         }
     }
@@ -464,11 +538,12 @@ impl App {
     pub(crate) fn ask(&mut self, context: &egui::Context, size: [u32; 2], busy: bool) {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
+        let busy = busy || std::mem::take(&mut self.stirred);
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
-            if busy || flight != Flight::default() {
-                self.growing = None;
-            }
+        }
+        if self.first_camera.is_some_and(|(_, aspect)| aspect != self.aspect) && self.stands_by_itself() {
+            self.first_view();
         }
         let moving = now - self.moved < REST;
         if moving {
@@ -539,5 +614,13 @@ impl eframe::App for App {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         storage::save(self, storage);
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(path) = &self.state
+            && let Err(error) = State::of(self).write(path)
+        {
+            eprintln!("error: {error}");
+        }
     }
 }

@@ -9,6 +9,8 @@ pub(crate) enum Command {
     Open,
     Export,
     Screenshot,
+    Film,
+    SaveState,
     CloseAll,
     Quit,
     Undo,
@@ -79,10 +81,12 @@ impl Tool {
 
 impl Command {
     /// All of them, in the order of the menus.
-    pub(crate) const ALL: [Self; 41] = [
+    pub(crate) const ALL: [Self; 43] = [
         Self::Open,
         Self::Export,
         Self::Screenshot,
+        Self::Film,
+        Self::SaveState,
         Self::CloseAll,
         Self::Quit,
         Self::Undo,
@@ -129,6 +133,8 @@ impl Command {
             Self::Open => "Open…",
             Self::Export => "Export points…",
             Self::Screenshot => "Save picture…",
+            Self::Film => "Film…",
+            Self::SaveState => "Save session…",
             Self::CloseAll => "Close all",
             Self::Quit => "Quit",
             Self::Undo => "Undo",
@@ -179,6 +185,8 @@ impl Command {
             Self::Open => command(Key::O),
             Self::Export => command(Key::E),
             Self::Screenshot => command(Key::S),
+            Self::Film => command(Key::T),
+            Self::SaveState => shift(Key::S),
             Self::CloseAll => shift(Key::W),
             Self::Quit => command(Key::Q),
             Self::Undo => command(Key::Z),
@@ -227,6 +235,8 @@ impl Command {
             Self::Open => "Add point clouds, meshes or depth images to what is open",
             Self::Export => "Write the points as they are now, edits included, in any format",
             Self::Screenshot => "Write what is seen, at any size",
+            Self::Film => "A turntable or a way through views, as a film or as pictures",
+            Self::SaveState => "Keep what is open and how it is seen; 'autosplats --state FILE' has it again",
             Self::CloseAll => "Remove everything that is open",
             Self::Quit => "Close the window",
             Self::Undo => "Take back the last change",

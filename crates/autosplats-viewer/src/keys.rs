@@ -91,6 +91,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::Open => app.panels.dialogs.open(context),
         Command::Export => app.panels.export.open = true,
         Command::Screenshot => app.panels.picture.open = true,
+        Command::Film => app.panels.film.open = !app.panels.film.open,
+        Command::SaveState => app.panels.dialogs.save_state(context),
         Command::CloseAll => crate::panels::close_all(app),
         Command::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
         Command::Undo => match app.undo() {
@@ -113,8 +115,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             }
         }
         Command::SelectNone => {
-            // Escape goes back a step each time: what is being drawn, the tool, the selection.
-            if app.tools.cancel() {
+            // Escape goes back a step each time: a window, what is being drawn, the tool, the selection.
+            if app.panels.close_window() || app.tools.cancel() {
                 return;
             }
             if app.tool == Tool::Navigate {

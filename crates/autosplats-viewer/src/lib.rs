@@ -18,12 +18,15 @@ mod output;
 mod overlay;
 mod panels;
 mod render;
+mod state;
 mod storage;
 #[cfg(test)]
 mod tests;
 mod threads;
 mod tools;
 mod viewport;
+
+use std::path::PathBuf;
 
 use autosplats::Backend;
 use eframe::egui;
@@ -35,6 +38,8 @@ pub use self::loading::Input;
 pub struct Options {
     /// What is opened.
     pub inputs: Vec<Input>,
+    /// Where the session is kept: had again if it is there, and written at the end.
+    pub state: Option<PathBuf>,
     /// Read files again when they change.
     pub watch: bool,
     /// Where pictures are made; as last time if it is not said.
@@ -48,13 +53,18 @@ pub enum Error {
     /// There is no display, or nothing that draws on it.
     #[error("no window can be opened: {0}; 'autosplats render' makes pictures without one")]
     Window(String),
+    /// The file of a session cannot be had again.
+    #[error("{0}")]
+    State(String),
 }
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`Error::Window`].
+/// [`Error::Window`], and [`Error::State`] if there is a file of a session that cannot be understood.
 pub fn run(options: Options) -> Result<(), Error> {
+    let path = options.state.as_deref().filter(|path| path.exists());
+    let state = path.map(state::State::read).transpose().map_err(Error::State)?;
     let viewport = egui::ViewportBuilder::default()
         .with_app_id("autosplats")
         .with_title("autosplats")
@@ -63,8 +73,32 @@ pub fn run(options: Options) -> Result<(), Error> {
         .with_drag_and_drop(true);
     let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
+        colors(&creation.egui_ctx);
         let (look, recent) = storage::load(creation.storage);
-        Ok(Box::new(app::App::new(options, look, recent, &creation.egui_ctx)))
+        let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
+        if let Some(state) = state {
+            let folder = app.state.as_deref().map(state::folder).unwrap_or_default();
+            state.restore(&mut app, &folder);
+        }
+        Ok(Box::new(app))
     });
+    let screens = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    if cfg!(target_os = "linux") && screens.iter().all(|name| std::env::var_os(name).is_none()) {
+        return Err(Error::Window("there is no screen, as neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
+    }
     eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))
+}
+
+/// Colours that can be read: egui's own red is too dark on a dark ground.
+fn colors(context: &egui::Context) {
+    let red = |dark: bool| if dark { [255, 128, 118] } else { [176, 24, 16] };
+    let amber = |dark: bool| if dark { [255, 180, 70] } else { [150, 84, 0] };
+    for theme in [egui::Theme::Dark, egui::Theme::Light] {
+        context.style_mut_of(theme, |style| {
+            let dark = theme == egui::Theme::Dark;
+            let color = |[r, g, b]: [u8; 3]| egui::Color32::from_rgb(r, g, b);
+            style.visuals.error_fg_color = color(red(dark));
+            style.visuals.warn_fg_color = color(amber(dark));
+        });
+    }
 }

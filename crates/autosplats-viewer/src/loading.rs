@@ -293,3 +293,6 @@ impl Progress for Follower<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -20,6 +20,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
         let scale = ui.ctx().pixels_per_point();
         let side = |points: f32| ((points * scale).round() as u32).clamp(1, autosplats::MAX_SIDE);
         let size = [side(rect.width()), side(rect.height())];
+        app.view_rect = rect;
         app.aspect = f64::from(size[0]) / f64::from(size[1]);
         let busy = handle(app, &response, size);
         app.ask(ui.ctx(), size, busy);

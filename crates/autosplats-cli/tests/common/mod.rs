@@ -61,6 +61,8 @@ impl Folder {
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_autosplats"));
         command.current_dir(self.0.path()).args(arguments).stdin(Stdio::null());
+        // No test opens a window by mistake.
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
         command
     }
 

@@ -88,7 +88,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         app.panels.export.what = What::Shown;
     }
     let window = egui::Window::new("Export points").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(context.content_rect().center() - egui::vec2(210.0, 140.0)).show(context, |ui| {
+    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
         ui.set_width(420.0);
         let export = &mut app.panels.export;
         if let Some(work) = &export.work {
@@ -132,7 +132,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 
 /// What can be written: what it is called, what it is, and whether there is any of it.
 fn choices(app: &mut App) -> Vec<(String, What, bool)> {
-    let counts = app.counts().1;
+    let counts = app.counts().all;
     let document = app.document();
     let mut choices = vec![
         ("What is shown".into(), What::Shown, counts.points > 0),

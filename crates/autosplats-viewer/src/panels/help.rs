@@ -21,7 +21,9 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let mut open = app.panels.help;
     let window = egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).resizable(false);
     window.anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
-        egui::ScrollArea::vertical().max_height(context.content_rect().height() - 140.0).show(ui, |ui| {
+        ui.set_width(440.0);
+        let height = context.content_rect().height() - 140.0;
+        egui::ScrollArea::vertical().auto_shrink([false, true]).max_height(height).show(ui, |ui| {
             egui::Grid::new("help").num_columns(2).striped(true).spacing([24.0, 4.0]).show(ui, |ui| {
                 for (keys, what) in MOUSE {
                     ui.strong(keys);

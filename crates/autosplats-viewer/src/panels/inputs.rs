@@ -47,7 +47,7 @@ fn loading(app: &App, ui: &mut egui::Ui) {
 fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     let Some(layer) = app.document().layer(id) else { return };
     let (name, visible, tint, path) = (layer.name.clone(), layer.visible, layer.tint, layer.path.clone());
-    let counts = app.counts().2.get(&id).copied().unwrap_or_default();
+    let counts = app.counts().layers.get(&id).copied().unwrap_or_default();
     let unsaved = app.history.is_unsaved(id);
     ui.push_id(id, |ui| {
         ui.horizontal(|ui| {
@@ -103,17 +103,64 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         ui.close();
     }
     if ui.button("Remove").on_hover_text("Take it off the list; its file stays as it is").clicked() {
-        app.edit("Remove an input", |document| {
-            document.remove(id);
-        });
+        remove(app, vec![id]);
         ui.close();
     }
 }
 
-/// Takes everything off the list; undo brings it back.
+/// Takes everything off the list.
 pub(crate) fn close_all(app: &mut App) {
     app.loader.cancel_all();
-    app.edit("Close all", |document| document.layers.clear());
+    let ids = app.document().layers.iter().map(|layer| layer.id).collect();
+    remove(app, ids);
+}
+
+/// Takes layers off the list, which undo brings back; asks first if edits could be lost.
+fn remove(app: &mut App, ids: Vec<LayerId>) {
+    if ids.iter().any(|&id| app.history.is_unsaved(id)) {
+        app.panels.removal = ids;
+    } else {
+        remove_now(app, &ids);
+    }
+}
+
+fn remove_now(app: &mut App, ids: &[LayerId]) {
+    let label = if let [_] = ids { "Remove an input" } else { "Close all" };
+    app.edit(label, |document| {
+        ids.iter().for_each(|&id| {
+            document.remove(id);
+        });
+    });
+}
+
+/// Asks before edits go with their layer.
+pub(super) fn removal(app: &mut App, context: &egui::Context) {
+    if app.panels.removal.is_empty() {
+        return;
+    }
+    let unsaved: Vec<LayerId> = app.panels.removal.iter().copied().filter(|&id| app.history.is_unsaved(id)).collect();
+    let names: Vec<String> =
+        unsaved.iter().filter_map(|&id| app.document().layer(id)).map(|layer| layer.name.clone()).collect();
+    let mut answer = None;
+    let modal = egui::Modal::new(egui::Id::unique("removal")).show(context, |ui| {
+        ui.heading("Edits are not saved");
+        ui.label(format!("Those of {} are in no file yet.", names.join(", ")));
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            for (label, remove, export) in [("Export…", false, true), ("Remove", true, false), ("Keep", false, false)] {
+                if ui.button(label).clicked() {
+                    answer = Some((remove, export));
+                }
+            }
+        });
+    });
+    if let Some((remove, export)) = answer.or_else(|| modal.should_close().then_some((false, false))) {
+        let ids = std::mem::take(&mut app.panels.removal);
+        if remove {
+            remove_now(app, &ids);
+        }
+        app.panels.export.open |= export;
+    }
 }
 
 /// What is known of the point that was asked about.
@@ -121,7 +168,7 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
     let Some(point) = app.tools.inspected.clone() else { return };
     let mut open = true;
     let window = egui::Window::new("Point").open(&mut open).resizable(true).default_width(260.0);
-    window.default_pos(context.content_rect().right_top() + egui::vec2(-300.0, 60.0)).show(context, |ui| {
+    window.default_pos(app.view_rect.right_top() + egui::vec2(-290.0, 10.0)).show(context, |ui| {
         egui::ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
             egui::Grid::new("point").num_columns(2).striped(true).show(ui, |ui| {
                 let mut row = |name: &str, value: &str| {

@@ -39,6 +39,8 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     command_button(app, ui, Command::Export, any);
     command_button(app, ui, Command::Screenshot, any);
+    command_button(app, ui, Command::Film, any);
+    command_button(app, ui, Command::SaveState, any);
     ui.separator();
     command_button(app, ui, Command::CloseAll, any);
     command_button(app, ui, Command::Quit, true);
@@ -49,7 +51,7 @@ fn edit(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::Undo, steps[0]);
     command_button(app, ui, Command::Redo, steps[1]);
     ui.separator();
-    let counts = app.counts().1;
+    let counts = app.counts().all;
     let any = counts.points > 0;
     command_button(app, ui, Command::SelectAll, any);
     command_button(app, ui, Command::SelectNone, counts.selected > 0);
@@ -97,15 +99,15 @@ fn window(app: &mut App, ui: &mut egui::Ui) {
     ui.separator();
     ui.checkbox(&mut app.look.overlay, "Axes and scale bar");
     ui.separator();
-    // egui's own buttons for this have signs that no font here has.
-    let mut theme = ui.options(|options| options.theme_preference);
-    for (name, preference) in [
-        ("Light or dark as the system", egui::ThemePreference::System),
-        ("Light", egui::ThemePreference::Light),
-        ("Dark", egui::ThemePreference::Dark),
-    ] {
-        if ui.radio_value(&mut theme, preference, name).changed() {
-            ui.set_theme(theme);
+    let mut theme = ui.ctx().options(|options| options.theme_preference);
+    let themes = [
+        (egui::ThemePreference::Dark, "Dark"),
+        (egui::ThemePreference::Light, "Light"),
+        (egui::ThemePreference::System, "As the system"),
+    ];
+    for (preference, label) in themes {
+        if ui.radio_value(&mut theme, preference, label).changed() {
+            ui.ctx().set_theme(preference);
         }
     }
 }

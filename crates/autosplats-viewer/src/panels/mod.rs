@@ -1,6 +1,7 @@
 //! Everything around the picture.
 
 mod export;
+mod film;
 mod help;
 mod inputs;
 mod look;
@@ -15,6 +16,7 @@ use eframe::egui;
 pub(crate) use self::inputs::close_all;
 use crate::app::App;
 use crate::commands::Command;
+use crate::document::LayerId;
 
 /// What is open around the picture.
 pub(crate) struct Panels {
@@ -25,12 +27,15 @@ pub(crate) struct Panels {
     pub(crate) dialogs: open::Dialogs,
     pub(crate) export: export::Export,
     pub(crate) picture: picture::PictureDialog,
+    pub(crate) film: film::Film,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
     /// Depth of what a drag took hold of.
     pub(crate) grabbed: Option<f64>,
     /// Whether the user wants to leave though something is not saved.
     leave: bool,
+    /// Layers with edits that are in no file, which the user wants to remove.
+    removal: Vec<LayerId>,
 }
 
 impl Default for Panels {
@@ -43,10 +48,20 @@ impl Default for Panels {
             dialogs: open::Dialogs::default(),
             export: export::Export::default(),
             picture: picture::PictureDialog::default(),
+            film: film::Film::default(),
             claimed: Vec::new(),
             grabbed: None,
             leave: false,
+            removal: Vec::new(),
         }
+    }
+}
+
+impl Panels {
+    /// Closes a window that lies over the picture; says whether there was one.
+    pub(crate) fn close_window(&mut self) -> bool {
+        let windows = [&mut self.help, &mut self.export.open, &mut self.picture.open, &mut self.film.open];
+        windows.into_iter().find(|open| **open).map(|open| *open = false).is_some()
     }
 }
 
@@ -68,8 +83,10 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     statistics::show(app, context);
     export::show(app, context);
     picture::show(app, context);
+    film::show(app, context);
     help::show(app, context);
     inputs::inspected(app, context);
+    inputs::removal(app, context);
     leave(app, context);
 }
 

@@ -6,18 +6,28 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use eframe::egui;
 
 use crate::app::App;
-use crate::files::ask_for_inputs;
+use crate::files::{ask_for_inputs, ask_for_output};
 use crate::loading::Input;
+use crate::state::State;
 
 /// What is being asked.
 #[derive(Default)]
 pub(crate) struct Dialogs {
     chosen: Option<Receiver<Vec<PathBuf>>>,
+    /// Where the session is to be kept.
+    state: Option<Receiver<Option<PathBuf>>>,
     /// What is typed, while it can be.
     typed: Option<String>,
 }
 
 impl Dialogs {
+    /// Asks where to keep the session.
+    pub(crate) fn save_state(&mut self, context: &egui::Context) {
+        if self.state.is_none() {
+            self.state = Some(ask_for_output(context, "Save session", "autosplats.json"));
+        }
+    }
+
     /// Asks for files.
     pub(crate) fn open(&mut self, context: &egui::Context) {
         if self.chosen.is_none() {
@@ -26,7 +36,20 @@ impl Dialogs {
     }
 }
 
+/// Writes the session where the user has said.
+fn save_state(app: &mut App) {
+    let Some(Ok(chosen)) = app.panels.dialogs.state.as_ref().map(Receiver::try_recv) else { return };
+    app.panels.dialogs.state = None;
+    // Without a system dialog it goes where the program was started.
+    let path = chosen.unwrap_or_else(|| "autosplats.json".into());
+    match State::of(app).write(&path) {
+        Ok(()) => app.messages.note(format!("{} was written; 'autosplats --state' has it again", path.display())),
+        Err(error) => app.messages.error(error),
+    }
+}
+
 pub(super) fn show(app: &mut App, context: &egui::Context) {
+    save_state(app);
     match app.panels.dialogs.chosen.as_ref().map(Receiver::try_recv) {
         // No system dialog, or nothing chosen in it: a path can be typed.
         Some(Ok(paths)) if paths.is_empty() => {

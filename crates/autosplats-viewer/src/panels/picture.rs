@@ -62,7 +62,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let mut save = false;
     let seen = app.shot.as_ref().map(|shot| shot.picture.size);
     let window = egui::Window::new("Save picture").open(&mut open).collapsible(false).resizable(false);
-    window.default_pos(context.content_rect().center() - egui::vec2(210.0, 110.0)).show(context, |ui| {
+    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 110.0)).show(context, |ui| {
         ui.set_width(420.0);
         let dialog = &mut app.panels.picture;
         ui.checkbox(&mut dialog.window, "The window as it is, menus and all");

@@ -19,7 +19,7 @@ const STAGES: [(&str, fn(&Timings) -> f64, egui::Color32); 6] = [
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     let mut open = app.panels.statistics;
-    let place = context.content_rect().left_bottom() + egui::vec2(230.0, -330.0);
+    let place = app.view_rect.left_bottom() + egui::vec2(10.0, -320.0);
     let window = egui::Window::new("Statistics").open(&mut open).default_pos(place).default_width(330.0);
     window.show(context, |ui| {
         Plot::new("stages")

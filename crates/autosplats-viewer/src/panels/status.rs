@@ -2,13 +2,13 @@
 
 use eframe::egui;
 
-use crate::app::App;
+use crate::app::{App, Counted};
 use crate::document::grouped;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     egui::Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
-            let counts = app.counts().1;
+            let &Counted { all: counts, bytes, old_bytes, .. } = app.counts();
             ui.label(format!("{} points", grouped(counts.points)));
             if counts.selected > 0 {
                 ui.separator();
@@ -33,10 +33,8 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let device = app.device.as_ref().map_or("CPU", |device| &*device.name);
                 ui.weak(device).on_hover_text("Where pictures are made");
-                let bytes: usize = app.document().layers.iter().map(|layer| layer.cloud.byte_len()).sum();
-                let old = app.history.old_bytes();
-                ui.weak(format!("{:.0} MB", (bytes + old) as f64 * 1e-6))
-                    .on_hover_text(format!("Points, and {:.0} MB for undo", old as f64 * 1e-6));
+                ui.weak(format!("{:.0} MB", (bytes + old_bytes) as f64 * 1e-6))
+                    .on_hover_text(format!("Points, and {:.0} MB for undo", old_bytes as f64 * 1e-6));
             });
         });
     });

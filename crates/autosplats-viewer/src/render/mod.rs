@@ -34,8 +34,8 @@ pub(crate) struct Wish {
     /// Dots so many pixels wide in place of splats.
     pub(crate) dots: Option<u32>,
     pub(crate) backend: Backend,
-    /// Which way is up, for heights.
-    pub(crate) axes: Axes,
+    /// Which way is up, for heights, if it is not to be guessed.
+    pub(crate) axes: Option<Axes>,
     /// Milliseconds that a picture may take, as the next one is waited for; `None` takes the time that it takes.
     pub(crate) budget_ms: Option<f64>,
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud};
-use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings, guess_axes};
+use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings};
 use eframe::egui;
 use rayon::prelude::*;
 
@@ -56,7 +56,7 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
 struct Studio {
     renderer: Option<(Backend, Renderer)>,
     costs: Costs,
-    shown: Option<(Axes, Arc<Shown>)>,
+    shown: Option<(Option<Axes>, Arc<Shown>)>,
     sparse: Option<Sparse>,
 }
 
@@ -93,8 +93,8 @@ impl Studio {
             return Arc::clone(shown);
         }
         let mut shown = wish.document.shown();
-        if guess_axes(&shown.cloud) != wish.axes {
-            shown.cloud = Arc::new(PointCloud::clone(&shown.cloud).with_axes(wish.axes));
+        if let Some(axes) = wish.axes.filter(|axes| shown.cloud.axes() != Some(*axes)) {
+            shown.cloud = Arc::new(PointCloud::clone(&shown.cloud).with_axes(axes));
         }
         let shown = Arc::new(shown);
         self.shown = Some((wish.axes, Arc::clone(&shown)));

@@ -8,6 +8,7 @@ const SHARED: &[(&str, &str)] = &[
     ("rank", include_str!("../shared/rank.wgsl")),
     ("project_point", include_str!("../shared/project_point.wgsl")),
     ("count_dropped", include_str!("../shared/count_dropped.wgsl")),
+    ("add_sixteenth", include_str!("../shared/add_sixteenth.wgsl")),
     ("divide", include_str!("../shared/divide.wgsl")),
     ("keys", include_str!("../shared/keys.wgsl")),
     ("density", include_str!("../shared/density.wgsl")),

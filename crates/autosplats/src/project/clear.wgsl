@@ -1,6 +1,6 @@
-// Empties what the frame before left: keys, density cells and counters.
+// Empties what the frame before left: keys, density cells, counters and sixteenths.
 //
-// Writes: keys, density, counters.
+// Writes: keys, density, counters, sixteenths.
 
 #import frame
 #import groups
@@ -9,6 +9,7 @@
 @group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
 @group(0) @binding(2) var<storage, read_write> density: array<vec2u>;
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
+@group(0) @binding(4) var<storage, read_write> sixteenths: array<u32>;
 
 @compute @workgroup_size(256)
 fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -21,5 +22,8 @@ fn clear(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     if index < arrayLength(&counters) {
         counters[index] = 0u;
+    }
+    if index < arrayLength(&sixteenths) {
+        sixteenths[index] = 0u;
     }
 }

@@ -7,6 +7,7 @@ use autosplats_cloud::PointCloud;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::sixteenths::{Sixteenths, sixteenth, sixteenths_at};
 use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
 use crate::camera::View;
 
@@ -39,7 +40,7 @@ impl Projector {
     pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> &ScreenPoints {
         let ProjectRules { k, halves, grid_culling } = *rules;
         let Self { keys, screen } = self;
-        screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys);
+        screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys, &mut screen.sixteenths);
         let keys = Keys::settle(keys, view, halves);
         let spacing_px = keys.mean_spacing();
         compact(cloud.positions(), view, &keys, spacing_px, screen);
@@ -112,16 +113,24 @@ impl<'a> Keys<'a> {
     }
 }
 
-/// Fills `keys` with the nearest point of each pixel, or each half of one.
-fn nearest_per_pixel(positions: &[[f32; 3]], view: &View, halves: bool, keys: &mut Vec<AtomicU64>) -> Dropped {
+/// Fills `keys` with the nearest point of each pixel, or each half of one, and `sixteenths` with all points.
+fn nearest_per_pixel(
+    positions: &[[f32; 3]],
+    view: &View,
+    halves: bool,
+    keys: &mut Vec<AtomicU64>,
+    sixteenths: &mut Sixteenths,
+) -> Dropped {
     let pixels = view.width as usize * view.height as usize;
     keys.resize_with(pixels << u32::from(halves), AtomicU64::default);
     keys.par_chunks_mut(1 << 16).for_each(|keys| keys.iter_mut().for_each(|key| *key.get_mut() = EMPTY));
     let keys = keys.as_slice();
+    sixteenths.clear(view);
+    let sixteenths = &*sixteenths;
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
     positions.par_chunks(CHUNK).enumerate().for_each(|(chunk, positions)| {
         let first = (chunk * CHUNK) as u32;
-        let dropped = pulp::Arch::new().dispatch(|| project_chunk(positions, first, view, halves, keys));
+        let dropped = pulp::Arch::new().dispatch(|| project_chunk(positions, first, view, halves, keys, sixteenths));
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
         outside.fetch_add(dropped.outside, Ordering::Relaxed);
@@ -136,18 +145,26 @@ const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
 #[inline(always)]
-fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, halves: bool, keys: &[AtomicU64]) -> Dropped {
+fn project_chunk(
+    positions: &[[f32; 3]],
+    first: u32,
+    view: &View,
+    halves: bool,
+    keys: &[AtomicU64],
+    sixteenths: &Sixteenths,
+) -> Dropped {
     let mut dropped = Dropped::default();
     let mut slot = [0u32; LANES];
     let mut depth = [0f32; LANES];
+    let mut part = [0u32; LANES];
     for (group, positions) in positions.chunks(LANES).enumerate() {
         if let Ok(positions) = <&[[f32; 3]; LANES]>::try_from(positions) {
             for lane in 0..LANES {
-                (slot[lane], depth[lane]) = project_point(positions[lane], view, halves);
+                (slot[lane], depth[lane], part[lane]) = project_point(positions[lane], view, halves);
             }
         } else {
             for (lane, &position) in positions.iter().enumerate() {
-                (slot[lane], depth[lane]) = project_point(position, view, halves);
+                (slot[lane], depth[lane], part[lane]) = project_point(position, view, halves);
             }
         }
         for lane in 0..positions.len() {
@@ -163,6 +180,7 @@ fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, halves: bool, 
                     if key < cell.load(Ordering::Relaxed) {
                         cell.fetch_min(key, Ordering::Relaxed);
                     }
+                    sixteenths.add(slot >> u32::from(halves), part[lane]);
                 }
             }
         }
@@ -170,24 +188,25 @@ fn project_chunk(positions: &[[f32; 3]], first: u32, view: &View, halves: bool, 
     dropped
 }
 
-/// Slot and depth of one point, without branches. Halves of pixels lie side by side and one below the other in turn, like
+/// Slot and depth of one point and the sixteenth of its pixel, without branches. Halves of pixels lie side by side and one below the other in turn, like
 /// the black and the white squares of a chessboard: so no direction is seen better than another.
 #[inline(always)]
-fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32) {
+fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32) {
     let [x, y, z] = view.to_view(position).to_array();
     let [px, py] = view.to_pixel(Vec3::new(x, y, z));
     // Inside the image the coordinates are positive, so that truncation is rounding down.
     let inside = (px >= 0.0) & (py >= 0.0) & (px < view.width as f32) & (py < view.height as f32);
-    let [column, row] = [px as u32, py as u32];
+    let [x4, y4] = sixteenths_at([px, py]);
+    let [column, row] = [x4 >> 2, y4 >> 2];
     let pixel = row.wrapping_mul(view.width).wrapping_add(column);
-    let along = if column.wrapping_add(row) & 1 == 1 { px - column as f32 } else { py - row as f32 };
-    let slot = if halves { (pixel << 1) | u32::from(along >= 0.5) } else { pixel };
+    let along = if column.wrapping_add(row) & 1 == 1 { x4 } else { y4 };
+    let slot = if halves { (pixel << 1) | (along >> 1 & 1) } else { pixel };
     let slot = if inside { slot } else { OUTSIDE };
     let slot = if z > view.near { slot } else { BEHIND };
     // Finite coordinates so large that their transform is not count as not finite too.
     #[allow(clippy::eq_op, reason = "three subtractions vectorise, is_finite does not")]
     let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
-    (if finite { slot } else { NOT_FINITE }, z)
+    (if finite { slot } else { NOT_FINITE }, z, sixteenth([x4, y4]))
 }
 
 fn is_owned(key: &AtomicU64) -> bool {

@@ -120,6 +120,8 @@ pub(crate) struct ScreenBuffers {
     pub(crate) density: wgpu::Buffer,
     /// First screen point of each cell.
     pub(crate) cell_start: wgpu::Buffer,
+    /// Which sixteenths of each pixel hold points, two pixels to a `u32`.
+    pub(crate) sixteenths: wgpu::Buffer,
     /// Index in the cloud of each screen point.
     pub(crate) source: wgpu::Buffer,
     pixels: wgpu::Buffer,
@@ -161,6 +163,7 @@ impl ScreenBuffers {
             // Cells are two pixels wide at least.
             density: gpu.storage::<[u32; 2]>("density grid", width.div_ceil(2) * height.div_ceil(2))?,
             cell_start: gpu.storage::<u32>("starts of cells", pixels + 1)?,
+            sixteenths: gpu.storage::<u32>("sixteenths of pixels", pixels.div_ceil(2))?,
             source: gpu.storage::<u32>("sources of screen points", capacity)?,
             pixels: gpu.storage::<u32>("pixels of screen points", capacity)?,
             points: gpu.storage::<ScreenPoint>("screen points", capacity)?,
@@ -239,7 +242,8 @@ impl NearestPass {
     fn steps(&self, gpu: &Gpu, frame: &wgpu::Buffer, cloud: &DeviceCloud, screen: &ScreenBuffers) -> Vec<Step> {
         let run = |pass: &Pass, turn: Option<&wgpu::Buffer>| -> Vec<Step> {
             let step = |chunk: &Chunk| {
-                let buffers = [frame, &chunk.uniform, &chunk.positions, &screen.keys, &screen.counters];
+                let ScreenBuffers { keys, counters, sixteenths, .. } = screen;
+                let buffers = [frame, &chunk.uniform, &chunk.positions, keys, counters, sixteenths];
                 let buffers: Vec<_> = buffers.into_iter().chain(turn).collect();
                 pass.step(gpu, &buffers, chunk.capacity.div_ceil(GROUP))
             };
@@ -300,12 +304,13 @@ impl ProjectPasses {
         cloud: &DeviceCloud,
         screen: &ScreenBuffers,
     ) -> Vec<Step> {
-        let ScreenBuffers { counters, keys, density, cell_start, source, pixels, points, values, block_sums, .. } =
-            screen;
+        let ScreenBuffers { counters, keys, density, cell_start, sixteenths, .. } = screen;
+        let ScreenBuffers { source, pixels, points, values, block_sums, .. } = screen;
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
         let slot_blocks = slots.div_ceil(BLOCK);
-        let mut steps = vec![self.clear.step(gpu, &[frame, keys, density, counters], slots.div_ceil(GROUP))];
+        let mut steps =
+            vec![self.clear.step(gpu, &[frame, keys, density, counters, sixteenths], slots.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));
         let blocks_16 = width.div_ceil(16) * height.div_ceil(16);
         steps.push(self.occupancy.step(gpu, &[frame, keys, counters], blocks_16));

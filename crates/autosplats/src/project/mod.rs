@@ -13,10 +13,14 @@
 //!
 //! A coarser grid, about k screen points to a cell, counts points for the first search radius (§5.1) and holds the
 //! nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
+//!
+//! Of all other points nothing is kept but the sixteenth of a pixel that they fall into: a bit, for the splatting to tell where
+//! surfaces end.
 
 mod cpu;
 mod device_cloud;
 pub(crate) mod gpu;
+mod sixteenths;
 #[cfg(test)]
 mod tests;
 
@@ -24,6 +28,7 @@ pub(crate) use cpu::Projector;
 #[cfg(test)]
 pub(crate) use device_cloud::ChunkUniform;
 pub(crate) use device_cloud::{Chunk, DeviceCloud, PointValues, Uploader};
+pub(crate) use sixteenths::Sixteenths;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -78,6 +83,7 @@ pub(crate) struct ScreenPoints {
     pub(crate) active: Vec<u32>,
     /// Screen points probably hidden, ascending; empty without grid culling.
     pub(crate) passive: Vec<u32>,
+    pub(crate) sixteenths: Sixteenths,
     pub(crate) dropped: Dropped,
 }
 

@@ -1,17 +1,19 @@
 // Every point to its pixel, or half of one, the nearest wins [Paper, §3]: depth and index in one 64-bit atomic minimum.
 //
-// Reads: a chunk of the cloud. Writes: keys, counters. `project_32` does the same with 32 bits.
+// Reads: a chunk of the cloud. Writes: keys, counters, sixteenths. `project_32` does the same with 32 bits.
 
 #import frame
 #import groups
 #import counters
 #import project_point
 #import count_dropped
+#import add_sixteenth
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;
 @group(0) @binding(3) var<storage, read_write> keys: array<atomic<u64>>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
 
 @compute @workgroup_size(256)
 fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -25,6 +27,7 @@ fn project(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         } else {
             let key = (u64(bitcast<u32>(projected.depth)) << 32u) | u64(chunk.first + index);
             atomicMin(&keys[projected.slot], key);
+            add_sixteenth(projected.sixteenths);
         }
     }
     count_dropped_finish(local);

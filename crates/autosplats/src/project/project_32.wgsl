@@ -2,20 +2,22 @@
 // index among the points at that depth. One pass that is told which turn it is and not two, because no device owes two
 // programs the same bits: a point whose depth differed between them would leave a hole.
 //
-// Reads: a chunk of the cloud, turn. Writes: keys, as pairs of atomics; counters.
+// Reads: a chunk of the cloud, turn. Writes: keys, as pairs of atomics; counters, sixteenths.
 
 #import frame
 #import groups
 #import counters
 #import project_point
 #import count_dropped
+#import add_sixteenth
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> positions: array<f32>;
 @group(0) @binding(3) var<storage, read_write> keys: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> sixteenths: array<atomic<u32>>;
 // 0 for depths, 1 for indices.
-@group(0) @binding(5) var<uniform> turn: u32;
+@group(0) @binding(6) var<uniform> turn: u32;
 
 @compute @workgroup_size(256)
 fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -31,6 +33,7 @@ fn project_32(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             }
         } else if turn == 0u {
             atomicMin(&keys[2u * projected.slot + 1u], depth);
+            add_sixteenth(projected.sixteenths);
         } else if atomicLoad(&keys[2u * projected.slot + 1u]) == depth {
             atomicMin(&keys[2u * projected.slot], chunk.first + index);
         }

@@ -52,6 +52,8 @@ fn place(camera: &Camera, size: [u32; 2], position: [f32; 3]) -> Place {
 struct Oracle {
     /// Index and view-space position of the owner of each pixel, or of its halves.
     owners: HashMap<([usize; 2], usize), (usize, DVec3)>,
+    /// Of each pixel that holds points, a bit for each of its sixteenths that does.
+    sixteenths: HashMap<[usize; 2], u16>,
     dropped: Dropped,
 }
 
@@ -82,6 +84,8 @@ fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]], halves: bool)
             Place::Behind => oracle.dropped.behind += 1,
             Place::Ahead(px, view) => {
                 if (0..2).all(|i| (0.0..f64::from(size[i])).contains(&px[i])) {
+                    let [column, row] = px.map(|c| (4.0 * c.fract()) as usize);
+                    *oracle.sixteenths.entry(px.map(|c| c as usize)).or_default() |= 1 << (4 * row + column);
                     let slot = if halves { half(px) } else { 0 };
                     let owner = oracle.owners.entry((px.map(|c| c as usize), slot)).or_insert((index, view));
                     if view.z < owner.1.z {
@@ -100,7 +104,7 @@ fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]], halves: bool)
     oracle
 }
 
-/// The points that `f32` cannot put elsewhere than `f64`: not within 2e-3 px of the border of a pixel or of half of one
+/// The points that `f32` cannot put elsewhere than `f64`: not within 2e-3 px of the border of a pixel or of a quarter of one
 /// (rounding of positions and of the rotation reaches 1e-4 px here), and not within 1e-5 of another point's depth in the same
 /// pixel but for copies, or of where such a point would not count.
 fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions {
@@ -113,7 +117,7 @@ fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions
                 let far = depth.max(view.z) - gate(camera, size, depth.min(view.z));
                 other == position || ((depth - view.z).abs() > 1e-5 && far.abs() > 1e-5)
             });
-            if !clear || px.iter().any(|c| (2.0 * c - (2.0 * c).round()).abs() < 4e-3) {
+            if !clear || px.iter().any(|c| (4.0 * c - (4.0 * c).round()).abs() < 8e-3) {
                 continue;
             }
             others.push((position, view.z));
@@ -123,11 +127,16 @@ fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions
     settled
 }
 
-/// Owners, drops, order, start table, density grid and the split by depth.
+/// Owners, drops, sixteenths, order, start table, density grid and the split by depth.
 fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 2]) -> Result<(), String> {
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(what.to_owned()) };
-    let ScreenPoints { points, source, cells, density, active, passive, dropped } = screen;
+    let ScreenPoints { points, source, cells, density, active, passive, sixteenths, dropped } = screen;
     ensure(*dropped == oracle.dropped, &format!("dropped {dropped:?}, not {:?}", oracle.dropped))?;
+    for (pixel, [x, y]) in (0..size[1] as usize).flat_map(|y| (0..size[0] as usize).map(move |x| [x, y])).enumerate() {
+        let expected = oracle.sixteenths.get(&[x, y]).copied().unwrap_or(0);
+        let found = sixteenths.of(pixel);
+        ensure(found == expected, &format!("sixteenths of {x}, {y}: {found:x}, not {expected:x}"))?;
+    }
     ensure(points.len() == oracle.owners.len() && source.len() == points.len(), "number of screen points")?;
     for (point, &source) in points.iter().zip(source) {
         let owners = [0, 1].map(|slot| oracle.owners.get(&(point.pixel_xy(), slot)));
@@ -200,7 +209,7 @@ fn comparison_sees_each_kind_of_error() {
     let view = camera.view(DVec3::ZERO, size).expect("a view");
     let oracle = oracle(&camera, size, &positions, true);
     type Spoil = fn(&mut ScreenPoints);
-    let errors: [(&str, Spoil); 9] = [
+    let errors: [(&str, Spoil); 10] = [
         ("other owner", |s| s.source[3] += 1),
         ("moved point", |s| s.points[5].position_view[0] += 1e-4),
         ("other pixel", |s| s.points[0].pixel += 1 << 16),
@@ -215,6 +224,7 @@ fn comparison_sees_each_kind_of_error() {
         ("wrong start", |s| s.cells.start[500] += 1),
         ("wrong count", |s| s.density.count[7] += 1),
         ("wrong drop", |s| s.dropped.outside += 1),
+        ("wrong sixteenth", |s| (0..16).for_each(|sixteenth| s.sixteenths.add(7, sixteenth))),
         ("wrong list", |s| s.passive.extend(s.active.pop())),
     ];
     let mut projector = Projector::default();

@@ -6,10 +6,11 @@ use autosplats_cloud::PointCloud;
 
 use super::attributes::Wanted;
 use super::surfels::point_surfels;
+use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{AdaptRules, Adapter, DepthNoise};
-use crate::camera::{Camera, View, guess_axes, up};
+use crate::camera::{Camera, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
@@ -27,6 +28,7 @@ pub(super) struct CpuRenderer {
     /// Identity of the cloud that what follows is of.
     known: Option<u64>,
     sensors: Sensors,
+    upward: Upward,
     /// Once a frame of these points was adapted.
     depth_noise: Option<DepthNoise>,
     /// Passive points to be reconstructed after all.
@@ -47,6 +49,7 @@ impl Default for CpuRenderer {
             adapter: Adapter::default(),
             known: None,
             sensors: Sensors::default(),
+            upward: Upward::default(),
             depth_noise: None,
             recovered: Vec::new(),
             splatter: Splatter::default(),
@@ -105,6 +108,7 @@ impl CpuRenderer {
             adapter,
             known,
             sensors,
+            upward,
             depth_noise,
             recovered,
             splatter,
@@ -155,10 +159,10 @@ impl CpuRenderer {
             splatter.refine(surfels, &view);
         }
         splatter.attributes(surfels, &view, &attributes);
-        let (layers, covered) = splatter.trim(&view);
+        let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
         clock.lap(|timings| &mut timings.splat);
 
-        let scene = Scene { view: &view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
         shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade);
 

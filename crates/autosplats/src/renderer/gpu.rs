@@ -7,11 +7,12 @@ use autosplats_cloud::PointCloud;
 
 use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
+use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
 use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
-use crate::camera::{Camera, View, guess_axes, up};
+use crate::camera::{Camera, View};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::Sensors;
@@ -43,6 +44,7 @@ pub(super) struct GpuRenderer {
     frame: wgpu::Buffer,
     passes: Passes,
     prepared: Option<Prepared>,
+    upward: Upward,
     /// Of the last frame.
     view: Option<View>,
     readback: Readback,
@@ -128,6 +130,7 @@ impl GpuRenderer {
                 shade: ShadePasses::new(&gpu)?,
             },
             prepared: None,
+            upward: Upward::default(),
             view: None,
             readback: Readback::default(),
             image: Image::default(),
@@ -270,9 +273,9 @@ impl GpuRenderer {
         self.make_resident(cloud, &wanted, &|_| true)?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
         self.prepare(size, &wanted, settings)?;
-        let Self { gpu, clock, prepared, view: last_view, readback, image, layers, times, frame, .. } = self;
+        let Self { gpu, clock, prepared, upward, view: last_view, readback, image, layers, times, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         prepared.tell(gpu, frame, view, settings, &uniform);
 
@@ -344,9 +347,9 @@ impl GpuRenderer {
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
         self.prepare([texture.width(), texture.height()], &wanted, settings)?;
-        let Self { gpu, prepared, view: last_view, frame, .. } = self;
+        let Self { gpu, prepared, upward, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let scene = Scene { view, up: up(guess_axes(cloud)), origin: cloud.origin() };
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         prepared.tell(gpu, frame, view, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);

@@ -7,6 +7,7 @@ mod gpu;
 mod layers;
 mod settings;
 mod surfels;
+mod upward;
 
 use autosplats_cloud::PointCloud;
 

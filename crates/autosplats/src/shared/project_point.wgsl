@@ -18,28 +18,30 @@ struct Projected {
     // Index of a slot of the keys, or why there is none.
     slot: u32,
     depth: f32,
+    // Where the point lies, in sixteenths of pixels: column and row.
+    sixteenths: vec2u,
 }
 
 fn project_point(position: vec3f) -> Projected {
     let position_view = to_view(position);
     // Finite coordinates so large that their transform is not count as not finite too.
     if !(is_finite(position_view.x) && is_finite(position_view.y) && is_finite(position_view.z)) {
-        return Projected(SLOT_NOT_FINITE, 0.0);
+        return Projected(SLOT_NOT_FINITE, 0.0, vec2u(0u));
     }
     if !(position_view.z > frame.near) {
-        return Projected(SLOT_BEHIND, 0.0);
+        return Projected(SLOT_BEHIND, 0.0, vec2u(0u));
     }
     let at = to_pixel(position_view);
     if !(at.x >= 0.0 && at.y >= 0.0 && at.x < f32(frame.size.x) && at.y < f32(frame.size.y)) {
-        return Projected(SLOT_OUTSIDE, 0.0);
+        return Projected(SLOT_OUTSIDE, 0.0, vec2u(0u));
     }
-    let pixel = vec2u(at.xy);
+    let sixteenths = vec2u(4.0 * at);
+    let pixel = sixteenths / 4u;
     let index = pixel.y * frame.size.x + pixel.x;
     if frame.halves == 0u {
-        return Projected(index, position_view.z);
+        return Projected(index, position_view.z, sixteenths);
     }
     // Halves of pixels lie side by side and one below the other in turn.
-    let within = at - vec2f(pixel);
-    let along = select(within.y, within.x, ((pixel.x + pixel.y) & 1u) == 1u);
-    return Projected(2u * index + u32(along >= 0.5), position_view.z);
+    let along = select(sixteenths.y, sixteenths.x, ((pixel.x + pixel.y) & 1u) == 1u);
+    return Projected(2u * index + (along / 2u & 1u), position_view.z, sixteenths);
 }

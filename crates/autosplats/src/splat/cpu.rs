@@ -11,6 +11,7 @@ use super::trim::{Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::camera::View;
 use crate::fit::Surfel;
+use crate::project::Sixteenths;
 
 /// Surfels in a run.
 const RUN: usize = 16 * 1024;
@@ -106,10 +107,10 @@ impl Splatter {
         layers
     }
 
-    /// Trims the attributes just drawn: silhouettes end where the surface does. Returns the number of covered pixels too.
-    pub(crate) fn trim(&mut self, view: &View) -> (&GBuffer, usize) {
+    /// Trims the attributes just drawn: silhouettes end where the surface does, of whose points `sixteenths` tell. Returns the number of covered pixels too.
+    pub(crate) fn trim(&mut self, view: &View, sixteenths: &Sixteenths) -> (&GBuffer, usize) {
         let Self { rims, centers, layers, .. } = self;
-        let outline = Outline { rims, centers, view };
+        let outline = Outline { rims, centers, sixteenths, view };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;

@@ -14,8 +14,8 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::{
-    AROUND_PX, CORE_WEIGHT, DENSE_REACH_PX, FEWEST, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LONGEST_ALIGNED, OFF_PX,
-    STRIDES_PER_REACH,
+    AROUND_PX, CORE_WEIGHT, DENSE_REACH_PX, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
+    LEAST_SHARE, LONGEST_ALIGNED, MANY_POINTS, OFF_PX, STRIDES_PER_REACH,
 };
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -181,10 +181,13 @@ impl SplatPasses {
             ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
             ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
             ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
+            ("LEAST_SHARE", LEAST_SHARE.into()),
+            ("FEWEST_POINTS", FEWEST_POINTS.into()),
+            ("MANY_POINTS", MANY_POINTS.into()),
             ("AROUND_PX", AROUND_PX.into()),
             ("OFF_PX", OFF_PX.into()),
             ("DENSE_REACH_PX", DENSE_REACH_PX.into()),
-            ("FEWEST", FEWEST.into()),
+            ("FEWEST_SPLATS", FEWEST_SPLATS.into()),
             ("STEPS", STEPS.into()),
         ];
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
@@ -299,7 +302,7 @@ impl SplatPasses {
         depth_refinement: bool,
     ) -> Vec<Step> {
         let SplatBuffers { splats: list, tree, depth, centers, .. } = splats;
-        let ScreenBuffers { counters, values, .. } = screen;
+        let ScreenBuffers { counters, values, sixteenths, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
         for _ in 0..if depth_refinement { 2 } else { 0 } {
@@ -311,7 +314,7 @@ impl SplatPasses {
         steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
         let all = screen.groups(Work::Queries256);
         steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
-        let trim = [frame, surface, cover, extras, counters, centers];
+        let trim = [frame, surface, cover, extras, counters, centers, sixteenths];
         steps.push(self.trim.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }

@@ -7,6 +7,7 @@ use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, SUPPORT};
 use super::{Attributes, GBuffer, PointColors, Splatter};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::Surfel;
+use crate::project::Sixteenths;
 use crate::test_clouds::Random;
 
 /// Pictures of less than a tile, of several, and with tiles cut off.
@@ -173,6 +174,14 @@ impl Data {
         let scalars = (0..points).map(|i| if i % 7 == 0 { f32::NAN } else { 100.0 * random.signed() }).collect();
         Self { colors, scalars, linear: std::array::from_fn(|step| (step as f32 / 255.0).powi(2)) }
     }
+}
+
+/// The sixteenths of pixels that hold points if there are those of `surfels` and no others.
+pub(super) fn sixteenths(surfels: &[Surfel], view: &View) -> Sixteenths {
+    let places = surfels.iter().map(|surfel| view.to_pixel(surfel.center.into()));
+    let size = [view.width as usize, view.height as usize];
+    let is_seen = |[x, y]: &[f32; 2]| *x >= 0.0 && *y >= 0.0 && *x < size[0] as f32 && *y < size[1] as f32;
+    Sixteenths::with(size, places.filter(is_seen))
 }
 
 fn draw(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> GBuffer {

@@ -1,6 +1,6 @@
 // Trim: takes off the tails that splats leave around a silhouette. The CPU form, `trim.rs`, says how.
 //
-// Reads: centers. Reads and writes: surface, cover, extras. What is read of them, the rims, is not written. Writes: counters.
+// Reads: centers, sixteenths. Reads and writes: surface, cover, extras. What is read of them, the rims, is not written. Writes: counters.
 
 #import frame
 #import groups
@@ -12,6 +12,7 @@
 @group(0) @binding(3) var<storage, read_write> extras: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> centers: array<u32>;
+@group(0) @binding(6) var<storage, read> sixteenths: array<u32>;
 
 // How far lines go, in reaches of the splat; strides in a reach; pixels added to how far they go.
 override FURTHEST: f32;
@@ -19,11 +20,15 @@ override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 // Longest stride that stops where those of neighbours do.
 override LONGEST_ALIGNED: i32;
-// What points around a pixel at the border are, where their mean may be, and when they tell.
+// What part of the points around a pixel lies on each side, how many tell, and how many alone.
+override LEAST_SHARE: u32;
+override FEWEST_POINTS: u32;
+override MANY_POINTS: u32;
+// What splats around a pixel are, where their mean may be, and when they tell.
 override AROUND_PX: f32;
 override OFF_PX: f32;
 override DENSE_REACH_PX: f32;
-override FEWEST: f32;
+override FEWEST_SPLATS: f32;
 // Steps of a centre's place in its pixel.
 override STEPS: f32;
 
@@ -44,6 +49,14 @@ var<workgroup> tail_count: atomic<u32>;
 var<workgroup> empties: array<atomic<u32>, 80>;
 // The same of pixels in the middle of an empty square.
 var<workgroup> middles: array<vec2u, 40>;
+// For each line, the sixteenths around a pixel that lie ahead, then for each those behind: two words of four rows each.
+var<workgroup> sides: array<vec2u, 16>;
+
+// The eight lines, and the places of a pixel's own sixteenths among those around it.
+const LINES = array(
+    vec2i(1, 0), vec2i(0, 1), vec2i(1, 1), vec2i(1, -1), vec2i(2, 1), vec2i(1, 2), vec2i(2, -1), vec2i(1, -2),
+);
+const OWN = vec2u(0x3c3c0000u, 0x3c3cu);
 
 @compute @workgroup_size(64)
 fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -53,6 +66,9 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     }
     for (var word = local; word < 2u * WIDE; word += GROUP) {
         atomicStore(&empties[word], 0u);
+    }
+    if local < 16u {
+        sides[local] = side(local);
     }
     workgroupBarrier();
     let columns = (frame.size.x + SQUARE - 1u) / SQUARE;
@@ -136,51 +152,106 @@ fn seven_bits(column: u32, bits: vec2u) -> u32 {
     return (((bits.x >> column) >> 1u) | (bits.y << (31u - column))) & 127u;
 }
 
-fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
-    var points = Points(false, vec2f(0.0));
-    if border {
-        points = points_around(pixel, own);
+// The sixteenths around a pixel, within a pixel of its middle, that lie ahead along a line, or behind, or neither.
+fn side(which: u32) -> vec2u {
+    var lines = LINES;
+    let along = select(lines[which % 8u], -lines[which % 8u], which >= 8u);
+    var bits = vec2u(0u);
+    for (var bit = 0u; bit < 64u; bit++) {
+        // From the middle, in eighths of a pixel.
+        let at = 2 * vec2i(vec2u(bit % 8u, bit / 8u)) - 7;
+        let is_in = at.x * at.x + at.y * at.y < 64 && at.x * along.x + at.y * along.y >= 0;
+        bits[bit / 32u] |= u32(is_in) << (bit % 32u);
     }
-    if !points.tell {
+    return bits;
+}
+
+fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
+    var answer = SILENT;
+    if border && abs(own) <= DENSE_REACH_PX {
+        answer = is_beside(pixel);
+    }
+    if answer == SILENT {
         return own > EMPTY_RIM && is_open(vec2i(pixel), own);
     }
-    if !is_off(points.offset) {
-        return false;
-    }
-    // The pixel farther out has to go too.
-    let out = outward(pixel, points.offset);
-    let rim = cover[out.y * frame.size.x + out.x].rim;
-    if rim == EMPTY_RIM {
-        return true;
-    }
-    let beyond = points_around(out, rim);
-    return select(rim > EMPTY_RIM, is_off(beyond.offset), beyond.tell);
+    return answer == YES;
 }
 
-// Whether points whose mean has this offset lie beside a pixel rather than around it.
-fn is_off(offset: vec2f) -> bool {
-    return dot(offset, offset) > OFF_PX * OFF_PX;
-}
+// What points say, if anything.
+const SILENT = 0u;
+const YES = 1u;
+const NO = 2u;
 
-// The pixel beside one that is farthest from points at this offset.
-fn outward(pixel: vec2u, offset: vec2f) -> vec2u {
-    let away = select(pixel + 1u, pixel - 1u, offset > vec2f(0.0));
-    return select(vec2u(pixel.x, away.y), vec2u(away.x, pixel.y), abs(offset.x) > abs(offset.y));
-}
-
-// The points around a pixel: whether they are dense enough to tell of a border, and the mean of their offsets in pixels.
-struct Points {
-    tell: bool,
-    offset: vec2f,
-}
-
-fn points_around(pixel: vec2u, rim: f32) -> Points {
+// Whether a pixel is beside the surface, by the points around.
+fn is_beside(pixel: vec2u) -> u32 {
     let window = u32(AROUND_PX);
     // Of points beyond the picture nothing is known.
-    if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) || abs(rim) > DENSE_REACH_PX {
-        return Points(false, vec2f(0.0));
+    if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
+        return SILENT;
     }
-    var points = 0.0;
+    let points = around(pixel);
+    let of_disc = count(points & (sides[0] | sides[8]));
+    let open = open_side(points);
+    if of_disc >= FEWEST_POINTS && open < 16u {
+        // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
+        if all((points & OWN) == vec2u(0u)) {
+            return YES;
+        }
+        var lines = LINES;
+        let along = sign(lines[open % 8u]);
+        let behind = vec2u(vec2i(pixel) + select(along, -along, open < 8u));
+        let is_drawn = cover[behind.y * frame.size.x + behind.x].rim != EMPTY_RIM;
+        return select(NO, YES, is_drawn && open_side(around(behind)) == 16u);
+    }
+    if of_disc >= MANY_POINTS {
+        return NO;
+    }
+    return mean_of_splats(pixel);
+}
+
+fn count(bits: vec2u) -> u32 {
+    return countOneBits(bits.x) + countOneBits(bits.y);
+}
+
+// The side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface;
+// else 16.
+fn open_side(points: vec2u) -> u32 {
+    var side = 0u;
+    var least = count(points & sides[0]);
+    for (var which = 1u; which < 16u; which++) {
+        let there = count(points & sides[which]);
+        if there < least {
+            side = which;
+            least = there;
+        }
+    }
+    let all = count(points & (sides[0] | sides[8]));
+    return select(16u, side, LEAST_SHARE * least < max(all, 1u));
+}
+
+// The sixteenths no farther than a pixel from the middle of one that hold points: eight rows of eight.
+fn around(pixel: vec2u) -> vec2u {
+    var rows = vec2u(0u);
+    for (var row = 0u; row < 8u; row++) {
+        let at = (pixel.y + (row + 2u) / 4u - 1u) * frame.size.x + pixel.x;
+        let of_pixel = 4u * ((row + 2u) % 4u);
+        let left = (of_pixel_at(at - 1u) >> of_pixel) & 15u;
+        let own = (of_pixel_at(at) >> of_pixel) & 15u;
+        let right = (of_pixel_at(at + 1u) >> of_pixel) & 3u;
+        rows[row / 4u] |= ((left >> 2u) | (own << 2u) | (right << 6u)) << (8u * (row % 4u));
+    }
+    return rows;
+}
+
+// The sixteenths of a pixel.
+fn of_pixel_at(index: u32) -> u32 {
+    return (sixteenths[index / 2u] >> (16u * (index % 2u))) & 0xffffu;
+}
+
+// Whether the mean of the splats around a pixel is far from its middle.
+fn mean_of_splats(pixel: vec2u) -> u32 {
+    let window = u32(AROUND_PX);
+    var splats = 0.0;
     var sum = 0.0;
     var offsets = vec2f(0.0);
     for (var y = 0u; y <= 2u * window; y++) {
@@ -189,12 +260,16 @@ fn points_around(pixel: vec2u, rim: f32) -> Points {
             let offset = there.xy + (vec2f(vec2u(x, y)) - f32(window));
             let near = max(1.0 - dot(offset, offset) / (AROUND_PX * AROUND_PX), 0.0);
             let weight = there.z * near * near * near;
-            points += there.z;
+            splats += select(0.0, there.z, weight > 0.0);
             sum += weight;
             offsets += weight * offset;
         }
     }
-    return Points(points >= FEWEST && sum > 0.0, offsets / max(sum, 1e-9));
+    if splats < FEWEST_SPLATS {
+        return SILENT;
+    }
+    let offset = offsets / sum;
+    return select(NO, YES, dot(offset, offset) > OFF_PX * OFF_PX);
 }
 
 // The mean of a pixel's centres from its middle, in pixels, and how many there are.
@@ -209,10 +284,7 @@ fn is_open(pixel: vec2i, own: f32) -> bool {
     // Wide splats have wide cores, which strides do not miss; so the work per pixel is bounded whatever the density.
     let stride = i32(max(own / STRIDES_PER_REACH, 1.0));
     let strides = i32(FURTHEST * own) / stride + LEAST_REACH_PX;
-    // The eight lines.
-    var lines = array(
-        vec2i(1, 0), vec2i(0, 1), vec2i(1, 1), vec2i(1, -1), vec2i(2, 1), vec2i(1, 2), vec2i(2, -1), vec2i(1, -2),
-    );
+    var lines = LINES;
     // What has no core anywhere around, as a point alone, sticks out of nothing.
     var is_tail = false;
     for (var line = 0u; line < 8u; line++) {

@@ -82,7 +82,14 @@ pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
     recorder.finish();
 }
 
-fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> ScreenPoints {
+/// What is on the screen, and the words of its sixteenths.
+fn project(
+    gpu: &Gpu,
+    passes: &ProjectPasses,
+    cloud: &PointCloud,
+    view: &View,
+    rules: &ProjectRules,
+) -> (ScreenPoints, Vec<u32>) {
     let mut uploader = Uploader::new();
     let mut device_cloud = DeviceCloud::default();
     device_cloud.resize(gpu, cloud.len()).expect("room");
@@ -99,7 +106,9 @@ fn project(gpu: &Gpu, passes: &ProjectPasses, cloud: &PointCloud, view: &View, r
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     passes.steps(gpu, &frame, &device_cloud, &screen).iter().for_each(|step| recorder.run(step));
     recorder.finish();
-    read_screen(gpu, &screen).0
+    let pixels = view.width as usize * view.height as usize;
+    let sixteenths = read_back(gpu, &screen.sixteenths, pixels.div_ceil(2)).expect("sixteenths");
+    (read_screen(gpu, &screen).0, sixteenths)
 }
 
 /// Points of the first that own another pixel, or none, in the second, relative to all.
@@ -132,13 +141,17 @@ fn the_device_finds_what_the_host_finds() {
                 let mut projector = Projector::default();
                 let host = projector.project(&cloud, &view, &rules);
                 for (int64, passes) in &forms {
-                    let device = project(&gpu, passes, &cloud, &view, &rules);
+                    let (device, sixteenths) = project(&gpu, passes, &cloud, &view, &rules);
                     let case = format!("{name} {projection:?} {size:?} {rules:?} {int64}");
                     assert_eq!(device.dropped, host.dropped, "{case}");
                     // Divisions may be off by some units in the last place on a device, which moves a few points of ten
                     // thousand over a pixel's border.
                     let moved = moved(host, &device);
                     assert!(moved < 2e-3, "{case}: {moved} of the points own another pixel");
+                    let words = host.sixteenths.words();
+                    assert_eq!(sixteenths.len(), words.len(), "{case}: words of sixteenths");
+                    let other: u32 = sixteenths.iter().zip(&words).map(|(a, b)| (a ^ b).count_ones()).sum();
+                    assert!(f64::from(other) < 8e-3 * cloud.len() as f64, "{case}: {other} sixteenths are others");
                     if moved == 0.0 {
                         assert_same(host, &device, &case);
                     }

@@ -3,7 +3,7 @@
 use autosplats_cloud::FieldValues;
 
 use super::super::layers::COVER_BYTES;
-use super::super::tests::{ALL_DISCS, Data, Discs, surfels, views};
+use super::super::tests::{ALL_DISCS, Data, Discs, sixteenths, surfels, views};
 use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA};
 use super::*;
 use crate::camera::View;
@@ -60,6 +60,8 @@ impl Scene<'_> {
             [color, scalar].into_iter().flatten()
         });
         screen.values = gpu.storage_with("values", &values.collect::<Vec<u32>>()).expect("room");
+        let words = sixteenths(self.surfels, self.view).words();
+        gpu.queue.write_buffer(&screen.sixteenths, 0, bytemuck::cast_slice(&words));
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
         gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(self.view, 1)));
         Buffers {
@@ -109,7 +111,7 @@ impl Scene<'_> {
             backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
-        let layers = splatter.trim(view).0.clone();
+        let layers = splatter.trim(view, &sixteenths(surfels, view)).0.clone();
         (splatter, layers)
     }
 }

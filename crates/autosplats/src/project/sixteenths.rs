@@ -1,0 +1,118 @@
+//! Which sixteenths of each pixel hold points, those that own no pixel among them: a surface ends where its outermost points
+//! lie, and where many fall into a pixel those are seldom the nearest.
+
+use std::sync::atomic::{AtomicU16, Ordering};
+
+use rayon::prelude::*;
+
+use crate::camera::View;
+
+/// Sixteenths of pixels in a row of a pixel, and rows.
+pub(super) const PER_SIDE: u32 = 4;
+
+/// For each pixel, row by row, a bit for each of its sixteenths, row by row as well, the upper left one the lowest.
+#[derive(Debug, Default)]
+pub(crate) struct Sixteenths {
+    width: usize,
+    pixels: Vec<AtomicU16>,
+}
+
+impl Sixteenths {
+    /// Sizes it for `view` and leaves no point in it.
+    pub(crate) fn clear(&mut self, view: &View) {
+        self.width = view.width as usize;
+        self.pixels.resize_with(self.width * view.height as usize, AtomicU16::default);
+        self.pixels.par_chunks_mut(1 << 16).for_each(|pixels| pixels.iter_mut().for_each(|pixel| *pixel.get_mut() = 0));
+    }
+
+    /// Adds a point in a sixteenth of a pixel.
+    #[inline(always)]
+    pub(crate) fn add(&self, pixel: u32, sixteenth: u32) {
+        let pixel = &self.pixels[pixel as usize];
+        let bit = 1 << sixteenth;
+        // Most points find others there; a plain load tells them so without taking the cache line from other threads.
+        if pixel.load(Ordering::Relaxed) & bit == 0 {
+            pixel.fetch_or(bit, Ordering::Relaxed);
+        }
+    }
+
+    /// Those of a pixel, which counts row by row.
+    pub(crate) fn of(&self, pixel: usize) -> u16 {
+        self.pixels[pixel].load(Ordering::Relaxed)
+    }
+
+    /// Those no farther than a pixel from the middle of pixel (x, y), which lies not at the edge of the picture: eight rows of
+    /// eight, a bit each, the upper left one the lowest.
+    pub(crate) fn around(&self, [x, y]: [usize; 2]) -> u64 {
+        let row = |row: usize| {
+            let [y, of_pixel] = [y + (row + 2) / 4 - 1, (row + 2) % 4];
+            let [left, own, right] =
+                [x - 1, x, x + 1].map(|x| u64::from(self.of(y * self.width + x)) >> (4 * of_pixel) & 15);
+            left >> 2 | own << 2 | (right & 3) << 6
+        };
+        (0..8).fold(0, |rows, at| rows | row(at) << (8 * at))
+    }
+}
+
+#[cfg(test)]
+impl Sixteenths {
+    /// Those with points at these places, given in pixels, in a picture of this size.
+    pub(crate) fn with([width, height]: [usize; 2], places: impl IntoIterator<Item = [f32; 2]>) -> Self {
+        let mut sixteenths = Self { width, pixels: Vec::new() };
+        sixteenths.pixels.resize_with(width * height, AtomicU16::default);
+        for [x, y] in places.into_iter().map(sixteenths_at) {
+            sixteenths.add(y / PER_SIDE * width as u32 + x / PER_SIDE, sixteenth([x, y]));
+        }
+        sixteenths
+    }
+
+    /// As the device has them.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        let of = |pixel: &AtomicU16| u32::from(pixel.load(Ordering::Relaxed));
+        self.pixels.chunks(2).map(|pair| of(&pair[0]) | pair.get(1).map_or(0, of) << 16).collect()
+    }
+}
+
+impl Clone for Sixteenths {
+    fn clone(&self) -> Self {
+        let pixels = (0..self.pixels.len()).map(|pixel| self.of(pixel).into()).collect();
+        Self { width: self.width, pixels }
+    }
+}
+
+/// Column and row of sixteenths in which a place lies, given in pixels.
+#[inline(always)]
+pub(crate) fn sixteenths_at(place: [f32; 2]) -> [u32; 2] {
+    place.map(|at| (PER_SIDE as f32 * at) as u32)
+}
+
+/// Which of its pixel's that is.
+#[inline(always)]
+pub(crate) fn sixteenth([column, row]: [u32; 2]) -> u32 {
+    PER_SIDE * (row % PER_SIDE) + column % PER_SIDE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_clouds::Random;
+
+    #[test]
+    fn around_a_pixel_are_those_no_farther_than_a_pixel() {
+        let size = [7, 5];
+        let mut random = Random::new(81);
+        let places: Vec<[f32; 2]> = (0..120).map(|_| size.map(|side| random.unit() * side as f32)).collect();
+        let sixteenths = Sixteenths::with(size, places.iter().copied());
+        for (x, y) in (1..size[0] - 1).flat_map(|x| (1..size[1] - 1).map(move |y| (x, y))) {
+            let mut expected = 0u64;
+            for [px, py] in &places {
+                // From the corner of the eight by eight.
+                let [column, row] = [px - (x as f32 - 0.5), py - (y as f32 - 0.5)].map(|at| (4.0 * at).floor());
+                if (0.0..8.0).contains(&column) && (0.0..8.0).contains(&row) {
+                    expected |= 1 << (8 * row as usize + column as usize);
+                }
+            }
+            assert_eq!(sixteenths.around([x, y]), expected, "{x}, {y}");
+        }
+    }
+}
