@@ -79,7 +79,10 @@ impl State {
     /// What is wrong with the file, by its name and place.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let state: Self = serde_json::from_str(&text).map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
+        // An empty list would pass for a state of which everything is missing.
+        let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
+            .and_then(|fields| serde_json::from_value::<Self>(fields.into()))
+            .map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
         state.look.settings.check().map_err(|error| format!("{}: {error}", path.display()))?;
         for camera in state.camera.iter().chain(&state.keys) {
             camera.check().map_err(|error| format!("{}: {error}", path.display()))?;

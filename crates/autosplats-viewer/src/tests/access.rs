@@ -23,6 +23,10 @@ fn everything_that_can_be_used_has_a_name() {
     window.steps(3);
     assert!(window.says("Radius of the brush") || window.app().tool == Tool::Brush, "C takes the brush");
     look(&window, "picture, help and brush");
+    window.key(CTRL, Key::T);
+    window.steps(3);
+    look(&window, "film");
+    window.key(CTRL, Key::T);
     for menu in ["File", "Edit", "View", "Window"] {
         window.click_on(menu);
         look(&window, menu);
@@ -79,14 +83,14 @@ fn a_small_window_has_room_for_everything() {
     window.steps(3);
     assert!(crowding(&window).1.is_empty(), "statistics: {:#?}", crowding(&window).1);
     window.press(Key::P);
-    for command in [Command::Export, Command::Screenshot, Command::Help] {
+    for command in [Command::Export, Command::Screenshot, Command::Help, Command::Film] {
         let context = window.harness.ctx.clone();
         crate::keys::run(window.harness.state_mut(), &context, command);
         window.steps(4);
         let (_, outside) = crowding(&window);
         assert!(outside.is_empty(), "{command:?}: {outside:#?}");
         let panels = &mut window.harness.state_mut().panels;
-        (panels.export.open, panels.picture.open, panels.help) = (false, false, false);
+        (panels.export.open, panels.picture.open, panels.help, panels.film.open) = (false, false, false, false);
         window.steps(2);
     }
     // The comparison can fail: what is put outside is found.

@@ -89,6 +89,16 @@ fn check(window: &mut Window, command: Command) {
             assert!(app.panels.picture.open && window.says("Save picture"), "the dialog is open");
             window.harness.state_mut().panels.picture.open = false;
         }
+        Command::Film => {
+            assert!(app.panels.film.open && window.says("Film"), "the window is open");
+            give(window, command);
+            assert!(!window.app().panels.film.open, "and goes");
+        }
+        Command::SaveState => {
+            window.until("the session is kept", |window| window.says("was written"));
+            let path = std::env::temp_dir().join(format!("{}-autosplats.json", std::process::id()));
+            std::fs::remove_file(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        }
         Command::CloseAll => {
             assert!(app.document().layers.is_empty(), "nothing is open any more");
             give(window, Command::Undo);

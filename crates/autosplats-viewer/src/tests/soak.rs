@@ -41,7 +41,7 @@ fn anything(window: &mut Window, chance: &mut Chance) {
         0 | 1 => {
             let command = Command::ALL[chance.below(Command::ALL.len())];
             let Some(shortcut) = command.shortcut() else { return };
-            if command != Command::Quit {
+            if !matches!(command, Command::Quit | Command::SaveState) {
                 let ctrl = if shortcut.modifiers.command { CTRL } else { Modifiers::NONE };
                 window.key(ctrl | shortcut.modifiers, shortcut.logical_key);
             }
