@@ -70,6 +70,7 @@ fn test(root: &Path) -> Result<()> {
     };
     step("test data", &|| find_data(root))?;
     step("graphics device", &find_device)?;
+    step("screen in memory", &find_screen)?;
     step("stages import in one direction", &|| layers::check(&root.join("crates/autosplats/src")))?;
     step("autosplats-cloud never reaches wgpu", &|| check_dependencies(root))?;
     step("format", &|| {
@@ -118,20 +119,49 @@ fn find_device() -> Result<()> {
         println!("a driver is there, or comes with the system");
         return Ok(());
     }
-    let install = |arguments: &[&str]| {
-        let mut command = Command::new("apt-get");
-        run(command.args(arguments).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()))
-    };
-    let packages = [&["install", "--yes", "--no-install-recommends"][..], &SOFTWARE_VULKAN].concat();
-    let installed = install(&["update"]).and_then(|()| install(&packages));
     let absent = format!("there is no Vulkan driver; on Debian: apt-get install {}", SOFTWARE_VULKAN.join(" "));
-    if installed.is_ok() && drivers() > 0 {
+    if install(&SOFTWARE_VULKAN) && drivers() > 0 {
         println!("installed {}", SOFTWARE_VULKAN.join(" "));
         return Ok(());
     }
     ensure!(std::env::var_os("CI").is_none(), "{absent}");
     println!("{absent}. Tests of the GPU are left out.");
     Ok(())
+}
+
+/// What a window on a screen in memory takes on Debian and its kin.
+const SCREEN: [&str; 7] =
+    ["xvfb", "libgl1", "libxkbcommon-x11-0", "libxcursor1", "libxi6", "libxrandr2", "libx11-xcb1"];
+
+/// The window's test runs on a screen in memory. Where there is none it is installed if that can be done without asking
+/// anybody.
+fn find_screen() -> Result<()> {
+    let found = || {
+        let paths = std::env::var_os("PATH").unwrap_or_default();
+        std::env::split_paths(&paths).any(|folder| folder.join("Xvfb").is_file())
+    };
+    if !cfg!(target_os = "linux") || found() {
+        println!("Xvfb is there, or not of this system");
+        return Ok(());
+    }
+    let absent = format!("there is no Xvfb; on Debian: apt-get install {}", SCREEN.join(" "));
+    if install(&SCREEN) && found() {
+        println!("installed {}", SCREEN.join(" "));
+        return Ok(());
+    }
+    ensure!(std::env::var_os("CI").is_none(), "{absent}");
+    println!("{absent}. The window's test is left out.");
+    Ok(())
+}
+
+/// Installs packages of Debian, if that can be done without asking anybody; says whether it could.
+fn install(packages: &[&str]) -> bool {
+    let apt = |arguments: &[&str]| {
+        let mut command = Command::new("apt-get");
+        run(command.args(arguments).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()))
+    };
+    let arguments = [&["install", "--yes", "--no-install-recommends"][..], packages].concat();
+    apt(&["update"]).and_then(|()| apt(&arguments)).is_ok()
 }
 
 /// Reading points must stay possible without a graphics stack.

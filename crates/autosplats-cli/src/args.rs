@@ -72,9 +72,12 @@ In the window H shows what keys and mouse do.";
 #[derive(Args, Debug)]
 #[command(after_help = VIEW_EXAMPLES, after_long_help = format!("{VIEW_EXAMPLES}\n\n{EXIT_CODES}"))]
 pub(crate) struct ViewArgs {
-    #[arg(value_name = "INPUT", help = "\
+    #[arg(
+        value_name = "INPUT",
+        help = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT]. None opens an empty window to drop files on.")]
+generated scene as scene:NAME[:COUNT]. None opens an empty window to drop files on."
+    )]
     pub(crate) inputs: Vec<String>,
     #[command(flatten)]
     pub(crate) input: InputArgs,

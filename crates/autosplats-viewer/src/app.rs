@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use autosplats::cloud::glam::DVec3;
-use autosplats::cloud::Axes;
+use autosplats::cloud::{Axes, PointCloud};
 use autosplats::{AdapterSummary, Camera};
 use eframe::egui;
 

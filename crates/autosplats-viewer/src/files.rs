@@ -22,7 +22,8 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Vec<PathBuf>> 
             autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
         let dialog =
             rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
-        let files = dialog.add_filter("All files", &["*"]).pick_files();
+        // Tests have nobody to ask.
+        let files = if cfg!(test) { None } else { dialog.add_filter("All files", &["*"]).pick_files() };
         let _ = sender.send(files.unwrap_or_default());
         context.request_repaint();
     });
@@ -35,7 +36,13 @@ pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -
     let context = context.clone();
     let (title, name) = (title.to_owned(), name.to_owned());
     spawn("dialog", move || {
-        let _ = sender.send(rfd::FileDialog::new().set_title(title).set_file_name(name).save_file());
+        let chosen = if cfg!(test) {
+            // What tests write without a dialog is put aside.
+            Some(std::env::temp_dir().join(format!("{}-{name}", std::process::id())))
+        } else {
+            rfd::FileDialog::new().set_title(title).set_file_name(name).save_file()
+        };
+        let _ = sender.send(chosen);
         context.request_repaint();
     });
     receiver

@@ -22,6 +22,8 @@ mod panels;
 mod render;
 mod state;
 mod storage;
+#[cfg(test)]
+mod tests;
 mod threads;
 mod tools;
 mod viewport;

@@ -159,7 +159,8 @@ impl App {
 
     /// Reads a file again that has changed.
     fn reload(&mut self, path: &Path) {
-        let layers = self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path) && !layer.incomplete);
+        let layers =
+            self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path) && !layer.incomplete);
         let ids: Vec<_> = layers.map(|layer| layer.id).collect();
         ids.into_iter().for_each(|id| self.reload_layer(id));
     }

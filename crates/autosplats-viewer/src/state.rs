@@ -68,8 +68,11 @@ impl State {
             (&job.input, visible, tint)
         });
         let absent = waiting.chain(app.failed.iter().map(|input| (input, true, None)));
-        let absent = absent.map(|(input, visible, tint)| {
-            InputState { source: App::source_name(input), visible, tint, pose: input.world_from_input }
+        let absent = absent.map(|(input, visible, tint)| InputState {
+            source: App::source_name(input),
+            visible,
+            tint,
+            pose: input.world_from_input,
         });
         let inputs: Vec<InputState> = layers.chain(absent).collect();
         let up = app.up_axis.map(|axes| match axes {
@@ -92,10 +95,9 @@ impl State {
     /// What is wrong with the file, by its name and place.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        // A list would be taken for the fields in their order.
-        let fields: serde_json::Map<String, serde_json::Value> =
-            serde_json::from_str(&text).map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
-        let state: Self = serde_json::from_value(fields.into())
+        // An empty list would pass for a state of which everything is missing.
+        let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
+            .and_then(|fields| serde_json::from_value::<Self>(fields.into()))
             .map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
         state.look.settings.check().map_err(|error| format!("{}: {error}", path.display()))?;
         for camera in state.camera.iter().chain(&state.keys) {
@@ -130,7 +132,9 @@ impl State {
             let name = if source.starts_with("scene:") { source } else { folder.join(source).display().to_string() };
             match Input::parse(&name) {
                 // Named when the program was started, too.
-                Ok(input) if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input)) => {}
+                Ok(input)
+                    if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input)) => {
+                }
                 Ok(input) => app.open_as(Input { world_from_input: pose, ..input }, visible, tint),
                 Err(error) => app.messages.error(error.to_string()),
             }

@@ -153,7 +153,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, cameras: Vec<Camera>) {
         ui.add(egui::DragValue::new(&mut film.size[1]).range(16..=MAX_SIDE).suffix(" px"));
     });
     ui.horizontal(|ui| {
-        if ui.add(egui::TextEdit::singleline(&mut film.name).desired_width(280.0)).changed() {
+        if ui.add(egui::TextEdit::singleline(&mut film.name).desired_width(280.0).hint_text("film.mp4")).changed() {
             film.replace = false;
         }
         if ui.button("Browse…").clicked() && film.chosen.is_none() {

@@ -69,7 +69,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let modal = egui::Modal::new(egui::Id::unique("open")).show(context, |ui| {
         ui.set_width(420.0);
         ui.label("Path of a file, or a scene such as scene:statue");
-        let line = ui.add(egui::TextEdit::singleline(typed).desired_width(f32::INFINITY));
+        let line = ui.add(egui::TextEdit::singleline(typed).desired_width(f32::INFINITY).hint_text("scan.laz"));
         let enter = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if !enter {
             line.request_focus();

@@ -81,7 +81,10 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             });
         });
         ui.horizontal(|ui| {
-            if ui.add(egui::TextEdit::singleline(&mut dialog.path).desired_width(320.0)).changed() {
+            if ui
+                .add(egui::TextEdit::singleline(&mut dialog.path).desired_width(320.0).hint_text("picture.png"))
+                .changed()
+            {
                 dialog.replace = false;
             }
             if ui.button("Browse…").clicked() && dialog.chosen.is_none() {

@@ -1,0 +1,191 @@
+//! The whole viewer without a window: events go in, the tree of accessible widgets and the state come out.
+
+mod access;
+mod edits;
+mod mouse;
+mod opening;
+mod shortcuts;
+mod soak;
+
+use std::time::{Duration, Instant};
+
+use autosplats::Backend;
+use eframe::egui::accesskit::Role;
+use eframe::egui::{
+    Event, Key, Modifiers, OutputCommand, PointerButton, Pos2, Rect, Vec2, ViewportCommand, ViewportId,
+};
+use eframe::{App as _, egui};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+
+use crate::app::App;
+use crate::look::Look;
+use crate::{Input, Options};
+
+/// The smallest window that everything has to work in.
+const SMALL: Vec2 = egui::vec2(1024.0, 640.0);
+/// What threads get to answer, on machines that do much else.
+const WAIT: Duration = Duration::from_secs(90);
+/// Ctrl, as events have it.
+const CTRL: Modifiers = Modifiers { ctrl: true, command: true, ..Modifiers::NONE };
+const CTRL_SHIFT: Modifiers = Modifiers { shift: true, ..CTRL };
+const SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::NONE };
+/// A scene of few points, which the processor draws quickly.
+const STATUE: &str = "scene:statue:20K";
+
+/// The viewer, and what it asked of the system since.
+struct Window {
+    harness: Harness<'static, App>,
+    commands: Vec<ViewportCommand>,
+    outputs: Vec<OutputCommand>,
+}
+
+impl Window {
+    /// A window that begins to open what is named.
+    fn new(names: &[&str]) -> Self {
+        let parse = |name: &&str| Input::parse(name).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let options =
+            Options { inputs: names.iter().map(parse).collect(), backend: Some(Backend::Cpu), ..Options::default() };
+        let builder = Harness::builder().with_size(SMALL).with_step_dt(1.0 / 60.0).with_max_steps(2);
+        let builder = builder.with_accessibility_check(false).with_os(egui::os::OperatingSystem::Nix);
+        let harness =
+            builder.build_eframe(move |creation| App::new(options, Look::default(), Vec::new(), &creation.egui_ctx));
+        Self { harness, commands: Vec::new(), outputs: Vec::new() }
+    }
+
+    /// A window that shows the statue.
+    fn with_statue() -> Self {
+        let mut window = Self::new(&[STATUE]);
+        window.settle();
+        window
+    }
+
+    fn app(&self) -> &App {
+        self.harness.state()
+    }
+
+    fn step(&mut self) {
+        self.harness.step();
+        let output = self.harness.output();
+        let commands = output.viewport_output.get(&ViewportId::ROOT).map(|output| output.commands.clone());
+        self.commands.extend(commands.into_iter().flatten());
+        self.outputs.extend(output.platform_output.commands.iter().cloned());
+    }
+
+    fn steps(&mut self, count: usize) {
+        (0..count).for_each(|_| self.step());
+    }
+
+    /// Draws the window until something is so.
+    fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        let start = Instant::now();
+        loop {
+            self.step();
+            if done(self) {
+                return;
+            }
+            assert!(start.elapsed() < WAIT, "{what}: not so after {WAIT:?}; seen is {:#?}", self.words());
+            std::thread::sleep(Duration::from_millis(4));
+        }
+    }
+
+    /// Draws the window until everything is read and the picture is what is wanted.
+    fn settle(&mut self) {
+        self.steps(2);
+        self.until("the picture is whole", |window| {
+            let app = window.app();
+            let asked = app.loader.jobs().is_empty() && !app.navigation.is_moving();
+            let empty = app.document().layers.is_empty() && app.shot.is_none();
+            asked
+                && (empty
+                    || app.shot.as_ref().is_some_and(|shot| {
+                        let picture = &shot.picture;
+                        let side = |points: f32| points.round() as u32;
+                        let rect = window.picture();
+                        picture.whole
+                            && picture.dots == app.look.dots
+                            && picture.camera == app.navigation.camera()
+                            && picture.size == [side(rect.width()), side(rect.height())]
+                            && picture.shown.shows(app.document())
+                    }))
+        });
+    }
+
+    /// One thing happens, and the window is drawn. The first look goes to the application, as in a real window.
+    fn event(&mut self, event: Event) {
+        let mut input = egui::RawInput { events: vec![event], ..egui::RawInput::default() };
+        let context = self.harness.ctx.clone();
+        self.harness.state_mut().raw_input_hook(&context, &mut input);
+        input.events.into_iter().for_each(|event| self.harness.event(event));
+        self.step();
+    }
+
+    fn key(&mut self, modifiers: Modifiers, key: Key) {
+        self.event(Event::ModifiersChanged(modifiers));
+        for pressed in [true, false] {
+            self.event(Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
+        }
+        self.event(Event::ModifiersChanged(Modifiers::NONE));
+    }
+
+    fn press(&mut self, key: Key) {
+        self.key(Modifiers::NONE, key);
+    }
+
+    fn button(&mut self, pos: Pos2, button: PointerButton, pressed: bool, modifiers: Modifiers) {
+        self.event(Event::PointerButton { pos, button, pressed, modifiers });
+    }
+
+    fn click(&mut self, place: Pos2) {
+        self.event(Event::PointerMoved(place));
+        [true, false].into_iter().for_each(|down| self.button(place, PointerButton::Primary, down, Modifiers::NONE));
+    }
+
+    /// Drags in eight steps.
+    fn drag(&mut self, button: PointerButton, modifiers: Modifiers, from: Pos2, to: Pos2) {
+        self.event(Event::PointerMoved(from));
+        self.event(Event::ModifiersChanged(modifiers));
+        self.button(from, button, true, modifiers);
+        (1..=8).for_each(|step| self.event(Event::PointerMoved(from.lerp(to, step as f32 / 8.0))));
+        self.button(to, button, false, modifiers);
+        self.event(Event::ModifiersChanged(Modifiers::NONE));
+    }
+
+    /// Clicks a widget.
+    fn click_on(&mut self, label: &str) {
+        let place = self.harness.get_by_label(label).rect().center();
+        self.click(place);
+        self.steps(2);
+    }
+
+    /// Everything that is written in the window.
+    fn words(&self) -> Vec<String> {
+        let nodes = self.harness.root().children_recursive().map(|node| node.accesskit_node());
+        nodes.filter(|node| !node.is_hidden()).flat_map(|node| [node.label(), node.value()]).flatten().collect()
+    }
+
+    /// Whether some text can be read in the window.
+    fn says(&self, text: &str) -> bool {
+        self.words().iter().any(|word| word.contains(text))
+    }
+
+    /// Where the picture is.
+    fn picture(&self) -> Rect {
+        self.harness.get_by_role_and_label(Role::Image, "Surface of the points").rect()
+    }
+
+    /// A place in the picture, by shares of its sides.
+    fn place(&self, x: f32, y: f32) -> Pos2 {
+        let rect = self.picture();
+        rect.min + rect.size() * egui::vec2(x, y)
+    }
+}
+
+#[test]
+fn what_is_not_there_is_not_found() {
+    let mut window = Window::new(&[]);
+    window.settle();
+    assert!(window.says("Drop point clouds here"), "the welcome can be read");
+    assert!(!window.says("Drop point clouds there"), "this is said nowhere");
+    assert!(window.app().shot.is_none(), "nothing is open, so there is no picture");
+}

@@ -1,0 +1,101 @@
+//! From a name to a picture, or to a word about why not.
+
+use super::*;
+use crate::storage;
+
+#[test]
+fn a_scene_is_shown_and_listed() {
+    let window = Window::with_statue();
+    let app = window.app();
+    let shot = app.shot.as_ref().expect("there is a picture");
+    assert_eq!(app.document().layers.len(), 1, "one thing is open");
+    assert!(window.says(STATUE), "its name is in the list: {:?}", window.words());
+    let points = app.document().layers[0].cloud.len();
+    assert!(window.says(&format!("{} points", crate::document::grouped(points))), "and its number of points");
+    let [width, height] = shot.picture.size;
+    let share = shot.picture.counts.covered as f64 / f64::from(width * height);
+    // The statue's first view fills about half of the picture.
+    assert!((0.1..0.9).contains(&share), "the surface covers {share} of the picture");
+}
+
+#[test]
+fn what_cannot_be_read_says_why_in_place() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let broken = folder.path().join("broken.ply");
+    std::fs::write(&broken, "ply\nformat ascii 1.0\nelement vertex 3\nend_header\n").expect("it can be written");
+    let absent = folder.path().join("absent.laz");
+    let names = [&broken, &absent].map(|path| path.display().to_string());
+    let mut window = Window::new(&[&*names[0], &*names[1], STATUE]);
+    window.settle();
+    for name in ["broken.ply", "absent.laz"] {
+        assert!(window.says(name), "{name} is explained: {:?}", window.words());
+    }
+    assert_eq!(window.app().document().layers.len(), 1, "what can be read is there all the same");
+    // Errors stay until they are closed.
+    window.steps(700);
+    assert!(window.says("broken.ply"), "errors do not go by themselves");
+    let closers = |window: &Window| window.harness.query_all_by_label_contains("Close this message").count();
+    // A button without words of its own is named by its tooltip or its sign.
+    if closers(&window) == 0 {
+        window.harness.get_all_by_label("×").next().expect("a message can be closed").click();
+    } else {
+        window.harness.query_all_by_label_contains("Close this message").next().expect("counted").click();
+    }
+    window.steps(3);
+    let left = ["broken.ply", "absent.laz"].into_iter().filter(|name| window.says(name)).count();
+    assert_eq!(left, 1, "one message was closed: {:?}", window.words());
+}
+
+#[test]
+fn settings_survive_other_versions() {
+    let mut look = Look { dots: true, dot_size: 5, ..Look::default() };
+    look.settings.reconstruction.k = 33;
+    let text = serde_json::to_string(&look).expect("a look can be written");
+    let read: Look = serde_json::from_str(&text).expect("and read");
+    assert_eq!(read, look, "as it was");
+    assert_ne!(read, Look::default(), "the comparison can tell two looks apart");
+    let newer = text.replacen('{', r#"{"not_yet_known":[1,2],"#, 1);
+    assert_eq!(serde_json::from_str::<Look>(&newer).expect("fields of a newer version are left out"), look, "the rest");
+    let older: Look = serde_json::from_str(r#"{"dot_size":7}"#).expect("missing fields are as in the beginning");
+    assert_eq!(older, Look { dot_size: 7, ..Look::default() }, "all but one");
+    assert!(serde_json::from_str::<Look>(r#"{"dot_size":"wide"}"#).is_err(), "what is no number is an error");
+}
+
+/// Settings in memory.
+#[derive(Default)]
+struct Memory(std::collections::HashMap<String, String>);
+
+impl eframe::Storage for Memory {
+    fn get_string(&self, key: &str) -> Option<String> {
+        self.0.get(key).cloned()
+    }
+
+    fn set_string(&mut self, key: &str, value: String) {
+        self.0.insert(key.into(), value);
+    }
+
+    fn remove_string(&mut self, key: &str) {
+        self.0.remove(key);
+    }
+
+    fn flush(&mut self) {}
+}
+
+#[test]
+fn settings_are_kept_between_starts() {
+    let mut window = Window::new(&[]);
+    window.harness.state_mut().look.dot_size = 6;
+    window.harness.state_mut().recent = vec!["/some/where.ply".into()];
+    let mut memory = Memory::default();
+    storage::save(window.app(), &mut memory);
+    let (look, recent) = storage::load(Some(&memory));
+    assert_eq!(look, window.app().look, "the look comes back");
+    assert_eq!(recent, window.app().recent, "and the names");
+    let broken = memory.0.keys().map(|key| (key.clone(), "(((".to_owned())).collect();
+    assert_eq!(storage::load(Some(&Memory(broken))), (Look::default(), Vec::new()), "what is broken is left behind");
+    assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
+    // Values that no renderer takes are left behind, too.
+    window.harness.state_mut().look.settings.reconstruction.k = 100_000;
+    storage::save(window.app(), &mut memory);
+    assert_eq!(storage::load(Some(&memory)).0, Look::default(), "k of 100,000 is out of range");
+}

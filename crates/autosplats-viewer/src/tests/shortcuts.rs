@@ -1,0 +1,251 @@
+//! Every command by its key.
+
+use autosplats::cloud::Axes;
+use autosplats::cloud::glam::DVec3;
+use autosplats::{Camera, ViewDirection};
+
+use super::*;
+use crate::commands::Command;
+
+/// Presses the key of a command, as a keyboard does; the clipboard's keys arrive as what they mean.
+fn give(window: &mut Window, command: Command) {
+    window.commands.clear();
+    window.outputs.clear();
+    if command == Command::CopyView {
+        window.event(Event::Copy);
+    } else if command == Command::PasteView {
+        let text = serde_json::to_string(&elsewhere(window)).expect("a camera can be written");
+        window.event(Event::Paste(text));
+    } else {
+        let shortcut = command.shortcut().unwrap_or_else(|| panic!("{command:?} has a key"));
+        let ctrl = if shortcut.modifiers.command { CTRL } else { Modifiers::NONE };
+        window.key(ctrl | shortcut.modifiers, shortcut.logical_key);
+    }
+    window.step();
+}
+
+/// The camera one step aside.
+fn elsewhere(window: &Window) -> Camera {
+    let camera = window.app().navigation.goal_camera();
+    let aside = DVec3::new(0.25, 0.5, 0.0);
+    Camera { eye: camera.eye + aside, look_at: camera.look_at + aside, ..camera }
+}
+
+fn forward(window: &Window) -> DVec3 {
+    let camera = window.app().navigation.goal_camera();
+    (camera.look_at - camera.eye).normalize()
+}
+
+/// Where a view looks with Z upward; nothing for those that depend on the points.
+fn wanted(direction: ViewDirection) -> Option<DVec3> {
+    Some(match direction {
+        ViewDirection::Front => DVec3::Y,
+        ViewDirection::Back => DVec3::NEG_Y,
+        ViewDirection::Right => DVec3::NEG_X,
+        ViewDirection::Left => DVec3::X,
+        ViewDirection::Top => DVec3::NEG_Z,
+        ViewDirection::Bottom => DVec3::Z,
+        _ => return None,
+    })
+}
+
+/// Whether a key did what its command is for; `before` is what was so before.
+fn check(window: &mut Window, command: Command) {
+    let counts = |window: &Window| window.app().document().counts();
+    let before = counts(window);
+    let view = window.app().navigation.goal_camera();
+    let (dots, look) = (window.app().look.dots, window.app().panels.look);
+    let (inputs, statistics) = (window.app().panels.inputs, window.app().panels.statistics);
+    let orthographic = window.app().navigation.is_orthographic();
+    match command {
+        Command::InvertSelection | Command::HideSelected | Command::DeleteSelected | Command::CropToSelected => {
+            // Half of the points, without waiting for a picture.
+            window.harness.state_mut().change(|document| {
+                let shown = document.shown();
+                document.select(&shown, |index| index % 2 == 0, crate::document::SelectMode::Replace);
+            });
+        }
+        _ => {}
+    }
+    let selected = counts(window).selected;
+    give(window, command);
+    let after = counts(window);
+    let now = window.app().navigation.goal_camera();
+    let app = window.app();
+    match command {
+        // No system dialog opens here: a path can be typed.
+        Command::Open => {
+            window.until("a path can be typed", |window| window.says("Path of a file"));
+            window.steps(2);
+            assert!(window.harness.unnamed_widgets().is_empty(), "{:?}", window.harness.unnamed_widgets());
+            window.click_on("Cancel");
+            assert!(!window.says("Path of a file"), "it goes away");
+        }
+        Command::Export => {
+            assert!(app.panels.export.open && window.says("Export points"), "the dialog is open");
+            window.harness.state_mut().panels.export.open = false;
+        }
+        Command::Screenshot => {
+            assert!(app.panels.picture.open && window.says("Save picture"), "the dialog is open");
+            window.harness.state_mut().panels.picture.open = false;
+        }
+        Command::Film => {
+            assert!(app.panels.film.open && window.says("Film"), "the window is open");
+            give(window, command);
+            assert!(!window.app().panels.film.open, "and goes");
+        }
+        Command::SaveState => {
+            window.until("the session is kept", |window| window.says("was written"));
+            let path = std::env::temp_dir().join(format!("{}-autosplats.json", std::process::id()));
+            std::fs::remove_file(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        }
+        Command::CloseAll => {
+            assert!(app.document().layers.is_empty(), "nothing is open any more");
+            give(window, Command::Undo);
+            assert_eq!(counts(window).points, before.points, "undo opens it again");
+        }
+        Command::Quit => assert!(window.commands.contains(&ViewportCommand::Close), "the window is to close"),
+        Command::Undo | Command::Redo => {
+            give(window, Command::SelectAll);
+            give(window, Command::DeleteSelected);
+            assert_eq!(counts(window).deleted, before.points, "all is deleted");
+            give(window, Command::Undo);
+            assert_eq!(counts(window).deleted, 0, "undo brings it back");
+            give(window, Command::Redo);
+            assert_eq!(counts(window).deleted, before.points, "redo takes it away");
+            give(window, Command::Undo);
+            window.settle();
+        }
+        Command::SelectAll => assert_eq!(after.selected, after.points, "all is selected"),
+        Command::SelectNone => assert_eq!(after.selected, 0, "nothing is selected"),
+        Command::InvertSelection => assert_eq!(after.selected, after.points - selected, "the others are selected"),
+        Command::HideSelected => {
+            assert_eq!(after.hidden, before.hidden + selected, "half is hidden");
+            give(window, Command::ShowAll);
+            assert_eq!(counts(window).hidden, 0, "and shown again");
+        }
+        Command::ShowAll => assert_eq!(after.hidden, 0, "nothing is hidden"),
+        Command::DeleteSelected | Command::CropToSelected => {
+            let gone = if command == Command::DeleteSelected { selected } else { before.points - selected };
+            assert_eq!(after.deleted, gone, "{command:?}");
+            give(window, Command::Undo);
+            assert_eq!(counts(window).deleted, 0, "undone");
+        }
+        Command::FitAll | Command::FitSelected => {
+            let far = Camera { eye: view.eye + 100.0 * (view.eye - view.look_at), ..view };
+            window.harness.state_mut().navigation.go_to(&far, true);
+            give(window, command);
+            let fitted = window.app().navigation.goal_camera();
+            let distance = fitted.eye.distance(fitted.look_at);
+            assert!(distance < 0.1 * far.eye.distance(far.look_at), "{command:?} comes near: {distance}");
+        }
+        Command::View(direction) => {
+            if let Some(wanted) = wanted(direction) {
+                let angle = forward(window).angle_between(wanted).to_degrees();
+                // Straight down has no horizon: the eye stays a little aside.
+                assert!(angle < 1.0, "{direction:?} looks along {:?}", forward(window));
+            } else {
+                assert_ne!(now, view, "{direction:?} stands elsewhere");
+            }
+        }
+        Command::OppositeView => {
+            let up = app.up();
+            let [a, b] = [view, now].map(|camera| (camera.look_at - camera.eye).reject_from(up));
+            let other = if a.length() > 1e-2 * view.eye.distance(view.look_at) { a.dot(b) < 0.0 } else { now != view };
+            assert!(other, "{view:?} to {now:?}");
+        }
+        Command::Projection => assert_ne!(app.navigation.is_orthographic(), orthographic, "the other projection"),
+        Command::UpAxis => {
+            assert_eq!(app.up_axis, Some(Axes::ZUp), "first Z");
+            for axes in [Some(Axes::YUp), Some(Axes::Camera), None] {
+                give(window, command);
+                assert_eq!(window.app().up_axis, axes, "then the next");
+            }
+        }
+        Command::Level => {
+            let tilted = Camera { up: view.up + 0.5 * DVec3::X, ..Camera { eye: view.look_at + DVec3::Y, ..view } };
+            window.harness.state_mut().navigation.go_to(&tilted, true);
+            give(window, command);
+            let camera = window.app().navigation.goal_camera();
+            let [right, ..] = camera.axes().expect("it sees");
+            assert!(right.dot(window.app().up()).abs() < 1e-9, "the horizon is level: {right}");
+        }
+        Command::CopyView => {
+            let copied = window.outputs.iter().find_map(|output| match output {
+                OutputCommand::CopyText(text) => Some(text.clone()),
+                _ => None,
+            });
+            let copied: Camera = serde_json::from_str(&copied.expect("something is copied")).expect("it is a camera");
+            assert_eq!(copied, view, "the one that sees");
+        }
+        Command::PasteView => {
+            let wanted = view.eye + DVec3::new(0.25, 0.5, 0.0);
+            assert!(now.eye.distance(wanted) < 1e-6, "{} is not {wanted}", now.eye);
+        }
+        Command::Dots => {
+            assert_ne!(app.look.dots, dots, "the other kind of picture");
+            window.settle();
+            give(window, command);
+        }
+        Command::Inputs => assert_ne!(app.panels.inputs, inputs, "the list comes or goes"),
+        Command::Look => assert_ne!(app.panels.look, look, "the panel comes or goes"),
+        Command::Statistics => assert_ne!(app.panels.statistics, statistics, "the window comes or goes"),
+        Command::Help => {
+            assert!(window.says("Keys and mouse"), "the help is there");
+            give(window, command);
+            assert!(!window.app().panels.help, "and goes");
+            window.event(Event::Text("?".into()));
+            assert!(window.app().panels.help, "and comes by the other key");
+            give(window, command);
+        }
+        Command::Tool(tool) => assert_eq!(app.tool, tool, "the tool is taken"),
+        #[allow(unreachable_patterns, reason = "a new command has no case before it is written")]
+        other => panic!("{other:?}: say here what its key does"),
+    }
+}
+
+#[test]
+fn every_key_does_what_its_command_says() {
+    let mut window = Window::with_statue();
+    for command in Command::ALL {
+        if command.shortcut().is_none() {
+            continue;
+        }
+        window.press(Key::Escape);
+        window.press(Key::Escape);
+        window.press(Key::Escape);
+        // A place that no view stands at.
+        let mut camera = elsewhere(&window);
+        camera.projection = autosplats::Projection::PerspectiveFovDeg(40.0);
+        window.harness.state_mut().navigation.go_to(&camera, true);
+        if command == Command::View(ViewDirection::Front) {
+            // These are told for Z upward.
+            window.harness.state_mut().up_axis = Some(Axes::ZUp);
+        } else if command == Command::UpAxis {
+            window.harness.state_mut().up_axis = None;
+        }
+        if window.app().shown().is_none() {
+            window.settle();
+        }
+        check(&mut window, command);
+    }
+    window.settle();
+}
+
+#[test]
+fn keys_that_are_typed_are_no_commands() {
+    let mut window = Window::with_statue();
+    window.key(CTRL, Key::E);
+    window.steps(2);
+    let field = window.harness.get_by_role(Role::TextInput);
+    field.focus();
+    window.steps(2);
+    let (dots, look) = (window.app().look.dots, window.app().panels.look);
+    window.press(Key::L);
+    window.press(Key::Delete);
+    assert_eq!((window.app().look.dots, window.app().panels.look), (dots, look), "letters go into the text");
+    window.press(Key::Escape);
+    window.steps(2);
+    window.press(Key::L);
+    assert_ne!(window.app().panels.look, look, "without the text L opens a panel");
+}

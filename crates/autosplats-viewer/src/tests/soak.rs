@@ -1,0 +1,168 @@
+//! Anything in any order: nothing may panic, and memory may not grow.
+
+use super::*;
+use crate::commands::Command;
+
+/// A sequence of numbers that is the same each time (xorshift64*, Vigna 2016).
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() >> 33) as usize % count
+    }
+
+    fn share(&mut self) -> f32 {
+        self.below(10_001) as f32 / 10_000.0
+    }
+}
+
+/// Megabytes of memory that this program has in use.
+fn resident_mb() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
+    let pages: f64 = text.split_whitespace().nth(1)?.parse().ok()?;
+    Some(pages * 4096e-6)
+}
+
+/// What is opened and closed.
+const SCENES: [&str; 4] = [STATUE, "scene:figure:5K", "scene:herd:3K", "/nowhere/absent.ply"];
+
+fn anything(window: &mut Window, chance: &mut Chance) {
+    let size = window.harness.input().screen_rect.map_or(SMALL, |rect| rect.size());
+    let place = |chance: &mut Chance| egui::pos2(chance.share() * size.x, chance.share() * size.y);
+    let modifiers = |chance: &mut Chance| [Modifiers::NONE, Modifiers::NONE, SHIFT, CTRL, CTRL_SHIFT][chance.below(5)];
+    match chance.below(12) {
+        0 | 1 => {
+            let command = Command::ALL[chance.below(Command::ALL.len())];
+            let Some(shortcut) = command.shortcut() else { return };
+            if !matches!(command, Command::Quit | Command::SaveState) {
+                let ctrl = if shortcut.modifiers.command { CTRL } else { Modifiers::NONE };
+                window.key(ctrl | shortcut.modifiers, shortcut.logical_key);
+            }
+        }
+        2 | 3 => {
+            let buttons =
+                [PointerButton::Primary, PointerButton::Primary, PointerButton::Secondary, PointerButton::Middle];
+            let (button, held) = (buttons[chance.below(4)], modifiers(chance));
+            let (from, to) = (place(chance), place(chance));
+            window.drag(button, held, from, to);
+        }
+        4 | 5 => {
+            let place = place(chance);
+            // Dialogs that write would write.
+            if !window.says("Browse…") {
+                window.click(place);
+            }
+        }
+        6 => {
+            let place = place(chance);
+            window.event(Event::PointerMoved(place));
+            window.event(Event::MouseWheel {
+                unit: egui::MouseWheelUnit::Line,
+                delta: egui::vec2(0.0, 8.0 * (chance.share() - 0.5)),
+                phase: egui::TouchPhase::Move,
+                modifiers: modifiers(chance),
+                source: egui::MouseWheelSource::Wheel,
+            });
+        }
+        7 => {
+            let side = |least: f32, share: f32| (least + 700.0 * share).round();
+            let size = egui::vec2(side(640.0, chance.share()), side(400.0, chance.share()));
+            window.harness.set_size(size);
+        }
+        8 => {
+            if let Ok(input) = Input::parse(SCENES[chance.below(SCENES.len())]) {
+                // More than a few make pictures slow and test nothing more.
+                if window.app().document().layers.len() < 3 {
+                    window.harness.state_mut().open(input);
+                }
+            }
+        }
+        9 => {
+            let context = window.harness.ctx.clone();
+            crate::keys::run(window.harness.state_mut(), &context, Command::CloseAll);
+            if chance.below(2) == 0 {
+                window.press(Key::Escape);
+            }
+        }
+        10 => {
+            let keys =
+                [Key::W, Key::A, Key::S, Key::D, Key::ArrowLeft, Key::Tab, Key::Enter, Key::Escape, Key::Backspace];
+            let key = keys[chance.below(keys.len())];
+            let held = modifiers(chance);
+            window.event(Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: held });
+            window.steps(4);
+            window.event(Event::Key { key, physical_key: None, pressed: false, repeat: false, modifiers: held });
+        }
+        _ => {
+            let text = ["scene:statue:20K", "ä", "?", "\u{0}", "{\"eye\":[0,0,1]}"][chance.below(5)];
+            let event = if chance.below(2) == 0 { Event::Text(text.into()) } else { Event::Paste(text.into()) };
+            window.event(event);
+        }
+    }
+    window.steps(1 + chance.below(3));
+}
+
+/// Memory in use by what has been done so far, megabytes, at times after the warm-up.
+fn soak(seconds: f64, seed: u64) {
+    let mut window = Window::with_statue();
+    let mut chance = Chance(seed);
+    let start = Instant::now();
+    // What is kept on purpose, above all for undo, is full by then.
+    let warm = 0.4 * seconds;
+    let (mut events, mut base, mut peak, mut next) = (0_u64, None, 0.0_f64, 0.0);
+    while start.elapsed().as_secs_f64() < seconds {
+        anything(&mut window, &mut chance);
+        events += 1;
+        let now = start.elapsed().as_secs_f64();
+        if now < next {
+            continue;
+        }
+        next = now + 0.01 * seconds;
+        let Some(memory) = resident_mb() else { continue };
+        if now < warm {
+            base = Some(base.map_or(memory, |base: f64| base.max(memory)));
+        } else {
+            peak = peak.max(memory);
+        }
+    }
+    let seen = format!(
+        "{events} rounds in {seconds:.0} s, seed {seed}: {base:?} MB at most before {warm:.0} s, {peak:.0} MB after"
+    );
+    println!("{seen}");
+    // The other tests of this program run at the same time and have memory, too; a leak of a picture a round is far more.
+    let base = base.unwrap_or(f64::INFINITY);
+    assert!(is_bounded(base, peak), "memory grows: {seen}");
+    assert!(events as f64 > 0.5 * seconds, "the window still answers: {seen}");
+    window.until("it can still be used", |window| !window.app().navigation.is_moving());
+}
+
+/// Half as much again and a few pictures are chance; more is growth.
+fn is_bounded(base: f64, peak: f64) -> bool {
+    peak < 1.5 * base + 200.0
+}
+
+#[test]
+fn growth_is_told_from_chance() {
+    assert!(is_bounded(300.0, 400.0), "as things go");
+    assert!(!is_bounded(300.0, 900.0), "three times as much is growth");
+}
+
+#[test]
+fn twenty_seconds_of_anything() {
+    soak(20.0, 0x5EED_0001);
+}
+
+/// The long form: `AUTOSPLATS_SOAK_SECONDS` tells how long.
+#[test]
+#[ignore = "takes ten minutes"]
+fn ten_minutes_of_anything() {
+    let seconds = std::env::var("AUTOSPLATS_SOAK_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(600.0);
+    soak(seconds, 0x5EED_0002);
+}
