@@ -215,6 +215,12 @@ impl Navigation {
         true
     }
 
+    /// Whether the eye is on its way.
+    #[cfg(test)]
+    pub(crate) fn is_moving(&self) -> bool {
+        self.shown != self.goal
+    }
+
     /// Turns about the pivot. `drag` is in heights of the picture, right and down.
     pub(crate) fn orbit(&mut self, drag: DVec2) {
         self.turn(drag);

@@ -198,6 +198,12 @@ fn check(window: &mut Window, command: Command) {
             assert!(window.app().panels.help, "and comes by the other key");
             give(window, command);
         }
+        Command::Clip => {
+            let clips = |window: &Window| window.app().document().clip.is_some_and(|clip| clip.enabled);
+            assert!(clips(window), "a box is around the points");
+            give(window, command);
+            assert!(!clips(window), "and clips no longer");
+        }
         Command::Tool(tool) => assert_eq!(app.tool, tool, "the tool is taken"),
         #[allow(unreachable_patterns, reason = "a new command has no case before it is written")]
         other => panic!("{other:?}: say here what its key does"),

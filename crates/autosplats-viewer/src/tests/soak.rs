@@ -112,6 +112,8 @@ fn anything(window: &mut Window, chance: &mut Chance) {
 /// Memory in use by what has been done so far, megabytes, at times after the warm-up.
 fn soak(seconds: f64, seed: u64) {
     let mut window = Window::with_statue();
+    // A button of egui's own, in its choice of colours, has a sign that no font here has.
+    window.harness.ctx.set_missing_glyph_policy(egui::MissingGlyphPolicy::Tofu);
     let mut chance = Chance(seed);
     let start = Instant::now();
     // What is kept on purpose, above all for undo, is full by then.

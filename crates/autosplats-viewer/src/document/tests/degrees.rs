@@ -51,10 +51,10 @@ fn a_file_read_again_stays_on_the_map() {
     let shown = document.shown();
     document.select_all(&shown);
     document.delete_selected();
-    assert!(document.reload(second, degrees(DVec3::new(10.0625, 50.0, 100.0))), "it is there");
+    document.reload(second, &degrees(DVec3::new(10.0625, 50.0, 100.0)));
     assert_eq!(document.layers[1].position(3), place, "where it was");
     assert_eq!(document.counts_of(&document.layers[1]).deleted, 0, "with all its points");
-    document.reload(second, cloud(10, DVec3::ZERO));
+    document.reload(second, &cloud(10, DVec3::ZERO));
     assert_eq!(document.layers[1].position(3), document.layers[1].file_position(3), "metres are on no map");
 }
 

@@ -122,7 +122,7 @@ fn drags_move_from_where_they_began() {
     dragged.move_gripped(&grip, &DMat4::IDENTITY);
     assert_eq!(contents(&dragged), before, "and can be given up");
     dragged.remove(first);
-    dragged.reload(second, super::cloud(10, FAR));
+    dragged.reload(second, &super::cloud(10, FAR));
     let before = contents(&dragged);
     assert_eq!(dragged.move_gripped(&grip, &DMat4::from_translation(DVec3::X)), 0, "what has gone is let go");
     assert_eq!(contents(&dragged), before, "and nothing else is touched");

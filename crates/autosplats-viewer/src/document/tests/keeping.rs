@@ -83,8 +83,10 @@ fn memory_of_old_documents_is_bounded() {
     let mut document = history.current().clone();
     document.remove(id);
     history.record("Remove layer", document);
-    assert!(history.old_bytes() <= most, "a layer that only old documents have counts");
-    assert_eq!(history.undo(), None, "so that it is gone");
+    assert!(history.old_bytes() > most, "a layer that only old documents have counts");
+    assert_eq!(history.undo().as_deref(), Some("Remove layer"), "but what was done last can be undone");
+    assert_eq!(history.undo(), None, "that alone");
+    assert!(history.current().layer(id).is_some(), "and it is there again");
 }
 
 #[test]
@@ -149,4 +151,49 @@ fn labels_count() {
         ["Delete 0 points", "Delete 12 points", "Delete 999 points", "Delete 1,000 points", "Delete 1,234,567 points"],
         "others"
     );
+}
+
+#[test]
+fn files_that_come_outlast_undo() {
+    let mut history = History::default();
+    let first = Layer::new("first", None, cloud(10, FAR));
+    let id = first.id;
+    history.everywhere(|document| {
+        document.add(first.clone());
+    });
+    let mut document = history.current().clone();
+    edit(&mut document, id, |layer| layer.edits.deleted = every(10, 2));
+    history.record("Delete", document);
+    let second = Layer::new("second", None, cloud(20, FAR));
+    history.everywhere(|document| {
+        document.add(second.clone());
+    });
+    assert_eq!(history.undo().as_deref(), Some("Delete"), "the edit is undone");
+    assert!(history.current().layer(second.id).is_some(), "the file stays");
+    assert_eq!(history.redo().as_deref(), Some("Delete"), "and done again");
+    history.reload(id, &cloud(30, FAR));
+    assert!(!history.is_unsaved(id), "what was done was of other points");
+    history.undo();
+    assert_eq!(
+        history.current().layer(id).map(|layer| layer.cloud.len()),
+        Some(30),
+        "undo does not bring old points back"
+    );
+}
+
+#[test]
+fn what_is_incomplete_is_not_edited() {
+    let mut document = Document::default();
+    let id = document.add(Layer { incomplete: true, ..Layer::new("growing", None, cloud(10, FAR)) });
+    let shown = document.shown();
+    document.select_all(&shown);
+    assert_eq!(
+        document.delete_selected() + document.hide_selected() + document.crop_to_selection(),
+        0,
+        "nothing is done"
+    );
+    document.complete(id);
+    let shown = document.shown();
+    document.select_all(&shown);
+    assert_eq!(document.delete_selected(), 10, "until it is complete");
 }
