@@ -81,7 +81,10 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     let rect = response.rect;
     let context = &response.ctx;
     let modifiers = context.input(|input| input.modifiers);
-    let drag = response.drag_delta();
+    // What the pointer went before it was known to drag belongs to the drag.
+    let dragged = response.total_drag_delta().unwrap_or_default();
+    let drag = if response.dragged() { dragged - app.panels.dragged } else { egui::Vec2::ZERO };
+    app.panels.dragged = dragged;
     let drag = DVec2::new(drag.x.into(), drag.y.into()) / f64::from(rect.height().max(1.0));
     let mut busy = false;
     if response.drag_started() {

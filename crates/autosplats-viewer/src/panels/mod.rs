@@ -40,6 +40,8 @@ pub(crate) struct Panels {
     pub(crate) film: film::Film,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
+    /// How far the drag has gone that the view has followed, screen points.
+    pub(crate) dragged: egui::Vec2,
     /// Depth of what a drag took hold of.
     pub(crate) grabbed: Option<f64>,
     /// Whether the user wants to leave though something is not saved.
@@ -64,6 +66,7 @@ impl Default for Panels {
             picture: picture::PictureDialog::default(),
             film: film::Film::default(),
             claimed: Vec::new(),
+            dragged: egui::Vec2::ZERO,
             grabbed: None,
             leave: false,
             removal: Vec::new(),
