@@ -17,7 +17,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let mut open = true;
     let mut clip = app.document().clip;
     let mut busy = false;
-    let place = context.content_rect().right_top() + egui::vec2(-16.0, 60.0);
+    let place = app.view_rect.right_top() + egui::vec2(-16.0, 60.0);
     let window = egui::Window::new("Clipping box")
         .open(&mut open)
         .resizable(false)

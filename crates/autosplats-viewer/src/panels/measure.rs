@@ -16,7 +16,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let report = Report::new(&ruler(app), &app.tools.measured);
     let mut open = true;
-    let place = context.content_rect().right_top() + egui::vec2(-16.0, 310.0);
+    let place = app.view_rect.right_top() + egui::vec2(-16.0, 310.0);
     let window = egui::Window::new("Measurement")
         .open(&mut open)
         .resizable(true)

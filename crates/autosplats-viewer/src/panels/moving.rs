@@ -21,7 +21,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let selected = app.counts().all.selected;
     let mut act = None;
-    let place = context.content_rect().right_top() + egui::vec2(-16.0, 310.0);
+    let place = app.view_rect.right_top() + egui::vec2(-16.0, 310.0);
     egui::Window::new("Move")
         .resizable(false)
         .default_width(250.0)

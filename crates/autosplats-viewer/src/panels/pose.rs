@@ -81,7 +81,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let window = window
         .open(&mut open)
         .resizable(false)
-        .default_pos(context.content_rect().left_top() + egui::vec2(240.0, 60.0));
+        .default_pos(app.view_rect.left_top() + egui::vec2(16.0, 16.0));
     window.show(context, |ui| {
         let mut parts = pose.parts;
         busy = numbers(ui, &mut parts, speed);
