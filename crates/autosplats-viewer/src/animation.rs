@@ -6,7 +6,8 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use autosplats::cloud::glam::{DQuat, DVec3};
@@ -18,6 +19,9 @@ use crate::threads::spawn;
 
 /// Pictures that wait to be written.
 const QUEUE: usize = 3;
+
+/// How many recordings there have been.
+static RECORDINGS: AtomicU64 = AtomicU64::new(0);
 
 /// Cameras of a turn about the vertical through the pivot, `pictures` of them, `degrees` in all; the last one is not where
 /// the first one is, so that the film can be played in a loop.
@@ -139,6 +143,8 @@ pub(crate) fn has_ffmpeg() -> bool {
 
 /// A film in the making.
 pub(crate) struct Recording {
+    /// Which one it is: no other has the same number.
+    pub(crate) number: u64,
     cameras: Vec<Camera>,
     /// Picture that is asked for next.
     next: usize,
@@ -170,12 +176,13 @@ impl Recording {
                 Target::Frames(folder, before, after) => {
                     write_frames(&queue, &folder, &before, &after, total, &context)
                 }
-                Target::Film(path) => write_film(&queue, &path, size, rate, total, &context),
+                Target::Film(path) => write_film(&queue, &path, total, &context, |part| ffmpeg(part, size, rate)),
             };
             let _ = sender.send(written);
             context.request_repaint();
         });
-        Self { cameras, next: 0, size, pictures: Some(pictures), waiting: None, asked: false, result }
+        let number = RECORDINGS.fetch_add(1, Ordering::Relaxed);
+        Self { number, cameras, next: 0, size, pictures: Some(pictures), waiting: None, asked: false, result }
     }
 
     /// Part that is done, 0 to 1.
@@ -254,39 +261,39 @@ fn write_frames(
     }
 }
 
-/// Hands pictures to ffmpeg. The film appears complete or not at all.
+/// Hands pictures to ffmpeg, by a command that writes to the path it is given. The film appears complete or not at all.
 fn write_film(
     queue: &Receiver<Image>,
     path: &Path,
-    size: [u32; 2],
-    rate: u32,
     total: usize,
     context: &egui::Context,
+    command: impl FnOnce(&Path) -> Command,
 ) -> Result<String, String> {
-    let extension = path.extension().unwrap_or_default();
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut suffix = std::ffi::OsString::from(".");
-    suffix.push(extension);
-    let part = tempfile::Builder::new().prefix(".autosplats").suffix(&suffix).tempfile_in(folder);
-    let part = part.map_err(|error| format!("{}: {error}", path.display()))?.into_temp_path();
-    let mut child = ffmpeg(&part, size, rate).map_err(|error| format!("ffmpeg does not start: {error}"))?;
+    suffix.push(path.extension().unwrap_or_default());
+    let part = files::temporary(path, &suffix).map_err(|error| format!("{}: {error}", path.display()))?;
+    let part = part.into_temp_path();
+    let mut command = command(&part);
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().map_err(|error| format!("ffmpeg does not start: {error}"))?;
     let mut input = child.stdin.take();
     let mut count = 0;
+    let mut died = false;
     for image in queue {
-        let Some(pipe) = &mut input else { break };
-        if pipe.write_all(image.pixels.as_flattened()).is_err() {
-            // It has ended; its own words say why.
-            input = None;
+        died = input.as_mut().is_none_or(|pipe| pipe.write_all(image.pixels.as_flattened()).is_err());
+        if died {
+            break;
         }
         count += 1;
         context.request_repaint();
     }
     drop(input);
     let output = child.wait_with_output().map_err(|error| format!("ffmpeg: {error}"))?;
-    if count < total {
+    // One that ended by itself says why; one that was stopped may complain that there were too few pictures.
+    if count < total && !died {
         return Err("The film was stopped; nothing was written".into());
     }
-    if !output.status.success() {
+    if died || !output.status.success() {
         let words = String::from_utf8_lossy(&output.stderr);
         return Err(format!("ffmpeg: {}", words.lines().last().unwrap_or("it failed without a word")));
     }
@@ -294,13 +301,14 @@ fn write_film(
     Ok(format!("{count} pictures were written as {}", path.display()))
 }
 
-fn ffmpeg(path: &Path, [width, height]: [u32; 2], rate: u32) -> std::io::Result<Child> {
+/// The command that makes a film of raw pictures.
+fn ffmpeg(path: &Path, [width, height]: [u32; 2], rate: u32) -> Command {
     let mut command = Command::new("ffmpeg");
     command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
     command.args(["-s", &format!("{width}x{height}"), "-r", &rate.to_string(), "-i", "-"]);
     // Most players want even sides and this kind of colour.
     command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(path);
-    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn()
+    command
 }
 
 #[cfg(test)]
@@ -348,6 +356,51 @@ mod tests {
             "where it is told"
         );
         assert!(target("film").is_err() && target("film.gif").is_err(), "others are not known");
+    }
+
+    /// Writes a film of `pictures` of 3 pictures by a shell script that is told the file's name as `$0`.
+    #[cfg(unix)]
+    fn film(path: &Path, pictures: usize, script: &str) -> Result<String, String> {
+        let (sender, queue) = sync_channel(3);
+        for _ in 0..pictures {
+            let image = Image { width: 500, height: 500, pixels: vec![[7; 4]; 500 * 500], linear: Vec::new() };
+            sender.send(image).expect("there is room");
+        }
+        drop(sender);
+        write_film(&queue, path, 3, &egui::Context::default(), |part| {
+            let mut command = Command::new("sh");
+            command.args(["-c", script]).arg(part);
+            command
+        })
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_film_appears_when_it_is_complete() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("film.mp4");
+        let stopped = film(&path, 1, "cat > \"$0\"; echo too few >&2; exit 1");
+        assert_eq!(stopped, Err("The film was stopped; nothing was written".into()), "the user did that");
+        assert_eq!(film(&path, 3, "echo bad >&2; exit 1"), Err("ffmpeg: bad".into()), "it died before all was read");
+        assert_eq!(film(&path, 3, "cat > \"$0\"; echo late >&2; exit 1"), Err("ffmpeg: late".into()), "at the end");
+        let names = || std::fs::read_dir(folder.path()).expect("a folder").count();
+        assert_eq!(names(), 0, "nothing is left behind");
+        assert!(film(&path, 3, "cat > \"$0\"").is_ok(), "all is well");
+        assert_eq!(std::fs::read(&path).expect("a film").len(), 3 * 4 * 500 * 500, "every picture is in it");
+        let other = folder.path().join("other");
+        std::fs::write(&other, "").expect("a file");
+        let mode = |path: &Path| std::fs::metadata(path).expect("a file").permissions().mode();
+        assert_eq!(mode(&path), mode(&other), "others may see it as any file");
+    }
+
+    #[test]
+    fn no_two_recordings_are_mistaken_for_each_other() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = Target::new(&folder.path().join("t.png")).expect("pictures");
+        let context = egui::Context::default();
+        let [one, other] = [(); 2].map(|()| Recording::start(Vec::new(), [1, 1], 25, target.clone(), &context).number);
+        assert_ne!(one, other, "each has a number of its own");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The one place that asks the system for files, as a browser has none.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 
@@ -13,8 +14,9 @@ pub(crate) fn dropped(file: &dyn egui::DroppedFile) -> Option<PathBuf> {
     Some(file.path()).filter(|path| path.is_absolute()).map(Path::to_path_buf)
 }
 
-/// Asks for files to open, beside the window; they arrive when the user has chosen.
-pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Vec<PathBuf>> {
+/// Asks for files to open, beside the window; they arrive when the user has chosen: none if the dialog was cancelled, nothing
+/// at all if there is no dialog.
+pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Option<Vec<PathBuf>>> {
     let (sender, receiver) = channel();
     let context = context.clone();
     spawn("dialog", move || {
@@ -24,13 +26,14 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Vec<PathBuf>> 
             rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
         // Tests have nobody to ask.
         let files = if cfg!(test) { None } else { dialog.add_filter("All files", &["*"]).pick_files() };
-        let _ = sender.send(files.unwrap_or_default());
+        // Where the dialog is another program, which may be missing, what is cancelled is an empty list; elsewhere it is none.
+        let _ = sender.send(files.or_else(|| (!cfg!(target_os = "linux")).then(Vec::new)));
         context.request_repaint();
     });
     receiver
 }
 
-/// Asks where to write a file.
+/// Asks where to write a file. Nothing arrives if the dialog was cancelled, and likewise if there is none.
 pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -> Receiver<Option<PathBuf>> {
     let (sender, receiver) = channel();
     let context = context.clone();
@@ -62,14 +65,24 @@ pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> st
     .map_err(std::io::Error::other)
 }
 
+/// A file beside `path` for what will be there when it is complete.
+pub(crate) fn temporary(path: &Path, suffix: &OsStr) -> std::io::Result<tempfile::NamedTempFile> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".autosplats-").suffix(suffix);
+    // Temporary files are for their owner alone unless told otherwise; the result is a file like any.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
 /// Writes a file so that it appears complete or not at all.
 pub(crate) fn write(
     path: &Path,
     content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
     use std::io::Write as _;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".autosplats").tempfile_in(folder)?;
+    let mut file = temporary(path, OsStr::new(".tmp"))?;
     {
         let mut writer = std::io::BufWriter::new(file.as_file_mut());
         content(&mut writer)?;
@@ -77,4 +90,20 @@ pub(crate) fn write(
     }
     file.persist(path).map_err(|error| error.error)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_what_is_written() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = |name: &str| std::fs::metadata(folder.path().join(name)).expect("a file").permissions().mode();
+        write(&folder.path().join("ours"), |writer| writer.write_all(b"ours")).expect("it is written");
+        std::fs::write(folder.path().join("any"), b"any").expect("it is written");
+        assert_eq!(mode("ours"), mode("any"), "as any other file");
+    }
 }

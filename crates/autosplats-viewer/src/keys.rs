@@ -1,6 +1,7 @@
 //! Keys to commands, and commands to what is done.
 
 use autosplats::cloud::Axes;
+use autosplats::cloud::glam::DVec3;
 use autosplats::{Camera, ViewDirection};
 use eframe::egui::{self, Event, Key, Modifiers};
 
@@ -8,9 +9,14 @@ use crate::app::App;
 use crate::commands::{Command, Tool};
 use crate::loading::Input;
 
+/// Whether something is open that has the keys to itself: a menu, or a question that has to be answered first.
+fn is_behind(context: &egui::Context) -> bool {
+    context.memory(|memory| memory.top_modal_layer()).is_some() || egui::Popup::is_any_open(context)
+}
+
 /// Takes keys that egui would use itself: Tab, which otherwise goes from button to button, as long as none has the focus.
 pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::RawInput) {
-    if context.memory(|memory| memory.focused()).is_some() {
+    if is_behind(context) || context.memory(|memory| memory.focused()).is_some() {
         return;
     }
     input.events.retain(|event| match event {
@@ -30,7 +36,7 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
         run(app, context, command);
     }
     dropped(app, context);
-    if context.egui_wants_keyboard_input() {
+    if is_behind(context) || context.egui_wants_keyboard_input() {
         return;
     }
     // The clipboard's keys come as events of their own.
@@ -94,8 +100,15 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::Export => app.panels.export.open = true,
         Command::Screenshot => app.panels.picture.open = true,
         Command::Film => app.panels.film.open = !app.panels.film.open,
-        Command::SaveState => app.panels.dialogs.save_state(context),
-        Command::CloseAll => crate::panels::close_all(app),
+        Command::SaveState => app.panels.dialogs.save_state(app.state.as_deref()),
+        Command::CloseAll => {
+            if app.document().layers.is_empty() {
+                // There is nothing to undo, but what is being read may be given up.
+                app.loader.cancel_all();
+            } else {
+                crate::panels::close_all(app);
+            }
+        }
         Command::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
         Command::Undo => match app.undo() {
             Some(label) => app.messages.note(format!("Undone: {label}")),
@@ -117,8 +130,9 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             }
         }
         Command::SelectNone => {
-            // Escape goes back a step each time: what is dragged, a window, what is being drawn, the tool, the selection.
-            if crate::gizmo::cancel(app) || app.panels.close_window() || app.tools.cancel() {
+            // Escape goes back a step each time: what is dragged, a window, what the tool has, the tool, the selection.
+            let dragged = crate::gizmo::cancel(app) || app.tools.cancel_drag();
+            if dragged || app.panels.close_window() || app.tools.cancel() {
                 return;
             }
             if app.tool == Tool::Navigate {
@@ -143,17 +157,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::View(ViewDirection::Auto) => app.first_view(),
         Command::View(direction) => app.look_from(direction, false),
         Command::OppositeView => {
-            let camera = app.navigation.goal_camera();
-            let Camera { eye, look_at, .. } = camera;
-            let up = app.up();
-            // Turned about the vertical through the pivot; straight down becomes straight up.
-            let away = eye - look_at;
-            let eye = if away.reject_from(up).length() > 1e-3 * away.length() {
-                look_at - away.reject_from(up) + away.project_onto(up)
-            } else {
-                look_at - away
-            };
-            app.navigation.go_to(&Camera { eye, ..camera }, false);
+            let camera = opposite(&app.navigation.goal_camera(), app.up());
+            app.navigation.go_to(&camera, false);
         }
         Command::Projection => app.navigation.toggle_projection(),
         Command::UpAxis => {
@@ -189,6 +194,18 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
     }
 }
 
+/// The camera turned half about the vertical through what it looks at; straight down becomes straight up.
+fn opposite(camera: &Camera, up: DVec3) -> Camera {
+    let Camera { eye, look_at, .. } = *camera;
+    let away = eye - look_at;
+    let turned = |vector: DVec3| 2.0 * vector.project_onto(up) - vector;
+    if away.reject_from(up).length() > 1e-3 * away.length() {
+        Camera { eye: look_at + turned(away), up: turned(camera.up), ..*camera }
+    } else {
+        Camera { eye: look_at - away, ..*camera }
+    }
+}
+
 /// Stands where a copied camera stood.
 fn paste_view(app: &mut App, text: &str) {
     match serde_json::from_str::<Camera>(text).map_err(|error| error.to_string()) {
@@ -197,5 +214,111 @@ fn paste_view(app: &mut App, text: &str) {
             Err(error) => app.messages.error(format!("The copied view cannot see: {error}")),
         },
         Err(_) => app.messages.note("What is on the clipboard is no view; Copy view puts one there"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use autosplats::Projection;
+    use autosplats::cloud::PointCloud;
+
+    use super::*;
+    use crate::Options;
+    use crate::document::{Layer, SelectMode};
+    use crate::look::Look;
+
+    #[test]
+    fn the_opposite_view_is_upright() {
+        for degrees in [-60.0_f64, 0.0, 30.0, 45.0, 60.0, 89.0] {
+            let (sine, cosine) = degrees.to_radians().sin_cos();
+            let look_at = DVec3::new(3.0, 4.0, 5.0);
+            let eye = look_at + 10.0 * DVec3::new(0.0, -cosine, sine);
+            let up = DVec3::new(0.0, sine, cosine);
+            let camera = Camera { eye, look_at, up, projection: Projection::PerspectiveFovDeg(40.0) };
+            let there = opposite(&camera, DVec3::Z);
+            assert!(there.eye.distance(look_at + 10.0 * DVec3::new(0.0, cosine, sine)) < 1e-9, "{degrees}: {there:?}");
+            let [before, after] = [camera, there].map(|camera| camera.axes().expect("a camera that sees"));
+            assert!(before[0].distance(-after[0]) < 1e-9, "{degrees}: right is left");
+            assert!(after[1].z < 0.0, "{degrees}: down is down, {:?}", after[1]);
+            let back = opposite(&there, DVec3::Z);
+            assert!(back.eye.distance(eye) < 1e-9 && back.up.distance(up) < 1e-9, "{degrees}: twice is none");
+        }
+        let above = Camera {
+            eye: DVec3::Z,
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            projection: Projection::OrthographicHeight(1.0),
+        };
+        assert_eq!(opposite(&above, DVec3::Z).eye, DVec3::NEG_Z, "from above is from below");
+    }
+
+    /// An application with points that are selected.
+    fn app(context: &egui::Context) -> App {
+        let mut app = App::new(Options::default(), Look::default(), Vec::new(), context);
+        app.change(|document| {
+            document.add(Layer::new("some", None, Arc::new(PointCloud::new(DVec3::ZERO, vec![[0.5; 3]; 10]))));
+            let shown = document.shown();
+            document.select(&shown, |_| true, SelectMode::Replace);
+        });
+        app
+    }
+
+    /// Presses a key in a frame of the window in which a question is asked or not.
+    fn press(app: &mut App, context: &egui::Context, key: Key, question: bool) {
+        let mut input = egui::RawInput::default();
+        let event =
+            |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::NONE };
+        input.events.push(event(key));
+        claim(app, context, &mut input);
+        let mut output = context.run_ui(input, |ui| {
+            let context = ui.ctx().clone();
+            perform(app, &context);
+            if question {
+                egui::Modal::new(egui::Id::unique("question")).show(&context, |ui| ui.label("Well?"));
+            }
+        });
+        // There is nothing to draw on.
+        output.textures_delta.clear();
+    }
+
+    #[test]
+    fn keys_do_nothing_behind_a_question() {
+        let context = egui::Context::default();
+        let mut app = app(&context);
+        press(&mut app, &context, Key::F20, true);
+        for key in [Key::Delete, Key::Tab] {
+            press(&mut app, &context, key, true);
+        }
+        assert_eq!(app.history.undo_label(), None, "nothing was deleted");
+        assert!(!app.look.dots, "nor shown in another way");
+        press(&mut app, &context, Key::F20, false);
+        for key in [Key::Delete, Key::Tab] {
+            press(&mut app, &context, key, false);
+        }
+        assert!(app.history.undo_label().is_some(), "without a question they do what they do");
+        assert!(app.look.dots, "both of them");
+    }
+
+    #[test]
+    fn escape_gives_up_a_drag_before_it_closes_a_window() {
+        let context = egui::Context::default();
+        let mut app = app(&context);
+        app.panels.help = true;
+        app.tool = Tool::Lasso;
+        app.tools.draw(&[egui::pos2(1.0, 2.0)]);
+        press(&mut app, &context, Key::Escape, false);
+        assert!(app.panels.help && app.tool == Tool::Lasso, "first the drag");
+        press(&mut app, &context, Key::Escape, false);
+        assert!(!app.panels.help, "then the window");
+    }
+
+    #[test]
+    fn closing_nothing_is_nothing_to_undo() {
+        let context = egui::Context::default();
+        let mut app = App::new(Options::default(), Look::default(), Vec::new(), &context);
+        run(&mut app, &context, Command::CloseAll);
+        assert_eq!(app.undo(), None, "nothing was done");
     }
 }

@@ -14,16 +14,17 @@ use crate::threads::spawn;
 pub(crate) enum Goal {
     /// A file.
     File(PathBuf),
-    /// The film in the making.
-    Film,
+    /// The film in the making, if it is still the one with this number.
+    Film(u64),
 }
 
 /// Does with a picture what it was made for.
 pub(crate) fn photographed(app: &mut App, picture: Image, goal: Goal) {
     match goal {
         Goal::File(path) => save_picture(app, picture, path),
-        Goal::Film => {
-            if let Some(recording) = &mut app.recording {
+        Goal::Film(number) => {
+            // One that was stopped may have left a picture in work.
+            if let Some(recording) = app.recording.as_mut().filter(|recording| recording.number == number) {
                 recording.arrived(picture);
             }
         }
@@ -53,10 +54,10 @@ pub(crate) fn record(app: &mut App) {
         }
         return;
     }
-    let size = recording.size;
+    let (size, number) = (recording.size, recording.number);
     if let Some(camera) = recording.wanted() {
         let wish = Wish { camera, ..app.wish(size, false) };
-        app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film });
+        app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film(number) });
     }
 }
 

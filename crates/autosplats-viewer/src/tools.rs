@@ -7,7 +7,7 @@ use crate::commands::Tool;
 use crate::document::{PickedPoint, Region, SelectMode};
 use crate::gizmo::Gizmo;
 use crate::measure::{Ruler, angle_text};
-use crate::render::{Purpose, Seen, Task, Wish};
+use crate::render::{Purpose, Seen, Task};
 use autosplats::cloud::glam::DVec3;
 
 /// Points a brush is wide at first, screen points.
@@ -17,6 +17,8 @@ const BRUSH: f32 = 24.0;
 pub(crate) struct Tools {
     /// The way of the pointer since the button went down, screen points.
     way: Vec<Pos2>,
+    /// Whether the drag was given up; the button may still be down.
+    given_up: bool,
     /// Radius of the brush, screen points.
     pub(crate) brush: f32,
     /// Selects what is behind the surface, too.
@@ -33,6 +35,7 @@ impl Default for Tools {
     fn default() -> Self {
         Self {
             way: Vec::new(),
+            given_up: false,
             brush: BRUSH,
             through: false,
             inspected: None,
@@ -43,29 +46,52 @@ impl Default for Tools {
 }
 
 impl Tools {
+    /// As if the pointer had gone this way.
+    #[cfg(test)]
+    pub(crate) fn draw(&mut self, way: &[Pos2]) {
+        self.way.extend_from_slice(way);
+    }
+
+    /// Gives up what is being drawn, for as long as the button stays down; says whether there was anything.
+    pub(crate) fn cancel_drag(&mut self) -> bool {
+        let any = !self.way.is_empty();
+        self.given_up |= any;
+        self.way.clear();
+        any
+    }
+
     /// Gives up what is being done; says whether there was anything.
     pub(crate) fn cancel(&mut self) -> bool {
-        let any = !self.way.is_empty() || self.inspected.is_some() || !self.measured.is_empty();
-        self.way.clear();
+        let any = self.cancel_drag() || self.inspected.is_some() || !self.measured.is_empty();
         self.inspected = None;
         self.measured.clear();
         any
     }
 }
 
-/// Selection by a drag with the left button.
+/// Selection by a drag with the left button, or by a click of the brush.
 pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
     let Some(place) = response.interact_pointer_pos() else { return };
+    let modifiers = response.ctx.input(|input| input.modifiers);
     if response.drag_started_by(egui::PointerButton::Primary) {
+        app.tools.given_up = false;
         app.tools.way.clear();
         // The pointer has moved already when a drag is known to be one.
         let start = response.ctx.input(|input| input.pointer.press_origin());
         app.tools.way.extend(start);
     }
+    let dab = app.tool == Tool::Brush && response.clicked_by(egui::PointerButton::Primary) && !modifiers.alt;
+    if dab {
+        app.tools.given_up = false;
+        app.tools.way = vec![place];
+    }
+    if app.tools.given_up {
+        return;
+    }
     if response.dragged_by(egui::PointerButton::Primary) && app.tools.way.last() != Some(&place) {
         app.tools.way.push(place);
     }
-    if !response.drag_stopped_by(egui::PointerButton::Primary) || app.tools.way.is_empty() {
+    if !(dab || response.drag_stopped_by(egui::PointerButton::Primary)) || app.tools.way.is_empty() {
         return;
     }
     let scale = size[0] as f32 / response.rect.width();
@@ -76,14 +102,13 @@ pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
         Tool::Lasso => Region::lasso(&way),
         _ => Region::brush(&way, app.tools.brush * scale),
     };
-    let modifiers = response.ctx.input(|input| input.modifiers);
     let mode = match (modifiers.shift, modifiers.command) {
         (true, true) => SelectMode::Intersect,
         (true, false) => SelectMode::Add,
         (false, true) => SelectMode::Subtract,
         (false, false) => SelectMode::Replace,
     };
-    let wish = Box::new(Wish { dots: None, ..app.wish(size, false) });
+    let wish = Box::new(app.wish(size, false).of_points());
     app.render.task(Task::Select { wish, region, through: app.tools.through, mode });
 }
 
@@ -99,7 +124,10 @@ impl App {
         let described = self.document().describe(&seen.shown, seen.index);
         match (purpose, described) {
             (Purpose::Inspect, described) => self.tools.inspected = described,
-            (Purpose::Measure, Some(described)) => self.tools.measured.push(described.position),
+            // The second click of a double one meets the same point.
+            (Purpose::Measure, Some(described)) if self.tools.measured.last() != Some(&described.position) => {
+                self.tools.measured.push(described.position);
+            }
             _ => {}
         }
     }
@@ -181,4 +209,141 @@ pub(crate) fn ruler(app: &App) -> Ruler {
     let layers = &app.document().layers;
     let crs = layers.first().map(|layer| layer.cloud.crs().clone()).unwrap_or_default();
     Ruler::new(&crs, app.up())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::time::{Duration, Instant};
+
+    use autosplats::cloud::PointCloud;
+    use eframe::egui::{Event, Key, Modifiers, PointerButton, Rect, pos2, vec2};
+
+    use super::*;
+    use crate::Options;
+    use crate::document::Layer;
+    use crate::look::Look;
+    use crate::render::{Answer, Outcome};
+
+    /// An application in a window 200 by 200 whose middle one of 2 points is in.
+    fn app(context: &egui::Context, tool: Tool) -> App {
+        let mut app = App::new(Options::default(), Look::default(), Vec::new(), context);
+        let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3], [0.5, 0.0, 0.0]]);
+        app.change(|document| document.add(Layer::new("two", None, Arc::new(cloud))));
+        let camera = autosplats::Camera {
+            eye: DVec3::new(0.0, -3.0, 0.0),
+            look_at: DVec3::ZERO,
+            up: DVec3::Z,
+            projection: autosplats::Projection::PerspectiveFovDeg(40.0),
+        };
+        app.stand_at(&camera);
+        app.tool = tool;
+        // What is seen would need a picture.
+        app.tools.through = true;
+        frame(&mut app, context, Event::PointerMoved(pos2(100.0, 100.0)));
+        app
+    }
+
+    fn frame(app: &mut App, context: &egui::Context, event: Event) {
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(200.0, 200.0));
+        let escape = matches!(event, Event::Key { key: Key::Escape, .. });
+        let input = egui::RawInput { screen_rect: Some(rect), events: vec![event], ..egui::RawInput::default() };
+        let mut output = context.run_ui(input, |ui| {
+            if escape {
+                app.tools.cancel_drag();
+            }
+            let response = ui.allocate_rect(rect, egui::Sense::click_and_drag());
+            drag(app, &response, [200, 200]);
+        });
+        // There is nothing to draw on.
+        output.textures_delta.clear();
+    }
+
+    fn button(pressed: bool, place: Pos2) -> Event {
+        Event::PointerButton { pos: place, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
+    }
+
+    /// How many points are hit by the selection that was asked for, if one was.
+    fn hits(app: &App) -> Option<usize> {
+        // Tasks are done in their order: with the answer to this one all are in.
+        let (wish, region) = (Box::new(app.wish([200, 200], false)), Region::brush(&[], 1.0));
+        app.render.task(Task::Select { wish, region, through: true, mode: SelectMode::Intersect });
+        let mut hits = None;
+        let end = Instant::now() + Duration::from_secs(60);
+        while Instant::now() < end {
+            for answer in app.render.answers() {
+                match answer {
+                    Answer::Done(Outcome::Selected { mode: SelectMode::Intersect, .. }) => return hits,
+                    Answer::Done(Outcome::Selected { hits: found, .. }) => {
+                        hits = Some(found.into_iter().filter(|hit| *hit).count());
+                    }
+                    Answer::Failed(why) => panic!("{why}"),
+                    _ => {}
+                }
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        panic!("the thread does not answer");
+    }
+
+    #[test]
+    fn a_click_of_the_brush_selects_what_is_under_it() {
+        let context = egui::Context::default();
+        for (tool, wanted) in [(Tool::Brush, Some(1)), (Tool::Lasso, None)] {
+            let mut app = app(&context, tool);
+            frame(&mut app, &context, button(true, pos2(100.0, 100.0)));
+            frame(&mut app, &context, button(false, pos2(100.0, 100.0)));
+            assert_eq!(hits(&app), wanted, "{tool:?}");
+            assert!(app.tools.way.is_empty(), "nothing is drawn any more");
+        }
+    }
+
+    #[test]
+    fn a_drag_that_is_given_up_selects_nothing() {
+        for escape in [false, true] {
+            let context = egui::Context::default();
+            let mut app = app(&context, Tool::Brush);
+            frame(&mut app, &context, button(true, pos2(100.0, 100.0)));
+            frame(&mut app, &context, Event::PointerMoved(pos2(90.0, 120.0)));
+            frame(&mut app, &context, Event::PointerMoved(pos2(80.0, 140.0)));
+            if escape {
+                let (key, modifiers) = (Key::Escape, Modifiers::NONE);
+                let event = Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+                frame(&mut app, &context, event);
+            }
+            frame(&mut app, &context, Event::PointerMoved(pos2(70.0, 120.0)));
+            frame(&mut app, &context, button(false, pos2(70.0, 100.0)));
+            assert_eq!(hits(&app), (!escape).then_some(1), "given up: {escape}");
+            frame(&mut app, &context, button(true, pos2(100.0, 100.0)));
+            frame(&mut app, &context, Event::PointerMoved(pos2(110.0, 120.0)));
+            frame(&mut app, &context, button(false, pos2(110.0, 120.0)));
+            assert_eq!(hits(&app), Some(1), "the next drag selects");
+        }
+    }
+
+    #[test]
+    fn a_double_click_measures_one_corner() {
+        let context = egui::Context::default();
+        let mut app = app(&context, Tool::Measure);
+        let shown = Arc::new(app.document().shown());
+        for index in [0, 0, 1, 1, 0] {
+            let seen = Seen { index, shown: Arc::clone(&shown), surface: DVec3::ZERO };
+            app.picked(Purpose::Measure, Some(seen));
+        }
+        let [one, other] = [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)];
+        assert_eq!(app.tools.measured, [one, other, one], "none twice in a row");
+    }
+
+    #[test]
+    fn all_dots_can_be_selected() {
+        let context = egui::Context::default();
+        let mut app = app(&context, Tool::Lasso);
+        let reconstruction = app.look.settings.reconstruction.clone();
+        assert!(reconstruction.outlier_expansions.is_some(), "outliers are left out of surfaces");
+        assert_eq!(app.wish([9, 9], false).of_points().settings.reconstruction, reconstruction, "and stay so");
+        app.look.dots = true;
+        let wish = app.wish([9, 9], false).of_points();
+        assert_eq!(wish.dots, None, "found by a surface");
+        assert_eq!(wish.settings.reconstruction.outlier_expansions, None, "that has all points");
+    }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use autosplats::cloud::{Error, Progress, written_formats};
+use autosplats::cloud::{Progress, written_formats};
 use eframe::egui;
 
 use crate::app::App;
@@ -16,21 +16,52 @@ use crate::threads::spawn;
 /// What is being asked and what is being written.
 pub(crate) struct Export {
     pub(crate) open: bool,
+    /// Whether it was open in the last frame.
+    was_open: bool,
     what: What,
     path: String,
     chosen: Option<Receiver<Option<PathBuf>>>,
-    /// Why it was not written, to be decided about.
-    refused: Option<(String, Replace)>,
+    /// What was not written, to be decided about.
+    refused: Option<Refusal>,
     work: Option<Work>,
 }
 
 impl Default for Export {
     fn default() -> Self {
-        Self { open: false, what: What::Shown, path: String::new(), chosen: None, refused: None, work: None }
+        Self {
+            open: false,
+            was_open: false,
+            what: What::Shown,
+            path: String::new(),
+            chosen: None,
+            refused: None,
+            work: None,
+        }
     }
 }
 
+/// What was not written.
+struct Refusal {
+    what: What,
+    path: PathBuf,
+    why: String,
+    /// What writing it all the same would replace.
+    replace: Replace,
+}
+
 impl Export {
+    fn path(&self) -> PathBuf {
+        self.path.trim().into()
+    }
+
+    /// Forgets why something was not written as soon as something else is asked for: what may be replaced is one file.
+    fn forget_refusal(&mut self) {
+        let path = self.path();
+        let opened = self.open && !self.was_open;
+        self.was_open = self.open;
+        self.refused.take_if(|refused| opened || refused.path != path || refused.what != self.what);
+    }
+
     /// Whether a file is being written, which leaving would stop.
     pub(crate) fn is_writing(&self) -> bool {
         self.work.is_some()
@@ -78,6 +109,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             app.panels.export.path = path.display().to_string();
         }
     }
+    app.panels.export.forget_refusal();
     if !app.panels.export.open {
         return;
     }
@@ -105,9 +137,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         ui.add_space(6.0);
         ui.horizontal(|ui| {
             let typed = egui::TextEdit::singleline(&mut export.path).desired_width(320.0).hint_text("points.ply");
-            if ui.add(typed).changed() {
-                export.refused = None;
-            }
+            ui.add(typed);
             if ui.button("Browse…").clicked() && export.chosen.is_none() {
                 export.chosen = Some(ask_for_output(context, "Export points", "points.ply"));
             }
@@ -115,10 +145,11 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
         ui.small(format!("The name tells the format: .{}", formats.join(" .")));
         ui.add_space(6.0);
-        if let Some((why, replace)) = export.refused.clone() {
+        export.forget_refusal();
+        if let Some(Refusal { why, replace, .. }) = &export.refused {
             ui.colored_label(ui.visuals().error_fg_color, why);
-            if replace != Replace::Nothing && ui.button("Replace it").clicked() {
-                begin = Some(replace);
+            if *replace != Replace::Nothing && ui.button("Replace it").clicked() {
+                begin = Some(*replace);
             }
         } else if ui.add_enabled(!export.path.trim().is_empty(), egui::Button::new("Export")).clicked() {
             begin = Some(Replace::Nothing);
@@ -149,7 +180,7 @@ fn choices(app: &mut App) -> Vec<(String, What, bool)> {
 fn start(app: &mut App, context: &egui::Context, replace: Replace) {
     let document = app.document().clone();
     let export_state = &mut app.panels.export;
-    let path = PathBuf::from(export_state.path.trim());
+    let path = export_state.path();
     let listener = Arc::new(Listener {
         done: AtomicU32::new(0),
         cancelled: AtomicBool::new(false),
@@ -179,15 +210,17 @@ fn finish(app: &mut App) {
             app.messages.note(format!("{} points were written to {}", grouped(points), path.display()));
             app.panels.export.open = false;
         }
-        Err(ExportError::Cloud(Error::Cancelled)) => app.messages.note("Nothing was written"),
+        Err(ExportError::Cancelled) => app.messages.note("Nothing was written"),
         Err(error) => {
             let replace = match &error {
                 ExportError::Exists { .. } => Replace::Files,
                 ExportError::Input { .. } => Replace::Inputs,
                 _ => Replace::Nothing,
             };
-            app.panels.export.refused = Some((error.to_string(), replace));
-            app.panels.export.open = true;
+            let export = &mut app.panels.export;
+            export.refused = Some(Refusal { what, path, why: error.to_string(), replace });
+            // It is opened to say so, not to forget it.
+            (export.open, export.was_open) = (true, true);
         }
     }
 }
@@ -208,4 +241,35 @@ fn saved_layers(document: &Document, what: What) -> Vec<LayerId> {
 /// Whether a path names a picture.
 pub(super) fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A window in which replacing `a.ply` was refused.
+    fn refused() -> Export {
+        let refused = Refusal { what: What::Shown, path: "a.ply".into(), why: "there".into(), replace: Replace::Files };
+        Export { open: true, was_open: true, path: " a.ply".into(), refused: Some(refused), ..Export::default() }
+    }
+
+    #[test]
+    fn what_may_be_replaced_is_what_was_refused() {
+        let kept = |change: fn(&mut Export)| {
+            let mut export = refused();
+            change(&mut export);
+            export.forget_refusal();
+            export.refused.is_some()
+        };
+        assert!(kept(|_| {}), "nothing has changed");
+        assert!(!kept(|export| export.path = "b.ply".into()), "another file");
+        assert!(!kept(|export| export.what = What::All), "other points");
+        assert!(!kept(|export| export.was_open = false), "the window is opened anew");
+        let mut export = refused();
+        export.path = "b.ply".into();
+        export.forget_refusal();
+        export.path = "a.ply".into();
+        export.forget_refusal();
+        assert!(export.refused.is_none(), "it is asked again after all");
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
+use std::sync::{Arc, OnceLock};
 
 use autosplats::{Camera, MAX_SIDE};
 use eframe::egui;
@@ -10,6 +11,7 @@ use crate::animation::{Recording, Target, has_ffmpeg, path, turntable};
 use crate::app::App;
 use crate::files::ask_for_output;
 use crate::output;
+use crate::threads::spawn;
 
 /// What is being asked and what is being played.
 pub(crate) struct Film {
@@ -21,11 +23,40 @@ pub(crate) struct Film {
     size: [u32; 2],
     name: String,
     chosen: Option<Receiver<Option<PathBuf>>>,
-    replace: bool,
-    /// Whether films can be made, once somebody has looked.
-    ffmpeg: Option<bool>,
+    /// What was not written because it would replace something.
+    refused: Option<Refusal>,
+    /// Whether films can be made, once it is known, and once somebody looks.
+    ffmpeg: Option<Arc<OnceLock<bool>>>,
     /// Cameras that are being played, and when that began.
     played: Option<(Vec<Camera>, f64)>,
+}
+
+/// So many pictures that were not written, and the file that is there.
+struct Refusal {
+    target: Target,
+    pictures: usize,
+    there: PathBuf,
+}
+
+impl Film {
+    /// Number of pictures.
+    fn pictures(&self) -> usize {
+        (self.seconds * f64::from(self.rate)).round().max(1.0) as usize
+    }
+
+    /// Whether films can be made; nobody has to wait for it, as it is found out beside the window.
+    fn has_ffmpeg(&mut self, context: &egui::Context) -> Option<bool> {
+        let found = self.ffmpeg.get_or_insert_with(|| {
+            let found = Arc::new(OnceLock::new());
+            let (theirs, context) = (Arc::clone(&found), context.clone());
+            spawn("ffmpeg", move || {
+                theirs.get_or_init(has_ffmpeg);
+                context.request_repaint();
+            });
+            found
+        });
+        found.get().copied()
+    }
 }
 
 impl Default for Film {
@@ -39,7 +70,7 @@ impl Default for Film {
             size: [1280, 720],
             name: "turntable.mp4".into(),
             chosen: None,
-            replace: false,
+            refused: None,
             ffmpeg: None,
             played: None,
         }
@@ -55,6 +86,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         }
     }
     if !app.panels.film.open {
+        app.panels.film.refused = None;
         return;
     }
     let mut open = true;
@@ -70,19 +102,20 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         }
         way(app, ui);
         ui.separator();
-        let cameras = cameras(app);
+        let ready = has_way(app);
         ui.horizontal(|ui| {
             let film = &mut app.panels.film;
             ui.add(egui::DragValue::new(&mut film.seconds).range(0.1..=600.0).speed(0.1).suffix(" s"));
             ui.add(egui::DragValue::new(&mut film.rate).range(1..=120).suffix(" pictures a second"));
             let playing = film.played.is_some();
-            let button = ui.add_enabled(!cameras.is_empty(), egui::Button::new(if playing { "Stop" } else { "Play" }));
+            let button = ui.add_enabled(ready, egui::Button::new(if playing { "Stop" } else { "Play" }));
             if button.clicked() {
-                film.played = (!playing).then(|| (cameras.clone(), context.input(|input| input.time)));
+                let began = context.input(|input| input.time);
+                app.panels.film.played = (!playing).then(|| (cameras(app), began));
             }
         });
         ui.separator();
-        target(app, ui, cameras);
+        target(app, ui, ready);
     });
     app.panels.film.open = open;
 }
@@ -130,10 +163,15 @@ fn way(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
-/// The cameras of the film.
+/// Whether the film has cameras.
+fn has_way(app: &App) -> bool {
+    !app.document().layers.is_empty() && (!app.panels.film.keyed || !app.keys.is_empty())
+}
+
+/// The cameras of the film, up to tens of thousands.
 fn cameras(app: &App) -> Vec<Camera> {
     let film = &app.panels.film;
-    let pictures = (film.seconds * f64::from(film.rate)).round().max(1.0) as usize;
+    let pictures = film.pictures();
     if app.document().layers.is_empty() {
         Vec::new()
     } else if film.keyed {
@@ -143,8 +181,8 @@ fn cameras(app: &App) -> Vec<Camera> {
     }
 }
 
-/// Where it goes.
-fn target(app: &mut App, ui: &mut egui::Ui, cameras: Vec<Camera>) {
+/// Where it goes, if it is `ready` to go anywhere.
+fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     let context = ui.ctx().clone();
     let film = &mut app.panels.film;
     ui.horizontal(|ui| {
@@ -153,42 +191,43 @@ fn target(app: &mut App, ui: &mut egui::Ui, cameras: Vec<Camera>) {
         ui.add(egui::DragValue::new(&mut film.size[1]).range(16..=MAX_SIDE).suffix(" px"));
     });
     ui.horizontal(|ui| {
-        if ui.add(egui::TextEdit::singleline(&mut film.name).desired_width(280.0).hint_text("film.mp4")).changed() {
-            film.replace = false;
-        }
+        ui.add(egui::TextEdit::singleline(&mut film.name).desired_width(280.0).hint_text("film.mp4"));
         if ui.button("Browse…").clicked() && film.chosen.is_none() {
             film.chosen = Some(ask_for_output(&context, "Save film", "film.mp4"));
         }
     });
-    let ffmpeg = *film.ffmpeg.get_or_insert_with(has_ffmpeg);
+    let ffmpeg = film.has_ffmpeg(&context);
+    let pictures = film.pictures();
     let target = Target::new(&PathBuf::from(film.name.trim()));
+    // What may be replaced is what was asked about and nothing else.
+    film.refused.take_if(|refused| Ok(&refused.target) != target.as_ref() || refused.pictures != pictures);
     let problem = match &target {
         Err(problem) => Some(problem.clone()),
-        Ok(Target::Film(_)) if !ffmpeg => {
+        Ok(Target::Film(_)) if ffmpeg == Some(false) => {
             Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
         }
-        Ok(_) if cameras.is_empty() => Some("There is no way to go yet".into()),
-        Ok(target) if !film.replace => {
-            target.existing(cameras.len()).map(|path| format!("{} is there already", path.display()))
-        }
+        Ok(_) if !ready => Some("There is no way to go yet".into()),
         Ok(_) => None,
     };
-    let mut start = false;
-    if let Some(problem) = &problem {
+    let there = film.refused.as_ref().map(|refused| format!("{} is there already", refused.there.display()));
+    if let Some(problem) = problem.as_ref().or(there.as_ref()) {
         ui.colored_label(ui.visuals().warn_fg_color, problem);
     }
-    ui.horizontal(|ui| {
-        start = ui.add_enabled(problem.is_none(), egui::Button::new("Write")).clicked();
-        let there = target.as_ref().is_ok_and(|target| target.existing(cameras.len()).is_some());
-        if there && !film.replace && ui.button("Replace it").clicked() {
-            film.replace = true;
-        }
-    });
-    if let (true, Ok(target)) = (start, target) {
-        film.replace = false;
+    let (write, replace) = ui
+        .add_enabled_ui(problem.is_none(), |ui| {
+            let write = there.is_none() && ui.button("Write").clicked();
+            (write, there.is_some() && ui.button("Replace it").clicked())
+        })
+        .inner;
+    let Ok(target) = target else { return };
+    if write {
+        film.refused = target.existing(pictures).map(|there| Refusal { target: target.clone(), pictures, there });
+    }
+    if replace || write && film.refused.is_none() {
+        film.refused = None;
         film.played = None;
         let (size, rate) = (film.size, film.rate);
-        app.recording = Some(Recording::start(cameras, size, rate, target, &context));
+        app.recording = Some(Recording::start(cameras(app), size, rate, target, &context));
     }
 }
 

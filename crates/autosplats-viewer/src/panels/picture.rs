@@ -25,8 +25,8 @@ pub(crate) struct PictureDialog {
     /// The window as it is, menus and all.
     window: bool,
     chosen: Option<Receiver<Option<PathBuf>>>,
-    /// A file that is there already may be replaced.
-    replace: bool,
+    /// The file that may be replaced if it is there.
+    replaced: Option<PathBuf>,
     /// The picture of the window, when it arrives, and where it goes.
     expected: Option<(Receiver<Arc<egui::ColorImage>>, PathBuf)>,
 }
@@ -39,7 +39,7 @@ impl Default for PictureDialog {
             size: [1920, 1080],
             window: false,
             chosen: None,
-            replace: false,
+            replaced: None,
             expected: None,
         }
     }
@@ -52,10 +52,11 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         if let Some(path) = chosen {
             app.panels.picture.path = path.display().to_string();
             // The system's dialog has asked already.
-            app.panels.picture.replace = true;
+            app.panels.picture.replaced = Some(path);
         }
     }
     if !app.panels.picture.open {
+        app.panels.picture.replaced = None;
         return;
     }
     let mut open = true;
@@ -81,12 +82,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             });
         });
         ui.horizontal(|ui| {
-            if ui
-                .add(egui::TextEdit::singleline(&mut dialog.path).desired_width(320.0).hint_text("picture.png"))
-                .changed()
-            {
-                dialog.replace = false;
-            }
+            ui.add(egui::TextEdit::singleline(&mut dialog.path).desired_width(320.0).hint_text("picture.png"));
             if ui.button("Browse…").clicked() && dialog.chosen.is_none() {
                 dialog.chosen = Some(ask_for_output(context, "Save picture", "picture.png"));
             }
@@ -97,7 +93,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             Some("The name has to end in .png".to_owned())
         } else if let Err(error) = check_memory("this picture", bytes) {
             Some(error.to_string())
-        } else if path.exists() && !dialog.replace {
+        } else if path.exists() && dialog.replaced.as_ref() != Some(&path) {
             Some("This file is there already".to_owned())
         } else {
             None
@@ -107,7 +103,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             if let Some(problem) = problem {
                 ui.colored_label(ui.visuals().warn_fg_color, problem);
                 if has_extension(&path, "png") && path.exists() && ui.button("Replace it").clicked() {
-                    dialog.replace = true;
+                    dialog.replaced = Some(path);
                 }
             }
         });
@@ -115,7 +111,6 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     app.panels.picture.open = open && !save;
     if save {
         let dialog = &mut app.panels.picture;
-        dialog.replace = false;
         let path = PathBuf::from(dialog.path.trim());
         if dialog.window {
             let (sender, receiver) = channel();

@@ -78,10 +78,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let speed = (app.navigation.height_at_pivot() * 1e-3).max(1e-9);
     let mut wanted = None;
     let window = egui::Window::new(format!("Place of {name}")).id(egui::Id::unique("pose"));
-    let window = window
-        .open(&mut open)
-        .resizable(false)
-        .default_pos(app.view_rect.left_top() + egui::vec2(16.0, 16.0));
+    let window = window.open(&mut open).resizable(false).default_pos(app.view_rect.left_top() + egui::vec2(16.0, 16.0));
     window.show(context, |ui| {
         let mut parts = pose.parts;
         busy = numbers(ui, &mut parts, speed);

@@ -10,7 +10,7 @@ use eframe::egui;
 use rayon::prelude::*;
 
 use super::pace::{Costs, Pace};
-use super::task::{Outcome, Seen};
+use super::task::{Outcome, Seen, enlarge};
 use super::{Answer, Depths, Outbox, Picture, Shared, Task, Wish};
 use crate::document::Shown;
 
@@ -140,8 +140,7 @@ impl Studio {
         }
         let part = sparse.as_ref().filter(|_| pace.halvings > 0);
         let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
-        let dots = wish.dots.unwrap_or(1).max(1);
-        let size = wish.size.map(|side| ((f64::from(side) * pace.scale / f64::from(dots)) as u32).max(1));
+        let size = wish.rendered_size(pace.scale);
         let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
         let mut settings = settings(wish, cloud.len());
         settings.all_layers = selected.is_some();
@@ -251,9 +250,9 @@ impl Studio {
             Task::Photograph { wish, goal } => {
                 let shown = self.shown(&wish)?;
                 let settings = settings(&wish, shown.cloud.len());
-                let frame =
-                    self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, wish.size, &settings)?;
-                let image: Box<Image> = Box::new(frame.image.clone());
+                let size = wish.rendered_size(1.0);
+                let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
+                let image = Box::new(enlarge(frame.image, wish.size));
                 Ok(Outcome::Photographed { image, goal })
             }
         }
