@@ -223,6 +223,7 @@ mod tests {
     use crate::Options;
     use crate::document::Layer;
     use crate::look::Look;
+    use crate::output::Goal;
     use crate::render::{Answer, Outcome};
 
     /// An application in a window 200 by 200 whose middle one of 2 points is in.
@@ -319,6 +320,30 @@ mod tests {
             frame(&mut app, &context, button(false, pos2(110.0, 120.0)));
             assert_eq!(hits(&app), Some(1), "the next drag selects");
         }
+    }
+
+    #[test]
+    fn pictures_of_dots_have_dots_as_large_as_the_screen() {
+        let context = egui::Context::default();
+        let mut app = app(&context, Tool::Navigate);
+        (app.look.dots, app.look.dot_size) = (true, 4);
+        app.look.backend = autosplats::Backend::Cpu;
+        let (wish, goal) = (Box::new(app.wish([40, 40], false)), Goal::Film(0));
+        app.render.task(Task::Photograph { wish, goal });
+        let end = Instant::now() + Duration::from_secs(60);
+        let image = loop {
+            assert!(Instant::now() < end, "the thread does not answer");
+            match app.render.answers().find(|answer| !matches!(answer, Answer::Device(_))) {
+                Some(Answer::Done(Outcome::Photographed { image, .. })) => break image,
+                Some(Answer::Failed(why)) => panic!("{why}"),
+                _ => std::thread::sleep(Duration::from_millis(1)),
+            }
+        };
+        assert_eq!([image.width, image.height], [40, 40], "as large as was asked for");
+        let pixel = |x: usize, y: usize| image.pixels[y * 40 + x];
+        let places = (0..40).flat_map(|y| (0..40).map(move |x| (x, y)));
+        assert!(places.clone().all(|(x, y)| pixel(x, y) == pixel(x / 4 * 4, y / 4 * 4)), "dots are 4 pixels wide");
+        assert!(places.clone().any(|(x, y)| pixel(x, y) != pixel(0, 0)), "and there are some");
     }
 
     #[test]
