@@ -401,7 +401,7 @@ impl App {
 
     /// Has what is at a pixel of the picture found.
     pub(crate) fn pick(&mut self, size: [u32; 2], pixel: [f32; 2], purpose: Purpose) {
-        let wish = Box::new(Wish { dots: None, ..self.wish(size, false) });
+        let wish = Box::new(self.wish(size, false).of_points());
         self.render.task(Task::Pick { wish, pixel, purpose });
     }
 }

@@ -10,7 +10,10 @@ const RECENT: &str = "recent";
 
 /// Keeps the look and the names of files.
 pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
-    eframe::set_value(storage, LOOK, &app.look);
+    let mut look = app.look.clone();
+    // The range of one file's values is not that of another's.
+    look.settings.shading.range = None;
+    eframe::set_value(storage, LOOK, &look);
     eframe::set_value(storage, RECENT, &app.recent);
 }
 

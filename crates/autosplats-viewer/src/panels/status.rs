@@ -26,6 +26,9 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
                 if let Some(rate) = app.rate.per_second() {
                     ui.label(format!("{rate:.0} fps"));
                 }
+                if let Some(remark) = &picture.remark {
+                    ui.colored_label(ui.visuals().warn_fg_color, remark);
+                }
                 if !picture.whole {
                     ui.weak("moving").on_hover_text("Coarser while the view moves");
                 }

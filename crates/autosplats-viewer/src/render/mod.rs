@@ -52,6 +52,8 @@ pub(crate) struct Picture {
     pub(crate) dots: bool,
     pub(crate) counts: Counts,
     pub(crate) timings: Timings,
+    /// What of the look these points or this device cannot have.
+    pub(crate) remark: Option<String>,
     /// Milliseconds from the wish to the finished picture.
     pub(crate) milliseconds: f64,
     /// How far away what is seen is; empty on a GPU.

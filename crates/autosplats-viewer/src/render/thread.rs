@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud, check_memory};
-use autosplats::{Backend, Error, Frame, Image, Reconstruction, Renderer, Settings};
+use autosplats::{Backend, ColorMode, Error, Frame, Image, Reconstruction, Renderer, SearchEngine, Settings};
 use eframe::egui;
 use rayon::prelude::*;
 
@@ -122,6 +122,12 @@ impl Studio {
         Ok(renderer)
     }
 
+    /// What is asked of the renderer for a task.
+    fn settings(&mut self, wish: &Wish, shown: &Shown, outbox: &Outbox) -> Result<Settings, Error> {
+        let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
+        Ok(settings(wish, &shown.cloud, gpu).0)
+    }
+
     fn draw(&mut self, wish: &Wish, outbox: &Outbox) -> Result<Answer, Error> {
         let started = Instant::now();
         let shown = self.shown(wish)?;
@@ -142,10 +148,10 @@ impl Studio {
         let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
         let size = wish.rendered_size(pace.scale);
         let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
-        let mut settings = settings(wish, cloud.len());
+        let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
+        let (mut settings, remark) = settings(wish, cloud, gpu);
         settings.all_layers = selected.is_some();
         let renderer = self.renderer(wish.backend, outbox)?;
-        let gpu = renderer.adapter().is_some();
         let Frame { image, layers, counts, timings, .. } = renderer.render(cloud, &wish.camera, size, &settings)?;
         let mut image = to_egui(image);
         if let Some(selected) = &selected {
@@ -181,6 +187,7 @@ impl Studio {
             dots: wish.dots.is_some(),
             counts,
             timings,
+            remark,
             milliseconds: started.elapsed().as_secs_f64() * 1e3,
             depths,
             shown,
@@ -194,7 +201,7 @@ impl Studio {
                 if shown.cloud.len() < 2 {
                     return Ok(Outcome::Picked { purpose, point: None });
                 }
-                let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
+                let settings = Settings { all_layers: true, ..self.settings(&wish, &shown, outbox)? };
                 let layers = self
                     .renderer(wish.backend, outbox)?
                     .render(&shown.cloud, &wish.camera, wish.size, &settings)?
@@ -219,7 +226,7 @@ impl Studio {
             }
             Task::Select { wish, region, through, mode } => {
                 let shown = self.shown(&wish)?;
-                let settings = Settings { all_layers: true, ..settings(&wish, shown.cloud.len()) };
+                let settings = Settings { all_layers: true, ..self.settings(&wish, &shown, outbox)? };
                 let lens = wish.camera.lens(wish.size)?;
                 let layers = if through {
                     None
@@ -249,7 +256,7 @@ impl Studio {
             }
             Task::Photograph { wish, goal } => {
                 let shown = self.shown(&wish)?;
-                let settings = settings(&wish, shown.cloud.len());
+                let settings = self.settings(&wish, &shown, outbox)?;
                 let size = wish.rendered_size(1.0);
                 let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
                 let image = Box::new(enlarge(frame.image, wish.size));
@@ -259,10 +266,27 @@ impl Studio {
     }
 }
 
-/// What is asked of the renderer.
-fn settings(wish: &Wish, points: usize) -> Settings {
+/// What is asked of the renderer: what is wished as far as these points and this device can have it, and what is done instead
+/// of the rest, as a look is kept from file to file.
+fn settings(wish: &Wish, cloud: &PointCloud, gpu: bool) -> (Settings, Option<String>) {
     let mut settings = wish.settings.clone();
-    let most = points.saturating_sub(1).clamp(1, 64) as u32;
+    let mut remark = None;
+    let missing = match &settings.shading.color {
+        ColorMode::Rgb if cloud.colors().is_none() => Some("colours"),
+        ColorMode::Classification if cloud.field("Classification").is_none() => Some("Classification"),
+        ColorMode::Field(name) if cloud.field(name).is_none() => Some(&**name),
+        _ => None,
+    };
+    if let Some(missing) = missing {
+        remark = Some(format!("these points have no {missing}"));
+        settings.shading.color = ColorMode::Auto;
+        settings.shading.range = None;
+    }
+    if !gpu && settings.reconstruction.engine != SearchEngine::ScreenGrid {
+        remark = Some("this search runs on a GPU only".into());
+        settings.reconstruction.engine = SearchEngine::ScreenGrid;
+    }
+    let most = cloud.len().saturating_sub(1).clamp(1, 64) as u32;
     if wish.dots.is_some() {
         // A search for one neighbour is all that dots cost.
         settings.reconstruction = Reconstruction {
@@ -271,18 +295,59 @@ fn settings(wish: &Wish, points: usize) -> Settings {
             outlier_expansions: None,
             gap_factor: None,
             depth_refinement: false,
-            engine: autosplats::SearchEngine::ScreenGrid,
+            engine: SearchEngine::ScreenGrid,
             ..Reconstruction::paper()
         };
         settings.shading.lighting = false;
         settings.shading.occlusion = 0.0;
     }
     settings.reconstruction.k = settings.reconstruction.k.min(most);
-    settings
+    (settings, remark)
 }
 
 fn to_egui(image: &Image) -> egui::ColorImage {
     let size = [image.width as usize, image.height as usize];
     let pixels = image.pixels.iter().map(|&[r, g, b, a]| egui::Color32::from_rgba_unmultiplied(r, g, b, a)).collect();
     egui::ColorImage::new(size, pixels)
+}
+
+#[cfg(test)]
+mod tests {
+    use autosplats::cloud::glam::DVec3;
+    use autosplats::{Camera, Projection};
+
+    use super::*;
+    use crate::document::Document;
+
+    #[test]
+    fn a_look_that_cannot_be_had_is_replaced_and_told() {
+        let camera = Camera {
+            eye: DVec3::NEG_Y,
+            look_at: DVec3::ZERO,
+            up: DVec3::Z,
+            projection: Projection::PerspectiveFovDeg(40.0),
+        };
+        let wish = |color: ColorMode, engine: SearchEngine| {
+            let mut settings = Settings::default();
+            settings.shading.color = color;
+            settings.reconstruction.engine = engine;
+            let document = Document::default();
+            let backend = Backend::Cpu;
+            Wish { document, camera, size: [8, 8], settings, dots: None, backend, axes: None, budget_ms: None }
+        };
+        let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; 5]);
+        for color in [ColorMode::Rgb, ColorMode::Classification, ColorMode::Field("Intensity".into())] {
+            let (settings, remark) = settings(&wish(color.clone(), SearchEngine::ScreenGrid), &cloud, false);
+            assert_eq!(settings.shading.color, ColorMode::Auto, "instead of {color:?}");
+            assert!(remark.is_some(), "told for {color:?}");
+            assert_eq!(settings.reconstruction.k, 4, "no more neighbours than there are");
+        }
+        let height = wish(ColorMode::Height, SearchEngine::SplatCommunication);
+        let (on_cpu, remark) = settings(&height, &cloud, false);
+        assert_eq!(on_cpu.reconstruction.engine, SearchEngine::ScreenGrid, "the CPU has one engine");
+        assert!(remark.is_some(), "told");
+        let (on_gpu, remark) = settings(&height, &cloud, true);
+        assert_eq!(on_gpu.reconstruction.engine, SearchEngine::SplatCommunication, "a GPU has it");
+        assert_eq!((on_gpu.shading.color, remark), (ColorMode::Height, None), "and nothing is to be told");
+    }
 }

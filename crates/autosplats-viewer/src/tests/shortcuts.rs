@@ -95,9 +95,10 @@ fn check(window: &mut Window, command: Command) {
             assert!(!window.app().panels.film.open, "and goes");
         }
         Command::SaveState => {
-            window.until("the session is kept", |window| window.says("was written"));
-            let path = std::env::temp_dir().join(format!("{}-autosplats.json", std::process::id()));
-            std::fs::remove_file(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            window.until("it is asked where", |window| window.says("Keep the session in"));
+            window.steps(2);
+            window.click_on("Cancel");
+            assert!(!window.says("Keep the session in"), "it goes away");
         }
         Command::CloseAll => {
             assert!(app.document().layers.is_empty(), "nothing is open any more");
