@@ -1,7 +1,7 @@
 //! A window that shows raw points as a lit surface.
 //!
-//! [`run`] opens it. The window never waits: files are read ([`loading`]) and pictures made ([`render`]) by threads of their
-//! own, which send what they have; [`app`] is the round of a frame of the window.
+//! [`run`] opens it. The window never waits: files are read (`loading`) and pictures made (`render`) by threads of their
+//! own, which send what they have; `app` is the round of a frame of the window.
 
 mod animation;
 mod app;
