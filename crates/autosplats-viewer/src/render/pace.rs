@@ -4,6 +4,8 @@
 const LEAST_SCALE: f64 = 0.25;
 /// Share of the time that projecting all points may take before some are left out.
 const PROJECT: f64 = 0.4;
+/// Halvings to spare before more points are taken again.
+const EASE: f64 = 0.6;
 /// How much a scale has to differ from the last one to be taken, so that pictures do not breathe.
 const STEP: f64 = 0.08;
 
@@ -42,7 +44,15 @@ impl Costs {
     pub(super) fn pace(&mut self, points: usize, pixels: usize, budget_ms: f64) -> Pace {
         let all_points = self.points * points as f64 * 1e-6;
         let all_pixels = self.pixels * pixels as f64 * 1e-6;
-        let halvings = (all_points / (PROJECT * budget_ms)).log2().ceil().clamp(0.0, 16.0) as u32;
+        let needed = (all_points / (PROJECT * budget_ms)).log2();
+        let mut halvings = needed.ceil().clamp(0.0, 16.0) as u32;
+        if let Some(last) = self.last
+            && halvings < last.halvings
+            && needed > f64::from(last.halvings) - 1.0 - EASE
+        {
+            // Another part of the points has to be taken out of all of them, so it has to be worth it.
+            halvings = last.halvings;
+        }
         let left = budget_ms - all_points / f64::from(1 << halvings);
         let mut scale = (left / all_pixels.max(1e-9)).sqrt().clamp(LEAST_SCALE, 1.0);
         if let Some(last) = self.last
@@ -84,6 +94,19 @@ mod tests {
         let pace = costs.pace(100_000_000, 1_000_000, 33.0);
         assert!(1500.0 / f64::from(1 << pace.halvings) <= 0.4 * 33.0, "{pace:?}");
         assert!(pace.scale >= LEAST_SCALE, "{pace:?}");
+    }
+
+    #[test]
+    fn the_part_of_the_points_does_not_flicker() {
+        let mut costs = Costs::default();
+        costs.learn(1_000_000, 1_000_000, 30.0, 20.0);
+        let first = costs.pace(1_000_000, 1_000_000, 33.0).halvings;
+        assert_eq!(first, 2, "a quarter of 30 ms is below 13");
+        let mut cheaper = costs;
+        cheaper.points = 25.0;
+        assert_eq!(cheaper.pace(1_000_000, 1_000_000, 33.0).halvings, 2, "half would hardly fit: it stays");
+        cheaper.points = 15.0;
+        assert_eq!(cheaper.pace(1_000_000, 1_000_000, 33.0).halvings, 1, "half fits easily");
     }
 
     #[test]
