@@ -109,7 +109,7 @@ pub(crate) struct Rate {
     /// Mean seconds between pictures; 0 while unknown.
     interval: f64,
     /// The last pictures' times per stage, for the plot.
-    pub(crate) timings: std::collections::VecDeque<(autosplats::Timings, f64)>,
+    pub(crate) timings: std::collections::VecDeque<autosplats::Timings>,
 }
 
 impl Rate {
@@ -130,7 +130,7 @@ impl Rate {
         if self.timings.len() == Self::KEPT {
             self.timings.pop_front();
         }
-        self.timings.push_back((picture.timings, picture.milliseconds));
+        self.timings.push_back(picture.timings);
     }
 
     /// Pictures a second, if they follow each other.

@@ -75,6 +75,7 @@ impl App {
     /// Gives the points that have arrived to the layer of a job, which is made with the first of them. Undo takes none of this
     /// back. Says which layer it is, unless the user has removed it meanwhile.
     fn fill_layer(&mut self, input: &Input, job: JobId, cloud: Arc<PointCloud>) -> Option<LayerId> {
+        let first = self.document().layers.is_empty();
         let id = match self.loading.get(&job).copied() {
             Some(id) if self.document().layer(id).is_none() => {
                 self.loader.cancel(job);
@@ -93,36 +94,30 @@ impl App {
                 let id = layer.id;
                 self.loading.insert(job, id);
                 self.inputs.insert(id, input.clone());
-                if self.document().layers.is_empty() {
-                    self.first_camera = None;
-                    self.guessed_axes = Some(guess_axes(&cloud));
-                    self.settle(|document| {
-                        document.add(layer.clone());
-                    });
-                    if !std::mem::take(&mut self.camera_given) {
-                        self.first_view();
-                    }
-                } else {
-                    self.settle(|document| {
-                        document.add(layer.clone());
-                    });
-                }
+                self.settle(|document| {
+                    document.add(layer.clone());
+                });
                 id
             }
         };
-        self.look_anew(id, &cloud);
+        if first {
+            self.first_camera = None;
+        }
+        let fitted = first && !std::mem::take(&mut self.camera_given);
+        self.look_anew(id, &cloud, fitted);
         Some(id)
     }
 
-    /// After the points of a layer have changed: stands where all is seen, if nobody has moved.
-    fn look_anew(&mut self, id: LayerId, cloud: &PointCloud) {
+    /// After the points of a layer have changed: stands where all is seen, if that is asked for or nobody has moved.
+    fn look_anew(&mut self, id: LayerId, cloud: &PointCloud, fitted: bool) {
         if self.document().layers.first().is_some_and(|layer| layer.id == id) {
             self.guessed_axes = Some(guess_axes(cloud));
         }
-        if self.stands_by_itself() {
+        if fitted || self.stands_by_itself() {
             self.first_view();
+        } else {
+            self.measure_scene();
         }
-        self.measure_scene();
     }
 
     /// Takes the layer of a job away that will not be read to its end.
@@ -153,7 +148,7 @@ impl App {
             let cloud = Arc::new(cloud);
             self.fill(id, &cloud);
             self.messages.note(format!("{} was read again", input.name));
-            self.look_anew(id, &cloud);
+            self.look_anew(id, &cloud, false);
         }
     }
 

@@ -90,6 +90,7 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     if response.drag_started() {
         let pressed = context.input(|input| input.pointer.press_origin()).or(response.interact_pointer_pos());
         app.panels.grabbed = pressed.and_then(|place| under(app, rect, place)).map(|(_, depth)| depth);
+        // Whatever had the keyboard lets go of it, so that keys fly.
         response.request_focus();
         response.surrender_focus();
     }

@@ -37,7 +37,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             .show(ui, |plot| {
                 let mut below: Vec<f64> = vec![0.0; app.rate.timings.len()];
                 for (name, value, color) in STAGES {
-                    let bars = app.rate.timings.iter().zip(&mut below).enumerate().map(|(x, ((timings, _), below))| {
+                    let bars = app.rate.timings.iter().zip(&mut below).enumerate().map(|(x, (timings, below))| {
                         let value = value(timings);
                         let bar = Bar::new(x as f64, value).base_offset(*below).width(1.0).fill(color);
                         *below += value;
