@@ -188,8 +188,8 @@ fn project_chunk(
     dropped
 }
 
-/// Slot and depth of one point and the sixteenth of its pixel, without branches. Halves of pixels lie side by side and one below the other in turn, like
-/// the black and the white squares of a chessboard: so no direction is seen better than another.
+/// Slot and depth of one point and the sixteenth of its pixel, without branches. Halves of pixels lie side by side and one
+/// below the other in turn, like the black and the white squares of a chessboard: so no direction is seen better than another.
 #[inline(always)]
 fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32) {
     let [x, y, z] = view.to_view(position).to_array();
