@@ -49,5 +49,6 @@ pub use sample::sample_surface;
 pub use source::{
     Source,
     scene::{Hit, Scene, View, parse_count},
+    stream::{Next, Statistics, Stream, Timeline, Update},
 };
 pub use write::{check_writable, write, written_formats};

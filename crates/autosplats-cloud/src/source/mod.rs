@@ -1,6 +1,7 @@
 //! Where clouds come from.
 
 pub(crate) mod scene;
+pub(crate) mod stream;
 
 use std::path::{Path, PathBuf};
 
