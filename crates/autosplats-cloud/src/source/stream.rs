@@ -1,6 +1,6 @@
 //! Points that change: what sequences, recordings, live connections and simulated scanners have in common.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use crate::{Error, PointCloud, Progress};
 
@@ -48,7 +48,7 @@ pub struct Update {
     /// When the points were measured, in nanoseconds; of recordings since 1970, of sequences since their beginning.
     pub stamp: i64,
     /// The points, in the stream's common frame. Where the sensor stood say [their scans](PointCloud::scans).
-    pub cloud: PointCloud,
+    pub cloud: Arc<PointCloud>,
 }
 
 /// What became of the updates of a stream so far.
