@@ -20,6 +20,7 @@ use crate::panels::Panels;
 use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
 use crate::state::State;
 use crate::tools::Tools;
+use crate::turns::Turns;
 use crate::{Options, keys, output, panels, storage, viewport};
 
 /// Seconds after the last movement until the picture is made whole.
@@ -38,7 +39,8 @@ pub(crate) struct App {
     pub(crate) tools: Tools,
     pub(crate) panels: Panels,
     pub(crate) messages: Messages,
-    pub(crate) shot: Option<Shot>,
+    /// The last picture.
+    pub(crate) shot: Option<Box<Picture>>,
     pub(crate) device: Option<AdapterSummary>,
     /// Which way is up, if the user says so; guessed otherwise.
     pub(crate) up_axis: Option<Axes>,
@@ -68,6 +70,8 @@ pub(crate) struct App {
     counted: Counted,
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
+    /// Whether that picture has not come yet.
+    awaited: bool,
     /// Whether the first input is not to be fitted into the picture, as a camera was given.
     pub(crate) camera_given: bool,
     /// Inputs that could not be read, which a session keeps.
@@ -80,6 +84,10 @@ pub(crate) struct App {
     /// Cameras that a film goes through.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
+    /// Of the window's pixels; without a device nothing of the window is drawn.
+    pub(crate) format: Option<eframe::wgpu::TextureFormat>,
+    /// Where pictures and the window are drawn by the same processor.
+    pub(crate) turns: Option<Turns>,
 }
 
 /// What panels say of the document, as of a version of it.
@@ -94,12 +102,6 @@ pub(crate) struct Counted {
     pub(crate) bytes: usize,
     /// Bytes that undo keeps besides.
     pub(crate) old_bytes: usize,
-}
-
-/// The last picture, on its way to the screen.
-pub(crate) struct Shot {
-    pub(crate) texture: egui::TextureHandle,
-    pub(crate) picture: Box<Picture>,
 }
 
 /// Pictures a second, while they change.
@@ -182,6 +184,7 @@ impl App {
             version: 1,
             counted: Counted::default(),
             wished: None,
+            awaited: false,
             camera_given: false,
             failed: Vec::new(),
             stirred: false,
@@ -189,6 +192,8 @@ impl App {
             quit: false,
             keys: Vec::new(),
             recording: None,
+            format: None,
+            turns: None,
         };
         if let Some(backend) = options.backend {
             app.look.backend = backend;
@@ -294,7 +299,7 @@ impl App {
 
     /// The points as they are shown now, if they have been shown yet.
     pub(crate) fn shown(&self) -> Option<Arc<Shown>> {
-        let shown = &self.shot.as_ref()?.picture.shown;
+        let shown = &self.shot.as_ref()?.shown;
         shown.shows(self.document()).then(|| Arc::clone(shown))
     }
 
@@ -304,31 +309,27 @@ impl App {
         let now = context.input(|input| input.time);
         let answers: Vec<_> = self.render.answers().collect();
         for answer in answers {
-            match answer {
-                Answer::Picture(mut picture) => {
-                    self.rate.count(now, &picture);
-                    let options =
-                        if picture.dots { egui::TextureOptions::NEAREST } else { egui::TextureOptions::LINEAR };
-                    let image = std::mem::take(&mut picture.image);
-                    let texture = match self.shot.take() {
-                        Some(Shot { mut texture, .. }) => {
-                            texture.set(image, options);
-                            texture
-                        }
-                        None => context.load_texture("picture", image, options),
-                    };
-                    self.messages.forget_failure();
-                    self.shot = Some(Shot { texture, picture });
-                }
-                Answer::Empty => self.shot = None,
-                Answer::Device(device) => self.device = device,
-                Answer::Failed(why) => {
-                    // The picture that failed may have been the film's.
-                    output::stop(&mut self.recording);
-                    self.messages.failure(why);
-                }
-                Answer::Done(outcome) => self.done(outcome),
+            self.take(answer, now);
+        }
+    }
+
+    /// Takes in what came of a picture or a task.
+    fn take(&mut self, answer: Answer, now: f64) {
+        self.awaited &= matches!(answer, Answer::Device(_) | Answer::Done(_));
+        match answer {
+            Answer::Picture(picture) => {
+                self.rate.count(now, &picture);
+                self.messages.forget_failure();
+                self.shot = Some(picture);
             }
+            Answer::Empty => self.shot = None,
+            Answer::Device(device) => self.device = device,
+            Answer::Failed(why) => {
+                // The picture that failed may have been the film's.
+                output::stop(&mut self.recording);
+                self.messages.failure(why);
+            }
+            Answer::Done(outcome) => self.done(outcome),
         }
     }
 
@@ -358,7 +359,10 @@ impl App {
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
             axes: self.up_axis,
-            budget_ms: moving.then_some(self.look.moving_ms),
+            budget_ms: moving.then(|| {
+                let both_ms = self.look.moving_ms;
+                self.turns.as_ref().map_or(both_ms, |turns| turns.budget_ms(both_ms))
+            }),
         }
     }
 
@@ -396,6 +400,22 @@ impl App {
         if self.wished.as_ref() != Some(&key) {
             self.render.wish(self.wish(size, moving));
             self.wished = Some(key);
+            self.awaited = true;
+        }
+    }
+
+    /// Waits for the picture asked for, where it and the window take turns.
+    fn take_turns(&mut self, context: &egui::Context) {
+        let Some(turns) = &mut self.turns else { return };
+        turns.begin();
+        let now = context.input(|input| input.time);
+        let longest = turns.longest(self.look.moving_ms);
+        let moves = now - self.moved < REST && self.awaited;
+        if let Some(answer) = moves.then(|| self.render.answer_within(longest)).flatten() {
+            self.take(answer, now);
+        }
+        if let Some(turns) = &mut self.turns {
+            turns.end();
         }
     }
 
@@ -438,6 +458,7 @@ impl eframe::App for App {
         viewport::show(self, ui);
         panels::over(self, &context);
         output::record(self);
+        self.take_turns(&context);
         if self.quit {
             context.send_viewport_cmd(egui::ViewportCommand::Close);
         }

@@ -20,12 +20,14 @@ mod output;
 mod overlay;
 mod panels;
 mod render;
+mod screen;
 mod state;
 mod storage;
 #[cfg(test)]
 mod tests;
 mod threads;
 mod tools;
+mod turns;
 mod viewport;
 
 use std::path::PathBuf;
@@ -73,11 +75,14 @@ pub fn run(options: Options) -> Result<(), Error> {
         .with_inner_size([1280.0, 800.0])
         .with_min_inner_size([640.0, 400.0])
         .with_drag_and_drop(true);
-    let native = eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, ..Default::default() };
+    let native =
+        eframe::NativeOptions { viewport, renderer: eframe::Renderer::Wgpu, dithering: false, ..Default::default() };
     let create: eframe::AppCreator<'_> = Box::new(move |creation| {
         colors(&creation.egui_ctx);
         let (look, recent) = storage::load(creation.storage);
         let mut app = app::App::new(options, look, recent, &creation.egui_ctx);
+        app.format = creation.wgpu_render_state.as_ref().map(|state| state.target_format);
+        app.turns = turns::are_taken(creation).then(Default::default);
         if let Some(state) = state {
             let folder = app.state.as_deref().map(state::folder).unwrap_or_default();
             state.restore(&mut app, &folder);

@@ -1,11 +1,14 @@
 //! The picture in the window, and what the mouse does to it.
 
+use std::sync::Arc;
+
 use autosplats::cloud::glam::{DVec2, DVec3};
 use eframe::egui::{self, Color32, PointerButton, Sense};
 
 use crate::app::App;
 use crate::commands::Tool;
 use crate::render::Purpose;
+use crate::screen::OnScreen;
 use crate::{gizmo, overlay, tools};
 
 /// How much closer one line of a mouse wheel goes.
@@ -25,12 +28,16 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
         let busy = handle(app, &response, size);
         app.ask(ui.ctx(), size, busy);
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
-        if let Some(shot) = &app.shot {
-            let whole = egui::Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
-            painter.image(shot.texture.id(), rect, whole, Color32::WHITE);
-        } else if app.document().layers.is_empty() && app.loader.jobs().is_empty() {
-            welcome(app, ui, rect);
+        if let Some(picture) = &app.shot {
+            if let Some(format) = app.format {
+                let on_screen = OnScreen { image: Arc::clone(&picture.image), sharp: picture.dots, format };
+                painter.add(eframe::egui_wgpu::Callback::new_paint_callback(rect, on_screen));
+            }
+        } else {
+            painter.rect_filled(rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
+            if app.document().layers.is_empty() && app.loader.jobs().is_empty() {
+                welcome(app, ui, rect);
+            }
         }
         tools::show(app, ui, rect, size);
         gizmo::show(app, ui, rect, size);
@@ -153,7 +160,7 @@ fn under(app: &App, rect: egui::Rect, place: egui::Pos2) -> Option<(DVec3, f64)>
     let share =
         DVec2::new(((place.x - rect.left()) / rect.width()).into(), ((place.y - rect.top()) / rect.height()).into());
     let camera = app.navigation.camera();
-    let picture = app.shot.as_ref().map(|shot| &shot.picture);
+    let picture = app.shot.as_ref();
     let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, share));
     let [_, _, forward] = camera.axes().ok()?;
     let world = surface.or_else(|| {

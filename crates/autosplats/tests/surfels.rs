@@ -67,6 +67,30 @@ fn a_frame_that_fails_leaves_the_surfels_of_the_one_before() {
 }
 
 #[test]
+fn a_frame_that_is_given_up_leaves_nothing_behind() {
+    let cloud = sphere();
+    let settings = Settings::default();
+    let whole = Renderer::new().render(&cloud, &camera(), SIZE, &settings).expect("a picture").image.clone();
+    let mut renderer = Renderer::new();
+    let mut given_up = 0;
+    for most in 0.. {
+        let asked = std::cell::Cell::new(0);
+        let go_on = || asked.replace(asked.get() + 1) < most;
+        match renderer.render_while(&cloud, &camera(), SIZE, &settings, &go_on) {
+            Ok(frame) => {
+                assert!(*frame.image == whole, "the same picture after {given_up} that were given up");
+                break;
+            }
+            Err(error) => assert!(matches!(error, Error::Cancelled), "{error}"),
+        }
+        given_up += 1;
+        assert_eq!(asked.get(), most + 1, "nothing is done after a no");
+        assert!(renderer.surfels().expect("none").is_empty(), "half a frame has no surfels");
+    }
+    assert!(given_up > 6, "asked once a stage at least, not {given_up} times");
+}
+
+#[test]
 fn both_backends_hand_out_the_same_surfels() {
     let mut gpu = match Renderer::with_backend(Backend::Gpu) {
         Ok(renderer) => renderer,

@@ -166,7 +166,7 @@ fn faces_eye(clip: &ClipBox, view: &View, axis: usize, high: bool) -> bool {
 fn edge(app: &App, clip: &ClipBox, view: &View, painter: &Painter, ends: [DVec3; 2], (corner, along): (usize, usize)) {
     let sides = (0..3).filter(|&axis| axis != along).map(|axis| (axis, corner >> axis & 1 == 1));
     let behind_box = sides.into_iter().all(|(axis, high)| !faces_eye(clip, view, axis, high));
-    let picture = app.shot.as_ref().map(|shot| &shot.picture);
+    let picture = app.shot.as_ref();
     let covered = |place: Pos2, depth: f64| {
         let surface = picture.and_then(|picture| picture.depths.world(&picture.camera, view.share(place)));
         surface.and_then(|surface| view.seen(surface)).is_some_and(|(_, before)| before < depth)

@@ -76,9 +76,10 @@ fn choose<T: PartialEq + Clone>(ui: &mut egui::Ui, label: &str, value: &mut T, o
 }
 
 fn color(app: &mut App, ui: &mut egui::Ui) {
-    let fields: Vec<String> = app.shot.as_ref().map_or_else(Vec::new, |shot| {
-        shot.picture.shown.cloud.fields().iter().map(|field| field.name.clone()).collect()
-    });
+    let fields: Vec<String> = app
+        .shot
+        .as_ref()
+        .map_or_else(Vec::new, |shot| shot.shown.cloud.fields().iter().map(|field| field.name.clone()).collect());
     let shading = &mut app.look.settings.shading;
     let mut options = MODES.to_vec();
     for field in &fields {
@@ -175,7 +176,7 @@ fn search(app: &mut App, ui: &mut egui::Ui) {
     let reconstruction = &mut app.look.settings.reconstruction;
     let first_radius = match reconstruction.engine {
         SearchEngine::KdTree { first_radius } => first_radius,
-        _ => app.shot.as_ref().map_or(0.01, |shot| first_radius(&shot.picture.shown.cloud)),
+        _ => app.shot.as_ref().map_or(0.01, |shot| first_radius(&shot.shown.cloud)),
     };
     let engines = [
         ("screen grid", SearchEngine::ScreenGrid),

@@ -61,7 +61,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
     let mut open = true;
     let mut save = false;
-    let seen = app.shot.as_ref().map(|shot| shot.picture.size);
+    let seen = app.shot.as_ref().map(|shot| shot.size);
     let window = egui::Window::new("Save picture").open(&mut open).collapsible(false).resizable(false);
     window.default_pos(app.view_rect.center() - egui::vec2(220.0, 110.0)).show(context, |ui| {
         ui.set_width(420.0);

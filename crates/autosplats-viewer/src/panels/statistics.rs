@@ -46,8 +46,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                     plot.bar_chart(BarChart::new(name, bars.collect()).color(color));
                 }
             });
-        let Some(shot) = &app.shot else { return };
-        let picture = &shot.picture;
+        let Some(picture) = &app.shot else { return };
         egui::Grid::new("timings").num_columns(4).striped(true).show(ui, |ui| {
             for pair in STAGES.chunks(2) {
                 for (name, value, color) in pair {

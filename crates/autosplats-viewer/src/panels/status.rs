@@ -15,8 +15,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
                 let color = ui.visuals().warn_fg_color;
                 ui.colored_label(color, format!("{} selected", grouped(counts.selected)));
             }
-            if let Some(shot) = &app.shot {
-                let picture = &shot.picture;
+            if let Some(picture) = &app.shot {
                 ui.separator();
                 ui.label(format!("{} visible", grouped(picture.counts.visible)))
                     .on_hover_text("Points that own a pixel or half of one");

@@ -4,7 +4,8 @@
 //! The window posts what it wants to see; only the newest wish is kept, so a slow picture is followed by the one that is
 //! wanted then, never by a queue. [Tasks](Task) that have to be done, such as finding the point under the cursor, are done in
 //! their order before the next picture. Whatever comes of it arrives as [`Answer`]s, each with a request to draw the window
-//! again. While the eye moves, pictures are made smaller, of fewer points if need be, to come in time (`pace`).
+//! again. While the eye moves, pictures are made smaller, of fewer points if need be, to come in time (`pace`), and a
+//! whole one in work is given up.
 
 mod depths;
 mod pace;
@@ -14,9 +15,10 @@ mod thread;
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use autosplats::cloud::Axes;
-use autosplats::{AdapterSummary, Backend, Camera, Counts, Settings, Timings};
+use autosplats::{AdapterSummary, Backend, Camera, Counts, Image, Settings, Timings};
 use eframe::egui;
 
 pub(crate) use self::depths::Depths;
@@ -42,7 +44,7 @@ pub(crate) struct Wish {
 
 /// A picture and what is known of it.
 pub(crate) struct Picture {
-    pub(crate) image: egui::ColorImage,
+    pub(crate) image: Arc<Image>,
     pub(crate) camera: Camera,
     /// Pixels of the window's picture, which this one may be smaller than.
     pub(crate) size: [u32; 2],
@@ -91,6 +93,14 @@ impl Shared {
     fn lock(&self) -> MutexGuard<'_, Post> {
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// Whether the picture in work, which is of `wish`, is not worth finishing: the window has closed, or what was at rest
+    /// moves again. A picture made on the way is finished, or there would be none as long as the view moves.
+    fn is_in_haste(&self, wish: &Wish) -> bool {
+        let post = self.lock();
+        let moves = || post.wish.as_ref().is_some_and(|newer| newer.budget_ms.is_some());
+        post.closed || wish.budget_ms.is_none() && moves()
+    }
 }
 
 /// The window's end.
@@ -120,6 +130,11 @@ impl RenderThread {
     pub(crate) fn task(&self, task: Task) {
         self.shared.lock().tasks.push_back(task);
         self.shared.news.notify_one();
+    }
+
+    /// The next that comes, if it comes in time.
+    pub(crate) fn answer_within(&self, time: Duration) -> Option<Answer> {
+        self.answers.recv_timeout(time).ok()
     }
 
     /// What has come since.

@@ -6,7 +6,6 @@ use std::time::Instant;
 use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud, check_memory};
 use autosplats::{Backend, ColorMode, Error, Frame, Image, Reconstruction, Renderer, SearchEngine, Settings};
-use eframe::egui;
 use rayon::prelude::*;
 
 use super::pace::{Costs, Pace};
@@ -39,7 +38,7 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
         };
         let work = std::panic::AssertUnwindSafe(|| match (task, wish) {
             (Some(task), _) => studio.perform(task, outbox).map(Answer::Done),
-            (None, Some(wish)) => studio.draw(&wish, outbox),
+            (None, Some(wish)) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)),
             (None, None) => Ok(Answer::Empty),
         });
         // A bug in one picture must not end all pictures, with edits in the window that are not saved.
@@ -48,6 +47,9 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
             outbox.send(Answer::Failed("this picture failed, which is a bug of this program".into()));
             continue;
         };
+        if matches!(answer, Err(Error::Cancelled)) {
+            continue;
+        }
         outbox.send(answer.unwrap_or_else(|error| {
             if matches!(error, Error::DeviceLost(_)) {
                 studio.renderer = None;
@@ -128,7 +130,8 @@ impl Studio {
         Ok(settings(wish, &shown.cloud, gpu).0)
     }
 
-    fn draw(&mut self, wish: &Wish, outbox: &Outbox) -> Result<Answer, Error> {
+    /// Makes a picture, unless `go_on` says that another one is more urgent.
+    fn draw(&mut self, wish: &Wish, outbox: &Outbox, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
         let started = Instant::now();
         let shown = self.shown(wish)?;
         if shown.cloud.len() < 2 {
@@ -139,21 +142,22 @@ impl Studio {
             Some(budget) => self.costs.pace(shown.cloud.len(), pixels, budget),
             None => Pace::WHOLE,
         };
-        let mut sparse = self.sparse.take();
-        if pace.halvings > 0 {
-            let fits = |sparse: &Sparse| (sparse.identity, sparse.halvings) == (shown.cloud.identity(), pace.halvings);
-            sparse = sparse.filter(fits).or_else(|| Some(Sparse::new(&shown.cloud, pace.halvings)));
+        let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
+        let fits = |sparse: &Sparse| (sparse.identity, sparse.halvings) == (shown.cloud.identity(), pace.halvings);
+        if pace.halvings > 0 && !self.sparse.as_ref().is_some_and(fits) {
+            self.sparse = Some(Sparse::new(&shown.cloud, pace.halvings));
         }
+        let Self { renderer: Some((_, renderer)), sparse, costs, .. } = self else { return Ok(Answer::Empty) };
         let part = sparse.as_ref().filter(|_| pace.halvings > 0);
         let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
         let size = wish.rendered_size(pace.scale);
         let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
-        let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
         let (mut settings, remark) = settings(wish, cloud, gpu);
         settings.all_layers = selected.is_some();
-        let renderer = self.renderer(wish.backend, outbox)?;
-        let Frame { image, layers, counts, timings, .. } = renderer.render(cloud, &wish.camera, size, &settings)?;
-        let mut image = to_egui(image);
+        let Frame { image, layers, counts, timings, .. } =
+            renderer.render_while(cloud, &wish.camera, size, &settings, go_on)?;
+        let Image { width, height, ref pixels, .. } = *image;
+        let mut image = Image { width, height, pixels: pixels.clone(), linear: Vec::new() };
         if let Some(selected) = &selected {
             let is_selected = |point: u32| {
                 let index = part.map_or(point, |sparse| sparse.indices[point as usize]);
@@ -164,23 +168,16 @@ impl Studio {
                     let point = layers.point[layers.index(x, y)];
                     if point != u32::MAX && is_selected(point) {
                         let pixel = &mut image.pixels[y * size[0] as usize + x];
-                        let mixed = [0, 1, 2].map(|i| ((2 * u16::from(pixel[i]) + 3 * SELECTED[i]) / 5) as u8);
-                        *pixel = egui::Color32::from_rgb(mixed[0], mixed[1], mixed[2]);
+                        let mixed = |i: usize| ((2 * u16::from(pixel[i]) + 3 * SELECTED[i]) / 5) as u8;
+                        *pixel = [mixed(0), mixed(1), mixed(2), u8::MAX];
                     }
                 }
             }
         }
         let depths = if gpu { Depths::default() } else { Depths::new(layers) };
-        let points = cloud.len();
-        self.costs.learn(
-            points,
-            size[0] as usize * size[1] as usize,
-            timings.project + timings.upload,
-            timings.frame - timings.project,
-        );
-        self.sparse = sparse;
+        costs.learn(cloud.len(), size[0] as usize * size[1] as usize, timings.project, timings.frame - timings.project);
         Ok(Answer::Picture(Box::new(Picture {
-            image,
+            image: Arc::new(image),
             camera: wish.camera,
             size: wish.size,
             whole: pace == Pace::WHOLE,
@@ -305,36 +302,46 @@ fn settings(wish: &Wish, cloud: &PointCloud, gpu: bool) -> (Settings, Option<Str
     (settings, remark)
 }
 
-fn to_egui(image: &Image) -> egui::ColorImage {
-    let size = [image.width as usize, image.height as usize];
-    let pixels = image.pixels.iter().map(|&[r, g, b, a]| egui::Color32::from_rgba_unmultiplied(r, g, b, a)).collect();
-    egui::ColorImage::new(size, pixels)
-}
-
 #[cfg(test)]
 mod tests {
     use autosplats::cloud::glam::DVec3;
     use autosplats::{Camera, Projection};
 
+    use std::sync::{Condvar, Mutex};
+
     use super::*;
     use crate::document::Document;
 
+    fn wish(color: ColorMode, engine: SearchEngine) -> Wish {
+        let projection = Projection::PerspectiveFovDeg(40.0);
+        let camera = Camera { eye: DVec3::NEG_Y, look_at: DVec3::ZERO, up: DVec3::Z, projection };
+        let mut settings = Settings::default();
+        settings.shading.color = color;
+        settings.reconstruction.engine = engine;
+        let document = Document::default();
+        let backend = Backend::Cpu;
+        Wish { document, camera, size: [8, 8], settings, dots: None, backend, axes: None, budget_ms: None }
+    }
+
+    #[test]
+    fn a_whole_picture_is_given_up_when_the_view_moves() {
+        let whole = wish(ColorMode::Auto, SearchEngine::ScreenGrid);
+        let moving = Wish { budget_ms: Some(30.0), ..whole.clone() };
+        let shared = Shared { post: Mutex::default(), news: Condvar::new() };
+        let post = |wish: Option<&Wish>| shared.lock().wish = wish.cloned();
+        assert!(!shared.is_in_haste(&whole), "nothing is asked for");
+        post(Some(&whole));
+        assert!(!shared.is_in_haste(&whole), "another whole picture can wait");
+        post(Some(&moving));
+        assert!(shared.is_in_haste(&whole), "it moves");
+        assert!(!shared.is_in_haste(&moving), "or nothing would be seen while it moves");
+        post(None);
+        shared.lock().closed = true;
+        assert!(shared.is_in_haste(&moving), "nobody looks any more");
+    }
+
     #[test]
     fn a_look_that_cannot_be_had_is_replaced_and_told() {
-        let camera = Camera {
-            eye: DVec3::NEG_Y,
-            look_at: DVec3::ZERO,
-            up: DVec3::Z,
-            projection: Projection::PerspectiveFovDeg(40.0),
-        };
-        let wish = |color: ColorMode, engine: SearchEngine| {
-            let mut settings = Settings::default();
-            settings.shading.color = color;
-            settings.reconstruction.engine = engine;
-            let document = Document::default();
-            let backend = Backend::Cpu;
-            Wish { document, camera, size: [8, 8], settings, dots: None, backend, axes: None, budget_ms: None }
-        };
         let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; 5]);
         for color in [ColorMode::Rgb, ColorMode::Classification, ColorMode::Field("Intensity".into())] {
             let (settings, remark) = settings(&wish(color.clone(), SearchEngine::ScreenGrid), &cloud, false);

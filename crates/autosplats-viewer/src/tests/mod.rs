@@ -98,8 +98,7 @@ impl Window {
             let empty = app.document().layers.is_empty() && app.shot.is_none();
             asked
                 && (empty
-                    || app.shot.as_ref().is_some_and(|shot| {
-                        let picture = &shot.picture;
+                    || app.shot.as_ref().is_some_and(|picture| {
                         let side = |points: f32| points.round() as u32;
                         let rect = window.picture();
                         picture.whole

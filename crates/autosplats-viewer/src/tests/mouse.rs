@@ -8,14 +8,14 @@ use crate::commands::Tool;
 
 /// Where a place of the world is in the picture, by shares of its sides.
 fn share(window: &Window, camera: &Camera, world: DVec3) -> DVec2 {
-    let size = window.app().shot.as_ref().expect("there is a picture").picture.size;
+    let size = window.app().shot.as_ref().expect("there is a picture").size;
     let (pixel, _) = camera.lens(size).expect("the camera sees").to_pixel(world).expect("it is before the eye");
     DVec2::new(pixel.x, pixel.y) / DVec2::new(size[0].into(), size[1].into())
 }
 
 /// The surface at a place of the picture.
 fn surface(window: &Window, place: DVec2) -> DVec3 {
-    let picture = &window.app().shot.as_ref().expect("there is a picture").picture;
+    let picture = window.app().shot.as_ref().expect("there is a picture");
     picture.depths.world(&picture.camera, place).unwrap_or_else(|| panic!("there is a surface at {place}"))
 }
 

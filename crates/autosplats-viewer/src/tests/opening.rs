@@ -12,8 +12,8 @@ fn a_scene_is_shown_and_listed() {
     assert!(window.says(STATUE), "its name is in the list: {:?}", window.words());
     let points = app.document().layers[0].cloud.len();
     assert!(window.says(&format!("{} points", crate::document::grouped(points))), "and its number of points");
-    let [width, height] = shot.picture.size;
-    let share = shot.picture.counts.covered as f64 / f64::from(width * height);
+    let [width, height] = shot.size;
+    let share = shot.counts.covered as f64 / f64::from(width * height);
     // The statue's first view fills about half of the picture.
     assert!((0.1..0.9).contains(&share), "the surface covers {share} of the picture");
 }

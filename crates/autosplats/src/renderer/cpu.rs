@@ -14,7 +14,7 @@ use crate::camera::{Camera, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
-use crate::search::{Neighborhoods, SearchEngine, SearchRules, screen_grid};
+use crate::search::{Neighborhoods, SearchCounts, SearchEngine, SearchRules, screen_grid};
 use crate::shade::{Image, Scene, linear_steps, shade};
 use crate::splat::{Attributes, PointColors, Splatter};
 
@@ -77,7 +77,8 @@ impl CpuRenderer {
         self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
     }
 
-    /// See [`Renderer::render`](super::Renderer::render); `given` planes are drawn instead of what a search would find.
+    /// See [`Renderer::render_while`](super::Renderer::render_while); `given` planes are drawn instead of what a search would
+    /// find.
     pub(super) fn render(
         &mut self,
         cloud: &PointCloud,
@@ -85,14 +86,15 @@ impl CpuRenderer {
         size: [u32; 2],
         settings: &Settings,
         given: Option<GivenPlanes<'_>>,
+        go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
         if given.is_none() {
             check_engine(settings.reconstruction.engine)?;
         }
         let wanted = Wanted::new(cloud, settings)?;
-        // From here on nothing fails: what is kept is all of one frame.
-        self.view = Some(view);
+        // From here on nothing fails, but it may be given up; then there are no surfels.
+        self.view = None;
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
@@ -113,13 +115,14 @@ impl CpuRenderer {
             recovered,
             splatter,
             image,
+            view: last_view,
             ..
         } = self;
-        let mut clock = Clock::start();
+        let mut clock = Clock::start(go_on);
         if known.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);
             *depth_noise = None;
-            clock.lap(|timings| &mut timings.fit);
+            clock.lap(|timings| &mut timings.fit)?;
         }
 
         let rules = ProjectRules {
@@ -128,19 +131,20 @@ impl CpuRenderer {
             grid_culling: settings_splat.grid_culling,
         };
         let screen = projector.project(cloud, &view, &rules);
-        clock.lap(|timings| &mut timings.project);
+        clock.lap(|timings| &mut timings.project)?;
 
         if settings_splat.adaptive && given.is_none() {
             depth_noise.get_or_insert_with(|| DepthNoise::new(cloud));
             adapter.begin(screen, &view, settings_splat.k);
-            clock.lap(|timings| &mut timings.adapt);
+            clock.lap(|timings| &mut timings.adapt)?;
         }
         surfels.clear();
         splatter.begin(&view);
         let nothing = DepthNoise::default();
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
         let reconstruct = Reconstruct { screen, view: &view, settings, sensors, depth_noise, given };
-        let mut search_counts = reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock);
+        let mut search_counts =
+            reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock)?;
         recovered.clear();
         let hidden = |&index: &u32| {
             let point = &screen.points[index as usize];
@@ -148,10 +152,10 @@ impl CpuRenderer {
             splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
         };
         recovered.extend(screen.passive.iter().filter(|index| !hidden(index)));
-        clock.lap(|timings| &mut timings.splat);
+        clock.lap(|timings| &mut timings.splat)?;
         if !recovered.is_empty() {
             search_counts =
-                search_counts + reconstruct.run(recovered, neighborhoods, surfels, adapter, splatter, &mut clock);
+                search_counts + reconstruct.run(recovered, neighborhoods, surfels, adapter, splatter, &mut clock)?;
         }
 
         if settings_splat.depth_refinement {
@@ -160,11 +164,12 @@ impl CpuRenderer {
         }
         splatter.attributes(surfels, &view, &attributes);
         let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
-        clock.lap(|timings| &mut timings.splat);
+        clock.lap(|timings| &mut timings.splat)?;
 
         let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
         shade(layers, &scene, &settings.shading, settings.all_layers, image);
-        clock.lap(|timings| &mut timings.shade);
+        clock.lap(|timings| &mut timings.shade)?;
+        *last_view = Some(view);
 
         let dropped = screen.dropped;
         let counts = Counts {
@@ -205,17 +210,17 @@ impl Reconstruct<'_> {
         surfels: &mut Surfels,
         adapter: &mut Adapter,
         splatter: &mut Splatter,
-        clock: &mut Clock,
-    ) -> crate::search::SearchCounts {
+        clock: &mut Clock<'_>,
+    ) -> Result<SearchCounts, Error> {
         let Self { screen, view, settings, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
             place(screen, queries, &planes, view, settings.k, settings.splat_scale, surfels);
-            clock.lap(|timings| &mut timings.fit);
+            clock.lap(|timings| &mut timings.fit)?;
             splatter.add(surfels, first, view);
-            clock.lap(|timings| &mut timings.splat);
-            return crate::search::SearchCounts::default();
+            clock.lap(|timings| &mut timings.splat)?;
+            return Ok(SearchCounts::default());
         }
         let rules = SearchRules {
             k: settings.k,
@@ -228,7 +233,7 @@ impl Reconstruct<'_> {
                 unreachable!("refused before the frame begins")
             }
         }
-        clock.lap(|timings| &mut timings.search);
+        clock.lap(|timings| &mut timings.search)?;
 
         let rules = FitRules {
             k: settings.k,
@@ -239,40 +244,42 @@ impl Reconstruct<'_> {
             keep_outliers: settings.outlier_expansions.is_none(),
         };
         fit(screen, queries, neighborhoods, view, &rules, surfels);
-        clock.lap(|timings| &mut timings.fit);
+        clock.lap(|timings| &mut timings.fit)?;
 
         if settings.adaptive {
             let rules = AdaptRules { k: settings.k, longest: settings.longest(), keep_outliers: rules.keep_outliers };
             adapter.adapt(&mut surfels[first..], &screen.density, view, &rules, depth_noise);
-            clock.lap(|timings| &mut timings.adapt);
+            clock.lap(|timings| &mut timings.adapt)?;
         }
         sensors.orient(&mut surfels[first..], view);
-        clock.lap(|timings| &mut timings.fit);
+        clock.lap(|timings| &mut timings.fit)?;
 
         splatter.add(surfels, first, view);
-        clock.lap(|timings| &mut timings.splat);
-        neighborhoods.counts
+        clock.lap(|timings| &mut timings.splat)?;
+        Ok(neighborhoods.counts)
     }
 }
 
-/// Adds up the time of each stage.
-struct Clock {
+/// Adds up the time of each stage and asks whether to go on.
+struct Clock<'a> {
+    go_on: &'a dyn Fn() -> bool,
     begin: Instant,
     last: Instant,
     timings: Timings,
 }
 
-impl Clock {
-    fn start() -> Self {
+impl<'a> Clock<'a> {
+    fn start(go_on: &'a dyn Fn() -> bool) -> Self {
         let now = Instant::now();
-        Self { begin: now, last: now, timings: Timings::default() }
+        Self { go_on, begin: now, last: now, timings: Timings::default() }
     }
 
     /// Adds the time since the last lap to a stage.
-    fn lap(&mut self, stage: impl Fn(&mut Timings) -> &mut f64) {
+    fn lap(&mut self, stage: impl Fn(&mut Timings) -> &mut f64) -> Result<(), Error> {
         let now = Instant::now();
         *stage(&mut self.timings) += (now - self.last).as_secs_f64() * 1e3;
         self.last = now;
+        if (self.go_on)() { Ok(()) } else { Err(Error::Cancelled) }
     }
 
     fn finish(mut self) -> Timings {

@@ -247,17 +247,18 @@ impl GpuRenderer {
         })?
     }
 
-    /// See [`Renderer::render`](super::Renderer::render).
+    /// See [`Renderer::render_while`](super::Renderer::render_while).
     pub(super) fn render(
         &mut self,
         cloud: &PointCloud,
         camera: &Camera,
         size: [u32; 2],
         settings: &Settings,
+        go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
         // What a device that fails refuses arrives as an error, whatever it is asked for.
-        self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings))?
+        self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings, go_on))?
     }
 
     /// Renders what was checked.
@@ -267,10 +268,11 @@ impl GpuRenderer {
         view: &View,
         size: [u32; 2],
         settings: &Settings,
+        go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let wanted = Wanted::new(cloud, settings)?;
         let started = Instant::now();
-        self.make_resident(cloud, &wanted, &|_| true)?;
+        self.make_resident(cloud, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
         self.prepare(size, &wanted, settings)?;
         let Self { gpu, clock, prepared, upward, view: last_view, readback, image, layers, times, frame, .. } = self;

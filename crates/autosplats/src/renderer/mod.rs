@@ -192,9 +192,29 @@ impl Renderer {
         size: [u32; 2],
         settings: &Settings,
     ) -> Result<Frame<'_>, Error> {
+        self.render_while(cloud, camera, size, settings, &|| true)
+    }
+
+    /// [Renders](Self::render) unless `go_on`, asked before the frame begins and after each stage of it, says no: then the
+    /// view has changed, say, and nobody wants this picture any more. A GPU asks while points are uploaded, and works
+    /// without questions from then on.
+    ///
+    /// # Errors
+    /// Those of [`render`](Self::render), and [`Error::Cancelled`] if `go_on` said no.
+    pub fn render_while(
+        &mut self,
+        cloud: &PointCloud,
+        camera: &Camera,
+        size: [u32; 2],
+        settings: &Settings,
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<Frame<'_>, Error> {
+        if !go_on() {
+            return Err(Error::Cancelled);
+        }
         match &mut self.form {
-            Form::Cpu(renderer) => renderer.render(cloud, camera, size, settings, None),
-            Form::Gpu(renderer) => renderer.render(cloud, camera, size, settings),
+            Form::Cpu(renderer) => renderer.render(cloud, camera, size, settings, None, go_on),
+            Form::Gpu(renderer) => renderer.render(cloud, camera, size, settings, go_on),
         }
     }
 
@@ -225,7 +245,7 @@ impl Renderer {
         match &mut self.form {
             Form::Cpu(renderer) => {
                 let planes = GivenPlanes { normals, curvature, radius };
-                renderer.render(cloud, camera, size, settings, Some(planes))
+                renderer.render(cloud, camera, size, settings, Some(planes), &|| true)
             }
             Form::Gpu(_) => Err(Error::Device("normals found beforehand are rendered on the CPU only".into())),
         }
