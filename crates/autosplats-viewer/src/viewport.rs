@@ -141,8 +141,8 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
         let (scroll, pinch) = context.input(|input| (input.smooth_scroll_delta(), input.zoom_delta()));
         let factor = (f64::from(scroll.y) * WHEEL).exp() * f64::from(pinch);
         if factor != 1.0 {
-            let target = context.pointer_hover_pos().and_then(|place| under(app, rect, place));
-            app.navigation.zoom(factor, target.map(|(world, _)| world));
+            let target = context.pointer_hover_pos().and_then(|place| zoom_target(app, context, rect, place));
+            app.navigation.zoom(factor, target);
             busy = true;
         }
     }
@@ -152,6 +152,29 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
         busy = true;
     }
     busy
+}
+
+/// Where a turn of the wheel began.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Zoomed {
+    /// Of its last click, seconds.
+    time: f64,
+    place: egui::Pos2,
+    world: DVec3,
+}
+
+/// What a wheel goes to: as long as it turns and the pointer stays, to what was under that at first. Pictures made on the way
+/// lag behind, and a GPU hands out no depths with them.
+fn zoom_target(app: &mut App, context: &egui::Context, rect: egui::Rect, place: egui::Pos2) -> Option<DVec3> {
+    /// Longest pause between clicks of one turn, seconds.
+    const PAUSE: f64 = 0.4;
+    /// Furthest that the pointer trembles, screen points.
+    const TREMBLE: f32 = 3.0;
+    let time = context.input(|input| input.time);
+    let last = app.panels.zoomed.filter(|last| time - last.time < PAUSE && last.place.distance(place) < TREMBLE);
+    let world = last.map(|last| last.world).or_else(|| under(app, rect, place).map(|(world, _)| world));
+    app.panels.zoomed = world.map(|world| Zoomed { time, place, world });
+    world
 }
 
 /// The place in the world under a place of the window and its depth: of the surface where there is one, else as far away

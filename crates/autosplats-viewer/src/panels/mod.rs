@@ -40,10 +40,13 @@ pub(crate) struct Panels {
     pub(crate) film: film::Film,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
+    memory: status::Memory,
     /// How far the drag has gone that the view has followed, screen points.
     pub(crate) dragged: egui::Vec2,
     /// Depth of what a drag took hold of.
     pub(crate) grabbed: Option<f64>,
+    /// What the wheel goes to.
+    pub(crate) zoomed: Option<crate::viewport::Zoomed>,
     /// Whether the user wants to leave though something is not saved.
     leave: bool,
     /// Layers with edits that are in no file, which the user wants to remove.
@@ -66,8 +69,10 @@ impl Default for Panels {
             picture: picture::PictureDialog::default(),
             film: film::Film::default(),
             claimed: Vec::new(),
+            memory: status::Memory::default(),
             dragged: egui::Vec2::ZERO,
             grabbed: None,
+            zoomed: None,
             leave: false,
             removal: Vec::new(),
         }

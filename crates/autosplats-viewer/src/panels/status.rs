@@ -35,9 +35,29 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let device = app.device.as_ref().map_or("CPU", |device| &*device.name);
                 ui.weak(device).on_hover_text("Where pictures are made");
-                ui.weak(format!("{:.0} MB", (bytes + old_bytes) as f64 * 1e-6))
-                    .on_hover_text(format!("Points, and {:.0} MB for undo", old_bytes as f64 * 1e-6));
+                let [points, undo] = [bytes, old_bytes].map(|bytes| bytes as f64 * 1e-6);
+                let all = app.panels.memory.bytes(ui.input(|input| input.time)).map(|bytes| bytes as f64 * 1e-6);
+                ui.weak(format!("{:.0} MB", all.unwrap_or(points + undo)))
+                    .on_hover_text(format!("Memory of this program; points {points:.0} MB, undo {undo:.0} MB"));
             });
         });
     });
+}
+
+/// Memory that the program takes, asked for once a second.
+#[derive(Default)]
+pub(super) struct Memory {
+    asked: Option<f64>,
+    bytes: Option<usize>,
+}
+
+impl Memory {
+    /// Bytes in memory `now`, seconds; `None` where the system does not tell.
+    fn bytes(&mut self, now: f64) -> Option<usize> {
+        if self.asked.is_none_or(|asked| now - asked >= 1.0) {
+            self.asked = Some(now);
+            self.bytes = memory_stats::memory_stats().map(|stats| stats.physical_mem);
+        }
+        self.bytes
+    }
 }

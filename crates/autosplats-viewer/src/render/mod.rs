@@ -58,7 +58,7 @@ pub(crate) struct Picture {
     pub(crate) remark: Option<String>,
     /// Milliseconds from the wish to the finished picture.
     pub(crate) milliseconds: f64,
-    /// How far away what is seen is; empty on a GPU.
+    /// How far away what is seen is; of a GPU's pictures only those at rest have it.
     pub(crate) depths: Depths,
     pub(crate) shown: Arc<Shown>,
 }

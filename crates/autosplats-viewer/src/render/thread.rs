@@ -153,7 +153,8 @@ impl Studio {
         let size = wish.rendered_size(pace.scale);
         let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
         let (mut settings, remark) = settings(wish, cloud, gpu);
-        settings.all_layers = selected.is_some();
+        // A GPU hands out layers only if it is asked, which takes time: at rest the pointer needs depths.
+        settings.all_layers = selected.is_some() || gpu && wish.budget_ms.is_none();
         let Frame { image, layers, counts, timings, .. } =
             renderer.render_while(cloud, &wish.camera, size, &settings, go_on)?;
         let Image { width, height, ref pixels, .. } = *image;
@@ -174,7 +175,7 @@ impl Studio {
                 }
             }
         }
-        let depths = if gpu { Depths::default() } else { Depths::new(layers) };
+        let depths = Depths::new(layers);
         costs.learn(cloud.len(), size[0] as usize * size[1] as usize, timings.project, timings.frame - timings.project);
         Ok(Answer::Picture(Box::new(Picture {
             image: Arc::new(image),

@@ -43,9 +43,14 @@ struct Window {
 impl Window {
     /// A window that begins to open what is named.
     fn new(names: &[&str]) -> Self {
+        Self::on(Backend::Cpu, names)
+    }
+
+    /// A window with pictures made by a backend.
+    fn on(backend: Backend, names: &[&str]) -> Self {
         let parse = |name: &&str| Input::parse(name).unwrap_or_else(|error| panic!("{name}: {error}"));
         let options =
-            Options { inputs: names.iter().map(parse).collect(), backend: Some(Backend::Cpu), ..Options::default() };
+            Options { inputs: names.iter().map(parse).collect(), backend: Some(backend), ..Options::default() };
         let builder = Harness::builder().with_size(SMALL).with_step_dt(1.0 / 60.0).with_max_steps(2);
         let builder = builder.with_accessibility_check(false).with_os(egui::os::OperatingSystem::Nix);
         let harness =

@@ -32,7 +32,17 @@ const NEAR: f64 = 0.02;
 
 #[test]
 fn the_wheel_zooms_to_the_cursor() {
-    let mut window = Window::with_statue();
+    wheel_zooms(Window::with_statue());
+}
+
+#[test]
+fn with_pictures_of_a_gpu_too() {
+    let mut window = Window::on(Backend::Gpu, &[STATUE]);
+    window.settle();
+    wheel_zooms(window);
+}
+
+fn wheel_zooms(mut window: Window) {
     let at = DVec2::new(0.5, 0.42);
     let world = surface(&window, at);
     let before = camera(&window);
