@@ -1,0 +1,179 @@
+//! Pictures to ffmpeg.
+
+use std::ffi::OsString;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::thread::JoinHandle;
+
+use autosplats::Image;
+use tempfile::TempPath;
+
+use crate::Error;
+
+/// Whether films can be made.
+pub fn has_ffmpeg() -> bool {
+    let mut probe = Command::new("ffmpeg");
+    probe.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    probe.status().is_ok_and(|status| status.success())
+}
+
+/// A film in the making. It appears when it is [finished](Self::finish); one that is dropped leaves nothing behind.
+#[derive(Debug)]
+pub struct Film {
+    path: PathBuf,
+    /// Until it is put in place.
+    part: Option<TempPath>,
+    size: [u32; 2],
+    child: Child,
+    input: Option<ChildStdin>,
+    /// Reads what ffmpeg complains of, so that it never waits for a reader.
+    words: Option<JoinHandle<String>>,
+}
+
+impl Film {
+    /// Begins a film of `size` (width, height) pixels with `rate` pictures a second. What is at `path` stays until the film is
+    /// finished.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if nothing can be written there, [`Error::NoFfmpeg`].
+    pub fn begin(path: &Path, size: [u32; 2], rate: f64) -> Result<Self, Error> {
+        Self::with(path, size, |part| ffmpeg(part, size, rate))
+    }
+
+    /// Hands pictures to a command that writes to the path it is given.
+    fn with(path: &Path, size: [u32; 2], command: impl FnOnce(&Path) -> Command) -> Result<Self, Error> {
+        let part = temporary(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        let mut command = command(&part);
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(Error::NoFfmpeg)?;
+        let input = child.stdin.take();
+        let words = child.stderr.take().map(|mut pipe| {
+            std::thread::spawn(move || {
+                let mut words = Vec::new();
+                // What cannot be read was not said.
+                let _ = pipe.read_to_end(&mut words);
+                String::from_utf8_lossy(&words).into_owned()
+            })
+        });
+        Ok(Self { path: path.into(), part: Some(part), size, child, input, words })
+    }
+
+    /// Adds a picture.
+    ///
+    /// # Errors
+    /// [`Error::Ffmpeg`] if it has ended, with what it said.
+    ///
+    /// # Panics
+    /// If the picture has another size than the film.
+    pub fn add(&mut self, picture: &Image) -> Result<(), Error> {
+        assert_eq!([picture.width, picture.height], self.size, "all pictures of a film have its size");
+        let written = self.input.as_mut().map(|pipe| pipe.write_all(picture.pixels.as_flattened()));
+        if matches!(written, Some(Ok(()))) { Ok(()) } else { Err(self.complaint()) }
+    }
+
+    /// Ends the film, and puts it in place.
+    ///
+    /// # Errors
+    /// [`Error::Ffmpeg`] if it failed, [`Error::Io`] if the film cannot be put in place.
+    pub fn finish(mut self) -> Result<(), Error> {
+        self.input = None;
+        let status = self.child.wait().map_err(|error| Error::Ffmpeg(error.to_string()))?;
+        if !status.success() {
+            return Err(self.complaint());
+        }
+        let place = |part: TempPath| {
+            part.persist(&self.path).map_err(|error| Error::Io { path: self.path.clone(), source: error.error })
+        };
+        self.part.take().map_or(Ok(()), place)
+    }
+
+    /// The last that ffmpeg said.
+    fn complaint(&mut self) -> Error {
+        self.input = None;
+        // It has ended, or ends as nothing more comes.
+        let _ = self.child.wait();
+        let words = self.words.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
+        let last = words.lines().rev().find(|line| !line.trim().is_empty());
+        Error::Ffmpeg(last.unwrap_or("it failed without a word").trim().into())
+    }
+}
+
+impl Drop for Film {
+    fn drop(&mut self) {
+        if self.part.is_some() {
+            self.input = None;
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
+}
+
+/// A file beside `path` with its extension, by which ffmpeg knows what to make.
+fn temporary(path: &Path) -> std::io::Result<TempPath> {
+    let mut suffix = OsString::from(".");
+    suffix.push(path.extension().unwrap_or_default());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".autosplats-").suffix(&suffix);
+    // Temporary files are for their owner alone unless told otherwise; the film is a file like any.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    Ok(builder.tempfile_in(folder)?.into_temp_path())
+}
+
+/// The command that makes a film of raw pictures.
+fn ffmpeg(path: &Path, [width, height]: [u32; 2], rate: f64) -> Command {
+    let mut command = Command::new("ffmpeg");
+    command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
+    command.args(["-s", &format!("{width}x{height}"), "-r", &rate.to_string(), "-i", "-"]);
+    // Most players want even sides and this kind of colour.
+    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(path);
+    command
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    const SIZE: [u32; 2] = [500, 500];
+
+    /// A film of three pictures by a shell script that is told the file's name as `$0`.
+    fn film(path: &Path, script: &str) -> Result<(), Error> {
+        let mut film = Film::with(path, SIZE, |part| {
+            let mut command = Command::new("sh");
+            command.args(["-c", script]).arg(part);
+            command
+        })?;
+        let picture = Image { width: 500, height: 500, pixels: vec![[7; 4]; 500 * 500], linear: Vec::new() };
+        (0..3).try_for_each(|_| film.add(&picture))?;
+        film.finish()
+    }
+
+    #[test]
+    fn a_film_appears_when_it_is_complete() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("film.mp4");
+        let words = |script: &str| film(&path, script).expect_err("it fails").to_string();
+        assert_eq!(words("echo bad >&2; exit 1"), "ffmpeg: bad", "it died before all was read");
+        assert_eq!(words("cat > \"$0\"; echo late >&2; exit 1"), "ffmpeg: late", "at the end");
+        assert_eq!(words("cat > \"$0\"; exit 1"), "ffmpeg: it failed without a word");
+        // More than a pipe holds.
+        assert_eq!(words("yes | head -c 300000 >&2; cat > \"$0\"; exit 1"), "ffmpeg: y", "it never waits for a reader");
+        let dropped = Film::with(&path, SIZE, |part| {
+            let mut command = Command::new("sh");
+            command.args(["-c", "cat > \"$0\""]).arg(part);
+            command
+        });
+        drop(dropped.expect("it begins"));
+        let names = || std::fs::read_dir(folder.path()).expect("a folder").count();
+        assert_eq!(names(), 0, "nothing is left behind");
+        film(&path, "cat > \"$0\"").expect("all is well");
+        assert_eq!(std::fs::read(&path).expect("a film").len(), 3 * 4 * 500 * 500, "every picture is in it");
+        let other = folder.path().join("other");
+        std::fs::write(&other, "").expect("a file");
+        let mode = |path: &Path| std::fs::metadata(path).expect("a file").permissions().mode();
+        assert_eq!(mode(&path), mode(&other), "others may see it as any file");
+    }
+}

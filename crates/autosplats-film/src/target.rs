@@ -1,0 +1,128 @@
+//! What the name of an output means.
+
+use std::path::{Path, PathBuf};
+
+use crate::Error;
+
+/// Most digits of a number in a name.
+const MAX_DIGITS: usize = 12;
+/// Digits of a number where the name says nothing of it.
+const DIGITS: usize = 5;
+
+/// Where pictures that follow each other go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// A PNG file each.
+    Frames(Frames),
+    /// One film.
+    Film(PathBuf),
+}
+
+/// Names of numbered files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frames {
+    folder: PathBuf,
+    before: String,
+    digits: usize,
+    after: String,
+}
+
+impl Target {
+    /// What a path means: a film by its extension (`.mp4`, `.mkv`, `.webm`, `.mov`), otherwise numbered PNG files, with the number
+    /// in place of `%d`, `%05d` or the like, or else at the end of the name, five digits wide.
+    ///
+    /// # Errors
+    /// [`Error::Name`] if it is neither, or has several numbers.
+    pub fn new(path: &Path) -> Result<Self, Error> {
+        let refuse = |why: &str| Error::Name { path: path.into(), why: why.into() };
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("mp4" | "mkv" | "webm" | "mov") => Ok(Self::Film(path.into())),
+            Some("png") => {
+                let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+                let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+                let (before, digits, after) = match number(&name) {
+                    Some((place, digits)) => (name[..place.start].into(), digits, name[place.end..].to_owned()),
+                    None => (name[..name.len() - 4].to_owned() + "_", DIGITS, ".png".into()),
+                };
+                if number(&after).is_some() {
+                    return Err(refuse("a name has one number"));
+                }
+                Ok(Self::Frames(Frames { folder, before, digits, after }))
+            }
+            _ => Err(refuse("the name has to end in .png, .mp4, .mkv, .webm or .mov")),
+        }
+    }
+
+    /// The first file that is there already and would be replaced by so many pictures, counted from 0.
+    pub fn existing(&self, pictures: usize) -> Option<PathBuf> {
+        match self {
+            Self::Film(path) => Some(path.clone()).filter(|path| path.exists()),
+            Self::Frames(frames) => (0..pictures).map(|number| frames.file(number)).find(|path| path.exists()),
+        }
+    }
+}
+
+impl Frames {
+    /// The file of a picture.
+    pub fn file(&self, number: usize) -> PathBuf {
+        let Self { folder, before, digits, after } = self;
+        folder.join(format!("{before}{number:0digits$}{after}"))
+    }
+
+    /// All of them, for a message.
+    pub fn pattern(&self) -> PathBuf {
+        self.folder.join(format!("{}…{}", self.before, self.after))
+    }
+}
+
+/// Whether the name says where a number goes.
+pub(crate) fn number(name: &str) -> Option<(std::ops::Range<usize>, usize)> {
+    name.match_indices('%').find_map(|(start, _)| {
+        let rest = &name[start + 1..];
+        let end = rest.find('d')?;
+        let width = &rest[..end];
+        let digits = match width.strip_prefix('0') {
+            None if width.is_empty() => 1,
+            Some(digits) => digits.parse().ok().filter(|digits| (1..=MAX_DIGITS).contains(digits))?,
+            None => return None,
+        };
+        Some((start..start + 1 + end + 1, digits))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(pattern: &str, picture: usize) -> String {
+        match Target::new(Path::new(pattern)) {
+            Ok(Target::Frames(frames)) => frames.file(picture).display().to_string(),
+            other => panic!("{pattern} is {other:?}"),
+        }
+    }
+
+    #[test]
+    fn names_tell_what_is_written() {
+        let film = Target::new(Path::new("a/film.MP4")).expect("a film");
+        assert_eq!(film, Target::Film("a/film.MP4".into()));
+        assert_eq!(file("a/f.png", 7), "a/f_00007.png", "numbered");
+        assert_eq!(file("f%03d_x.png", 7), "f007_x.png", "where it is told");
+        assert_eq!(file("%d.png", 12), "12.png", "as wide as it is");
+        assert_eq!(file("100%_done.png", 1), "100%_done_00001.png", "a percent sign alone is one");
+        assert_eq!(file("f%02d.png", 12345), "f12345.png", "no digit is lost");
+        for name in ["film", "film.gif", "a%d_%d.png"] {
+            assert!(matches!(Target::new(Path::new(name)), Err(Error::Name { .. })), "{name} is none");
+        }
+    }
+
+    #[test]
+    fn what_would_be_replaced_is_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let target = Target::new(&folder.path().join("f%02d.png")).expect("pictures");
+        assert_eq!(target.existing(10), None, "nothing is there");
+        std::fs::write(folder.path().join("f03.png"), "").expect("a file");
+        assert_eq!(target.existing(10), Some(folder.path().join("f03.png")));
+        assert_eq!(target.existing(3), None, "that is beyond");
+    }
+}
