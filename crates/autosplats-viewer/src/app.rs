@@ -385,16 +385,13 @@ impl App {
             }
             return;
         }
-        let key = WishKey {
-            version: self.version,
-            camera: self.navigation.camera(),
-            size,
-            look: self.look.clone(),
-            axes: self.axes(),
-            moving,
-        };
+        let mut look = self.look.clone();
+        // It lies over the picture here, where it stays as large when pictures become coarse.
+        look.settings.shading.legend = false;
+        let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
+        let key = WishKey { version, camera, size, look, axes, moving };
         if self.wished.as_ref() != Some(&key) {
-            self.render.wish(self.wish(size, moving));
+            self.render.wish(Wish { settings: key.look.settings.clone(), ..self.wish(size, moving) });
             self.wished = Some(key);
         }
     }

@@ -8,25 +8,39 @@ use eframe::egui::{self, Event, Key, Modifiers};
 use crate::app::App;
 use crate::commands::{Command, Tool};
 use crate::loading::Input;
+use crate::panels;
 
 /// Whether something is open that has the keys to itself: a menu, or a question that has to be answered first.
 fn is_behind(context: &egui::Context) -> bool {
     context.memory(|memory| memory.top_modal_layer()).is_some() || egui::Popup::is_any_open(context)
 }
 
-/// Takes keys that egui would use itself: Tab, which otherwise goes from button to button, as long as none has the focus.
+/// Looks at keys before egui does, which uses some itself. F6 goes from part to part whatever has the focus; Tab, which
+/// otherwise goes from control to control, changes the picture as long as nothing has it.
 pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::RawInput) {
-    if is_behind(context) || context.memory(|memory| memory.focused()).is_some() {
+    app.panels.left = false;
+    if is_behind(context) {
         return;
     }
-    input.events.retain(|event| match event {
-        Event::Key { key: Key::Tab, pressed, modifiers, .. } if modifiers.is_none() => {
-            if *pressed {
-                app.panels.claimed.push(Command::Dots);
+    let focused = context.memory(|memory| memory.focused()).is_some();
+    input.events.retain(|event| {
+        let Event::Key { key, pressed, modifiers, .. } = event else { return true };
+        let command = match key {
+            Key::F6 if modifiers.is_none() => Command::NextPart,
+            Key::F6 if modifiers.shift_only() => Command::PreviousPart,
+            Key::Tab if modifiers.is_none() && !focused => Command::Dots,
+            _ => {
+                app.panels.focus.by_keys |= *key == Key::Tab;
+                app.panels.entered |= *pressed && *key == Key::Enter && modifiers.is_none() && !focused;
+                // Escape in a panel gives the focus back and nothing else; in a dialog it closes it.
+                app.panels.left |= *pressed && *key == Key::Escape && focused && !app.panels.has_window();
+                return true;
             }
-            false
+        };
+        if *pressed {
+            app.panels.claimed.push(command);
         }
-        _ => true,
+        false
     });
 }
 
@@ -62,9 +76,10 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
             2 - u8::from(modifiers.shift) - u8::from(modifiers.command)
         });
         let clipboard = [Command::CopyView, Command::PasteView];
+        let left = app.panels.left;
+        let wanted = |command: &Command| !(clipboard.contains(command) || left && *command == Command::SelectNone);
         let hit = |command: &Command| command.shortcut().is_some_and(|shortcut| input.consume_shortcut(&shortcut));
-        let mut pressed: Vec<_> =
-            commands.into_iter().filter(|command| !clipboard.contains(command)).filter(hit).collect();
+        let mut pressed: Vec<_> = commands.into_iter().filter(wanted).filter(hit).collect();
         // '?' needs Shift on most keyboards.
         if input.events.iter().any(|event| matches!(event, Event::Text(text) if text == "?")) {
             pressed.push(Command::Help);
@@ -97,16 +112,16 @@ fn dropped(app: &mut App, context: &egui::Context) {
 pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
     match command {
         Command::Open => app.panels.dialogs.open(context),
-        Command::Export => app.panels.export.open = true,
-        Command::Screenshot => app.panels.picture.open = true,
-        Command::Film => app.panels.film.open = !app.panels.film.open,
-        Command::SaveState => app.panels.dialogs.save_state(app.state.as_deref()),
+        Command::Export => panels::ask_for_export(app),
+        Command::Screenshot => panels::ask_for_picture(app),
+        Command::Film => panels::toggle_film(app),
+        Command::SaveState => panels::ask_for_session(app),
         Command::CloseAll => {
             if app.document().layers.is_empty() {
                 // There is nothing to undo, but what is being read may be given up.
                 app.loader.cancel_all();
             } else {
-                crate::panels::close_all(app);
+                panels::close_all(app);
             }
         }
         Command::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
@@ -187,6 +202,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::Look => app.panels.look = !app.panels.look,
         Command::Statistics => app.panels.statistics = !app.panels.statistics,
         Command::Help => app.panels.help = !app.panels.help,
+        Command::NextPart => panels::go_on(app, context, false),
+        Command::PreviousPart => panels::go_on(app, context, true),
         Command::Tool(tool) => {
             app.tools.cancel();
             app.tool = tool;

@@ -10,6 +10,7 @@ mod document;
 mod files;
 mod gizmo;
 mod keys;
+mod legend;
 mod loading;
 mod look;
 mod measure;

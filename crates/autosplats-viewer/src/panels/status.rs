@@ -6,7 +6,7 @@ use crate::app::{App, Counted};
 use crate::document::grouped;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    egui::Panel::bottom("status").show(ui, |ui| {
+    let shown = egui::Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
             let &Counted { all: counts, bytes, old_bytes, .. } = app.counts();
             ui.label(format!("{} points", grouped(counts.points)));
@@ -41,4 +41,9 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             });
         });
     });
+    let rect = shown.response.rect;
+    // Nothing in it can be used, but people who do not see it can have it read.
+    let line = ui.interact(rect, egui::Id::unique("status line"), egui::Sense::focusable_noninteractive());
+    line.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "Status"));
+    app.panels.focus.part(rect);
 }
