@@ -179,7 +179,7 @@ impl Command {
             Self::Statistics => "Statistics",
             Self::Help => "Keys and mouse",
             Self::NextPart => "Next part of the window",
-            Self::PreviousPart => "Part of the window before",
+            Self::PreviousPart => "Previous part of the window",
             Self::Tool(Tool::Navigate) => "Navigate",
             Self::Tool(Tool::Inspect) => "Inspect point",
             Self::Tool(Tool::Measure) => "Measure",

@@ -6,9 +6,10 @@ use autosplats::{Camera, MAX_SIDE};
 use eframe::egui;
 
 use super::target_file::{TargetFile, Words};
-use crate::animation::{Recording, Target, has_ffmpeg, path, turntable};
+use crate::animation::{path, turntable};
 use crate::app::App;
 use crate::output;
+use crate::recording::{Recording, Target, has_ffmpeg};
 use crate::threads::spawn;
 
 /// What is being asked and what is being played.

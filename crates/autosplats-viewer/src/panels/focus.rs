@@ -98,7 +98,7 @@ pub(super) fn ring(app: &mut App, context: &Context) {
         return;
     };
     let painter = context.layer_painter(LayerId::new(egui::Order::Foreground, Id::unique("focus ring")));
-    let color = context.global_style().visuals.hyperlink_color;
+    let color = context.global_style().visuals.selection.stroke.color;
     let rect = widget.interact_rect.expand(2.0);
     painter.rect_stroke(rect, 3.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Middle);
 }

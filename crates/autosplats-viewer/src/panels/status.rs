@@ -2,8 +2,9 @@
 
 use eframe::egui;
 
-use crate::app::{App, Counted};
+use crate::app::App;
 use crate::document::grouped;
+use crate::editing::Counted;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     let shown = egui::Panel::bottom("status").show(ui, |ui| {

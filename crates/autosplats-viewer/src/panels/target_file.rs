@@ -125,6 +125,7 @@ impl TargetFile {
         if let Some(why) = why {
             ui.add(egui::Label::new(egui::RichText::new(why).color(color)).wrap());
         }
+        ui.add_space(4.0);
         let path = self.path();
         let named = !self.text.trim().is_empty() && problem.is_none();
         let write = |replace, answered| Some(Write { path: path.clone(), replace, answered });

@@ -132,26 +132,27 @@ fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
             samples.extend(resident_mb());
         }
     }
-    let least = least_of_thirds(&samples);
+    let least = least(&samples, 10);
     let peak = samples.iter().copied().fold(0.0, f64::max);
-    let seen = format!(
-        "{events} rounds in {seconds:.0} s, seed {seed}: {least:.1?} MB at least in each third, {peak:.0} at most"
-    );
+    let what = format!("{events} rounds in {seconds:.0} s, seed {seed}");
+    let seen = format!("{what}: {least:.1?} MB at least in each tenth, {peak:.0} at most");
     println!("{seen}");
     assert!(grown(&samples) < allowed_mb, "memory grows: {seen}");
     assert!(events as f64 > 0.5 * seconds, "the window still answers: {seen}");
     window.until("it can still be used", |window| !window.app().navigation.is_moving());
 }
 
-fn least_of_thirds(samples: &[f64]) -> [f64; 3] {
-    let third = samples.len() / 3;
-    [0, 1, 2].map(|part| samples[part * third..][..third].iter().copied().fold(f64::INFINITY, f64::min))
+/// The least of each of some equal parts.
+fn least(samples: &[f64], parts: usize) -> Vec<f64> {
+    let len = samples.len() / parts;
+    let least = |part: usize| samples[part * len..][..len].iter().copied().fold(f64::INFINITY, f64::min);
+    (0..parts).map(least).collect()
 }
 
 /// Megabytes that the last third has more than the middle one, each at its least.
 fn grown(samples: &[f64]) -> f64 {
-    let [_, middle, last] = least_of_thirds(samples);
-    if middle.is_finite() { last - middle } else { 0.0 }
+    let least = least(samples, 3);
+    if least[1].is_finite() { least[2] - least[1] } else { 0.0 }
 }
 
 #[test]
