@@ -4,19 +4,21 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
-use autosplats::cloud::{Axes, PointCloud};
 use autosplats::{AdapterSummary, Camera};
 use eframe::egui;
 
-use crate::animation::Recording;
 use crate::commands::Tool;
-use crate::document::{Counts, Document, History, LayerId, Shown, label};
+use crate::document::{History, LayerId, Shown};
+use crate::editing::Counted;
 use crate::loading::{Input, JobId, Loader, Watch};
 use crate::look::Look;
 use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
 use crate::panels::Panels;
+use crate::rate::Rate;
+use crate::recording::Recording;
 use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
 use crate::state::State;
 use crate::tools::Tools;
@@ -66,8 +68,8 @@ pub(crate) struct App {
     /// anew when points arrive and when the picture changes its shape.
     pub(crate) first_camera: Option<(Camera, f64)>,
     /// Grows with each change of the document.
-    version: u64,
-    counted: Counted,
+    pub(crate) version: u64,
+    pub(crate) counted: Counted,
     /// What the picture that was wished for last shows.
     wished: Option<WishKey>,
     /// Whether that picture has not come yet.
@@ -88,57 +90,6 @@ pub(crate) struct App {
     pub(crate) format: Option<eframe::wgpu::TextureFormat>,
     /// Where pictures and the window are drawn by the same processor.
     pub(crate) turns: Option<Turns>,
-}
-
-/// What panels say of the document, as of a version of it.
-#[derive(Default)]
-pub(crate) struct Counted {
-    version: u64,
-    /// Points of all layers.
-    pub(crate) all: Counts,
-    /// Points of each layer.
-    pub(crate) layers: HashMap<LayerId, Counts>,
-    /// Bytes of all points.
-    pub(crate) bytes: usize,
-    /// Bytes that undo keeps besides.
-    pub(crate) old_bytes: usize,
-}
-
-/// Pictures a second, while they change.
-#[derive(Default)]
-pub(crate) struct Rate {
-    last: Option<f64>,
-    /// Mean seconds between pictures; 0 while unknown.
-    interval: f64,
-    /// The last pictures' times per stage, for the plot.
-    pub(crate) timings: std::collections::VecDeque<autosplats::Timings>,
-}
-
-impl Rate {
-    /// Pictures kept for the plot.
-    const KEPT: usize = 120;
-
-    fn count(&mut self, now: f64, picture: &Picture) {
-        if let Some(last) = self.last {
-            let interval = now - last;
-            // A pause is no slow picture.
-            if interval < 0.5 {
-                self.interval = if self.interval > 0.0 { 0.8 * self.interval + 0.2 * interval } else { interval };
-            } else {
-                self.interval = 0.0;
-            }
-        }
-        self.last = Some(now);
-        if self.timings.len() == Self::KEPT {
-            self.timings.pop_front();
-        }
-        self.timings.push_back(picture.timings);
-    }
-
-    /// Pictures a second, if they follow each other.
-    pub(crate) fn per_second(&self) -> Option<f64> {
-        (self.interval > 0.0).then(|| 1.0 / self.interval)
-    }
 }
 
 /// All that a picture depends on.
@@ -205,82 +156,6 @@ impl App {
     /// Says that the view moves, so that pictures have to hurry.
     pub(crate) fn stir(&mut self) {
         self.stirred = true;
-    }
-
-    /// What is open.
-    pub(crate) fn document(&self) -> &Document {
-        self.history.current()
-    }
-
-    /// Grows with each change of the document.
-    pub(crate) fn version(&self) -> u64 {
-        self.version
-    }
-
-    /// Numbers of points of all that is open, and of each layer; counted anew only after changes, and after drags.
-    pub(crate) fn counts(&mut self) -> &Counted {
-        if self.counted.version != self.version && !self.tools.gizmo.is_busy() {
-            let document = self.document();
-            self.counted = Counted {
-                version: self.version,
-                all: document.counts(),
-                layers: document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect(),
-                bytes: document.layers.iter().map(|layer| layer.cloud.byte_len()).sum(),
-                old_bytes: self.history.old_bytes(),
-            };
-        }
-        &self.counted
-    }
-
-    /// Changes the document in a way that can be undone.
-    pub(crate) fn edit(&mut self, label: impl Into<String>, edit: impl FnOnce(&mut Document)) {
-        let mut document = self.document().clone();
-        edit(&mut document);
-        self.history.record(label, document);
-        self.version += 1;
-    }
-
-    /// Changes points in a way that can be undone; `edit` says how many it reached.
-    pub(crate) fn edit_points(&mut self, verb: &str, edit: impl FnOnce(&mut Document) -> usize) {
-        let mut document = self.document().clone();
-        let points = edit(&mut document);
-        if points > 0 {
-            self.history.record(label(verb, points), document);
-            self.version += 1;
-        }
-    }
-
-    /// Changes the document in a way that is not worth undoing.
-    pub(crate) fn change<T>(&mut self, change: impl FnOnce(&mut Document) -> T) -> T {
-        let mut document = self.document().clone();
-        let result = change(&mut document);
-        self.history.replace(document);
-        self.version += 1;
-        result
-    }
-
-    /// Changes the document in a way that outlasts undo: files come and go, inputs are shown or not.
-    pub(crate) fn settle(&mut self, change: impl Fn(&mut Document)) {
-        self.history.everywhere(change);
-        self.version += 1;
-    }
-
-    /// Gives a layer other points.
-    pub(crate) fn fill(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
-        self.history.reload(id, cloud);
-        self.version += 1;
-    }
-
-    /// Takes back the last edit; says which it was.
-    pub(crate) fn undo(&mut self) -> Option<String> {
-        self.version += 1;
-        self.history.undo()
-    }
-
-    /// Does again what was taken back last; says what.
-    pub(crate) fn redo(&mut self) -> Option<String> {
-        self.version += 1;
-        self.history.redo()
     }
 
     /// Which way is up.
@@ -389,16 +264,13 @@ impl App {
             }
             return;
         }
-        let key = WishKey {
-            version: self.version,
-            camera: self.navigation.camera(),
-            size,
-            look: self.look.clone(),
-            axes: self.axes(),
-            moving,
-        };
+        let mut look = self.look.clone();
+        // It lies over the picture here, where it stays as large when pictures become coarse.
+        look.settings.shading.legend = false;
+        let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
+        let key = WishKey { version, camera, size, look, axes, moving };
         if self.wished.as_ref() != Some(&key) {
-            self.render.wish(self.wish(size, moving));
+            self.render.wish(Wish { settings: key.look.settings.clone(), ..self.wish(size, moving) });
             self.wished = Some(key);
             self.awaited = true;
         }

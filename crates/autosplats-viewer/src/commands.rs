@@ -37,6 +37,8 @@ pub(crate) enum Command {
     Look,
     Statistics,
     Help,
+    NextPart,
+    PreviousPart,
     Tool(Tool),
 }
 
@@ -85,7 +87,7 @@ impl Tool {
 
 impl Command {
     /// All of them, in the order of the menus.
-    pub(crate) const ALL: [Self; 45] = [
+    pub(crate) const ALL: [Self; 47] = [
         Self::Open,
         Self::Export,
         Self::Screenshot,
@@ -124,6 +126,8 @@ impl Command {
         Self::Look,
         Self::Statistics,
         Self::Help,
+        Self::NextPart,
+        Self::PreviousPart,
         Self::Tool(Tool::Navigate),
         Self::Tool(Tool::Inspect),
         Self::Tool(Tool::Measure),
@@ -174,6 +178,8 @@ impl Command {
             Self::Look => "Look",
             Self::Statistics => "Statistics",
             Self::Help => "Keys and mouse",
+            Self::NextPart => "Next part of the window",
+            Self::PreviousPart => "Previous part of the window",
             Self::Tool(Tool::Navigate) => "Navigate",
             Self::Tool(Tool::Inspect) => "Inspect point",
             Self::Tool(Tool::Measure) => "Measure",
@@ -229,6 +235,8 @@ impl Command {
             Self::Look => plain(Key::L),
             Self::Statistics => plain(Key::P),
             Self::Help => plain(Key::H),
+            Self::NextPart => plain(Key::F6),
+            Self::PreviousPart => Some(KeyboardShortcut::new(Modifiers::SHIFT, Key::F6)),
             Self::Tool(Tool::Navigate) => plain(Key::N),
             Self::Tool(Tool::Inspect) => plain(Key::X),
             Self::Tool(Tool::Measure) => plain(Key::M),
@@ -274,6 +282,8 @@ impl Command {
             Self::Look => "How it is shown",
             Self::Statistics => "What a picture costs",
             Self::Help => "Everything that keys and mouse do",
+            Self::NextPart => "Give the keyboard to the next panel or window; Escape gives it back to the picture",
+            Self::PreviousPart => "The other way round",
             Self::Tool(Tool::Navigate) => "Left drag turns the view",
             Self::Tool(Tool::Inspect) => "Click a point to see its coordinates and attributes",
             Self::Tool(Tool::Measure) => "Click points to measure distance, height and angle",

@@ -8,25 +8,39 @@ use eframe::egui::{self, Event, Key, Modifiers};
 use crate::app::App;
 use crate::commands::{Command, Tool};
 use crate::loading::Input;
+use crate::panels;
 
 /// Whether something is open that has the keys to itself: a menu, or a question that has to be answered first.
 fn is_behind(context: &egui::Context) -> bool {
     context.memory(|memory| memory.top_modal_layer()).is_some() || egui::Popup::is_any_open(context)
 }
 
-/// Takes keys that egui would use itself: Tab, which otherwise goes from button to button, as long as none has the focus.
+/// Looks at keys before egui does, which uses some itself. F6 goes from part to part whatever has the focus; Tab, which
+/// otherwise goes from control to control, changes the picture as long as nothing has it.
 pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::RawInput) {
-    if is_behind(context) || context.memory(|memory| memory.focused()).is_some() {
+    app.panels.left = false;
+    if is_behind(context) {
         return;
     }
-    input.events.retain(|event| match event {
-        Event::Key { key: Key::Tab, pressed, modifiers, .. } if modifiers.is_none() => {
-            if *pressed {
-                app.panels.claimed.push(Command::Dots);
+    let focused = context.memory(|memory| memory.focused()).is_some();
+    input.events.retain(|event| {
+        let Event::Key { key, pressed, modifiers, .. } = event else { return true };
+        let command = match key {
+            Key::F6 if modifiers.is_none() => Command::NextPart,
+            Key::F6 if modifiers.shift_only() => Command::PreviousPart,
+            Key::Tab if modifiers.is_none() && !focused => Command::Dots,
+            _ => {
+                app.panels.focus.by_keys |= *key == Key::Tab;
+                app.panels.entered |= *pressed && *key == Key::Enter && modifiers.is_none() && !focused;
+                // Escape in a panel gives the focus back and nothing else; in a dialog it closes it.
+                app.panels.left |= *pressed && *key == Key::Escape && focused && !app.panels.has_window();
+                return true;
             }
-            false
+        };
+        if *pressed {
+            app.panels.claimed.push(command);
         }
-        _ => true,
+        false
     });
 }
 
@@ -62,9 +76,10 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
             2 - u8::from(modifiers.shift) - u8::from(modifiers.command)
         });
         let clipboard = [Command::CopyView, Command::PasteView];
+        let left = app.panels.left;
+        let wanted = |command: &Command| !(clipboard.contains(command) || left && *command == Command::SelectNone);
         let hit = |command: &Command| command.shortcut().is_some_and(|shortcut| input.consume_shortcut(&shortcut));
-        let mut pressed: Vec<_> =
-            commands.into_iter().filter(|command| !clipboard.contains(command)).filter(hit).collect();
+        let mut pressed: Vec<_> = commands.into_iter().filter(wanted).filter(hit).collect();
         // '?' needs Shift on most keyboards.
         if input.events.iter().any(|event| matches!(event, Event::Text(text) if text == "?")) {
             pressed.push(Command::Help);
@@ -97,16 +112,16 @@ fn dropped(app: &mut App, context: &egui::Context) {
 pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
     match command {
         Command::Open => app.panels.dialogs.open(context),
-        Command::Export => app.panels.export.open = true,
-        Command::Screenshot => app.panels.picture.open = true,
-        Command::Film => app.panels.film.open = !app.panels.film.open,
-        Command::SaveState => app.panels.dialogs.save_state(app.state.as_deref()),
+        Command::Export => panels::ask_for_export(app),
+        Command::Screenshot => panels::ask_for_picture(app),
+        Command::Film => panels::toggle_film(app),
+        Command::SaveState => panels::ask_for_session(app),
         Command::CloseAll => {
             if app.document().layers.is_empty() {
                 // There is nothing to undo, but what is being read may be given up.
                 app.loader.cancel_all();
             } else {
-                crate::panels::close_all(app);
+                panels::close_all(app);
             }
         }
         Command::Quit => context.send_viewport_cmd(egui::ViewportCommand::Close),
@@ -187,6 +202,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::Look => app.panels.look = !app.panels.look,
         Command::Statistics => app.panels.statistics = !app.panels.statistics,
         Command::Help => app.panels.help = !app.panels.help,
+        Command::NextPart => panels::go_on(app, context, false),
+        Command::PreviousPart => panels::go_on(app, context, true),
         Command::Tool(tool) => {
             app.tools.cancel();
             app.tool = tool;
@@ -218,107 +235,4 @@ fn paste_view(app: &mut App, text: &str) {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use autosplats::Projection;
-    use autosplats::cloud::PointCloud;
-
-    use super::*;
-    use crate::Options;
-    use crate::document::{Layer, SelectMode};
-    use crate::look::Look;
-
-    #[test]
-    fn the_opposite_view_is_upright() {
-        for degrees in [-60.0_f64, 0.0, 30.0, 45.0, 60.0, 89.0] {
-            let (sine, cosine) = degrees.to_radians().sin_cos();
-            let look_at = DVec3::new(3.0, 4.0, 5.0);
-            let eye = look_at + 10.0 * DVec3::new(0.0, -cosine, sine);
-            let up = DVec3::new(0.0, sine, cosine);
-            let camera = Camera { eye, look_at, up, projection: Projection::PerspectiveFovDeg(40.0) };
-            let there = opposite(&camera, DVec3::Z);
-            assert!(there.eye.distance(look_at + 10.0 * DVec3::new(0.0, cosine, sine)) < 1e-9, "{degrees}: {there:?}");
-            let [before, after] = [camera, there].map(|camera| camera.axes().expect("a camera that sees"));
-            assert!(before[0].distance(-after[0]) < 1e-9, "{degrees}: right is left");
-            assert!(after[1].z < 0.0, "{degrees}: down is down, {:?}", after[1]);
-            let back = opposite(&there, DVec3::Z);
-            assert!(back.eye.distance(eye) < 1e-9 && back.up.distance(up) < 1e-9, "{degrees}: twice is none");
-        }
-        let above = Camera {
-            eye: DVec3::Z,
-            look_at: DVec3::ZERO,
-            up: DVec3::Y,
-            projection: Projection::OrthographicHeight(1.0),
-        };
-        assert_eq!(opposite(&above, DVec3::Z).eye, DVec3::NEG_Z, "from above is from below");
-    }
-
-    /// An application with points that are selected.
-    fn app(context: &egui::Context) -> App {
-        let mut app = App::new(Options::default(), Look::default(), Vec::new(), context);
-        app.change(|document| {
-            document.add(Layer::new("some", None, Arc::new(PointCloud::new(DVec3::ZERO, vec![[0.5; 3]; 10]))));
-            let shown = document.shown();
-            document.select(&shown, |_| true, SelectMode::Replace);
-        });
-        app
-    }
-
-    /// Presses a key in a frame of the window in which a question is asked or not.
-    fn press(app: &mut App, context: &egui::Context, key: Key, question: bool) {
-        let mut input = egui::RawInput::default();
-        let event =
-            |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::NONE };
-        input.events.push(event(key));
-        claim(app, context, &mut input);
-        let mut output = context.run_ui(input, |ui| {
-            let context = ui.ctx().clone();
-            perform(app, &context);
-            if question {
-                egui::Modal::new(egui::Id::unique("question")).show(&context, |ui| ui.label("Well?"));
-            }
-        });
-        // There is nothing to draw on.
-        output.textures_delta.clear();
-    }
-
-    #[test]
-    fn keys_do_nothing_behind_a_question() {
-        let context = egui::Context::default();
-        let mut app = app(&context);
-        press(&mut app, &context, Key::F20, true);
-        for key in [Key::Delete, Key::Tab] {
-            press(&mut app, &context, key, true);
-        }
-        assert_eq!(app.history.undo_label(), None, "nothing was deleted");
-        assert!(!app.look.dots, "nor shown in another way");
-        press(&mut app, &context, Key::F20, false);
-        for key in [Key::Delete, Key::Tab] {
-            press(&mut app, &context, key, false);
-        }
-        assert!(app.history.undo_label().is_some(), "without a question they do what they do");
-        assert!(app.look.dots, "both of them");
-    }
-
-    #[test]
-    fn escape_gives_up_a_drag_before_it_closes_a_window() {
-        let context = egui::Context::default();
-        let mut app = app(&context);
-        app.panels.help = true;
-        app.tool = Tool::Lasso;
-        app.tools.draw(&[egui::pos2(1.0, 2.0)]);
-        press(&mut app, &context, Key::Escape, false);
-        assert!(app.panels.help && app.tool == Tool::Lasso, "first the drag");
-        press(&mut app, &context, Key::Escape, false);
-        assert!(!app.panels.help, "then the window");
-    }
-
-    #[test]
-    fn closing_nothing_is_nothing_to_undo() {
-        let context = egui::Context::default();
-        let mut app = App::new(Options::default(), Look::default(), Vec::new(), &context);
-        run(&mut app, &context, Command::CloseAll);
-        assert_eq!(app.undo(), None, "nothing was done");
-    }
-}
+mod tests;

@@ -20,6 +20,8 @@ pub(crate) struct Look {
     pub(crate) backend: Backend,
     /// Milliseconds a picture may take while the eye moves; larger is sharper and less smooth.
     pub(crate) moving_ms: f64,
+    /// What two fingers do that are drawn over a touchpad.
+    pub(crate) two_fingers: TwoFingers,
     /// The little axes, the scale bar and the figures over the picture.
     pub(crate) overlay: bool,
 }
@@ -32,7 +34,21 @@ impl Default for Look {
             dot_size: 2,
             backend: Backend::Auto,
             moving_ms: MOVING_MS,
+            two_fingers: TwoFingers::default(),
             overlay: true,
         }
     }
+}
+
+/// What two fingers do that are drawn over a touchpad; pinched they zoom in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum TwoFingers {
+    /// As a wheel does.
+    #[default]
+    Zoom,
+    /// They turn the view.
+    Orbit,
+    /// They move it sideways.
+    Pan,
 }

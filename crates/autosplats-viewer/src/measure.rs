@@ -80,6 +80,11 @@ impl Ruler {
         with_unit(length, self.unit.map(symbol))
     }
 
+    /// The sign of the unit, if there is one.
+    pub(crate) fn unit(&self) -> Option<&'static str> {
+        self.unit.map(symbol)
+    }
+
     /// A length of few digits with its unit, as on a scale bar.
     pub(crate) fn round_text(&self, length: f64) -> String {
         let digits = if (1e-4..1e7).contains(&length) { length.to_string() } else { format!("{length:e}") };

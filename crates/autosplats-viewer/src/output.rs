@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use autosplats::Image;
 
-use crate::animation::Recording;
 use crate::app::App;
 use crate::files;
+use crate::recording::Recording;
 use crate::render::{Task, Wish};
 use crate::threads::spawn;
 

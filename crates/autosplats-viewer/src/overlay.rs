@@ -62,7 +62,7 @@ fn scale_bar(app: &App, painter: &egui::Painter, rect: egui::Rect) {
 }
 
 /// The next smaller number of the kind 1, 2, 5, 10, 20 …
-fn round(length: f64) -> f64 {
+pub(crate) fn round(length: f64) -> f64 {
     let power = 10f64.powf(length.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|step| step * power).find(|&step| step <= length * 1.000_001).unwrap_or(power)
 }

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use autosplats::Camera;
-use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DMat4;
+use autosplats::cloud::{Axes, DepthCamera, ReadOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::app::App;
+use crate::document::ClipBox;
 use crate::files;
 use crate::loading::Input;
 use crate::look::Look;
@@ -22,6 +23,8 @@ pub(crate) struct State {
     look: Look,
     /// Cameras that a film goes through.
     keys: Vec<Camera>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clip: Option<ClipBox>,
 }
 
 /// An input of the list.
@@ -37,6 +40,37 @@ struct InputState {
     /// From its own to world coordinates, by columns.
     #[serde(default)]
     pose: DMat4,
+    #[serde(default, skip_serializing_if = "Options::is_usual")]
+    options: Options,
+}
+
+/// How an input was read, where that was told.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Options {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    columns: Option<Vec<String>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    depth_camera: Option<DepthCamera>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    keep_no_returns: bool,
+}
+
+impl Options {
+    fn of(input: &Input) -> Self {
+        let ReadOptions { keep_no_returns, columns, depth_camera, .. } = input.options.clone();
+        Self { columns, depth_camera, keep_no_returns }
+    }
+
+    /// Whether nothing was told.
+    fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn read(self) -> ReadOptions {
+        let Self { columns, depth_camera, keep_no_returns } = self;
+        ReadOptions { columns, depth_camera, keep_no_returns, ..ReadOptions::default() }
+    }
 }
 
 fn yes() -> bool {
@@ -58,8 +92,9 @@ impl State {
     /// What is open in `app`, or was to be.
     pub(crate) fn of(app: &App) -> Self {
         let layers = app.document().layers.iter().filter_map(|layer| {
-            let source = App::source_name(app.inputs.get(&layer.id)?);
-            Some(InputState { source, visible: layer.visible, tint: layer.tint, pose: layer.pose })
+            let input = app.inputs.get(&layer.id)?;
+            let (source, options) = (App::source_name(input), Options::of(input));
+            Some(InputState { source, visible: layer.visible, tint: layer.tint, pose: layer.pose, options })
         });
         // What could not be read this time, or is still being read, is no less a part of the session.
         let started = |id| app.loading.contains_key(&id) || app.reloads.contains_key(&id);
@@ -73,6 +108,7 @@ impl State {
             visible,
             tint,
             pose: input.world_from_input,
+            options: Options::of(input),
         });
         let inputs: Vec<InputState> = layers.chain(absent).collect();
         let up = app.up_axis.map(|axes| match axes {
@@ -86,6 +122,7 @@ impl State {
             up,
             look: app.look.clone(),
             keys: app.keys.clone(),
+            clip: app.document().clip,
         }
     }
 
@@ -102,6 +139,9 @@ impl State {
         state.look.settings.check().map_err(|error| format!("{}: {error}", path.display()))?;
         for camera in state.camera.iter().chain(&state.keys) {
             camera.check().map_err(|error| format!("{}: {error}", path.display()))?;
+        }
+        if state.clip.as_ref().is_some_and(|clip| !clip.is_box()) {
+            return Err(format!("{}: the clipping box is no box", path.display()));
         }
         Ok(state)
     }
@@ -120,7 +160,7 @@ impl State {
 
     /// Opens what the state has; paths are from `folder`.
     pub(crate) fn restore(self, app: &mut App, folder: &Path) {
-        let Self { inputs, camera, up, look, keys } = self;
+        let Self { inputs, camera, up, look, keys, clip } = self;
         app.look = look;
         app.keys = keys;
         app.up_axis = up.map(|up| match up {
@@ -128,14 +168,20 @@ impl State {
             Up::Y => Axes::YUp,
             Up::Camera => Axes::Camera,
         });
-        for InputState { source, visible, tint, pose } in inputs {
+        if clip.is_some() {
+            app.settle(|document| document.clip = clip);
+        }
+        for InputState { source, visible, tint, pose, options } in inputs {
             let name = if source.starts_with("scene:") { source } else { folder.join(source).display().to_string() };
             match Input::parse(&name) {
                 // Named when the program was started, too.
                 Ok(input)
                     if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input)) => {
                 }
-                Ok(input) => app.open_as(Input { world_from_input: pose, ..input }, visible, tint),
+                Ok(input) => {
+                    let input = Input { world_from_input: pose, options: options.read(), ..input };
+                    app.open_as(input, visible, tint);
+                }
                 Err(error) => app.messages.error(error.to_string()),
             }
         }
@@ -152,16 +198,64 @@ pub(crate) fn folder(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use autosplats::cloud::glam::{DQuat, DVec3};
+
     use super::*;
 
     #[test]
     fn states_come_back() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("state.json");
-        let input = InputState { source: "a.ply".into(), visible: false, tint: Some([1, 2, 3]), pose: DMat4::IDENTITY };
-        let state = State { inputs: vec![input], up: Some(Up::Y), ..State::default() };
+        let camera = DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: 5000.0 };
+        let columns = Some(vec!["x".into(), "-".into(), "y".into()]);
+        let options = Options { columns, depth_camera: Some(camera), keep_no_returns: true };
+        let pose = DMat4::from_rotation_z(0.5);
+        let input = InputState { source: "a.ply".into(), visible: false, tint: Some([1, 2, 3]), pose, options };
+        let usual = InputState { source: "b.ply".into(), options: Options::default(), ..input.clone() };
+        let clip = ClipBox { rotation: DQuat::from_rotation_z(0.7), ..ClipBox::new(DVec3::ZERO, DVec3::ONE) };
+        let state = State { inputs: vec![input, usual], up: Some(Up::Y), clip: Some(clip), ..State::default() };
         state.write(&path).expect("written");
         assert_eq!(State::read(&path), Ok(state), "as it was");
+        let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z_up", "keys": []}"#;
+        std::fs::write(&path, older).expect("written");
+        let read = State::read(&path).expect("a file from before there were boxes and options");
+        assert_eq!((read.clip, &read.inputs[0].options), (None, &Options::default()), "none were told");
+    }
+
+    #[test]
+    fn a_session_is_had_again_with_its_box_and_the_ways_inputs_are_read() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("state.json");
+        let context = eframe::egui::Context::default();
+        let app = || App::new(crate::Options::default(), Look::default(), Vec::new(), &context);
+        let mut first = app();
+        let file = folder.path().join("columns.txt");
+        std::fs::write(&file, "1 9 2 3\n0 0 0 0\n4 9 5 6\n").expect("written");
+        let columns = Some(["x", "-", "y", "z"].map(String::from).to_vec());
+        let options = ReadOptions { columns, keep_no_returns: true, ..ReadOptions::default() };
+        let world_from_input = DMat4::from_translation(DVec3::X);
+        first.open(Input { options, world_from_input, ..Input::file(file) });
+        let clip = ClipBox::new(DVec3::NEG_ONE, DVec3::ONE);
+        first.change(|document| document.clip = Some(clip));
+        let kept = State::of(&first);
+        kept.write(&path).expect("written");
+        let mut second = app();
+        State::read(&path).expect("read").restore(&mut second, folder.path());
+        // Turns are kept as another kind of number, which rounds.
+        let without = |state: State| State { camera: None, ..state };
+        let kept = without(kept);
+        assert_eq!(without(State::of(&second)), kept, "what was still to be read is no less a part of it");
+        let start = std::time::Instant::now();
+        while second.document().layers.is_empty() || !second.loader.jobs().is_empty() {
+            assert!(start.elapsed().as_secs() < 60, "it is read");
+            second.follow_files();
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        assert_eq!(without(State::of(&second)), kept, "nor what was read");
+        assert_eq!(second.document().clip, Some(clip), "the box clips");
+        let layer = &second.document().layers[0];
+        assert_eq!(layer.cloud.len(), 3, "the sensor's own place is kept");
+        assert_eq!(layer.position(2), DVec3::new(5.0, 5.0, 6.0), "by the columns that were told, where it stood");
     }
 
     #[test]
@@ -174,6 +268,8 @@ mod tests {
             "{\"inputs\": 3}",
             "{\"unknown\": 1}",
             "{\"look\": {\"settings\": {\"reconstruction\": {\"k\": 0}}}}",
+            "{\"inputs\": [{\"source\": \"a\", \"options\": {\"colums\": []}}]}",
+            r#"{"clip": {"min": [0,0,0], "max": [-1,1,1], "rotation": [0,0,0,1], "enabled": true}}"#,
         ] {
             std::fs::write(&path, text).expect("written");
             let error = State::read(&path).expect_err(text);

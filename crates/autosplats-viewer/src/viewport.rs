@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use autosplats::cloud::glam::{DVec2, DVec3};
-use eframe::egui::{self, Color32, PointerButton, Sense};
+use eframe::egui::{self, Color32, MouseWheelSource, PointerButton, Sense};
 
 use crate::app::App;
 use crate::commands::Tool;
+use crate::look::TwoFingers;
 use crate::render::Purpose;
 use crate::screen::OnScreen;
-use crate::{gizmo, overlay, tools};
+use crate::{gizmo, legend, overlay, tools};
 
 /// How much closer one line of a mouse wheel goes.
 const WHEEL: f64 = 0.0024;
@@ -18,7 +19,7 @@ const WHEEL: f64 = 0.0024;
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
         let rect = ui.available_rect_before_wrap();
-        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        let response = ui.allocate_rect(rect, Sense::CLICK | Sense::DRAG);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Surface of the points"));
         let scale = ui.ctx().pixels_per_point();
         let side = |points: f32| ((points * scale).round() as u32).clamp(1, autosplats::MAX_SIDE);
@@ -44,6 +45,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
         if app.look.overlay {
             overlay::show(app, ui, rect);
         }
+        legend::show(app, ui, rect);
         app.messages.show(ui.ctx(), rect);
     });
 }
@@ -139,12 +141,23 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     }
     if response.hovered() {
         let (scroll, pinch) = context.input(|input| (input.smooth_scroll_delta(), input.zoom_delta()));
-        let factor = (f64::from(scroll.y) * WHEEL).exp() * f64::from(pinch);
+        app.panels.fingers = context.input(|input| by_fingers(&input.events)).unwrap_or(app.panels.fingers);
+        let way = DVec2::new(scroll.x.into(), scroll.y.into()) / f64::from(rect.height().max(1.0));
+        let fingers = app.panels.fingers && way != DVec2::ZERO;
+        let mut factor = f64::from(pinch);
+        match app.look.two_fingers {
+            TwoFingers::Orbit if fingers => app.navigation.orbit(way),
+            TwoFingers::Pan if fingers => {
+                let depth = context.pointer_hover_pos().and_then(|place| under(app, rect, place));
+                app.navigation.pan(way, depth.map(|(_, depth)| depth));
+            }
+            _ => factor *= (f64::from(scroll.y) * WHEEL).exp(),
+        }
         if factor != 1.0 {
             let target = context.pointer_hover_pos().and_then(|place| zoom_target(app, context, rect, place));
             app.navigation.zoom(factor, target);
-            busy = true;
         }
+        busy |= factor != 1.0 || way != DVec2::ZERO;
     }
     if let Some(touch) = context.multi_touch().filter(|_| response.contains_pointer()) {
         let drag = touch.translation_delta / rect.height();
@@ -175,6 +188,17 @@ fn zoom_target(app: &mut App, context: &egui::Context, rect: egui::Rect, place: 
     let world = last.map(|last| last.world).or_else(|| under(app, rect, place).map(|(world, _)| world));
     app.panels.zoomed = world.map(|world| Zoomed { time, place, world });
     world
+}
+
+/// Whether what scrolls is fingers on a touchpad, by the last event that tells. Where the system does not say, they are known
+/// by scrolling in pixels; X11 has lines for both.
+fn by_fingers(events: &[egui::Event]) -> Option<bool> {
+    events.iter().rev().find_map(|event| match event {
+        egui::Event::MouseWheel { source: MouseWheelSource::Trackpad | MouseWheelSource::Momentum, .. } => Some(true),
+        egui::Event::MouseWheel { source: MouseWheelSource::Wheel, .. } => Some(false),
+        egui::Event::MouseWheel { unit, .. } => Some(*unit == egui::MouseWheelUnit::Point),
+        _ => None,
+    })
 }
 
 /// The place in the world under a place of the window and its depth: of the surface where there is one, else as far away

@@ -20,6 +20,7 @@ const LOOK: Duration = Duration::from_millis(400);
 /// Keys by their symbols.
 pub(crate) mod keys {
     pub(crate) const TAB: u32 = 0xff09;
+    pub(crate) const ENTER: u32 = 0xff0d;
     pub(crate) const ESCAPE: u32 = 0xff1b;
     pub(crate) const DELETE: u32 = 0xffff;
     pub(crate) const CTRL: u32 = 0xffe3;

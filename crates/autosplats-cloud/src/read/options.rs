@@ -17,7 +17,7 @@ pub struct ReadOptions {
 
 /// A pinhole depth camera: the point of pixel (u, v) is `((u - cx) z / fx, (v - cy) z / fy, z)` with `z` the pixel's value
 /// divided by `scale`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DepthCamera {
     /// Focal length along a row, in pixels.
     pub fx: f64,

@@ -6,7 +6,8 @@ use autosplats::cloud::glam::{DQuat, DVec3};
 const LEAST_SIDE: f64 = 1e-4;
 
 /// A box in world coordinates. Points outside are not shown, so that no edit reaches them; they are not changed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct ClipBox {
     /// The lowest corner, before the box is turned.
     pub(crate) min: DVec3,
@@ -22,6 +23,12 @@ impl ClipBox {
     /// A box along the axes that clips.
     pub(crate) fn new(min: DVec3, max: DVec3) -> Self {
         Self { min, max, rotation: DQuat::IDENTITY, enabled: true }
+    }
+
+    /// Whether it is one: what a file says may be anything.
+    pub(crate) fn is_box(&self) -> bool {
+        let corners = self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all();
+        corners && self.rotation.is_normalized()
     }
 
     /// What it turns about.

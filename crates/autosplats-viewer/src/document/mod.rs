@@ -37,7 +37,7 @@ pub(crate) use self::{
     export::{ExportError, Exported, Replace, What, export},
     history::{History, grouped, label},
     layer::{Counts, Layer, LayerId},
-    pick::PickedPoint,
+    pick::{PickedPoint, shortest},
     region::Region,
     select::SelectMode,
     shown::Shown,

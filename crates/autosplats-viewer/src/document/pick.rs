@@ -61,16 +61,48 @@ fn value_text(values: &FieldValues, point: usize) -> String {
     each!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64)
 }
 
+/// Points by which it is told how many digits a file has.
+const SAMPLES: usize = 1000;
+/// Digits that somebody may have rounded a number to.
+const DIGITS: usize = 13;
+
 /// Coordinates with the digits of the file: those of its steps, or as few as tell a number from its neighbours.
 pub(super) fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
     let place = cloud.world_position(point);
-    let single = cloud.residuals().is_none() && cloud.origin() == DVec3::ZERO;
+    let single = is_single(cloud);
+    let lost = cloud.residuals().map_or([0.0; 3], |residuals| residuals[point]);
+    let digits = |axis: usize| {
+        if single { (place[axis] as f32).to_string() } else { file_digits(place[axis], lost[axis]) }
+    };
     [0, 1, 2].map(|axis| {
         let stepped = cloud.resolution().and_then(|step| in_steps(place[axis], step[axis]));
-        stepped.unwrap_or_else(|| {
-            if single { cloud.positions()[point][axis].to_string() } else { place[axis].to_string() }
-        })
+        stepped.unwrap_or_else(|| digits(axis))
     })
+}
+
+/// Whether all coordinates could be those of a file of `f32`, by a part of them: a decimal that is not is no `f32` as a rule.
+fn is_single(cloud: &PointCloud) -> bool {
+    let step = cloud.len().div_ceil(SAMPLES).max(1);
+    let same = |value: f64| f64::from(value as f32) == value || value.is_nan();
+    (0..cloud.len()).step_by(step).all(|point| cloud.world_position(point).to_array().into_iter().all(same))
+}
+
+/// The digits of a coordinate, `lost` of which `f32` could not hold. That is an `f32`, too, and near zero it may not be all:
+/// what the file says is the shortest number near enough then.
+fn file_digits(value: f64, lost: f32) -> String {
+    let error = 0.5 * f64::from(f32::EPSILON) * f64::from(lost.abs());
+    let step = f64::EPSILON * value.abs();
+    if error < 0.25 * step { value.to_string() } else { shortest(value, error + step) }
+}
+
+/// The shortest decimal that is no further than `error` from a number; all its digits where that would be no shorter than
+/// numbers that nobody has rounded.
+pub(crate) fn shortest(value: f64, error: f64) -> String {
+    let digits = (0..DIGITS).find_map(|digits| {
+        let short: f64 = format!("{value:.digits$e}").parse().ok()?;
+        ((short - value).abs() <= error).then_some(short)
+    });
+    digits.unwrap_or(value).to_string()
 }
 
 /// A number with the decimals that all multiples of a step can be written with; nothing if that is not the number, as where

@@ -8,64 +8,39 @@ use std::sync::{Arc, Mutex, PoisonError};
 use autosplats::cloud::{Progress, written_formats};
 use eframe::egui;
 
+use super::target_file::{TargetFile, Words, Write};
 use crate::app::App;
 use crate::document::{Document, ExportError, Exported, LayerId, Replace, What, export, grouped};
-use crate::files::ask_for_output;
 use crate::threads::spawn;
 
 /// What is being asked and what is being written.
 pub(crate) struct Export {
     pub(crate) open: bool,
-    /// Whether it was open in the last frame.
-    was_open: bool,
     what: What,
-    path: String,
-    chosen: Option<Receiver<Option<PathBuf>>>,
-    /// What was not written, to be decided about.
-    refused: Option<Refusal>,
+    target: TargetFile,
+    /// What writing the file that was refused would replace.
+    replace: Replace,
     work: Option<Work>,
 }
 
 impl Default for Export {
     fn default() -> Self {
-        Self {
-            open: false,
-            was_open: false,
-            what: What::Shown,
-            path: String::new(),
-            chosen: None,
-            refused: None,
-            work: None,
-        }
+        let target = TargetFile::new("");
+        Self { open: false, what: What::Shown, target, replace: Replace::Nothing, work: None }
     }
-}
-
-/// What was not written.
-struct Refusal {
-    what: What,
-    path: PathBuf,
-    why: String,
-    /// What writing it all the same would replace.
-    replace: Replace,
 }
 
 impl Export {
-    fn path(&self) -> PathBuf {
-        self.path.trim().into()
-    }
-
-    /// Forgets why something was not written as soon as something else is asked for: what may be replaced is one file.
-    fn forget_refusal(&mut self) {
-        let path = self.path();
-        let opened = self.open && !self.was_open;
-        self.was_open = self.open;
-        self.refused.take_if(|refused| opened || refused.path != path || refused.what != self.what);
-    }
-
     /// Whether a file is being written, which leaving would stop.
     pub(crate) fn is_writing(&self) -> bool {
         self.work.is_some()
     }
+}
+
+/// Asks where points go.
+pub(crate) fn open(app: &mut App) {
+    app.panels.export.target.open();
+    app.panels.export.open = true;
 }
 
 /// A file that is being written.
@@ -103,21 +78,15 @@ impl Progress for Listener {
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     finish(app);
-    if let Some(Ok(chosen)) = app.panels.export.chosen.as_ref().map(Receiver::try_recv) {
-        app.panels.export.chosen = None;
-        if let Some(path) = chosen {
-            app.panels.export.path = path.display().to_string();
-        }
-    }
-    app.panels.export.forget_refusal();
     if !app.panels.export.open {
         return;
     }
     let mut open = true;
-    let mut begin = None;
+    let mut write = None;
     let choices = choices(app);
     if !choices.iter().any(|(_, what, _)| *what == app.panels.export.what) {
         app.panels.export.what = What::Shown;
+        app.panels.export.target.forget();
     }
     let window = egui::Window::new("Export points").open(&mut open).collapsible(false).resizable(false);
     window.default_pos(app.view_rect.center() - egui::vec2(220.0, 140.0)).show(context, |ui| {
@@ -132,32 +101,24 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             return;
         }
         for (label, what, enabled) in choices {
-            ui.add_enabled_ui(enabled, |ui| ui.radio_value(&mut export.what, what, label));
+            if ui.add_enabled_ui(enabled, |ui| ui.radio_value(&mut export.what, what, label)).inner.changed() {
+                export.target.forget();
+            }
         }
         ui.add_space(6.0);
-        ui.horizontal(|ui| {
-            let typed = egui::TextEdit::singleline(&mut export.path).desired_width(320.0).hint_text("points.ply");
-            ui.add(typed);
-            if ui.button("Browse…").clicked() && export.chosen.is_none() {
-                export.chosen = Some(ask_for_output(context, "Export points", "points.ply"));
-            }
-        });
         let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
         ui.small(format!("The name tells the format: .{}", formats.join(" .")));
-        ui.add_space(6.0);
-        export.forget_refusal();
-        if let Some(Refusal { why, replace, .. }) = &export.refused {
-            ui.colored_label(ui.visuals().error_fg_color, why);
-            if *replace != Replace::Nothing && ui.button("Replace it").clicked() {
-                begin = Some(*replace);
-            }
-        } else if ui.add_enabled(!export.path.trim().is_empty(), egui::Button::new("Export")).clicked() {
-            begin = Some(Replace::Nothing);
-        }
+        let words = Words { title: "Export points", name: "points.ply", verb: "Export" };
+        write = export.target.show(ui, &words, &mut app.panels.entered, None);
     });
     app.panels.export.open = open;
-    if let Some(replace) = begin {
-        start(app, context, replace);
+    if let Some(Write { path, replace, answered }) = write {
+        let replace = match (answered, replace) {
+            (true, _) => app.panels.export.replace,
+            (false, true) => Replace::Files,
+            (false, false) => Replace::Nothing,
+        };
+        start(app, context, path, replace);
     }
 }
 
@@ -177,10 +138,8 @@ fn choices(app: &mut App) -> Vec<(String, What, bool)> {
     choices
 }
 
-fn start(app: &mut App, context: &egui::Context, replace: Replace) {
+fn start(app: &mut App, context: &egui::Context, path: PathBuf, replace: Replace) {
     let document = app.document().clone();
-    let export_state = &mut app.panels.export;
-    let path = export_state.path();
     let listener = Arc::new(Listener {
         done: AtomicU32::new(0),
         cancelled: AtomicBool::new(false),
@@ -188,14 +147,14 @@ fn start(app: &mut App, context: &egui::Context, replace: Replace) {
         context: context.clone(),
     });
     let (sender, result) = channel();
-    let what = export_state.what;
+    let what = app.panels.export.what;
     let (theirs, points, target) = (Arc::clone(&listener), document.clone(), path.clone());
     spawn("export", move || {
         let _ = sender.send(export(&points, what, &target, replace, &*theirs));
         theirs.context.request_repaint();
     });
-    export_state.refused = None;
-    export_state.work = Some(Work { document, what, path, listener, result });
+    app.panels.export.target.forget();
+    app.panels.export.work = Some(Work { document, what, path, listener, result });
 }
 
 /// Takes in how writing ended.
@@ -212,15 +171,16 @@ fn finish(app: &mut App) {
         }
         Err(ExportError::Cancelled) => app.messages.note("Nothing was written"),
         Err(error) => {
-            let replace = match &error {
+            let export = &mut app.panels.export;
+            export.replace = match &error {
                 ExportError::Exists { .. } => Replace::Files,
                 ExportError::Input { .. } => Replace::Inputs,
                 _ => Replace::Nothing,
             };
-            let export = &mut app.panels.export;
-            export.refused = Some(Refusal { what, path, why: error.to_string(), replace });
-            // It is opened to say so, not to forget it.
-            (export.open, export.was_open) = (true, true);
+            // What may be replaced is by what was to be written.
+            let question = export.replace != Replace::Nothing && export.what == what;
+            export.target.refuse(&path, error.to_string(), question);
+            export.open = true;
         }
     }
 }
@@ -241,35 +201,4 @@ fn saved_layers(document: &Document, what: What) -> Vec<LayerId> {
 /// Whether a path names a picture.
 pub(super) fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A window in which replacing `a.ply` was refused.
-    fn refused() -> Export {
-        let refused = Refusal { what: What::Shown, path: "a.ply".into(), why: "there".into(), replace: Replace::Files };
-        Export { open: true, was_open: true, path: " a.ply".into(), refused: Some(refused), ..Export::default() }
-    }
-
-    #[test]
-    fn what_may_be_replaced_is_what_was_refused() {
-        let kept = |change: fn(&mut Export)| {
-            let mut export = refused();
-            change(&mut export);
-            export.forget_refusal();
-            export.refused.is_some()
-        };
-        assert!(kept(|_| {}), "nothing has changed");
-        assert!(!kept(|export| export.path = "b.ply".into()), "another file");
-        assert!(!kept(|export| export.what = What::All), "other points");
-        assert!(!kept(|export| export.was_open = false), "the window is opened anew");
-        let mut export = refused();
-        export.path = "b.ply".into();
-        export.forget_refusal();
-        export.path = "a.ply".into();
-        export.forget_refusal();
-        assert!(export.refused.is_none(), "it is asked again after all");
-    }
 }

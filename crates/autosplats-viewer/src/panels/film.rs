@@ -1,16 +1,15 @@
 //! Turntables and ways of the camera, played and written.
 
-use std::path::PathBuf;
-use std::sync::mpsc::Receiver;
 use std::sync::{Arc, OnceLock};
 
 use autosplats::{Camera, MAX_SIDE};
 use eframe::egui;
 
-use crate::animation::{Recording, Target, has_ffmpeg, path, turntable};
+use super::target_file::{TargetFile, Words};
+use crate::animation::{path, turntable};
 use crate::app::App;
-use crate::files::ask_for_output;
 use crate::output;
+use crate::recording::{Recording, Target, has_ffmpeg};
 use crate::threads::spawn;
 
 /// What is being asked and what is being played.
@@ -21,21 +20,13 @@ pub(crate) struct Film {
     degrees: f64,
     rate: u32,
     size: [u32; 2],
-    name: String,
-    chosen: Option<Receiver<Option<PathBuf>>>,
-    /// What was not written because it would replace something.
-    refused: Option<Refusal>,
+    target: TargetFile,
+    /// How many pictures were not written because they would replace something.
+    refused: Option<usize>,
     /// Whether films can be made, once it is known, and once somebody looks.
     ffmpeg: Option<Arc<OnceLock<bool>>>,
     /// Cameras that are being played, and when that began.
     played: Option<(Vec<Camera>, f64)>,
-}
-
-/// So many pictures that were not written, and the file that is there.
-struct Refusal {
-    target: Target,
-    pictures: usize,
-    there: PathBuf,
 }
 
 impl Film {
@@ -68,8 +59,7 @@ impl Default for Film {
             degrees: 360.0,
             rate: 25,
             size: [1280, 720],
-            name: "turntable.mp4".into(),
-            chosen: None,
+            target: TargetFile::new("turntable.mp4"),
             refused: None,
             ffmpeg: None,
             played: None,
@@ -77,16 +67,15 @@ impl Default for Film {
     }
 }
 
+/// Opens the window, or closes it.
+pub(crate) fn toggle(app: &mut App) {
+    app.panels.film.target.forget();
+    app.panels.film.open = !app.panels.film.open;
+}
+
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     play(app, context);
-    if let Some(Ok(chosen)) = app.panels.film.chosen.as_ref().map(Receiver::try_recv) {
-        app.panels.film.chosen = None;
-        if let Some(path) = chosen {
-            app.panels.film.name = path.display().to_string();
-        }
-    }
     if !app.panels.film.open {
-        app.panels.film.refused = None;
         return;
     }
     let mut open = true;
@@ -190,45 +179,33 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
         ui.label("×");
         ui.add(egui::DragValue::new(&mut film.size[1]).range(16..=MAX_SIDE).suffix(" px"));
     });
-    ui.horizontal(|ui| {
-        ui.add(egui::TextEdit::singleline(&mut film.name).desired_width(280.0).hint_text("film.mp4"));
-        if ui.button("Browse…").clicked() && film.chosen.is_none() {
-            film.chosen = Some(ask_for_output(&context, "Save film", "film.mp4"));
-        }
-    });
     let ffmpeg = film.has_ffmpeg(&context);
     let pictures = film.pictures();
-    let target = Target::new(&PathBuf::from(film.name.trim()));
-    // What may be replaced is what was asked about and nothing else.
-    film.refused.take_if(|refused| Ok(&refused.target) != target.as_ref() || refused.pictures != pictures);
-    let problem = match &target {
-        Err(problem) => Some(problem.clone()),
+    if film.refused.take_if(|refused| *refused != pictures).is_some() {
+        film.target.forget();
+    }
+    let problem = match Target::new(&film.target.path()) {
+        Err(problem) => Some(problem),
         Ok(Target::Film(_)) if ffmpeg == Some(false) => {
             Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
         }
         Ok(_) if !ready => Some("There is no way to go yet".into()),
         Ok(_) => None,
     };
-    let there = film.refused.as_ref().map(|refused| format!("{} is there already", refused.there.display()));
-    if let Some(problem) = problem.as_ref().or(there.as_ref()) {
-        ui.colored_label(ui.visuals().warn_fg_color, problem);
+    let words = Words { title: "Save film", name: "film.mp4", verb: "Write" };
+    let Some(write) = film.target.show(ui, &words, &mut app.panels.entered, problem) else { return };
+    let Ok(target) = Target::new(&write.path) else { return };
+    // Of pictures the system's dialog knows one name only.
+    let there = target.existing(pictures).filter(|there| !(write.answered || write.replace && *there == write.path));
+    if let Some(there) = there {
+        film.target.refuse(&write.path, format!("{} is there already", there.display()), true);
+        film.refused = Some(pictures);
+        return;
     }
-    let (write, replace) = ui
-        .add_enabled_ui(problem.is_none(), |ui| {
-            let write = there.is_none() && ui.button("Write").clicked();
-            (write, there.is_some() && ui.button("Replace it").clicked())
-        })
-        .inner;
-    let Ok(target) = target else { return };
-    if write {
-        film.refused = target.existing(pictures).map(|there| Refusal { target: target.clone(), pictures, there });
-    }
-    if replace || write && film.refused.is_none() {
-        film.refused = None;
-        film.played = None;
-        let (size, rate) = (film.size, film.rate);
-        app.recording = Some(Recording::start(cameras(app), size, rate, target, &context));
-    }
+    film.target.forget();
+    film.played = None;
+    let (size, rate) = (film.size, film.rate);
+    app.recording = Some(Recording::start(cameras(app), size, rate, target, &context));
 }
 
 /// Goes on with what is being played.

@@ -5,16 +5,22 @@ use eframe::egui;
 use crate::app::App;
 use crate::commands::Command;
 
-const MOUSE: [(&str, &str); 10] = [
+const MOUSE: [(&str, &str); 13] = [
     ("Left drag", "Turn about the pivot"),
     ("Right drag, Shift + left drag", "Move sideways"),
     ("Wheel, pinch", "Zoom to the cursor"),
+    ("Two fingers on a touchpad", "Zoom, turn or move sideways, as Look, Movement says"),
     ("Ctrl + left drag", "Look around"),
     ("Double click", "Turn about this place from now on"),
     ("W A S D, Q E", "Fly forward, left, back, right, down and up"),
     ("Shift", "Fly faster"),
     ("Arrow keys", "Turn the head"),
     ("Alt + left drag", "Turn the view while selecting"),
+    (
+        "Tab, Shift + Tab",
+        "From control to control, once F6 or a click has gone to one; Escape goes back to the picture",
+    ),
+    ("Enter in a dialog", "What it is for; Escape closes it"),
     ("Drag dots, arrows, rings", "Move the faces of the clipping box, or the selection; Escape gives it up"),
 ];
 

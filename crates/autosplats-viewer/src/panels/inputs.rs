@@ -1,12 +1,14 @@
 //! The list of what is open, and what is known of a point.
 
+use autosplats::cloud::glam::DVec3;
 use eframe::egui;
 
 use crate::app::App;
-use crate::document::{Document, LayerId, grouped};
+use crate::document::{Document, LayerId, grouped, shortest};
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0).show(ui, |ui| {
+    let panel = egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0);
+    let shown = panel.show(ui, |ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
             ui.strong("Inputs");
@@ -29,6 +31,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             }
         });
     });
+    app.panels.focus.part(shown.response.rect);
 }
 
 /// What is being read.
@@ -58,7 +61,7 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
                 });
             }
             let mut color = tint.unwrap_or([200, 200, 200]);
-            if ui.color_edit_button_srgb(&mut color).on_hover_text("One colour for all its points").changed() {
+            if super::color::button(ui, &mut color, "One colour for all its points") {
                 app.settle(|document| {
                     document.set_tint(id, Some(color));
                 });
@@ -168,10 +171,12 @@ pub(super) fn removal(app: &mut App, context: &egui::Context) {
         ui.label(format!("Those of {} are in no file yet.", names.join(", ")));
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            for (label, remove, export) in [("Export…", false, true), ("Remove", true, false), ("Keep", false, false)]
-            {
+            if super::main_button(ui, "Export…").clicked() {
+                answer = Some((false, true));
+            }
+            for (label, remove) in [("Remove", true), ("Keep", false)] {
                 if ui.button(label).clicked() {
-                    answer = Some((remove, export));
+                    answer = Some((remove, false));
                 }
             }
         });
@@ -181,8 +186,16 @@ pub(super) fn removal(app: &mut App, context: &egui::Context) {
         if remove {
             remove_now(app, &ids);
         }
-        app.panels.export.open |= export;
+        if export {
+            super::export::open(app);
+        }
     }
+}
+
+/// A place with the digits that moving and turning leave exact.
+fn place_text(place: DVec3) -> String {
+    let error = 1e-13 * place.abs().max_element();
+    place.to_array().map(|value| shortest(value, error)).join(" ")
 }
 
 /// What is known of the point that was asked about.
@@ -204,8 +217,7 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
                     row(axis, value);
                 }
                 if point.position != point.file_position {
-                    let place = point.position;
-                    row("shown at", &format!("{} {} {}", place.x, place.y, place.z));
+                    row("shown at", &place_text(point.position));
                 }
                 if let Some([r, g, b]) = point.color {
                     row("Colour", &format!("{r} {g} {b}"));

@@ -4,7 +4,7 @@ use autosplats::{Backend, Background, Backs, ColorMap, ColorMode, SearchEngine, 
 use eframe::egui::{self, ComboBox, DragValue, Slider};
 
 use crate::app::App;
-use crate::look::Look;
+use crate::look::{Look, TwoFingers};
 
 /// Colour modes that every cloud has, or that an error explains if it does not.
 const MODES: [(&str, ColorMode); 9] = [
@@ -30,8 +30,13 @@ const MAPS: [(&str, Option<ColorMap>); 6] = [
 
 const BACKENDS: [(&str, Backend); 3] = [("auto", Backend::Auto), ("CPU", Backend::Cpu), ("GPU", Backend::Gpu)];
 
+/// What two fingers on a touchpad do.
+const FINGERS: [(&str, TwoFingers); 3] =
+    [("zoom", TwoFingers::Zoom), ("orbit", TwoFingers::Orbit), ("pan", TwoFingers::Pan)];
+
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    egui::Panel::right("look").default_size(250.0).size_range(200.0..=420.0).show(ui, |ui| {
+    let panel = egui::Panel::right("look").default_size(250.0).size_range(200.0..=420.0);
+    let shown = panel.show(ui, |ui| {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
             ui.strong("Look");
@@ -57,9 +62,11 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
                 if ui.add(slider).on_hover_text("More are smoother and coarser while the view moves").changed() {
                     app.look.moving_ms = 1000.0 / rate;
                 }
+                choose(ui, "two fingers", &mut app.look.two_fingers, &FINGERS);
             });
         });
     });
+    app.panels.focus.part(shown.response.rect);
 }
 
 fn section(ui: &mut egui::Ui, name: &str, content: impl FnOnce(&mut egui::Ui)) {
@@ -133,8 +140,8 @@ fn light(settings: &mut Settings, ui: &mut egui::Ui) {
             Background::Gradient(top, bottom) => (top, bottom),
             Background::Transparent => ([0; 3], [0; 3]),
         };
-        let top_changed = ui.color_edit_button_srgb(&mut top).on_hover_text("At the top").changed();
-        let bottom_changed = ui.color_edit_button_srgb(&mut bottom).on_hover_text("At the bottom").changed();
+        let top_changed = super::color::button(ui, &mut top, "At the top");
+        let bottom_changed = super::color::button(ui, &mut bottom, "At the bottom");
         if top_changed || bottom_changed {
             shading.background = Background::Gradient(top, bottom);
         }

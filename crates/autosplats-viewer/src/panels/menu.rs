@@ -9,7 +9,7 @@ use crate::commands::{Command, Tool};
 use crate::loading::Input;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    egui::Panel::top("menu").show(ui, |ui| {
+    let shown = egui::Panel::top("menu").show(ui, |ui| {
         egui::MenuBar::new().ui(ui, |ui| {
             ui.menu_button("File", |ui| file(app, ui));
             ui.menu_button("Edit", |ui| edit(app, ui));
@@ -19,6 +19,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             tools(app, ui);
         });
     });
+    app.panels.focus.part(shown.response.rect);
 }
 
 fn file(app: &mut App, ui: &mut egui::Ui) {
@@ -105,6 +106,10 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
 
 fn window(app: &mut App, ui: &mut egui::Ui) {
     for command in [Command::Inputs, Command::Look, Command::Statistics, Command::Help] {
+        command_button(app, ui, command, true);
+    }
+    ui.separator();
+    for command in [Command::NextPart, Command::PreviousPart] {
         command_button(app, ui, command, true);
     }
     ui.separator();

@@ -1,8 +1,10 @@
 //! Everything around the picture.
 
 mod clip;
+mod color;
 mod export;
 mod film;
+mod focus;
 mod help;
 mod inputs;
 mod layer;
@@ -13,12 +15,19 @@ mod moving;
 mod open;
 mod picture;
 mod pose;
+mod session;
 mod statistics;
 mod status;
+mod target_file;
 
 use eframe::egui;
 
+pub(crate) use self::export::open as ask_for_export;
+pub(crate) use self::film::toggle as toggle_film;
+pub(crate) use self::focus::go_on;
 pub(crate) use self::inputs::close_all;
+pub(crate) use self::picture::open as ask_for_picture;
+pub(crate) use self::session::open as ask_for_session;
 use crate::app::App;
 use crate::commands::Command;
 use crate::document::LayerId;
@@ -38,9 +47,17 @@ pub(crate) struct Panels {
     pub(crate) export: export::Export,
     pub(crate) picture: picture::PictureDialog,
     pub(crate) film: film::Film,
+    pub(crate) session: session::Session,
+    pub(crate) focus: focus::Focus,
+    /// Whether Enter was pressed where nothing takes it: the dialog on top does what it is for.
+    pub(crate) entered: bool,
+    /// Whether Escape has just given the focus back, which is all that it does then.
+    pub(crate) left: bool,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
     memory: status::Memory,
+    /// Whether fingers on a touchpad scroll, and not a wheel.
+    pub(crate) fingers: bool,
     /// How far the drag has gone that the view has followed, screen points.
     pub(crate) dragged: egui::Vec2,
     /// Depth of what a drag took hold of.
@@ -68,8 +85,13 @@ impl Default for Panels {
             export: export::Export::default(),
             picture: picture::PictureDialog::default(),
             film: film::Film::default(),
+            session: session::Session::default(),
+            focus: focus::Focus::default(),
+            entered: false,
+            left: false,
             claimed: Vec::new(),
             memory: status::Memory::default(),
+            fingers: false,
             dragged: egui::Vec2::ZERO,
             grabbed: None,
             zoomed: None,
@@ -82,13 +104,23 @@ impl Default for Panels {
 impl Panels {
     /// Closes a window that lies over the picture; says whether there was one.
     pub(crate) fn close_window(&mut self) -> bool {
-        let windows = [&mut self.help, &mut self.export.open, &mut self.picture.open, &mut self.film.open];
-        windows.into_iter().find(|open| **open).map(|open| *open = false).is_some()
+        self.windows().into_iter().find(|open| **open).map(|open| *open = false).is_some()
+    }
+
+    /// Whether there is a window that Escape closes.
+    pub(crate) fn has_window(&mut self) -> bool {
+        self.windows().into_iter().any(|open| *open)
+    }
+
+    fn windows(&mut self) -> [&mut bool; 5] {
+        let Self { help, export, picture, film, session, .. } = self;
+        [help, &mut export.open, &mut picture.open, &mut film.open, &mut session.open]
     }
 }
 
 /// Shows the panels that lie beside the picture.
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
+    app.panels.focus.begin();
     menu::show(app, ui);
     status::show(app, ui);
     if app.panels.inputs {
@@ -106,6 +138,7 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     export::show(app, context);
     picture::show(app, context);
     film::show(app, context);
+    session::show(app, context);
     help::show(app, context);
     inputs::inspected(app, context);
     clip::show(app, context);
@@ -114,6 +147,8 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     pose::show(app, context);
     inputs::removal(app, context);
     leave(app, context);
+    app.panels.entered = false;
+    focus::ring(app, context);
 }
 
 /// Asks before edits are lost.
@@ -140,9 +175,9 @@ fn leave(app: &mut App, context: &egui::Context) {
         }
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            if ui.button("Export…").clicked() {
+            if main_button(ui, "Export…").clicked() {
                 app.panels.leave = false;
-                app.panels.export.open = true;
+                export::open(app);
             }
             if ui.button("Leave without saving").clicked() {
                 app.quit = true;
@@ -156,6 +191,15 @@ fn leave(app: &mut App, context: &egui::Context) {
     if modal.should_close() {
         app.panels.leave = false;
     }
+}
+
+/// The button of a question that Enter presses, as it does no harm: it has the keyboard until another one is chosen.
+fn main_button(ui: &mut egui::Ui, label: &str) -> egui::Response {
+    let button = ui.button(label);
+    if ui.memory(|memory| memory.focused().is_none()) {
+        button.request_focus();
+    }
+    button
 }
 
 /// A button for a command, with its key and its tooltip.

@@ -9,8 +9,8 @@ use autosplats::cloud::check_memory;
 use eframe::egui;
 
 use super::export::has_extension;
+use super::target_file::{TargetFile, Words, Write};
 use crate::app::App;
-use crate::files::ask_for_output;
 use crate::output::Goal;
 use crate::render::{Task, Wish};
 
@@ -20,47 +20,33 @@ const BYTES_PER_PIXEL: u64 = 100;
 /// What is being asked.
 pub(crate) struct PictureDialog {
     pub(crate) open: bool,
-    path: String,
+    target: TargetFile,
     size: [u32; 2],
     /// The window as it is, menus and all.
     window: bool,
-    chosen: Option<Receiver<Option<PathBuf>>>,
-    /// The file that may be replaced if it is there.
-    replaced: Option<PathBuf>,
     /// The picture of the window, when it arrives, and where it goes.
     expected: Option<(Receiver<Arc<egui::ColorImage>>, PathBuf)>,
 }
 
 impl Default for PictureDialog {
     fn default() -> Self {
-        Self {
-            open: false,
-            path: "picture.png".into(),
-            size: [1920, 1080],
-            window: false,
-            chosen: None,
-            replaced: None,
-            expected: None,
-        }
+        Self { open: false, target: TargetFile::new("picture.png"), size: [1920, 1080], window: false, expected: None }
     }
+}
+
+/// Asks where a picture goes.
+pub(crate) fn open(app: &mut App) {
+    app.panels.picture.target.open();
+    app.panels.picture.open = true;
 }
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     arrived(app);
-    if let Some(Ok(chosen)) = app.panels.picture.chosen.as_ref().map(Receiver::try_recv) {
-        app.panels.picture.chosen = None;
-        if let Some(path) = chosen {
-            app.panels.picture.path = path.display().to_string();
-            // The system's dialog has asked already.
-            app.panels.picture.replaced = Some(path);
-        }
-    }
     if !app.panels.picture.open {
-        app.panels.picture.replaced = None;
         return;
     }
     let mut open = true;
-    let mut save = false;
+    let mut write = None;
     let seen = app.shot.as_ref().map(|shot| shot.size);
     let window = egui::Window::new("Save picture").open(&mut open).collapsible(false).resizable(false);
     window.default_pos(app.view_rect.center() - egui::vec2(220.0, 110.0)).show(context, |ui| {
@@ -81,48 +67,33 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                 }
             });
         });
-        ui.horizontal(|ui| {
-            ui.add(egui::TextEdit::singleline(&mut dialog.path).desired_width(320.0).hint_text("picture.png"));
-            if ui.button("Browse…").clicked() && dialog.chosen.is_none() {
-                dialog.chosen = Some(ask_for_output(context, "Save picture", "picture.png"));
-            }
-        });
-        let path = PathBuf::from(dialog.path.trim());
         let bytes = u64::from(dialog.size[0]) * u64::from(dialog.size[1]) * BYTES_PER_PIXEL;
-        let problem = if !has_extension(&path, "png") {
+        let problem = if !has_extension(&dialog.target.path(), "png") {
             Some("The name has to end in .png".to_owned())
-        } else if let Err(error) = check_memory("this picture", bytes) {
-            Some(error.to_string())
-        } else if path.exists() && dialog.replaced.as_ref() != Some(&path) {
-            Some("This file is there already".to_owned())
         } else {
-            None
+            check_memory("this picture", bytes).err().map(|error| error.to_string())
         };
-        ui.horizontal(|ui| {
-            save = ui.add_enabled(problem.is_none(), egui::Button::new("Save")).clicked();
-            if let Some(problem) = problem {
-                ui.colored_label(ui.visuals().warn_fg_color, problem);
-                if has_extension(&path, "png") && path.exists() && ui.button("Replace it").clicked() {
-                    dialog.replaced = Some(path);
-                }
-            }
-        });
+        let words = Words { title: "Save picture", name: "picture.png", verb: "Save" };
+        write = dialog.target.show(ui, &words, &mut app.panels.entered, problem);
     });
-    app.panels.picture.open = open && !save;
-    if save {
-        let dialog = &mut app.panels.picture;
-        let path = PathBuf::from(dialog.path.trim());
-        if dialog.window {
-            let (sender, receiver) = channel();
-            context.request_screenshot(move |image| {
-                let _ = sender.send(image);
-            });
-            dialog.expected = Some((receiver, path));
-        } else {
-            let size = dialog.size;
-            let wish: Wish = app.wish(size, false);
-            app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
-        }
+    app.panels.picture.open = open;
+    let Some(Write { path, replace, .. }) = write else { return };
+    let dialog = &mut app.panels.picture;
+    if !replace && path.exists() {
+        dialog.target.refuse(&path, "This file is there already", true);
+        return;
+    }
+    dialog.open = false;
+    if dialog.window {
+        let (sender, receiver) = channel();
+        context.request_screenshot(move |image| {
+            let _ = sender.send(image);
+        });
+        dialog.expected = Some((receiver, path));
+    } else {
+        let size = dialog.size;
+        let wish: Wish = app.wish(size, false);
+        app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
     }
 }
 

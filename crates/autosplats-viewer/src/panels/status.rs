@@ -2,11 +2,12 @@
 
 use eframe::egui;
 
-use crate::app::{App, Counted};
+use crate::app::App;
 use crate::document::grouped;
+use crate::editing::Counted;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
-    egui::Panel::bottom("status").show(ui, |ui| {
+    let shown = egui::Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
             let &Counted { all: counts, bytes, old_bytes, .. } = app.counts();
             ui.label(format!("{} points", grouped(counts.points)));
@@ -42,6 +43,11 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             });
         });
     });
+    let rect = shown.response.rect;
+    // Nothing in it can be used, but people who do not see it can have it read.
+    let line = ui.interact(rect, egui::Id::unique("status line"), egui::Sense::focusable_noninteractive());
+    line.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "Status"));
+    app.panels.focus.part(rect);
 }
 
 /// Memory that the program takes, asked for once a second.

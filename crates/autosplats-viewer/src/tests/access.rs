@@ -17,16 +17,21 @@ fn everything_that_can_be_used_has_a_name() {
     window.steps(3);
     look(&window, "look, statistics and export");
     let context = window.harness.ctx.clone();
-    crate::keys::run(window.harness.state_mut(), &context, Command::Screenshot);
+    window.press(Key::Escape);
     window.press(Key::H);
     window.press(Key::C);
+    crate::keys::run(window.harness.state_mut(), &context, Command::Screenshot);
     window.steps(3);
     assert!(window.says("Radius of the brush") || window.app().tool == Tool::Brush, "C takes the brush");
     look(&window, "picture, help and brush");
     window.key(CTRL, Key::T);
     window.steps(3);
     look(&window, "film");
-    window.key(CTRL, Key::T);
+    window.press(Key::Escape);
+    crate::keys::run(window.harness.state_mut(), &context, Command::SaveState);
+    window.steps(3);
+    look(&window, "session");
+    (0..4).for_each(|_| window.press(Key::Escape));
     for menu in ["File", "Edit", "View", "Window"] {
         window.click_on(menu);
         look(&window, menu);

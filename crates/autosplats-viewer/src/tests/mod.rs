@@ -1,6 +1,7 @@
 //! The whole viewer without a window: events go in, the tree of accessible widgets and the state come out.
 
 mod access;
+mod dialogs;
 mod edits;
 mod mouse;
 mod opening;

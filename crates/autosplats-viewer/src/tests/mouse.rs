@@ -148,3 +148,52 @@ fn points_are_inspected_and_measured_where_they_are_clicked() {
     window.press(Key::Escape);
     assert!(window.app().tools.measured.is_empty(), "Escape gives the measurement up");
 }
+
+/// Fingers or a wheel go over the middle of the picture.
+fn scroll(window: &mut Window, unit: egui::MouseWheelUnit, source: egui::MouseWheelSource, delta: Vec2) {
+    let place = window.place(0.5, 0.45);
+    window.event(Event::PointerMoved(place));
+    for phase in [egui::TouchPhase::Start, egui::TouchPhase::Move, egui::TouchPhase::Move, egui::TouchPhase::End] {
+        let delta = if phase == egui::TouchPhase::Move { delta } else { Vec2::ZERO };
+        window.event(Event::MouseWheel { unit, delta, phase, modifiers: Modifiers::NONE, source });
+    }
+    window.settle();
+}
+
+#[test]
+fn two_fingers_do_what_was_chosen_and_a_wheel_zooms() {
+    use crate::look::TwoFingers;
+    use egui::{MouseWheelSource as Source, MouseWheelUnit as Unit};
+    let mut window = Window::with_statue();
+    let first = camera(&window);
+    let distance = |camera: &Camera| camera.eye.distance(camera.look_at);
+    let turned = |camera: &Camera| forward(&first).angle_between(forward(camera)).to_degrees();
+    for fingers in [TwoFingers::Zoom, TwoFingers::Orbit, TwoFingers::Pan] {
+        window.harness.state_mut().look.two_fingers = fingers;
+        let ways = [(Unit::Point, Source::Trackpad), (Unit::Point, Source::Unknown), (Unit::Line, Source::Wheel)];
+        for (unit, source) in ways {
+            window.harness.state_mut().navigation.go_to(&first, true);
+            window.settle();
+            let delta = if unit == Unit::Point { egui::vec2(40.0, 30.0) } else { egui::vec2(0.0, 2.0) };
+            scroll(&mut window, unit, source, delta);
+            let now = camera(&window);
+            let case = format!("{fingers:?}, {unit:?}, {source:?}");
+            let chosen = if unit == Unit::Line { TwoFingers::Zoom } else { fingers };
+            let nearer = distance(&now) < 0.97 * distance(&first);
+            let moved = now.look_at.distance(first.look_at) > 0.01 * distance(&first);
+            match chosen {
+                TwoFingers::Zoom => assert!(nearer && turned(&now) < 1e-3, "{case}: zooms"),
+                TwoFingers::Orbit => assert!(!nearer && !moved && turned(&now) > 3.0, "{case}: turns {}", turned(&now)),
+                TwoFingers::Pan => assert!(!nearer && moved && turned(&now) < 1e-3, "{case}: moves"),
+            }
+        }
+        window.harness.state_mut().navigation.go_to(&first, true);
+        window.settle();
+        let place = window.place(0.5, 0.45);
+        window.event(Event::PointerMoved(place));
+        window.event(Event::Zoom(1.3));
+        window.settle();
+        let now = camera(&window);
+        assert!(distance(&now) < 0.9 * distance(&first) && turned(&now) < 1e-3, "{fingers:?}: a pinch zooms");
+    }
+}

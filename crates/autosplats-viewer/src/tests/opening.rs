@@ -85,6 +85,7 @@ impl eframe::Storage for Memory {
 fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
     window.harness.state_mut().look.dot_size = 6;
+    window.harness.state_mut().look.two_fingers = crate::look::TwoFingers::Pan;
     window.harness.state_mut().recent = vec!["/some/where.ply".into()];
     let mut memory = Memory::default();
     storage::save(window.app(), &mut memory);

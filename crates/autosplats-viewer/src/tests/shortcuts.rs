@@ -83,11 +83,13 @@ fn check(window: &mut Window, command: Command) {
         }
         Command::Export => {
             assert!(app.panels.export.open && window.says("Export points"), "the dialog is open");
-            window.harness.state_mut().panels.export.open = false;
+            window.press(Key::Escape);
+            assert!(!window.app().panels.export.open, "Escape closes it");
         }
         Command::Screenshot => {
             assert!(app.panels.picture.open && window.says("Save picture"), "the dialog is open");
-            window.harness.state_mut().panels.picture.open = false;
+            window.press(Key::Escape);
+            assert!(!window.app().panels.picture.open, "Escape closes it");
         }
         Command::Film => {
             assert!(app.panels.film.open && window.says("Film"), "the window is open");
@@ -95,10 +97,9 @@ fn check(window: &mut Window, command: Command) {
             assert!(!window.app().panels.film.open, "and goes");
         }
         Command::SaveState => {
-            window.until("it is asked where", |window| window.says("Keep the session in"));
-            window.steps(2);
-            window.click_on("Cancel");
-            assert!(!window.says("Keep the session in"), "it goes away");
+            assert!(app.panels.session.open && window.says("Save session"), "the dialog is open");
+            window.press(Key::Escape);
+            assert!(!window.app().panels.session.open, "Escape closes it");
         }
         Command::CloseAll => {
             assert!(app.document().layers.is_empty(), "nothing is open any more");
@@ -205,10 +206,75 @@ fn check(window: &mut Window, command: Command) {
             give(window, command);
             assert!(!clips(window), "and clips no longer");
         }
+        Command::NextPart | Command::PreviousPart => {
+            assert!(focused(window).is_some(), "a control has the keyboard");
+            window.press(Key::Escape);
+            assert_eq!(focused(window), None, "Escape gives it back");
+        }
         Command::Tool(tool) => assert_eq!(app.tool, tool, "the tool is taken"),
         #[allow(unreachable_patterns, reason = "a new command has no case before it is written")]
         other => panic!("{other:?}: say here what its key does"),
     }
+}
+
+/// What has the keyboard besides the picture.
+fn focused(window: &Window) -> Option<egui::Id> {
+    window.harness.ctx.memory(|memory| memory.focused())
+}
+
+/// Where what has the keyboard is in the window.
+fn place(window: &Window) -> Pos2 {
+    let response = window.harness.ctx.read_response(focused(window).expect("something has the keyboard"));
+    response.expect("it is seen").rect.center()
+}
+
+#[test]
+fn f6_goes_round_the_window_and_tab_through_a_panel() {
+    let mut window = Window::with_statue();
+    window.press(Key::L);
+    window.press(Key::P);
+    window.settle();
+    let mut places = Vec::new();
+    for _ in 0..20 {
+        window.press(Key::F6);
+        window.step();
+        if focused(&window).is_none() {
+            break;
+        }
+        places.push(place(&window));
+    }
+    // The menu, the status line, the list, the look and the statistics.
+    assert_eq!(places.len(), 5, "each part once, then the picture: {places:?}");
+    let picture = window.picture();
+    assert!(places[0].y < picture.top() && places[1].y > picture.bottom(), "above and below: {places:?}");
+    assert!(places[2].x < picture.left() && places[3].x > picture.right(), "left and right: {places:?}");
+    assert!(picture.contains(places[4]), "a window over the picture: {places:?}");
+    for wanted in places.iter().rev() {
+        window.key(SHIFT, Key::F6);
+        window.step();
+        assert_eq!(place(&window), *wanted, "backwards");
+    }
+    let dots = window.app().look.dots;
+    (0..3).for_each(|_| window.press(Key::F6));
+    assert!(place(&window).x > picture.right(), "the look panel");
+    for _ in 0..4 {
+        let before = place(&window);
+        window.press(Key::Tab);
+        window.step();
+        assert!(place(&window) != before && place(&window).x > picture.right(), "from control to control in it");
+    }
+    let selected = |window: &Window| window.app().document().counts().selected;
+    window.harness.state_mut().change(|document| {
+        let shown = document.shown();
+        document.select(&shown, |_| true, crate::document::SelectMode::Replace);
+    });
+    window.press(Key::Escape);
+    assert_eq!(focused(&window), None, "Escape gives the keyboard back to the picture");
+    assert!(selected(&window) > 0 && window.app().look.dots == dots, "and does nothing else");
+    window.press(Key::Tab);
+    assert_ne!(window.app().look.dots, dots, "there Tab is for points and surface");
+    window.press(Key::Escape);
+    assert_eq!(selected(&window), 0, "and Escape for the selection");
 }
 
 #[test]
@@ -243,9 +309,6 @@ fn every_key_does_what_its_command_says() {
 fn keys_that_are_typed_are_no_commands() {
     let mut window = Window::with_statue();
     window.key(CTRL, Key::E);
-    window.steps(2);
-    let field = window.harness.get_by_role(Role::TextInput);
-    field.focus();
     window.steps(2);
     let (dots, look) = (window.app().look.dots, window.app().panels.look);
     window.press(Key::L);

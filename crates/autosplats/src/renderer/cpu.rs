@@ -167,7 +167,7 @@ impl CpuRenderer {
         clock.lap(|timings| &mut timings.splat)?;
 
         let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
-        shade(layers, &scene, &settings.shading, settings.all_layers, image);
+        let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);
 
@@ -186,6 +186,7 @@ impl CpuRenderer {
             clamped: search_counts.clamped,
             bounded: search_counts.bounded,
             covered,
+            value_range,
         };
         Ok(Frame { image, layers, counts, timings: clock.finish(), passes: &[] })
     }

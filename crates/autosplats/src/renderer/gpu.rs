@@ -293,16 +293,17 @@ impl GpuRenderer {
         *times = recorder.finish();
         // What was not submitted left the surfels as they were.
         *last_view = Some(*view);
-        let counters = readback.read(gpu, |parts| {
+        let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
             let linear = if settings.all_layers { parts[2] } else { &[] };
-            finish(&ReadPicture { size, image: parts[1], linear, range }, &scene, &settings.shading, image);
+            let read = ReadPicture { size, image: parts[1], linear, range };
+            let value_range = finish(&read, &scene, &settings.shading, image);
             *layers = match parts {
                 [_, _, _, surface, cover, extras] => prepared.layers.to_host(surface, cover, extras),
                 _ => GBuffer::default(),
             };
-            counters
+            (counters, value_range)
         })?;
         let waited_ms = waited.elapsed().as_secs_f64() * 1e3;
         let spans = clock.read(gpu, times)?;
@@ -321,7 +322,7 @@ impl GpuRenderer {
             shade: stage("shade"),
             frame: frame_ms,
         };
-        Ok(Frame { image, layers, counts: counts(cloud, &counters), timings, passes: times })
+        Ok(Frame { image, layers, counts: Counts { value_range, ..counts(cloud, &counters) }, timings, passes: times })
     }
 
     /// See [`Renderer::render_to_texture`](super::Renderer::render_to_texture).
@@ -495,6 +496,7 @@ fn counts(cloud: &PointCloud, counters: &[u32]) -> Counts {
         clamped: count(Counter::Clamped),
         bounded: count(Counter::Bounded),
         covered: count(Counter::Covered),
+        value_range: None,
     }
 }
 

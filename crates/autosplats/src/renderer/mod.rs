@@ -29,8 +29,8 @@ pub use surfels::PointSurfel;
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// What became of the points of one frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+/// What became of the points of one frame, in numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Counts {
     /// Points in the cloud.
     pub points: usize,
@@ -58,6 +58,8 @@ pub struct Counts {
     pub bounded: usize,
     /// Pixels that show a surface.
     pub covered: usize,
+    /// Values at the two ends of the colour map, given or found in the picture; where the colour mode has one.
+    pub value_range: Option<[f64; 2]>,
 }
 
 /// Milliseconds spent in each stage of one frame. On a GPU with timestamps from the begin to the end of a stage's passes that

@@ -32,6 +32,13 @@ impl Scale {
     }
 }
 
+impl ColorMap {
+    /// The colour at `t`, 0 at its lower end to 1 at the upper one; sRGB, 8 bits a channel.
+    pub fn at(self, t: f32) -> [u8; 3] {
+        color(self, f64::from(t.clamp(0.0, 1.0))).map(|channel| (channel * 255.0).round() as u8)
+    }
+}
+
 /// Linear colours of a colour map, from its lower end to the upper.
 pub(super) fn table(map: ColorMap) -> Vec<[f32; 3]> {
     (0..STEPS).map(|step| color(map, step as f64 / (STEPS - 1) as f64).map(linear)).collect()

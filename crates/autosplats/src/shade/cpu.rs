@@ -10,7 +10,7 @@ use super::depths::{Depths, LANES};
 use super::edges::{Edges, INWARD, SEARCH};
 use super::light::{CLAY, EDGE_ON, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
-use super::{Background, ColorMap, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
+use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
 use crate::splat::GBuffer;
 
@@ -49,10 +49,22 @@ impl Scene<'_> {
         let offset = self.value_offset(&shading.color);
         shading.range.map(|range| range.map(|end| (f64::from(end) - offset) as f32))
     }
+
+    /// A range of values that shading computes with, as values of the world.
+    pub(super) fn world_range(&self, mode: &ColorMode, range: [f32; 2]) -> [f64; 2] {
+        range.map(|end| f64::from(end) + self.value_offset(mode))
+    }
 }
 
-/// Shades `layers` into `image`; also in linear light if `keep_linear`.
-pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep_linear: bool, image: &mut Image) {
+/// Shades `layers` into `image`; also in linear light if `keep_linear`. Says between which values the colour map lies, where
+/// the colour mode has one.
+pub(crate) fn shade(
+    layers: &GBuffer,
+    scene: &Scene<'_>,
+    shading: &Shading,
+    keep_linear: bool,
+    image: &mut Image,
+) -> Option<[f64; 2]> {
     let [width, height] = [layers.width as usize, layers.height as usize];
     image.width = layers.width;
     image.height = layers.height;
@@ -77,6 +89,7 @@ pub(crate) fn shade(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep
         let encode = |channel| encode(inks.table, channel);
         legend::draw(image, shading, scale, scene.value_offset(&shading.color), encode);
     }
+    shader.scale.as_ref().map(|scale| scene.world_range(&shading.color, scale.range()))
 }
 
 /// From linear light to 8-bit sRGB and back.
@@ -185,7 +198,7 @@ impl<'a> Shader<'a> {
         let colored = shows_colors(&shading.color) && !layers.color.is_empty();
         let (pairs, edges) = (pairs(layers.height), Edges::new(scene.view));
         let mut shader = Self { layers, scene, shading, colored, pairs, edges, scale: None };
-        if let Some(map) = usual_map(&shading.color) {
+        if let Some(map) = shading.color.usual_map() {
             let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
             shader.scale = Some(Scale::new(shading.color_map.unwrap_or(map), range));
         }
@@ -298,26 +311,6 @@ pub(super) fn sample_step(pixels: usize) -> usize {
 /// Whether a colour mode shows the colours of points, where they have any.
 pub(super) fn shows_colors(mode: &ColorMode) -> bool {
     matches!(mode, ColorMode::Auto | ColorMode::Rgb | ColorMode::Classification)
-}
-
-/// The colour map that suits a colour mode, if the mode is a value.
-pub(super) fn usual_map(mode: &ColorMode) -> Option<ColorMap> {
-    match mode {
-        ColorMode::Height | ColorMode::Depth => Some(ColorMap::Viridis),
-        ColorMode::Field(name) if name.eq_ignore_ascii_case("intensity") => Some(ColorMap::Gray),
-        ColorMode::Field(_) | ColorMode::Curvature => Some(ColorMap::Viridis),
-        ColorMode::Radius | ColorMode::KRadius => Some(ColorMap::Reds),
-        ColorMode::Auto | ColorMode::Rgb | ColorMode::Plain | ColorMode::Classification | ColorMode::Normal => None,
-    }
-}
-
-/// What a legend calls a colour mode.
-pub(super) fn title(mode: &ColorMode) -> String {
-    match mode {
-        ColorMode::Field(name) => name.clone(),
-        ColorMode::KRadius => "k-radius".into(),
-        other => format!("{other:?}").to_lowercase(),
-    }
 }
 
 /// The background at height `t` of the picture, 0 at the top to 1 at the bottom.

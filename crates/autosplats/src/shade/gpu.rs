@@ -9,7 +9,7 @@ pub(crate) use texture::check_texture;
 pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
 
 use super::color_map::{self, table};
-use super::cpu::{BACK_COLOR, BACK_LIGHT, ENCODE_STEPS, background, encode_table, sample_step, usual_map};
+use super::cpu::{BACK_COLOR, BACK_LIGHT, ENCODE_STEPS, background, encode_table, sample_step};
 use super::edges::INWARD;
 use super::{Background, ColorMap, Shading};
 use crate::Error;
@@ -90,7 +90,7 @@ impl ShadeBuffers {
     /// Tells the passes of the next frame what to do.
     pub(crate) fn write(&mut self, gpu: &Gpu, uniform: &ShadeUniform, shading: &Shading) {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(uniform));
-        let map = usual_map(&shading.color).map(|usual| shading.color_map.unwrap_or(usual));
+        let map = shading.color.usual_map().map(|usual| shading.color_map.unwrap_or(usual));
         if let Some(map) = map.filter(|map| self.map_held.replace(*map) != Some(*map)) {
             let colors: Vec<_> = table(map).iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
             gpu.queue.write_buffer(&self.color_map, 0, bytemuck::cast_slice(&colors));

@@ -3,7 +3,7 @@
 use font8x8::UnicodeFonts as _;
 
 use super::color_map::Scale;
-use super::cpu::{background, title};
+use super::cpu::background;
 use super::{Background, Image, Shading};
 
 /// Labels along the bar, both ends included.
@@ -16,7 +16,7 @@ const SHADE: [u8; 4] = [24, 26, 30, 255];
 /// Draws the legend where it hides the least, best in the middle of the right edge; in a picture too small for one,
 /// nothing. `offset` is added to the values of the scale.
 pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
-    let title = &title(&shading.color);
+    let title = &shading.color.title();
     let [width, height] = [image.width as usize, image.height as usize];
     // One font pixel is this many picture pixels.
     let unit = (height / 400).max(1);

@@ -71,6 +71,28 @@ pub enum ColorMode {
     Depth,
 }
 
+impl ColorMode {
+    /// The colour map that suits it, if it shows a value.
+    pub fn usual_map(&self) -> Option<ColorMap> {
+        match self {
+            Self::Height | Self::Depth => Some(ColorMap::Viridis),
+            Self::Field(name) if name.eq_ignore_ascii_case("intensity") => Some(ColorMap::Gray),
+            Self::Field(_) | Self::Curvature => Some(ColorMap::Viridis),
+            Self::Radius | Self::KRadius => Some(ColorMap::Reds),
+            Self::Auto | Self::Rgb | Self::Plain | Self::Classification | Self::Normal => None,
+        }
+    }
+
+    /// What a legend calls it.
+    pub fn title(&self) -> String {
+        match self {
+            Self::Field(name) => name.clone(),
+            Self::KRadius => "k-radius".into(),
+            other => format!("{other:?}").to_lowercase(),
+        }
+    }
+}
+
 /// Colours for scalar values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -35,7 +35,7 @@ fn half_a_wall(size: [u32; 2]) -> GBuffer {
 fn shaded(layers: &GBuffer, shading: &Shading) -> Image {
     let view = view([layers.width, layers.height]);
     let mut image = Image::default();
-    shade(layers, &Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO }, shading, true, &mut image);
+    let _ = shade(layers, &Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO }, shading, true, &mut image);
     assert_eq!(image.pixels.len(), (layers.width * layers.height) as usize, "size of the image");
     image
 }
@@ -112,6 +112,25 @@ fn normals_and_depth_are_shown_as_documented() {
     assert!(near, "a normal of (0, 0, -1) is shown as {normal:?}");
     let depth = Shading { range: Some([1.0, 3.0]), color_map: Some(ColorMap::Gray), ..flat(ColorMode::Depth) };
     assert!(shaded(&layers, &depth).pixels[0][0].abs_diff(128) <= 1, "the middle of the range");
+}
+
+#[test]
+fn the_range_that_was_shown_is_told() {
+    let layers = half_a_wall([8, 4]);
+    let view = view([8, 4]);
+    let range = |shading: &Shading, origin: DVec3| {
+        shade(&layers, &Scene { view: &view, up: DVec3::Y, origin }, shading, false, &mut Image::default())
+    };
+    let given = |color| Shading { range: Some([1.0, 3.0]), ..flat(color) };
+    assert_eq!(range(&given(ColorMode::Depth), DVec3::ZERO), Some([1.0, 3.0]), "as it was given");
+    assert_eq!(range(&given(ColorMode::Plain), DVec3::ZERO), None, "one tone has none");
+    let far = DVec3::Y * 4096.0;
+    assert_eq!(range(&given(ColorMode::Height), far), Some([1.0, 3.0]), "heights are those of the world");
+    let [low, high] = range(&flat(ColorMode::Depth), far).expect("depth is a value");
+    assert!(low <= high && layers.depth.contains(&(low as f32)), "as it was found: {low} to {high}");
+    let [near, above] =
+        [DVec3::ZERO, far].map(|origin| range(&flat(ColorMode::Height), origin).expect("height is a value"));
+    assert_eq!(above, near.map(|end| end + 4096.0), "found heights are those of the world, too");
 }
 
 #[test]

@@ -80,6 +80,13 @@ fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 
     near(a.clamped, b.clamped, "clamped");
     near(a.bounded, b.bounded, "bounded");
     near(a.covered, b.covered, "covered");
+    let [a, b] = [a, b].map(|counts| counts.value_range);
+    let alike = match (a, b) {
+        // Percentiles of nearly the same values; a part of the range is half a colour step.
+        (Some(a), Some(b)) => (0..2).all(|end| (a[end] - b[end]).abs() <= 0.02 * (a[1] - a[0]) + 1e-6 * a[end].abs()),
+        (a, b) => a == b,
+    };
+    assert!(alike, "{case}: the range is {a:?} on the CPU, {b:?} on the GPU");
     if settings.all_layers {
         compare_layers(host.layers, device.layers, case);
     }

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use autosplats::cloud::{
-    FieldValues, PointCloud, Scan,
+    FieldValues, PointCloud, ReadOptions, Scan,
     glam::{DMat4, DVec3},
 };
 
@@ -72,7 +72,42 @@ fn values_have_their_own_digits() {
     assert_eq!(describe(odd).file_text, ["0.0625", "0.0625", "0.0625"], "steps from an odd place");
     let doubles = PointCloud::new(FAR, vec![[0.0; 3], [0.5, 0.25, 0.0]]);
     assert_eq!(describe(doubles).file_text, ["512000.5", "5400000.25", "300"], "digits of f64");
+    let place = DVec3::new(512_000.0, 0.0, 0.0);
+    let singles = PointCloud::new(place, vec![[0.0; 3], [512_000.1_f32 - 512_000.0, 0.1, -0.1]]);
+    assert_eq!(describe(singles).file_text, ["512000.1", "0.1", "-0.1"], "digits of f32 about a place");
     assert_eq!(describe((*super::cloud(2, FAR)).clone()).color, cloud_color(), "its colour");
+}
+
+/// What files say is told as they say it, whatever their numbers are kept as.
+#[test]
+fn coordinates_are_told_as_the_file_has_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let digits = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).expect("written");
+        let options = ReadOptions { exact: true, ..ReadOptions::default() };
+        let cloud = autosplats::cloud::read_with(&path, &options, &()).expect("read");
+        (0..cloud.len()).map(|point| super::super::pick::file_text(&cloud, point).to_vec()).collect::<Vec<_>>()
+    };
+    let head = |encoding: &str, kind: &str, count: usize| {
+        let xyz = ["x", "y", "z"].map(|axis| format!("property {kind} {axis}\n")).concat();
+        format!("ply\nformat {encoding} 1.0\nelement vertex {count}\n{xyz}end_header\n").into_bytes()
+    };
+    let mut single = head("binary_little_endian", "float", 2);
+    let values = [[-0.032_292_2_f32, 0.1, 1e7], [0.3, -2.5e-9, 0.0]];
+    values.as_flattened().iter().for_each(|value| single.extend(value.to_le_bytes()));
+    assert_eq!(digits("f32.ply", &single)[0], ["-0.0322922", "0.1", "10000000"], "f32");
+    let mut text = head("ascii", "float", 2);
+    text.extend(b"-0.0322922 0.129176 0.00447467\n0.1 0.2 0.3\n");
+    assert_eq!(digits("text.ply", &text)[0], ["-0.0322922", "0.129176", "0.00447467"], "text");
+    let lines = "512345.678 5412345.12 -0.0322922\n512345.6781 5412345.3 0.0000001\n";
+    let wanted: Vec<Vec<&str>> = lines.lines().map(|line| line.split(' ').collect()).collect();
+    assert_eq!(digits("lost.xyz", lines.as_bytes()), wanted, "with what f32 loses");
+    let coarse = PointCloud::new(DVec3::new(512_345.67, 0.0, 0.0), vec![[0.0; 3], [0.01, 0.1, -1.0]]);
+    let path = folder.path().join("steps.las");
+    autosplats::cloud::write(&coarse.with_resolution(DVec3::splat(0.01)), &path, &()).expect("written");
+    let steps = std::fs::read(&path).expect("read");
+    assert_eq!(digits("again.las", &steps)[1], ["512345.68", "0.10", "-1.00"], "steps of a hundredth");
 }
 
 fn cloud_color() -> Option<[u8; 3]> {

@@ -67,7 +67,12 @@ fn own_formats_keep_all_digits() {
             let wanted = cloud.pick(&kept);
             assert_eq!(written.len(), wanted.len(), "{file}: points");
             let digits = |cloud: &PointCloud| (0..kept.len()).map(|index| file_text(cloud, index)).collect::<Vec<_>>();
-            assert!(digits(&written) == digits(&wanted), "{file}: to the last digit");
+            let both = digits(&written).into_iter().zip(digits(&wanted));
+            // Without steps, what is shortest depends on how far from its origin a cloud holds a number; the next check is
+            // about that.
+            let steps = wanted.resolution().is_some();
+            let unlike: Vec<_> = both.filter(|(written, wanted)| steps && written != wanted).collect();
+            assert!(unlike.is_empty(), "{file}: to the last digit: {:?} of {}", unlike.first(), unlike.len());
             for index in 0..kept.len() {
                 let off = written.world_position(index) - wanted.world_position(index);
                 // A step or two of f64 about other origins.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::color_map::Scale;
-use super::super::cpu::{Scene, encode, encode_table, usual_map};
+use super::super::cpu::{Scene, encode, encode_table};
 use super::super::{Image, Shading, legend};
 use super::pitch;
 
@@ -19,8 +19,14 @@ pub(crate) struct ReadPicture<'a> {
     pub(crate) range: [u32; 2],
 }
 
-/// Brings a picture into the host's form and draws its legend.
-pub(crate) fn finish(read: &ReadPicture<'_>, scene: &Scene<'_>, shading: &Shading, image: &mut Image) {
+/// Brings a picture into the host's form and draws its legend. Says between which values the colour map lies, where the
+/// colour mode has one.
+pub(crate) fn finish(
+    read: &ReadPicture<'_>,
+    scene: &Scene<'_>,
+    shading: &Shading,
+    image: &mut Image,
+) -> Option<[f64; 2]> {
     let [width, height] = read.size;
     image.width = width;
     image.height = height;
@@ -33,11 +39,13 @@ pub(crate) fn finish(read: &ReadPicture<'_>, scene: &Scene<'_>, shading: &Shadin
     linear
         .map(|bytes| bytemuck::pod_read_unaligned(&bytes[..size_of::<[f32; 3]>()]))
         .collect_into_vec(&mut image.linear);
-    if let (true, Some(map)) = (shading.legend, usual_map(&shading.color)) {
-        let range = scene.given_range(shading).unwrap_or_else(|| read.range.map(f32::from_bits));
+    let map = shading.color.usual_map()?;
+    let range = scene.given_range(shading).unwrap_or_else(|| read.range.map(f32::from_bits));
+    if shading.legend {
         let scale = Scale::new(shading.color_map.unwrap_or(map), range);
         let table = encode_table();
         let offset = scene.value_offset(&shading.color);
         legend::draw(image, shading, &scale, offset, |channel| encode(table, channel));
     }
+    Some(scene.world_range(&shading.color, range))
 }

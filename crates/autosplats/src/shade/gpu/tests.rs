@@ -113,7 +113,7 @@ fn assert_same(host: &Image, device: &Image, shading: &Shading, case: &str) {
     // Divisions, powers and fused sums may be off by some units in the last place, which moves a channel over the border
     // between two of 255 steps, and a value over that between two steps of a colour map: of 1024 steps the steepest, those
     // of Turbo, are two of 255 apart, or 0.02 in linear light.
-    let (worst, linear) = if usual_map(&shading.color).is_some() { (2, 0.02) } else { (1, 1e-5) };
+    let (worst, linear) = if shading.color.usual_map().is_some() { (2, 0.02) } else { (1, 1e-5) };
     assert!(found.worst <= worst && found.linear <= linear, "{case}: {found:?}");
     // Some pixels are many where there are few.
     let few = 3.0 / host.pixels.len() as f64;

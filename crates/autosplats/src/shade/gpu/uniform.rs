@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::cpu::{ENCODE_STEPS, Scene, darkening, sample_step, shows_colors, usual_map};
+use super::super::cpu::{ENCODE_STEPS, Scene, darkening, sample_step, shows_colors};
 use super::super::edges::{Edges, SEARCH};
 use super::super::light::{
     CLAY, EDGE_ON, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SHOULDER, SKY,
@@ -82,7 +82,7 @@ pub(crate) struct ShadeUniform {
 
 /// Whether the range of values is to be found among them.
 pub(crate) fn finds_range(shading: &Shading) -> bool {
-    usual_map(&shading.color).is_some() && shading.range.is_none()
+    shading.color.usual_map().is_some() && shading.range.is_none()
 }
 
 impl ShadeUniform {

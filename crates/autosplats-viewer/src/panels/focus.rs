@@ -1,0 +1,104 @@
+//! Which part of the window has the keyboard: F6 goes from part to part, Tab from control to control.
+//!
+//! # How it works
+//! Panels say where they are in each frame, windows are layers of egui's. A part is entered at its first control, as the last
+//! frame had them. The picture has the keyboard when nothing else has it, so that its keys need no modifiers.
+
+use eframe::egui::{self, Context, Id, LayerId, Rect};
+
+use crate::app::App;
+
+/// Where the panels are, and whether the keyboard is what goes from control to control.
+#[derive(Default)]
+pub(crate) struct Focus {
+    panels: Vec<Rect>,
+    /// Whether keys have chosen what has the focus, so that it is to be seen.
+    pub(crate) by_keys: bool,
+}
+
+impl Focus {
+    /// A frame begins.
+    pub(super) fn begin(&mut self) {
+        self.panels.clear();
+    }
+
+    /// There is a panel.
+    pub(super) fn part(&mut self, rect: Rect) {
+        self.panels.push(rect);
+    }
+}
+
+/// A part of the window besides the picture.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Panel(Rect),
+    Window(LayerId),
+}
+
+impl Part {
+    fn holds(self, layer: LayerId, rect: Rect) -> bool {
+        match self {
+            Self::Panel(panel) => layer.order == egui::Order::Background && panel.contains(rect.center()),
+            Self::Window(window) => layer == window,
+        }
+    }
+}
+
+/// The controls that can have the focus, in the order of Tab.
+fn controls(context: &Context) -> Vec<(Id, LayerId, Rect)> {
+    context.viewport(|viewport| {
+        let mut layers: Vec<_> = viewport.prev_pass.widgets.layers().collect();
+        layers.sort_by_key(|(layer, _)| layer.order);
+        let all = layers.into_iter().flat_map(|(layer, widgets)| widgets.iter().map(move |widget| (*layer, widget)));
+        let usable = all.filter(|(_, widget)| widget.enabled && widget.sense.is_focusable());
+        usable.map(|(layer, widget)| (widget.id, layer, widget.rect)).collect()
+    })
+}
+
+/// Gives the focus to the next part of the window, or to the one before.
+pub(crate) fn go_on(app: &mut App, context: &Context, back: bool) {
+    let controls = controls(context);
+    let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
+    windows.retain(|layer| layer.order == egui::Order::Middle);
+    windows.dedup();
+    let picture = app.view_rect;
+    let panels = app.panels.focus.panels.iter().filter(|panel| !picture.contains(panel.center()));
+    let mut parts: Vec<Part> = panels.map(|panel| Part::Panel(*panel)).collect();
+    parts.extend(windows.into_iter().map(Part::Window));
+    let first = |part: Part| controls.iter().find(|(_, layer, rect)| part.holds(*layer, *rect)).map(|(id, ..)| *id);
+    let stops: Vec<(Part, Id)> = parts.into_iter().filter_map(|part| Some((part, first(part)?))).collect();
+    let focused = context.memory(|memory| memory.focused());
+    let here = focused.and_then(|focused| {
+        let (_, layer, rect) = controls.iter().find(|(id, ..)| *id == focused)?;
+        stops.iter().position(|(part, _)| part.holds(*layer, *rect))
+    });
+    // One place more than there are stops is the picture's.
+    let count = stops.len() + 1;
+    let place = here.unwrap_or(stops.len());
+    let next = if back { place + count - 1 } else { place + 1 } % count;
+    context.memory_mut(|memory| match (stops.get(next), focused) {
+        (Some((_, id)), _) => memory.request_focus(*id),
+        (None, Some(focused)) => memory.surrender_focus(focused),
+        (None, None) => {}
+    });
+    app.panels.focus.by_keys = true;
+}
+
+/// Draws a ring around what has the focus, if keys have given it.
+pub(super) fn ring(app: &mut App, context: &Context) {
+    if context.input(|input| input.pointer.any_pressed()) {
+        app.panels.focus.by_keys = false;
+    }
+    if !app.panels.focus.by_keys {
+        return;
+    }
+    let focused = context.memory(|memory| memory.focused());
+    let Some(widget) = focused.and_then(|id| context.viewport(|viewport| viewport.this_pass.widgets.get(id).copied()))
+    else {
+        return;
+    };
+    let painter = context.layer_painter(LayerId::new(egui::Order::Foreground, Id::unique("focus ring")));
+    let color = context.global_style().visuals.selection.stroke.color;
+    let rect = widget.interact_rect.expand(2.0);
+    painter.rect_stroke(rect, 3.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Middle);
+}

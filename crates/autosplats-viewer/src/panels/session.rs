@@ -1,0 +1,54 @@
+//! Keeping the session in a file.
+
+use eframe::egui;
+
+use super::target_file::{TargetFile, Words};
+use crate::app::App;
+use crate::state::State;
+
+/// Where the session is to be kept.
+pub(crate) struct Session {
+    pub(crate) open: bool,
+    target: TargetFile,
+}
+
+impl Default for Session {
+    fn default() -> Self {
+        Self { open: false, target: TargetFile::new("autosplats.json") }
+    }
+}
+
+/// Asks where to keep it, which is where it is kept so far if that was told.
+pub(crate) fn open(app: &mut App) {
+    if let Some(path) = &app.state {
+        app.panels.session.target = TargetFile::new(path.display().to_string());
+    }
+    app.panels.session.target.open();
+    app.panels.session.open = true;
+}
+
+pub(super) fn show(app: &mut App, context: &egui::Context) {
+    let mut open = app.panels.session.open;
+    let mut write = None;
+    let window = egui::Window::new("Save session").open(&mut open).collapsible(false).resizable(false);
+    window.default_pos(app.view_rect.center() - egui::vec2(220.0, 60.0)).show(context, |ui| {
+        ui.set_width(420.0);
+        let words = Words { title: "Save session", name: "autosplats.json", verb: "Save" };
+        let (target, entered) = (&mut app.panels.session.target, &mut app.panels.entered);
+        let folder = target.path().is_dir().then(|| "This is a folder".into());
+        write = target.show(ui, &words, entered, folder);
+    });
+    app.panels.session.open = open;
+    let Some(write) = write else { return };
+    if !write.replace && write.path.exists() {
+        app.panels.session.target.refuse(&write.path, "This file is there already", true);
+        return;
+    }
+    match State::of(app).write(&write.path) {
+        Ok(()) => {
+            app.messages.note(format!("{} was written; 'autosplats --state' has it again", write.path.display()));
+            app.panels.session.open = false;
+        }
+        Err(error) => app.panels.session.target.refuse(&write.path, error, false),
+    }
+}

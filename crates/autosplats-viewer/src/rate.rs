@@ -1,0 +1,41 @@
+//! How many pictures a second there are.
+
+use crate::render::Picture;
+
+/// Pictures a second, while they change.
+#[derive(Default)]
+pub(crate) struct Rate {
+    last: Option<f64>,
+    /// Mean seconds between pictures; 0 while unknown.
+    interval: f64,
+    /// The last pictures' times per stage, for the plot.
+    pub(crate) timings: std::collections::VecDeque<autosplats::Timings>,
+}
+
+impl Rate {
+    /// Pictures kept for the plot.
+    const KEPT: usize = 120;
+
+    /// There is another picture.
+    pub(crate) fn count(&mut self, now: f64, picture: &Picture) {
+        if let Some(last) = self.last {
+            let interval = now - last;
+            // A pause is no slow picture.
+            if interval < 0.5 {
+                self.interval = if self.interval > 0.0 { 0.8 * self.interval + 0.2 * interval } else { interval };
+            } else {
+                self.interval = 0.0;
+            }
+        }
+        self.last = Some(now);
+        if self.timings.len() == Self::KEPT {
+            self.timings.pop_front();
+        }
+        self.timings.push_back(picture.timings);
+    }
+
+    /// Pictures a second, if they follow each other.
+    pub(crate) fn per_second(&self) -> Option<f64> {
+        (self.interval > 0.0).then(|| 1.0 / self.interval)
+    }
+}

@@ -1,0 +1,147 @@
+//! Dialogs by keys alone: Enter does what they are for, Escape closes them, and nothing is replaced unasked.
+
+use std::path::{Path, PathBuf};
+
+use super::*;
+use crate::commands::Command;
+
+/// Opens a dialog and types where it is to write.
+fn ask(window: &mut Window, command: Command, path: &Path) {
+    let context = window.harness.ctx.clone();
+    crate::keys::run(window.harness.state_mut(), &context, command);
+    window.steps(3);
+    if command == Command::Film {
+        // It stays open beside the picture, which keeps its keys.
+        let line = window.harness.get_by_role(Role::TextInput);
+        line.focus();
+        window.steps(2);
+    }
+    window.key(CTRL, Key::A);
+    window.event(Event::Text(path.display().to_string()));
+    window.step();
+}
+
+/// The four dialogs, and the name that each takes.
+const DIALOGS: [(Command, &str); 4] = [
+    (Command::Export, "points.ply"),
+    (Command::Screenshot, "picture.png"),
+    (Command::Film, "film.png"),
+    (Command::SaveState, "session.json"),
+];
+
+fn is_open(window: &Window, command: Command) -> bool {
+    let panels = &window.app().panels;
+    match command {
+        Command::Export => panels.export.open,
+        Command::Screenshot => panels.picture.open,
+        Command::Film => panels.film.open,
+        _ => panels.session.open,
+    }
+}
+
+/// What a dialog writes first: of a film a picture.
+fn written(folder: &Path, name: &str) -> PathBuf {
+    folder.join(if name == "film.png" { "film_00000.png" } else { name })
+}
+
+#[test]
+fn enter_writes_and_replaces_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = Window::with_statue();
+    for (command, name) in DIALOGS {
+        ask(&mut window, command, &folder.path().join(name));
+        window.press(Key::Enter);
+        let file = written(folder.path(), name);
+        window.until(name, |window| file.is_file() && window.app().recording.is_none());
+        window.until("it is told", |window| window.says("writ"));
+        window.settle();
+        (0..3).for_each(|_| window.press(Key::Escape));
+        assert!(!is_open(&window, command), "{name}: the dialog is gone");
+
+        std::fs::write(&file, "mine").expect("it can be written");
+        ask(&mut window, command, &folder.path().join(name));
+        for _ in 0..2 {
+            window.press(Key::Enter);
+            window.until("a question", |window| window.says("Replace it"));
+            window.steps(20);
+        }
+        assert_eq!(std::fs::read_to_string(&file).ok().as_deref(), Some("mine"), "{name}: nothing was replaced");
+        assert!(is_open(&window, command), "{name}: the question stays");
+        window.click_on("Replace it");
+        window.until(name, |window| {
+            window.app().recording.is_none() && std::fs::read(&file).is_ok_and(|bytes| bytes != b"mine")
+        });
+        window.settle();
+        (0..3).for_each(|_| window.press(Key::Escape));
+    }
+}
+
+#[test]
+fn what_may_be_replaced_is_what_was_asked_about() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("points.ply");
+    std::fs::write(&file, "mine").expect("it can be written");
+    let mut window = Window::with_statue();
+    let question = |window: &mut Window| {
+        window.press(Key::Enter);
+        window.until("a question", |window| window.says("Replace it"));
+    };
+    ask(&mut window, Command::Export, &file);
+    question(&mut window);
+    window.click_on("All, hidden points too");
+    assert!(!window.says("Replace it"), "other points are another question");
+    question(&mut window);
+    ask(&mut window, Command::Export, &file);
+    assert!(!window.says("Replace it"), "and when the dialog is opened anew");
+    question(&mut window);
+    ask(&mut window, Command::Export, &folder.path().join("other.ply"));
+    assert!(!window.says("Replace it"), "another file, too");
+    window.steps(10);
+    assert_eq!(std::fs::read_to_string(&file).ok().as_deref(), Some("mine"), "nothing was replaced");
+}
+
+#[test]
+fn escape_closes_a_dialog_and_writes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = Window::with_statue();
+    for (command, name) in DIALOGS {
+        ask(&mut window, command, &folder.path().join(name));
+        assert!(is_open(&window, command), "{name}: it is open");
+        window.press(Key::Escape);
+        assert!(!is_open(&window, command), "{name}: once is enough, though the line had the keyboard");
+    }
+    window.steps(20);
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing was written");
+}
+
+#[test]
+fn a_name_that_cannot_be_written_is_told_in_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = Window::with_statue();
+    for (command, name, why) in [
+        (Command::Export, "points.unknown", "unknown"),
+        (Command::Screenshot, "picture.bmp", "The name has to end in .png"),
+        (Command::Film, "film.bmp", "The name has to end in .mp4"),
+        (Command::SaveState, "", "This is a folder"),
+    ] {
+        ask(&mut window, command, &folder.path().join(name));
+        window.press(Key::Enter);
+        window.until(why, |window| window.says(why));
+        assert!(is_open(&window, command) && !window.says("Replace it"), "{name}: another name can be given");
+        window.press(Key::Escape);
+        window.step();
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing was written");
+}
+
+#[test]
+fn enter_leaves_by_exporting() {
+    let mut window = Window::with_statue();
+    window.key(CTRL, Key::A);
+    window.press(Key::Delete);
+    window.harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.push(egui::ViewportEvent::Close);
+    window.steps(3);
+    assert!(window.says("Edits are not saved"), "it is asked");
+    window.press(Key::Enter);
+    assert!(window.app().panels.export.open && !window.app().quit, "Enter does no harm");
+}
