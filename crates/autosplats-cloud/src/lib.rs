@@ -47,7 +47,7 @@ pub use read::{
 };
 pub use sample::sample_surface;
 pub use source::{
-    Source,
+    Source, point_cloud2,
     scene::{Hit, Scene, View, parse_count},
     stream::{Next, Statistics, Stream, Timeline, Update},
 };

@@ -18,11 +18,11 @@ const BLOCK: usize = 1 << 18;
 pub(crate) const SMALL: f64 = 1e4;
 
 /// Values of a point beyond which a header is rather broken than rich.
-pub(super) const MAX_COLUMNS: usize = 1024;
+pub(crate) const MAX_COLUMNS: usize = 1024;
 
 /// The number types that files hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(crate) enum Scalar {
     I8,
     U8,
     I16,
@@ -36,7 +36,7 @@ pub(super) enum Scalar {
 }
 
 impl Scalar {
-    pub(super) fn size(self) -> usize {
+    pub(crate) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -82,11 +82,11 @@ number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
 /// One number per point: the one of point `i` starts at byte `offset + i * stride`.
 #[derive(Clone, Debug)]
-pub(super) struct Column {
-    pub(super) name: String,
-    pub(super) scalar: Scalar,
-    pub(super) offset: usize,
-    pub(super) stride: usize,
+pub(crate) struct Column {
+    pub(crate) name: String,
+    pub(crate) scalar: Scalar,
+    pub(crate) offset: usize,
+    pub(crate) stride: usize,
 }
 
 impl Column {
@@ -99,20 +99,20 @@ impl Column {
 pub(super) const CHUNK: usize = 1 << 20;
 
 /// Columns over some bytes.
-pub(super) struct Table<'a> {
-    pub(super) bytes: &'a [u8],
-    pub(super) count: usize,
-    pub(super) big_endian: bool,
-    pub(super) columns: Vec<Column>,
+pub(crate) struct Table<'a> {
+    pub(crate) bytes: &'a [u8],
+    pub(crate) count: usize,
+    pub(crate) big_endian: bool,
+    pub(crate) columns: Vec<Column>,
     /// Whether a column named `rgb` or `rgba` holds a colour packed into 32 bits.
-    pub(super) packed_rgb: bool,
+    pub(crate) packed_rgb: bool,
     /// Part of the whole work that was done before this.
-    pub(super) done: f32,
+    pub(crate) done: f32,
 }
 
 impl Table<'_> {
     /// Makes the cloud. `place` is where an error about missing coordinates points to.
-    pub(super) fn into_cloud(mut self, job: &Job<'_>, place: &str) -> Result<PointCloud, Error> {
+    pub(crate) fn into_cloud(mut self, job: &Job<'_>, place: &str) -> Result<PointCloud, Error> {
         if self.columns.len() > MAX_COLUMNS {
             return Err(job.malformed(place, format!("{} values a point; at most {MAX_COLUMNS}", self.columns.len())));
         }

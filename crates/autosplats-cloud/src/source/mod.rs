@@ -1,7 +1,9 @@
 //! Where clouds come from.
 
+pub mod point_cloud2;
 pub(crate) mod scene;
 pub(crate) mod stream;
+pub(crate) mod wire;
 
 use std::path::{Path, PathBuf};
 

@@ -3,6 +3,8 @@
 #![allow(dead_code, reason = "not every test uses all of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+pub(crate) mod ros;
+
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, glam::DVec3, read};
 
 /// Reads `bytes` as a file of this name.
