@@ -1,6 +1,7 @@
 //! Where clouds come from.
 
 pub mod point_cloud2;
+pub(crate) mod recording;
 pub(crate) mod scene;
 pub(crate) mod stream;
 pub(crate) mod wire;
