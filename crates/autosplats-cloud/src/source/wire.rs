@@ -11,6 +11,9 @@ pub enum Encoding {
     Cdr,
 }
 
+/// What data compressed by Zstandard begin with.
+pub(crate) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
+
 /// What is wrong with some bytes, and at which of them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fault {
@@ -68,6 +71,10 @@ impl<'a> Wire<'a> {
         let Some([first, kind, _, _]) = bytes.first_chunk::<4>() else {
             return Err(Fault::new(0, "the four bytes that begin a CDR message are not there; it is cut off"));
         };
+        if bytes.starts_with(ZSTD) {
+            let what = "each message of this recording is compressed by itself; 'ros2 bag convert' undoes that";
+            return Err(Fault::new(0, what));
+        }
         let alignment = match (first, kind) {
             (0, 0 | 1) => 8,
             // The second version aligns numbers of eight bytes to four, and is the same otherwise.

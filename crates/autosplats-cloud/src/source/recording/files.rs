@@ -10,6 +10,7 @@ use crate::{
     Error, Progress, ReadOptions,
     error::message,
     read::{Bytes, Job, check_not_lfs_pointer},
+    source::wire::ZSTD,
 };
 
 /// One file, mapped, and what is where in it.
@@ -51,7 +52,7 @@ impl File {
                 job.unsupported(
                     "bags older than version 2.0 are not read; 'rosbag fix' or 'rosbag reindex' renews them",
                 )
-            } else if bytes.starts_with(b"\x28\xb5\x2f\xfd") {
+            } else if bytes.starts_with(ZSTD) {
                 job.unsupported("the whole file is compressed; 'zstd -d' unpacks it")
             } else {
                 job.malformed("byte 0", "this begins neither an MCAP file nor a ROS 1 bag")
