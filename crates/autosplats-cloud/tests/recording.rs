@@ -23,22 +23,27 @@ const SECOND: i64 = 1_000_000_000;
 
 /// Keeps what it is told.
 #[derive(Default)]
-struct Notes(Mutex<Vec<String>>);
+struct Notes {
+    notes: Mutex<Vec<String>>,
+    done: Mutex<f32>,
+}
 
 impl Progress for Notes {
     fn report(&self, fraction: f32) {
-        assert!((0.0..=1.0).contains(&fraction), "progress of {fraction}");
+        let mut done = self.done.lock().unwrap();
+        assert!((*done..=1.0).contains(&fraction), "progress of {fraction} after {done}");
+        *done = fraction;
     }
 
     fn note(&self, note: &str) {
         assert!(!note.contains(char::is_control), "one line: {note:?}");
-        self.0.lock().unwrap().push(note.into());
+        self.notes.lock().unwrap().push(note.into());
     }
 }
 
 impl Notes {
     fn all(self) -> Vec<String> {
-        self.0.into_inner().unwrap()
+        self.notes.into_inner().unwrap()
     }
 }
 

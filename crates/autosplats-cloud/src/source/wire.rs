@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 /// How a ROS message is written as bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// As ROS 1 does: little-endian and without gaps.
     Ros1,

@@ -9,6 +9,7 @@ use super::{
 use crate::{
     Error, Progress, ReadOptions,
     error::message,
+    progress::Part,
     read::{Bytes, Job, check_not_lfs_pointer},
     source::wire::ZSTD,
 };
@@ -140,7 +141,11 @@ pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Vec<Fil
     if parts.is_empty() {
         return Err(Error::Unsupported { path: path.into(), what: "the folder has no MCAP files".into() });
     }
-    parts.iter().map(|name| File::open(&path.join(name), progress)).collect()
+    let len = 1.0 / parts.len() as f32;
+    let open = |(index, name): (usize, &String)| {
+        File::open(&path.join(name), &Part { whole: progress, start: len * index as f32, len })
+    };
+    parts.iter().enumerate().map(open).collect()
 }
 
 /// The files that `metadata.yaml` lists: of YAML no more is needed than the lines of one list.

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// What a topic's messages are good for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Kind {
     Points,
     /// Transforms between frames; fixed ones hold at all times.
@@ -26,7 +26,7 @@ pub(super) enum Kind {
 }
 
 /// Messages of one name and type.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Topic {
     pub(super) name: String,
     pub(super) type_name: String,
@@ -150,7 +150,7 @@ impl Index {
         let mut records = 0_usize;
         while at < bytes.len() && !walk.ended {
             if records.is_multiple_of(BLOCK) {
-                tick(progress, at as f32 / bytes.len() as f32)?;
+                tick(progress, 0.5 * at as f32 / bytes.len() as f32)?;
             }
             records += 1;
             match container.record(bytes, at) {
@@ -226,7 +226,7 @@ impl Walk {
             if self.indexed[number].as_ref().is_some_and(known) {
                 continue;
             }
-            tick(progress, chunk.data.start as f32 / bytes.len() as f32)?;
+            tick(progress, 0.5 + 0.5 * chunk.data.start as f32 / bytes.len() as f32)?;
             let mut entries = Vec::new();
             let outcome = unpack(bytes, chunk).and_then(|content| {
                 let mut at = 0;
@@ -258,9 +258,10 @@ impl Walk {
 
         let mut ids: Vec<_> = self.topics.into_iter().collect();
         ids.sort_unstable_by_key(|(id, _)| *id);
+        // Several writers may have given one topic several numbers.
+        let mut known: HashMap<Topic, usize> = HashMap::new();
         for (id, topic) in ids {
-            // Several writers may have given one topic several numbers.
-            let at = index.topics.iter().position(|known| *known == topic).unwrap_or_else(|| {
+            let at = *known.entry(topic.clone()).or_insert_with(|| {
                 index.topics.push(topic);
                 index.topics.len() - 1
             });

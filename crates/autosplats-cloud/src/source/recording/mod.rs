@@ -16,7 +16,7 @@ mod play;
 mod summary;
 mod transforms;
 
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
 pub use self::{
     files::is_recording,
@@ -24,14 +24,17 @@ pub use self::{
 };
 use self::{
     files::{File, open_files},
-    index::{Kind, Place},
+    index::{Kind, Place, Topic},
     transforms::Transforms,
 };
 use super::{
     point_cloud2::{frame_name, stamp_and_frame},
     stream::{Statistics, Timeline},
 };
-use crate::{Error, Progress, ReadOptions, progress::tick};
+use crate::{
+    Error, Progress, ReadOptions,
+    progress::{Part, tick},
+};
 
 /// What is played of a recording, and how.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,7 +77,7 @@ impl Recording {
     /// [`Error::Io`], [`Error::Malformed`] if nothing can be played, [`Error::Unsupported`] if it has no such points, and
     /// [`Error::Cancelled`].
     pub fn open(path: &Path, options: &RecordingOptions, progress: &dyn Progress) -> Result<Self, Error> {
-        Self::of(path, open_files(path, progress)?, options, progress)
+        Self::of(path, open_files(path, &indexing(progress))?, options, progress)
     }
 
     /// [Opens](Self::open) a recording from the bytes of a file, whose name stands in messages.
@@ -87,7 +90,7 @@ impl Recording {
         options: &RecordingOptions,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
-        Self::of(name, vec![File::of_bytes(name, bytes, progress)?], options, progress)
+        Self::of(name, vec![File::of_bytes(name, bytes, &indexing(progress))?], options, progress)
     }
 
     fn of(
@@ -113,15 +116,13 @@ impl Recording {
             channels.clone_from(&options.topics);
         }
 
+        let numbers: HashMap<&str, usize> = channels.iter().enumerate().map(|(at, name)| (&**name, at)).collect();
         let mut frames = Vec::new();
-        for (number, file) in files.iter().enumerate() {
-            for message in &file.index.messages {
-                let topic = &file.index.topics[message.topic];
-                let channel = channels.iter().position(|name| *name == topic.name);
-                if let Some(channel) = channel.filter(|_| topic.kind == Kind::Points) {
-                    frames.push((Place { file: number, ..*message }, channel));
-                }
-            }
+        for (number, File { index, .. }) in files.iter().enumerate() {
+            let channel = |topic: &Topic| numbers.get(&*topic.name).copied().filter(|_| topic.kind == Kind::Points);
+            let channels: Vec<Option<usize>> = index.topics.iter().map(channel).collect();
+            let own = index.messages.iter().map(|place| Place { file: number, ..*place });
+            frames.extend(own.filter_map(|place| Some((place, channels[place.topic]?))));
         }
         frames.sort_by_key(|(place, _)| place.time);
         let timeline = Timeline::new(frames.iter().map(|(place, _)| place.time).collect());
@@ -136,18 +137,8 @@ impl Recording {
             }
         }
 
-        let mut transforms = Transforms::read(&files, progress)?;
-        let mut sensors = Vec::new();
-        for channel in 0..channels.len() {
-            // The first message that can be read says which frame the sensor of a topic is in.
-            let mut own = frames.iter().filter(|(_, of)| *of == channel).take(FIRST);
-            let frame = own.find_map(|(place, _)| {
-                let file = &mut files[place.file];
-                let encoding = file.index.topics[place.topic].encoding?;
-                Some(stamp_and_frame(file.message(place).ok()?, encoding)?.1)
-            });
-            sensors.extend(frame);
-        }
+        let mut transforms = Transforms::read(&files, &Part { whole: progress, start: INDEXING, len: 1.0 - INDEXING })?;
+        let sensors = sensors(&mut files, &frames, channels.len());
         transforms.choose(&sensors, options.frame.as_deref().map(frame_name)).map_err(&unsupported)?;
         summary.frames = transforms.frames(&sensors);
         summary.frame = transforms.target().map(str::to_owned);
@@ -171,11 +162,46 @@ impl Recording {
     /// [seek](crate::Stream::seek) they show all that playing up to there would.
     pub fn seen_at(&self, frame: usize) -> Vec<usize> {
         let before = &self.frames[..self.frames.len().min(frame.saturating_add(1))];
-        let last = |channel| before.iter().rposition(|(_, of)| *of == channel);
-        let mut seen: Vec<usize> = (0..self.channels.len()).filter_map(last).collect();
-        seen.sort_unstable();
+        let mut missing = vec![true; self.channels.len()];
+        let last = |(at, (_, channel)): (usize, &(Place, usize))| {
+            std::mem::replace(&mut missing[*channel], false).then_some(at)
+        };
+        let mut seen: Vec<usize> = before.iter().enumerate().rev().filter_map(last).collect();
+        seen.reverse();
         seen
     }
+}
+
+/// The frames of the channels' sensors, in their order, as the first messages that can be read say.
+fn sensors(files: &mut [File], frames: &[(Place, usize)], channels: usize) -> Vec<String> {
+    let mut found: Vec<Result<String, usize>> = vec![Err(0); channels];
+    let mut open = channels;
+    for (place, channel) in frames {
+        let Err(tried) = &mut found[*channel] else { continue };
+        *tried += 1;
+        let tried = *tried;
+        if tried > FIRST {
+            continue;
+        }
+        let file = &mut files[place.file];
+        let encoding = file.index.topics[place.topic].encoding;
+        let frame = encoding.and_then(|encoding| stamp_and_frame(file.message(place).ok()?, encoding));
+        open -= usize::from(frame.is_some() || tried == FIRST);
+        if let Some((_, frame)) = frame {
+            found[*channel] = Ok(frame);
+        }
+        if open == 0 {
+            break;
+        }
+    }
+    found.into_iter().flatten().collect()
+}
+
+/// Part of opening that finding the messages is; the rest is reading transforms.
+const INDEXING: f32 = 0.5;
+
+fn indexing(progress: &dyn Progress) -> Part<'_> {
+    Part { whole: progress, start: 0.0, len: INDEXING }
 }
 
 /// Messages of a topic that are looked at for the frame of its sensor.

@@ -1,8 +1,11 @@
 //! What is in a recording, for people.
 
-use std::time::Duration;
+use std::{collections::BTreeMap, time::Duration};
 
-use super::{files::File, index::Kind};
+use super::{
+    files::File,
+    index::{Kind, Topic},
+};
 
 /// What is in a recording, as far as it is known without its points.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,26 +44,16 @@ const LISTED: usize = 20;
 
 impl RecordingSummary {
     pub(super) fn of(files: &[File]) -> Self {
-        let mut topics: Vec<RecordingTopic> = Vec::new();
+        let mut topics: BTreeMap<(&str, &str), RecordingTopic> = BTreeMap::new();
         let mut kinds: Vec<String> = Vec::new();
         let mut times = None;
         for File { index, container, .. } in files {
-            for (topic, &messages) in index.topics.iter().zip(&index.counts) {
-                let (points, same) = (topic.kind == Kind::Points, |known: &&mut RecordingTopic| {
-                    known.name == topic.name && known.type_name == topic.type_name
-                });
-                match topics.iter_mut().find(same) {
-                    Some(known) => {
-                        known.messages += messages;
-                        known.points |= points;
-                    }
-                    None => topics.push(RecordingTopic {
-                        name: topic.name.clone(),
-                        type_name: topic.type_name.clone(),
-                        messages,
-                        points,
-                    }),
-                }
+            for (Topic { name, type_name, kind, .. }, messages) in index.topics.iter().zip(&index.counts) {
+                let new =
+                    || RecordingTopic { name: name.clone(), type_name: type_name.clone(), messages: 0, points: false };
+                let topic = topics.entry((name, type_name)).or_insert_with(new);
+                topic.messages += messages;
+                topic.points |= *kind == Kind::Points;
             }
             let compressed = index.chunks.iter().map(|chunk| &*chunk.compression).filter(|name| !name.is_empty());
             for kind in std::iter::once(container.name()).chain(compressed) {
@@ -74,12 +67,11 @@ impl RecordingSummary {
                 (all.start, all.end) = (all.start.min(own.start), all.end.max(own.end));
             }
         }
-        topics.sort_by(|a, b| (&a.name, &a.type_name).cmp(&(&b.name, &b.type_name)));
         let times = times.unwrap_or_default();
         let faults = files.iter().flat_map(|file| &file.index.faults);
         Self {
             format: kinds.join(", "),
-            topics,
+            topics: topics.into_values().collect(),
             start: times.start,
             duration: Duration::from_nanos(times.end.abs_diff(times.start)),
             notes: faults.map(|fault| crate::error::message(&format!("{}: {}", fault.place(), fault.what))).collect(),

@@ -120,9 +120,8 @@ impl Transforms {
             return Ok(());
         }
         // Without any transforms there is nothing to bring into one frame, nor of a sensor outside of the tree.
-        let mut inside = sensors.iter().filter(|&sensor| {
-            self.edges.contains_key(sensor) || self.edges.values().any(|edge| edge.parent == *sensor)
-        });
+        let parents: BTreeSet<&String> = self.edges.values().map(|edge| &edge.parent).collect();
+        let mut inside = sensors.iter().filter(|&sensor| self.edges.contains_key(sensor) || parents.contains(sensor));
         self.target = inside.find_map(|sensor| Some(self.to_root(sensor, 0)?.1.to_owned()));
         Ok(())
     }
