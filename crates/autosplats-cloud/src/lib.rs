@@ -47,7 +47,8 @@ pub use read::{
 };
 pub use sample::sample_surface;
 pub use source::{
-    Source,
+    Source, point_cloud2,
+    recording::{Recording, RecordingOptions, RecordingSummary, RecordingTopic, describe_recording, is_recording},
     scene::{Hit, Scene, View, parse_count},
     stream::{Next, Statistics, Stream, Timeline, Update},
 };

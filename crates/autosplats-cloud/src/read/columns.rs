@@ -143,3 +143,17 @@ pub(super) fn field_name(name: &str) -> String {
     };
     known.into()
 }
+
+/// Values that a field may have for each of them to become one of its own. Descriptors have more.
+pub(super) const MAX_COUNT: usize = 16;
+
+/// Names of the columns that a field of so many values is read as: none for padding, which `_` stands for, and for fields
+/// of too many.
+pub(crate) fn numbered(name: &str, count: usize) -> Vec<String> {
+    match count {
+        _ if name == "_" => Vec::new(),
+        1 => vec![name.to_owned()],
+        2..=MAX_COUNT => (0..count).map(|index| format!("{name}_{index}")).collect(),
+        _ => Vec::new(),
+    }
+}

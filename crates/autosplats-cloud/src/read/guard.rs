@@ -12,7 +12,7 @@ thread_local! {
 }
 
 /// Runs code of others on the bytes of a file; a panic becomes an error like any, and says nothing on standard error.
-pub(super) fn guard<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static QUIET: Once = Once::new();
     // The hook is the process's: for every panic outside of here it does what it did before.
     QUIET.call_once(|| {

@@ -35,8 +35,11 @@ mod xyz;
 
 use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
-use self::guard::guard;
-pub(crate) use self::table::{ColorScale, SMALL, middle};
+pub(crate) use self::{
+    columns::numbered,
+    guard::guard,
+    table::{ColorScale, Column, MAX_COLUMNS, SMALL, Scalar, Table, middle},
+};
 pub use self::{
     describe::{Attribute, Description},
     options::{DepthCamera, ReadOptions},
@@ -184,11 +187,17 @@ pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Resul
     (format(&job)?.describe)(&job)
 }
 
-fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
+/// Refuses the few lines that Git LFS leaves in a file's place.
+pub(crate) fn check_not_lfs_pointer(job: &Job<'_>) -> Result<(), Error> {
     if job.bytes.starts_with(b"version https://git-lfs") {
         let what = "a pointer of Git LFS stands in the file's place; 'git lfs pull' fetches the file";
         return Err(job.malformed("line 1", what));
     }
+    Ok(())
+}
+
+fn format(job: &Job<'_>) -> Result<&'static Format, Error> {
+    check_not_lfs_pointer(job)?;
     let name = job.path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     let by_content = FORMATS.iter().find(|format| (format.recognised)(job.bytes));
@@ -223,38 +232,60 @@ fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
 
 /// Scanners write (0, 0, 0) where nothing came back. One such point alone may be a real one, unless a sensor stands there.
 fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
-    let absent = |i: usize| cloud.world_position(i) == DVec3::ZERO;
-    let count = (0..cloud.len()).into_par_iter().filter(|&i| absent(i)).count();
+    let total = cloud.len();
     let least = if format.sensor_frame { 1 } else { 2 };
-    if count < least || count == cloud.len() {
-        return;
+    let count = take_out_no_returns(cloud, |count| (least..total).contains(&count));
+    if count > 0 {
+        job.note(format!("dropped {count} of {total} points at (0, 0, 0), where nothing was measured"));
+    }
+}
+
+/// Takes the points at (0, 0, 0) out if so many are no points, and returns how many they were.
+pub(crate) fn take_out_no_returns(cloud: &mut PointCloud, if_so_many: impl Fn(usize) -> bool) -> usize {
+    // About no origin, positions are world coordinates; of zeros no bit is set but the sign.
+    let exact = cloud.origin() == DVec3::ZERO && cloud.residuals().is_none();
+    let zero = |[x, y, z]: &[f32; 3]| (x.to_bits() | y.to_bits() | z.to_bits()) << 1 == 0;
+    let absent = |i: usize| {
+        if exact { zero(&cloud.positions()[i]) } else { cloud.world_position(i) == DVec3::ZERO }
+    };
+    let count = if exact {
+        let zeros = |points: &[[f32; 3]]| points.iter().map(|point| usize::from(zero(point))).sum::<usize>();
+        cloud.positions().par_chunks(BLOCK).map(zeros).sum()
+    } else {
+        (0..cloud.len()).into_par_iter().filter(|&i| absent(i)).count()
+    };
+    if count == 0 || !if_so_many(count) {
+        return 0;
     }
     let keep: Vec<bool> = (0..cloud.len()).into_par_iter().map(|i| !absent(i)).collect();
-    job.note(format!("dropped {count} of {} points at (0, 0, 0), where nothing was measured", cloud.len()));
     cloud.retain(|i| keep[i]);
+    count
 }
+
+/// Points that are looked at as one piece of work.
+const BLOCK: usize = 1 << 14;
 
 /// Bytes of a header line beyond which it is rather broken than long.
 const MAX_HEADER_LINE: usize = 1 << 16;
 
 /// What every reader is given.
 #[derive(Clone, Copy)]
-struct Job<'a> {
-    path: &'a Path,
-    progress: &'a dyn Progress,
-    bytes: &'a [u8],
-    options: &'a ReadOptions,
+pub(crate) struct Job<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) progress: &'a dyn Progress,
+    pub(crate) bytes: &'a [u8],
+    pub(crate) options: &'a ReadOptions,
     /// Whether triangles are wanted.
-    triangles: bool,
+    pub(crate) triangles: bool,
 }
 
 impl Job<'_> {
-    fn tick(&self, fraction: f32) -> Result<(), Error> {
+    pub(crate) fn tick(&self, fraction: f32) -> Result<(), Error> {
         tick(self.progress, fraction)
     }
 
     /// Tells the user what is no error.
-    fn note(&self, note: impl AsRef<str>) {
+    pub(crate) fn note(&self, note: impl AsRef<str>) {
         self.progress.note(&message(note.as_ref()));
     }
 
@@ -282,11 +313,11 @@ impl Job<'_> {
         check_memory(&format!("the {count} points of {name}"), bytes)
     }
 
-    fn malformed(&self, place: impl Into<String>, what: impl Into<String>) -> Error {
+    pub(crate) fn malformed(&self, place: impl Into<String>, what: impl Into<String>) -> Error {
         Error::Malformed { path: self.path.into(), place: place.into(), what: message(&what.into()) }
     }
 
-    fn unsupported(&self, what: impl Into<String>) -> Error {
+    pub(crate) fn unsupported(&self, what: impl Into<String>) -> Error {
         Error::Unsupported { path: self.path.into(), what: message(&what.into()) }
     }
 
@@ -317,20 +348,20 @@ impl Job<'_> {
 }
 
 /// A piece of a file as it may stand in a message: short, and without characters that would act on a terminal.
-fn shown(bytes: &[u8]) -> String {
+pub(crate) fn shown(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
     text.chars().flat_map(char::escape_debug).collect()
 }
 
 /// The whole content of a file: mapped, or read where there is nothing to map, as for a pipe.
-enum Bytes {
+pub(crate) enum Bytes {
     Mapped(memmap2::Mmap),
     Read(Vec<u8>),
 }
 
 impl Bytes {
     #[allow(unsafe_code, reason = "a memory map is several times faster than reading, and needs unsafe")]
-    fn open(path: &Path) -> std::io::Result<Self> {
+    pub(crate) fn open(path: &Path) -> std::io::Result<Self> {
         let mut file = File::open(path)?;
         let metadata = file.metadata()?;
         if metadata.is_file() && metadata.len() > 0 {

@@ -7,7 +7,9 @@ use glam::{DMat4, DVec3};
 
 use self::header::{Encoding, Header, Viewpoint};
 use super::{
-    Attribute, Contents, Description, Format, Job, shown,
+    Attribute, Contents, Description, Format, Job,
+    columns::{MAX_COUNT, numbered},
+    shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
     xyz,
@@ -113,9 +115,6 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 /// Fields left out that are told one by one.
 const LISTED: usize = 10;
 
-/// Values that a field may have for each of them to become one of its own. Descriptors have more.
-const MAX_COUNT: usize = 16;
-
 /// Neighbours looked at to find out from where an image of points was taken.
 const RAYS: usize = 1 << 14;
 
@@ -156,17 +155,6 @@ fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
     middle > 0.0 && even * 10 >= angles.len() * 9
 }
 
-/// Names of the columns that a field is read as: none for padding and for fields of too many values.
-fn column_names(field: &header::Field) -> Vec<String> {
-    // A name of "_" is padding.
-    match field.count {
-        _ if field.name == "_" => Vec::new(),
-        1 => vec![field.name.clone()],
-        2..=MAX_COUNT => (0..field.count).map(|index| format!("{}_{index}", field.name)).collect(),
-        _ => Vec::new(),
-    }
-}
-
 /// The columns over binary data. `place` makes offset and stride of a field from the bytes of a point before it and of
 /// itself.
 fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, usize) -> (usize, usize)) -> Table<'a> {
@@ -175,7 +163,7 @@ fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, 
     for field in &header.fields {
         let size = field.scalar.size() * field.count;
         let (offset, stride) = place(before, size);
-        for (index, name) in column_names(field).into_iter().enumerate() {
+        for (index, name) in numbered(&field.name, field.count).into_iter().enumerate() {
             let offset = offset + index * field.scalar.size();
             columns.push(Column { name, scalar: field.scalar, offset, stride });
         }
@@ -189,7 +177,7 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
     let mut tokens = Vec::new();
     let mut offset = 0;
     for field in &header.fields {
-        let names = column_names(field);
+        let names = numbered(&field.name, field.count);
         if names.is_empty() {
             // A line cannot be shorter than its values, which bounds what the header can ask for.
             if field.count > job.bytes.len().saturating_sub(tokens.len()) {
