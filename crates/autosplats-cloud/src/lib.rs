@@ -52,3 +52,5 @@ pub use source::{
     stream::{Next, Statistics, Stream, Timeline, Update},
 };
 pub use write::{check_writable, write, written_formats};
+
+pub use source::animation::{Animation, Playback};

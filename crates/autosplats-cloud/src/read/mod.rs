@@ -165,6 +165,23 @@ pub fn read_mesh_bytes(
     contents(&Job { path: name, progress, bytes, options, triangles: true })
 }
 
+/// Seconds that the first animation of a glTF lasts, and how many animations it has, if it has any.
+pub(crate) fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>, Error> {
+    let options = ReadOptions::default();
+    gltf::animation(&Job { path: name, progress: &(), bytes, options: &options, triangles: false })
+}
+
+/// The mesh of a glTF so many seconds into its first animation.
+pub(crate) fn read_gltf_at(
+    name: &Path,
+    bytes: &[u8],
+    seconds: f64,
+    progress: &dyn Progress,
+) -> Result<Contents, Error> {
+    let options = ReadOptions::default();
+    gltf::read_at(&Job { path: name, progress, bytes, options: &options, triangles: true }, Some(seconds))
+}
+
 /// What the header of a file says, in milliseconds whatever its size; formats without a header that counts are looked
 /// at no further than their beginning.
 ///

@@ -1,5 +1,6 @@
 //! Where clouds come from.
 
+pub(crate) mod animation;
 pub(crate) mod scene;
 pub(crate) mod stream;
 

@@ -3,6 +3,11 @@
 #![allow(dead_code, reason = "not every test uses all of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, glam::DVec3, read};
 
 /// Reads `bytes` as a file of this name.
@@ -11,6 +16,20 @@ pub(crate) fn read_bytes(name: &str, bytes: &[u8]) -> Result<PointCloud, Error> 
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     read(&path, &())
+}
+
+/// The folder of real files, if it is there; continuous integration must have it.
+pub(crate) fn shared_data() -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
+    if folder.join("README.md").exists() {
+        return Some(folder);
+    }
+    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
+    // Past the test harness, which would swallow what a passing test prints.
+    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
+    std::io::stderr().write_all(message.as_bytes()).unwrap();
+    None
 }
 
 /// The message of the error that reading `bytes` must give. It is one line and names the file.
