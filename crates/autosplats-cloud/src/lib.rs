@@ -54,3 +54,4 @@ pub use source::{
 pub use write::{check_writable, write, written_formats};
 
 pub use source::animation::{Animation, Playback};
+pub use source::scanner::Scanner;

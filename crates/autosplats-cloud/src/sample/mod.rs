@@ -14,6 +14,8 @@
 
 mod strewn;
 
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -354,16 +356,16 @@ fn depth(area: f64, patch: f64) -> i32 {
 }
 
 /// Splitmix: random numbers of one point, whoever asks.
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    fn new(seed: u64, point: u64) -> Self {
+    pub(crate) fn new(seed: u64, point: u64) -> Self {
         let mut random = Self(seed ^ point.wrapping_mul(0xD134_2543_DE82_EF95));
         random.bits();
         random
     }
 
-    fn bits(&mut self) -> u64 {
+    pub(crate) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -371,8 +373,22 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    fn unit(&mut self) -> f64 {
+    /// Uniform in 0..1.
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
+    }
+
+    /// Of the normal distribution, by Box and Muller.
+    pub(crate) fn normal(&mut self) -> f64 {
+        let (length, turn) = (1.0 - self.unit(), self.unit());
+        (-2.0 * length.ln()).sqrt() * (TAU * turn).cos()
+    }
+
+    /// Of length one.
+    pub(crate) fn direction(&mut self) -> DVec3 {
+        let (height, turn) = (2.0 * self.unit() - 1.0, TAU * self.unit());
+        let width = (1.0 - height * height).sqrt();
+        DVec3::new(width * turn.cos(), width * turn.sin(), height)
     }
 }
 

@@ -14,8 +14,14 @@ mod still;
 
 use std::{path::Path, sync::Arc};
 
+use glam::DVec3;
+
 pub use self::playback::Playback;
-use crate::{Contents, Error, PointCloud, Progress, ReadOptions, Scene, Timeline};
+use super::scanner::{Scanned, Scanner};
+use crate::{Axes, Contents, Error, PointCloud, Progress, ReadOptions, Scene, Timeline};
+
+/// Points that tell how large a scene is.
+const PLACED_BY: usize = 20_000;
 
 /// Frames by their numbers.
 pub(crate) trait Frames: Send + Sync {
@@ -89,6 +95,36 @@ impl Animation {
     /// [`Error::NoSurface`] if the first frame has none, those of reading it, and [`Error::OutOfMemory`].
     pub fn sampled(&self, count: usize, progress: &dyn Progress) -> Result<Self, Error> {
         Ok(Self { frames: Arc::new(sampled::Sampled::new(Arc::clone(&self.frames), count, progress)?) })
+    }
+
+    /// What `scanners` see of the surface, each on a channel of its own. The same `seed` gives the same points.
+    ///
+    /// # Errors
+    /// [`Error::BadValue`] for what a scanner cannot be, and [`Error::OutOfMemory`]. What has no surface fails when it is
+    /// played.
+    pub fn scanned(&self, scanners: Vec<Scanner>, seed: u64) -> Result<Self, Error> {
+        Ok(Self { frames: Arc::new(Scanned::new(Arc::clone(&self.frames), scanners, seed)?) })
+    }
+
+    /// `count` scanners [around](Scanner::around) its first frame. Where nothing says what is up, Y is, as in models.
+    ///
+    /// # Errors
+    /// Those of reading the first frame, and [`Error::NoSurface`].
+    pub fn scanners(&self, count: usize, progress: &dyn Progress) -> Result<Vec<Scanner>, Error> {
+        let surface = self.frames.surface(0, progress)?;
+        let cloud = match &surface {
+            Surface::Scene(scene) => &still::sample(scene, PLACED_BY, progress)?,
+            Surface::Mesh(mesh) => &mesh.cloud,
+        };
+        let places = (0..cloud.len()).map(|index| cloud.world_position(index)).filter(|place| place.is_finite());
+        let bounds = places.map(|place| [place; 2]).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
+        let [low, high] = bounds.ok_or(Error::NoSurface)?;
+        let up = match cloud.axes() {
+            Some(Axes::ZUp) => DVec3::Z,
+            Some(Axes::YUp) | None => DVec3::Y,
+            Some(Axes::Camera) => DVec3::NEG_Y,
+        };
+        Ok(Scanner::around(low, high, up, count))
     }
 
     /// When its frames happen.

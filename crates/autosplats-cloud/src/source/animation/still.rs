@@ -28,6 +28,11 @@ impl MovingScene {
     }
 
     fn at(&self, frame: usize) -> Scene {
+        if !self.scene.is_animated() {
+            // Clones share what has been made.
+            self.scene.prepare();
+            return self.scene.clone();
+        }
         let stamp = self.timeline.stamps().get(frame).copied().unwrap_or_default();
         self.scene.at(self.scene.seconds() + stamp as f64 / 1e9)
     }
