@@ -14,6 +14,7 @@ mod columns;
 mod depth_image;
 mod describe;
 mod e57;
+mod framing;
 mod gltf;
 mod guard;
 mod las;
@@ -35,6 +36,7 @@ mod xyz;
 
 use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
+pub(crate) use self::framing::{Found, Framing};
 use self::guard::guard;
 pub(crate) use self::table::{ColorScale, SMALL, middle};
 pub use self::{

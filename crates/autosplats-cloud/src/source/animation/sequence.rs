@@ -89,7 +89,7 @@ fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
         // Folders that may not be looked into have no frames.
         pattern.filter_map(Result::ok).collect()
     };
-    files.retain(|file| file.is_file() && file.file_name().is_none_or(|name| name.as_encoded_bytes()[0] != b'.'));
+    files.retain(|file| file.is_file());
     files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok(files)
 }
@@ -100,13 +100,8 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
     if files.is_empty() {
         return Err(no_frames("there are no files".into()));
     }
-    let known = |file: &Path| {
-        let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-        formats().any(|(_, extensions)| {
-            extensions.iter().any(|end| name.strip_suffix(end).is_some_and(|stem| stem.ends_with('.')))
-        })
-    };
-    let looked = files.into_par_iter().filter(|file| known(file)).map(|file| (describe(&file, options), file));
+    let looked =
+        files.into_par_iter().filter(|file| is_named_as_cloud(file)).map(|file| (describe(&file, options), file));
     let looked: Vec<_> = looked.collect();
     let (mut kept, mut sound, mut reason) = (Vec::new(), false, None);
     for (described, file) in looked {
@@ -130,6 +125,13 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
         kept.retain(numbered);
     }
     Ok(kept)
+}
+
+/// Whether a file has an extension of a format that is read, and is not hidden.
+pub(crate) fn is_named_as_cloud(file: &Path) -> bool {
+    let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
+    !name.starts_with('.') && formats().any(|(_, extensions)| extensions.iter().any(ends))
 }
 
 /// Names in the order of the numbers in them: `frame_2` before `frame_10`.
