@@ -91,6 +91,14 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
+    /// Nothing that could be played.
+    #[error("{name}: {why}")]
+    NoFrames {
+        /// What was to be played.
+        name: String,
+        /// Why it cannot be.
+        why: String,
+    },
     /// [`Progress::cancelled`](crate::Progress::cancelled) asked to stop.
     #[error("cancelled")]
     Cancelled,

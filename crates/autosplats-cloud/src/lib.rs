@@ -53,3 +53,7 @@ pub use source::{
     stream::{Next, Statistics, Stream, Timeline, Update},
 };
 pub use write::{check_writable, write, written_formats};
+
+pub use source::animation::{Animation, Playback};
+pub use source::live::{Live, LiveOptions};
+pub use source::scanner::Scanner;

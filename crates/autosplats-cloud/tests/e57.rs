@@ -5,8 +5,7 @@
 mod common;
 
 use std::{
-    io::Write as _,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Mutex,
     time::{Duration, Instant},
 };
@@ -16,20 +15,7 @@ use autosplats_cloud::{
     glam::{DMat4, DQuat, DVec3, EulerRot},
     read_bytes, read_with, write,
 };
-use common::{Random, rich_cloud};
-
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    if folder.join("README.md").exists() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    // Past the test harness, which would swallow what a passing test prints.
-    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
-    std::io::stderr().write_all(message.as_bytes()).unwrap();
-    None
-}
+use common::{Random, rich_cloud, shared_data};
 
 /// Remembers the notes.
 #[derive(Default)]
@@ -73,7 +59,7 @@ const CASES: &[Case] = &[
 
 #[test]
 fn real_files_are_what_others_say() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     for exact in [false, true] {
         for &(file, count, low, high, colored) in CASES {
             let (cloud, notes) = load(&folder.join(file), &ReadOptions { exact, ..ReadOptions::default() });
@@ -110,7 +96,7 @@ fn check_positions(what: &str, back: &PointCloud, cloud: &PointCloud) {
 
 #[test]
 fn real_files_come_back() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     for &(file, ..) in CASES {
         let (cloud, _) = load(&folder.join(file), &EXACT);
         let (back, notes) = round_trip(&cloud, &EXACT);

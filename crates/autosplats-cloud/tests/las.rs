@@ -15,7 +15,7 @@ use autosplats_cloud::{
     glam::{DMat4, DVec3},
     read_bytes, write,
 };
-use common::{Random, las_bytes, positions, rich_cloud};
+use common::{Random, las_bytes, positions, rich_cloud, shared_data};
 
 /// Keeps what readers and writers tell.
 #[derive(Default)]
@@ -548,16 +548,6 @@ fn what_las_cannot_hold() {
     assert!((0..500).map(off).fold(0.0, f64::max) < 0.000_51, "by half a step");
 }
 
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    if folder.join("README.md").exists() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    None
-}
-
 /// The file, its format, coordinate system and what a note says of it.
 type Case = (&'static str, &'static str, Option<u32>, Option<&'static str>, Option<Unit>, Option<&'static str>);
 
@@ -576,7 +566,7 @@ const CASES: &[Case] = &[
 
 #[test]
 fn real_files_are_described() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     for &(file, format, epsg, name, unit, note) in CASES {
         let path = folder.join(file);
         let description = describe(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
@@ -613,7 +603,7 @@ fn real_files_are_described() {
 
 #[test]
 fn degrees_of_a_real_file_become_metres() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let mut cloud = load(&std::fs::read(folder.join("scans/latlon_degrees.las")).unwrap()).0;
     assert_eq!(cloud.crs().vertical_unit, Some(Unit::Metre), "heights are metres");
     assert!(cloud.to_local_metres(), "degrees");
@@ -629,7 +619,7 @@ fn degrees_of_a_real_file_become_metres() {
 
 #[test]
 fn real_files_survive_writing() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let mut files: Vec<PathBuf> = CASES.iter().map(|case| folder.join(case.0)).collect();
     files.push(folder.join("malformed/las_gps_time_nan.las"));
     for path in files {

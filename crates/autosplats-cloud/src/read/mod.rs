@@ -14,6 +14,7 @@ mod columns;
 mod depth_image;
 mod describe;
 mod e57;
+mod framing;
 mod gltf;
 mod guard;
 mod las;
@@ -35,6 +36,7 @@ mod xyz;
 
 use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
+pub(crate) use self::framing::{Found, Framing};
 pub(crate) use self::{
     columns::numbered,
     guard::guard,
@@ -166,6 +168,23 @@ pub fn read_mesh_bytes(
     progress: &dyn Progress,
 ) -> Result<Contents, Error> {
     contents(&Job { path: name, progress, bytes, options, triangles: true })
+}
+
+/// Seconds that the first animation of a glTF lasts, and how many animations it has, if it has any.
+pub(crate) fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>, Error> {
+    let options = ReadOptions::default();
+    gltf::animation(&Job { path: name, progress: &(), bytes, options: &options, triangles: false })
+}
+
+/// The mesh of a glTF so many seconds into its first animation.
+pub(crate) fn read_gltf_at(
+    name: &Path,
+    bytes: &[u8],
+    seconds: f64,
+    progress: &dyn Progress,
+) -> Result<Contents, Error> {
+    let options = ReadOptions::default();
+    gltf::read_at(&Job { path: name, progress, bytes, options: &options, triangles: true }, Some(seconds))
 }
 
 /// What the header of a file says, in milliseconds whatever its size; formats without a header that counts are looked

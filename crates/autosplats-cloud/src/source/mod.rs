@@ -1,7 +1,10 @@
 //! Where clouds come from.
 
+pub(crate) mod animation;
+pub(crate) mod live;
 pub mod point_cloud2;
 pub(crate) mod recording;
+pub(crate) mod scanner;
 pub(crate) mod scene;
 pub(crate) mod stream;
 pub(crate) mod wire;

@@ -13,6 +13,11 @@ pub trait Stream: Send {
     /// The times of all frames, if they are known.
     fn timeline(&self) -> Option<&Timeline>;
 
+    /// Updates that each frame of the timeline has, one after the other; 1 but for several simulated scanners.
+    fn updates_per_frame(&self) -> usize {
+        1
+    }
+
     /// Makes `frame` the [next](Self::next) one; beyond the last there is none. Nothing is read yet. Live streams stay as
     /// they are.
     fn seek(&mut self, frame: usize);

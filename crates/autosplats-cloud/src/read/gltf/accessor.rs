@@ -120,6 +120,21 @@ impl<'a> Values<'a> {
         Ok(vectors)
     }
 
+    /// All numbers, element by element.
+    pub(super) fn numbers(&self, job: &Job<'_>, part: Part) -> Result<Vec<f64>, Error> {
+        let width = self.width;
+        let count = self.count.saturating_mul(width);
+        let mut numbers = collect("numbers", count, job, part, |i| {
+            f64::from(self.base.number(i / width, i % width, self.normalized))
+        })?;
+        self.replace(job, |to, values, from| {
+            for number in 0..width {
+                numbers[to * width + number] = f64::from(values.number(from, number, self.normalized));
+            }
+        })?;
+        Ok(numbers)
+    }
+
     /// The numbers as indices.
     pub(super) fn indices(&self, job: &Job<'_>, part: Part) -> Result<Vec<u32>, Error> {
         if !matches!(self.base.scalar, Scalar::U8 | Scalar::U16 | Scalar::U32) {
@@ -165,22 +180,19 @@ impl Elements<'_> {
     }
 
     fn vector(&self, index: usize, width: usize, normalized: bool) -> [f32; 3] {
-        let mut vector = [0.0; 3];
-        for (number, value) in vector.iter_mut().enumerate().take(width) {
-            let raw = self.raw(index, number);
-            let (integer, largest) = match self.scalar {
-                Scalar::F32 => {
-                    *value = f32::from_le_bytes(raw);
-                    continue;
-                }
-                Scalar::I8 => (f32::from(raw[0] as i8), 127.0),
-                Scalar::U8 => (f32::from(raw[0]), 255.0),
-                Scalar::I16 => (f32::from(i16::from_le_bytes([raw[0], raw[1]])), 32767.0),
-                Scalar::U16 => (f32::from(u16::from_le_bytes([raw[0], raw[1]])), 65535.0),
-                _ => (u32::from_le_bytes(raw) as f32, u32::MAX as f32),
-            };
-            *value = if normalized { (integer / largest).max(-1.0) } else { integer };
-        }
-        vector
+        std::array::from_fn(|number| if number < width { self.number(index, number, normalized) } else { 0.0 })
+    }
+
+    fn number(&self, index: usize, number: usize, normalized: bool) -> f32 {
+        let raw = self.raw(index, number);
+        let (integer, largest) = match self.scalar {
+            Scalar::F32 => return f32::from_le_bytes(raw),
+            Scalar::I8 => (f32::from(raw[0] as i8), 127.0),
+            Scalar::U8 => (f32::from(raw[0]), 255.0),
+            Scalar::I16 => (f32::from(i16::from_le_bytes([raw[0], raw[1]])), 32767.0),
+            Scalar::U16 => (f32::from(u16::from_le_bytes([raw[0], raw[1]])), 65535.0),
+            _ => (u32::from_le_bytes(raw) as f32, u32::MAX as f32),
+        };
+        if normalized { (integer / largest).max(-1.0) } else { integer }
     }
 }

@@ -7,6 +7,7 @@ use glam::{DMat4, DQuat, DVec3};
 use serde::{Deserialize, de::IgnoredAny};
 
 use super::super::{Job, guard};
+use super::animation::{Animation, NodePose};
 use crate::Error;
 
 /// All of it.
@@ -30,6 +31,8 @@ pub(super) struct Root<'a> {
     pub(super) buffer_views: Vec<View>,
     #[serde(default, borrow)]
     pub(super) buffers: Vec<Buffer<'a>>,
+    #[serde(default, borrow)]
+    pub(super) animations: Vec<Animation<'a>>,
     #[serde(default, borrow)]
     pub(super) extensions_required: Vec<Cow<'a, str>>,
 }
@@ -58,6 +61,7 @@ pub(super) struct Node {
     translation: Option<Box<[f64; 3]>>,
     rotation: Option<Box<[f64; 4]>>,
     scale: Option<Box<[f64; 3]>>,
+    pub(super) weights: Option<Box<[f64]>>,
     extensions: Option<Box<NodeExtensions>>,
 }
 
@@ -68,21 +72,25 @@ struct NodeExtensions {
 }
 
 impl Node {
-    /// Maps the node's own coordinates to its parent's.
-    pub(super) fn parent_from_node(&self) -> DMat4 {
+    /// Maps the node's own coordinates to its parent's, where an animation has put it in place of the file.
+    pub(super) fn parent_from_node(&self, animated: Option<&NodePose>) -> DMat4 {
         if let Some(matrix) = &self.matrix {
             return DMat4::from_cols_array(matrix);
         }
-        let vector = |given: &Option<Box<[f64; 3]>>, default| given.as_ref().map_or(default, |v| DVec3::from(**v));
+        let still = NodePose::default();
+        let animated = animated.unwrap_or(&still);
+        let vector = |animated: &Option<[f64; 3]>, own: &Option<Box<[f64; 3]>>, default| {
+            animated.or_else(|| own.as_deref().copied()).map_or(default, DVec3::from)
+        };
         // A rotation of length zero is none.
-        let rotation = self.rotation.as_ref().map_or(DQuat::IDENTITY, |rotation| {
-            let rotation = DQuat::from_array(**rotation);
+        let rotation = animated.rotation.or_else(|| self.rotation.as_deref().copied()).map_or(DQuat::IDENTITY, |own| {
+            let rotation = DQuat::from_array(own);
             if rotation.length() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
         });
         DMat4::from_scale_rotation_translation(
-            vector(&self.scale, DVec3::ONE),
+            vector(&animated.scale, &self.scale, DVec3::ONE),
             rotation,
-            vector(&self.translation, DVec3::ZERO),
+            vector(&animated.translation, &self.translation, DVec3::ZERO),
         )
     }
 
@@ -99,6 +107,7 @@ impl Node {
 #[derive(Deserialize)]
 pub(super) struct Mesh {
     pub(super) primitives: Vec<Primitive>,
+    pub(super) weights: Option<Box<[f64]>>,
 }
 
 #[derive(Deserialize)]
@@ -108,7 +117,8 @@ pub(super) struct Primitive {
     pub(super) material: Option<usize>,
     #[serde(default = "triangles")]
     pub(super) mode: u32,
-    targets: Option<IgnoredAny>,
+    #[serde(default)]
+    pub(super) targets: Vec<Attributes>,
     extensions: Option<PrimitiveExtensions>,
 }
 
@@ -117,10 +127,6 @@ fn triangles() -> u32 {
 }
 
 impl Primitive {
-    pub(super) fn has_targets(&self) -> bool {
-        self.targets.is_some()
-    }
-
     pub(super) fn is_draco(&self) -> bool {
         self.extensions.as_ref().is_some_and(|extensions| extensions.draco.is_some())
     }

@@ -6,6 +6,7 @@
 //! made. Then the buffers that are needed are found, and every primitive's vertices are moved to their places.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod json;
 mod plan;
@@ -13,8 +14,10 @@ mod plan;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
+pub(super) use self::animation::animation;
 use self::{
     accessor::Values,
+    animation::Pose,
     buffers::Buffers,
     json::{Attributes, Container, Root},
     plan::{FAN, Plan, STRIP, Shown, TRIANGLES},
@@ -47,7 +50,7 @@ fn crs() -> Crs {
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let container = Container::open(job)?;
     let root = container.root(job)?;
-    let plan = Plan::of(job, &root)?;
+    let plan = Plan::of(job, &root, None)?;
     let attributes = plan.shown.first().map(|shown| shown.primitive.attributes);
     let named = attributes.map_or([const { ("", None) }; 3], |Attributes { position, normal, color }| {
         [("POSITION", position), ("NORMAL", normal), ("COLOR_0", color)]
@@ -74,9 +77,15 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
 }
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
+    read_at(job, None)
+}
+
+/// The scene so many seconds into its first animation.
+pub(super) fn read_at(job: &Job<'_>, seconds: Option<f64>) -> Result<Contents, Error> {
     let container = Container::open(job)?;
     let root = container.root(job)?;
-    let plan = Plan::of(job, &root)?;
+    let pose = seconds.map(|seconds| Pose::at(job, &root, container.chunk, seconds)).transpose()?;
+    let plan = Plan::of(job, &root, pose.as_ref())?;
     let buffers = Buffers::load(job, &root, container.chunk, wanted(job, &root, &plan))?;
     plan.check_size(job, job.bytes.len().saturating_add(buffers.len_beside()))?;
     plan.notes.iter().for_each(|note| job.note(note));
@@ -109,13 +118,20 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 /// The buffers that the shown primitives need.
 fn wanted(job: &Job<'_>, root: &Root<'_>, plan: &Plan<'_>) -> impl Iterator<Item = usize> {
     let mut needed = vec![false; root.accessors.len()];
-    for Shown { primitive, .. } in &plan.shown {
+    for shown in &plan.shown {
+        let primitive = shown.primitive;
         let Attributes { position, normal, color } = primitive.attributes;
         let indices = primitive.indices.filter(|_| job.triangles);
-        for index in [position, normal, color, indices].into_iter().flatten() {
+        let targets = shown.targets().flat_map(|(target, _)| [target.position, target.normal]);
+        for index in [position, normal, color, indices].into_iter().chain(targets).flatten() {
             needed.get_mut(index).into_iter().for_each(|needed| *needed = true);
         }
     }
+    buffers_of(root, needed)
+}
+
+/// The buffers that accessors are in.
+fn buffers_of(root: &Root<'_>, needed: Vec<bool>) -> impl Iterator<Item = usize> {
     let views = root.accessors.iter().zip(needed).filter(|(_, needed)| *needed).flat_map(|(accessor, _)| {
         let sparse = accessor.sparse.as_ref().map(|sparse| [sparse.indices.buffer_view, sparse.values.buffer_view]);
         accessor.buffer_view.into_iter().chain(sparse.into_iter().flatten())
@@ -141,6 +157,25 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    /// Vectors of vertices, with those of the targets added to them.
+    fn morphed(
+        &self,
+        index: usize,
+        shown: &Shown<'_>,
+        of_target: impl Fn(&Attributes) -> Option<usize>,
+    ) -> Result<Vec<[f32; 3]>, Error> {
+        let mut vectors = self.vectors(index, &[3], Some(shown.count))?;
+        for (target, weight) in shown.targets() {
+            self.job.go_on()?;
+            let Some(index) = of_target(target) else { continue };
+            let steps = self.vectors(index, &[3], Some(shown.count))?;
+            vectors.par_iter_mut().zip(steps).for_each(|(vector, step)| {
+                (0..3).for_each(|axis| vector[axis] += (weight * f64::from(step[axis])) as f32);
+            });
+        }
+        Ok(vectors)
+    }
+
     fn vectors(&self, index: usize, widths: &[usize], count: Option<usize>) -> Result<Vec<[f32; 3]>, Error> {
         let values = Values::find(self.job, self.root, self.buffers, index, widths)?;
         if count.is_some_and(|count| count != values.count()) {
@@ -182,7 +217,7 @@ impl Points {
     fn add(&mut self, scene: &Scene<'_>, shown: &Shown<'_>) -> Result<(), Error> {
         let Attributes { position, normal, color } = shown.primitive.attributes;
         let Some(position) = position else { return Ok(()) };
-        let local = scene.vectors(position, &[3], Some(shown.count))?;
+        let local = scene.morphed(position, shown, |target| target.position)?;
         let vector = |value: [f32; 3]| DVec3::from(value.map(f64::from));
         let matrix = shown.world_from_mesh;
         self.positions.par_extend(local.par_iter().map(|&value| matrix.transform_point3(vector(value)).to_array()));
@@ -198,7 +233,7 @@ impl Points {
             }
         }
         if let (Some(normals), Some(normal)) = (&mut self.normals, normal) {
-            let local = scene.vectors(normal, &[3], Some(shown.count))?;
+            let local = scene.morphed(normal, shown, |target| target.normal)?;
             let matrix = normal_matrix(DMat3::from_mat4(matrix));
             for (axis, values) in normals.iter_mut().enumerate() {
                 let turned = |&value: &[f32; 3]| (matrix * vector(value)).normalize_or_zero()[axis] as f32;

@@ -1,11 +1,12 @@
 //! Which meshes a glTF shows, and where.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, rc::Rc};
 
 use glam::DMat4;
 
 use super::super::Job;
 use super::accessor;
+use super::animation::Pose;
 use super::json::{Attributes, Primitive, Root};
 use crate::Error;
 
@@ -29,6 +30,15 @@ pub(super) struct Shown<'a> {
     pub(super) count: usize,
     /// Whether another primitive has brought its points already.
     pub(super) shared: bool,
+    /// How much of each target is added to its shape.
+    pub(super) weights: Rc<[f64]>,
+}
+
+impl<'a> Shown<'a> {
+    /// The targets that move its vertices.
+    pub(super) fn targets(&self) -> impl Iterator<Item = (&'a Attributes, f64)> {
+        self.primitive.targets.iter().zip(self.weights.iter().copied()).filter(|(_, weight)| *weight != 0.0)
+    }
 }
 
 /// All that is shown.
@@ -48,7 +58,7 @@ pub(super) const STRIP: u32 = 5;
 pub(super) const FAN: u32 = 6;
 
 impl<'a> Plan<'a> {
-    pub(super) fn of(job: &Job<'_>, root: &'a Root<'_>) -> Result<Self, Error> {
+    pub(super) fn of(job: &Job<'_>, root: &'a Root<'_>, pose: Option<&Pose>) -> Result<Self, Error> {
         for extension in &root.extensions_required {
             match &**extension {
                 "KHR_draco_mesh_compression" => return Err(draco(job)),
@@ -60,13 +70,14 @@ impl<'a> Plan<'a> {
         }
         let mut plan = Self::default();
         let (mut lines, mut morphed) = (0, 0);
-        let places = places(job, root, &mut plan.notes)?;
+        let places = places(job, root, pose, &mut plan.notes)?;
         let most = (job.bytes.len() / BYTES_PER_SHOWN).max(ALWAYS);
         let mut looked_at = 0;
-        for (mesh, world_from_mesh) in places {
+        for (mesh, world_from_mesh, node) in places {
             let Some(mesh) = root.meshes.get(mesh) else {
                 return Err(job.malformed(format!("mesh {mesh}"), "there is no such mesh; export the file again"));
             };
+            let weights: Rc<[f64]> = pose.map_or_else(Rc::default, |pose| pose.weights(root, node, mesh).into());
             looked_at += mesh.primitives.len();
             if looked_at > most {
                 let what = format!("they show more than {most} primitives, too many for this file; split it");
@@ -86,10 +97,14 @@ impl<'a> Plan<'a> {
                 if primitive.is_draco() && accessor.buffer_view.is_none() {
                     return Err(draco(job));
                 }
-                let shared = known.get(&primitive.attributes).copied();
+                // The same vertices may be moved in several ways.
+                let moved = !primitive.targets.is_empty() && !weights.is_empty();
+                let shared = known.get(&primitive.attributes).copied().filter(|_| !moved);
                 let first = shared.unwrap_or(plan.points);
                 if shared.is_none() {
-                    known.insert(primitive.attributes, first);
+                    if !moved {
+                        known.insert(primitive.attributes, first);
+                    }
                     plan.points = plan.points.saturating_add(accessor.count);
                 }
                 let indices = primitive.indices.and_then(|index| root.accessors.get(index));
@@ -103,9 +118,10 @@ impl<'a> Plan<'a> {
                     plan.corners = plan.corners.saturating_add(corners);
                     plan.faces = plan.faces.saturating_add(faces);
                 }
-                morphed += usize::from(primitive.has_targets());
+                morphed += usize::from(!primitive.targets.is_empty() && pose.is_none());
                 let count = accessor.count;
-                plan.shown.push(Shown { primitive, world_from_mesh, first, count, shared: shared.is_some() });
+                let (shared, weights) = (shared.is_some(), Rc::clone(&weights));
+                plan.shown.push(Shown { primitive, world_from_mesh, first, count, shared, weights });
             }
         }
         if lines > 0 {
@@ -136,11 +152,16 @@ fn draco(job: &Job<'_>) -> Error {
     job.unsupported("the mesh is compressed by Draco, which is not read; export it without compression")
 }
 
-/// The meshes of the scene, each with the transform of its node. A node belongs to one parent, so each is visited once:
+/// The meshes of the scene, each with the transform of its node and the node. A node belongs to one parent, so each is visited once:
 /// cycles end, and nothing is repeated beyond the number of nodes.
-fn places(job: &Job<'_>, root: &Root<'_>, notes: &mut Vec<String>) -> Result<Vec<(usize, DMat4)>, Error> {
+fn places(
+    job: &Job<'_>,
+    root: &Root<'_>,
+    pose: Option<&Pose>,
+    notes: &mut Vec<String>,
+) -> Result<Vec<(usize, DMat4, Option<usize>)>, Error> {
     if root.nodes.is_empty() {
-        return Ok((0..root.meshes.len()).map(|mesh| (mesh, DMat4::IDENTITY)).collect());
+        return Ok((0..root.meshes.len()).map(|mesh| (mesh, DMat4::IDENTITY, None)).collect());
     }
     let mut roots: Vec<usize> = match root.scene {
         Some(scene) => {
@@ -170,11 +191,11 @@ fn places(job: &Job<'_>, root: &Root<'_>, notes: &mut Vec<String>) -> Result<Vec
             again += 1;
             continue;
         }
-        let world_from_node = world_from_parent * node.parent_from_node();
+        let world_from_node = world_from_parent * node.parent_from_node(pose.and_then(|pose| pose.node(index)));
         skinned |= node.mesh.is_some() && node.is_skinned();
         instanced |= node.mesh.is_some() && node.is_instanced();
         if let Some(mesh) = node.mesh {
-            places.push((mesh as usize, world_from_node));
+            places.push((mesh as usize, world_from_node, Some(index)));
         }
         stack.extend(node.children.iter().rev().map(|&child| (child, world_from_node)));
     }

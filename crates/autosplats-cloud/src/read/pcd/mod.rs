@@ -9,6 +9,7 @@ use self::header::{Encoding, Header, Viewpoint};
 use super::{
     Attribute, Contents, Description, Format, Job,
     columns::{MAX_COUNT, numbered},
+    framing::Body,
     shown,
     table::{Column, Part, Scalar, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
@@ -64,6 +65,19 @@ const NO_HEADER: &str = "there is no PCD header; read as text";
 /// Whether the file is no PCD but for its name.
 pub(super) fn without_header(job: &Job<'_>) -> bool {
     !header::recognised(job.bytes) && xyz::looks_like_rows(job.bytes)
+}
+
+/// What follows the header, where, and how many bytes that and the points take at least; no number if it is beyond all
+/// bounds.
+pub(super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize>), Error> {
+    let header = Header::parse(job)?;
+    let bytes = header.stride().and_then(|stride| header.points.checked_mul(stride));
+    Ok(match header.encoding {
+        // A value and the end of the line.
+        Encoding::Ascii => (Body::Lines(header.points), header.end, header.points.checked_mul(2)),
+        Encoding::Binary => (Body::Bytes(bytes.unwrap_or(usize::MAX)), header.end, bytes),
+        Encoding::Compressed => (Body::Sized, header.end, bytes),
+    })
 }
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {

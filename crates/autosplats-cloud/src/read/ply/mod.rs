@@ -3,8 +3,10 @@
 
 mod faces;
 mod header;
+mod length;
 
 use self::header::{Element, Encoding, Header};
+pub(super) use self::length::{Records, body};
 use super::{
     Attribute, Contents, Description, Format, Job, lines, shown,
     table::{Column, Part, Scalar, Table, reserve},

@@ -130,6 +130,11 @@ impl Scene {
         Self { kind: self.kind, seconds, model }
     }
 
+    /// Makes the surface now, for this scene and all its clones.
+    pub(crate) fn prepare(&self) {
+        self.model();
+    }
+
     fn model(&self) -> &Model {
         self.model.get_or_init(|| {
             let phase = if self.seconds.is_finite() { (self.seconds / Self::PERIOD).rem_euclid(1.0) } else { 0.0 };

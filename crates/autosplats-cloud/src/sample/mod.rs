@@ -12,10 +12,16 @@
 //! The middle of a part of a triangle is had in closed form: halves that lie before a place on the curve add their
 //! centres, weighted by area, and only the half that the place is in is looked into.
 
+mod strewn;
+
+use std::f64::consts::TAU;
+
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use crate::{Contents, Error, Field, FieldValues, PointCloud, Progress, memory::check_memory, progress};
+use self::strewn::Place;
+pub(crate) use self::strewn::Strewn;
+use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress};
 
 /// Points made between two looks at the caller's wish to stop.
 const BLOCK: usize = 1 << 18;
@@ -41,83 +47,39 @@ const FINER: i32 = 6;
 /// # Errors
 /// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
-    progress::tick(progress, 0.0)?;
-    let cloud = &mesh.cloud;
-    let value = |field: &Field| field.values.byte_len().checked_div(cloud.len()).unwrap_or(0);
-    let per_point = 12 + 3 + size_of::<Place>() + cloud.fields().iter().map(value).sum::<usize>();
-    let bytes = (count as u64).saturating_mul(per_point as u64).saturating_add(mesh.triangles.len() as u64 * 16);
-    check_memory(&format!("{count} points on a surface"), bytes)?;
-    let surface = Surface::new(mesh);
-    if surface.area() <= 0.0 {
-        return Err(Error::NoSurface);
-    }
-    progress::tick(progress, 0.1)?;
-
-    let mut places: Vec<Place> = Vec::new();
-    let full =
-        |_| Error::OutOfMemory { what: format!("{count} points on a surface"), bytes: count.saturating_mul(per_point) };
-    places.try_reserve_exact(count).map_err(full)?;
-    for start in (0..count).step_by(BLOCK) {
-        progress::tick(progress, 0.1 + 0.7 * start as f32 / count as f32)?;
-        let pieces = (start..count.min(start + BLOCK)).into_par_iter().step_by(PIECE);
-        let made: Vec<Vec<Place>> = pieces
-            .map(|first| surface.places(first..count.min(start + BLOCK).min(first + PIECE), count, seed))
-            .collect();
-        made.into_iter().for_each(|piece| places.extend(piece));
-    }
-    progress::tick(progress, 0.8)?;
-
-    let world = |place: &Place| surface.triangle(place.triangle).at(place.second, place.third).as_vec3().to_array();
-    let mut sampled =
-        PointCloud::new(cloud.origin(), places.par_iter().map(world).collect()).with_crs(cloud.crs().clone());
-    sampled.axes = cloud.axes();
-    if let Some(colors) = cloud.colors() {
-        let mixed = |place: &Place| {
-            let corners = surface.corners(place).map(|corner| colors[corner]);
-            [0, 1, 2].map(|c| (place.mix(corners.map(|color| color[c].into())) + 0.5) as u8)
-        };
-        sampled.colors = Some(places.par_iter().map(mixed).collect());
-    }
-    for field in cloud.fields() {
-        progress::tick(progress, 0.9)?;
-        sampled.fields.push(Field { name: field.name.clone(), values: surface.field(&field.values, &places) });
-    }
-    normalize_normals(&mut sampled);
+    let sampled = Strewn::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
     progress::tick(progress, 1.0)?;
     Ok(sampled)
 }
 
-/// A place on the surface: a triangle of those in order, and the weights of its second and third corners.
-#[derive(Clone, Copy)]
-struct Place {
-    triangle: u32,
-    second: f32,
-    third: f32,
-}
-
-impl Place {
-    fn weights(&self) -> [f64; 3] {
-        let (second, third) = (f64::from(self.second), f64::from(self.third));
-        [(1.0 - second - third).max(0.0), second, third]
-    }
-
-    fn mix(&self, [a, b, c]: [f64; 3]) -> f64 {
-        let [first, second, third] = self.weights();
-        // A corner without weight may be no number.
-        let part = |weight: f64, value: f64| if weight > 0.0 { weight * value } else { 0.0 };
-        part(first, a) + part(second, b) + part(third, c)
-    }
-
-    /// Which of the corners is nearest, by weight.
-    fn nearest(&self) -> usize {
-        let [first, second, third] = self.weights();
-        if first >= second && first >= third {
-            0
-        } else if second >= third {
-            1
-        } else {
-            2
+impl Strewn {
+    /// Places for `count` points on `mesh`.
+    pub(crate) fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
+        progress::tick(progress, 0.0)?;
+        let cloud = &mesh.cloud;
+        let value = |field: &Field| field.values.byte_len().checked_div(cloud.len()).unwrap_or(0);
+        let per_point = 12 + 3 + size_of::<Place>() + cloud.fields().iter().map(value).sum::<usize>();
+        let bytes = (count as u64).saturating_mul(per_point as u64).saturating_add(mesh.triangles.len() as u64 * 16);
+        check_memory(&format!("{count} points on a surface"), bytes)?;
+        let surface = Surface::new(mesh);
+        if surface.area() <= 0.0 {
+            return Err(Error::NoSurface);
         }
+        progress::tick(progress, 0.1)?;
+
+        let mut places: Vec<Place> = Vec::new();
+        let bytes = count.saturating_mul(per_point);
+        let full = |_| Error::OutOfMemory { what: format!("{count} points on a surface"), bytes };
+        places.try_reserve_exact(count).map_err(full)?;
+        for start in (0..count).step_by(BLOCK) {
+            progress::tick(progress, 0.1 + 0.7 * start as f32 / count as f32)?;
+            let pieces = (start..count.min(start + BLOCK)).into_par_iter().step_by(PIECE);
+            let made: Vec<Vec<Place>> = pieces
+                .map(|first| surface.places(first..count.min(start + BLOCK).min(first + PIECE), count, seed))
+                .collect();
+            made.into_iter().for_each(|piece| places.extend(piece));
+        }
+        Ok(Self { vertices: cloud.len(), triangles: surface.triangles, places })
     }
 }
 
@@ -255,10 +217,6 @@ impl<'a> Surface<'a> {
         self.triangle_of(&self.triangles[index as usize])
     }
 
-    fn corners(&self, place: &Place) -> [usize; 3] {
-        self.triangles[place.triangle as usize].map(|corner| corner as usize)
-    }
-
     fn area(&self) -> f64 {
         self.ways.last().copied().unwrap_or(0.0)
     }
@@ -390,26 +348,6 @@ impl<'a> Surface<'a> {
         let (second, third) = (weights.x.clamp(0.0, 1.0), weights.y.clamp(0.0, 1.0));
         Place { triangle: index as u32, second: second as f32, third: third.min(1.0 - second) as f32 }
     }
-
-    fn field(&self, values: &FieldValues, places: &[Place]) -> FieldValues {
-        let mixed = |value: &(dyn Fn(usize) -> f64 + Sync), place: &Place| place.mix(self.corners(place).map(value));
-        macro_rules! nearest {
-            ($($variant:ident),*) => {
-                match values {
-                    FieldValues::F32(v) => FieldValues::F32(
-                        places.par_iter().map(|place| mixed(&|i| v[i].into(), place) as f32).collect(),
-                    ),
-                    FieldValues::F64(v) => FieldValues::F64(
-                        places.par_iter().map(|place| mixed(&|i| v[i], place)).collect(),
-                    ),
-                    $(FieldValues::$variant(v) => FieldValues::$variant(
-                        places.par_iter().map(|place| v[self.corners(place)[place.nearest()]]).collect(),
-                    ),)*
-                }
-            };
-        }
-        nearest!(U8, I8, U16, I16, U32, I32, U64, I64)
-    }
 }
 
 /// Halvings of a triangle until its pieces are much smaller than a patch.
@@ -417,36 +355,17 @@ fn depth(area: f64, patch: f64) -> i32 {
     (FINER + (area / patch).log2().ceil().clamp(0.0, 40.0) as i32).min(46)
 }
 
-/// Interpolated normals are shorter than one.
-fn normalize_normals(cloud: &mut PointCloud) {
-    let find =
-        |cloud: &PointCloud, name: &str| cloud.fields.iter().position(|field| field.name.eq_ignore_ascii_case(name));
-    for names in [["NormalX", "NormalY", "NormalZ"], ["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]] {
-        let [Some(x), Some(y), Some(z)] = names.map(|name| find(cloud, name)) else { continue };
-        let value = |axis: usize, i: usize| cloud.fields[axis].values.get(i);
-        let unit = |i: usize| DVec3::new(value(x, i), value(y, i), value(z, i)).normalize_or_zero();
-        let units: Vec<DVec3> = (0..cloud.len()).into_par_iter().map(unit).collect();
-        for (axis, index) in [x, y, z].into_iter().enumerate() {
-            match &mut cloud.fields[index].values {
-                FieldValues::F32(v) => v.iter_mut().zip(&units).for_each(|(v, unit)| *v = unit[axis] as f32),
-                FieldValues::F64(v) => v.iter_mut().zip(&units).for_each(|(v, unit)| *v = unit[axis]),
-                _ => {}
-            }
-        }
-    }
-}
-
 /// Splitmix: random numbers of one point, whoever asks.
-struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
-    fn new(seed: u64, point: u64) -> Self {
+    pub(crate) fn new(seed: u64, point: u64) -> Self {
         let mut random = Self(seed ^ point.wrapping_mul(0xD134_2543_DE82_EF95));
         random.bits();
         random
     }
 
-    fn bits(&mut self) -> u64 {
+    pub(crate) fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -454,8 +373,22 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    fn unit(&mut self) -> f64 {
+    /// Uniform in 0..1.
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
+    }
+
+    /// Of the normal distribution, by Box and Muller.
+    pub(crate) fn normal(&mut self) -> f64 {
+        let (length, turn) = (1.0 - self.unit(), self.unit());
+        (-2.0 * length.ln()).sqrt() * (TAU * turn).cos()
+    }
+
+    /// Of length one.
+    pub(crate) fn direction(&mut self) -> DVec3 {
+        let (height, turn) = (2.0 * self.unit() - 1.0, TAU * self.unit());
+        let width = (1.0 - height * height).sqrt();
+        DVec3::new(width * turn.cos(), width * turn.sin(), height)
     }
 }
 

@@ -1,0 +1,406 @@
+//! Files one after the other in a stream of bytes: where each begins and ends.
+//!
+//! # How it works
+//!
+//! Only formats whose header tells how long they are can follow each other like this: PLY and PCD. Bytes come in any pieces
+//! and are looked at once. What cannot be the beginning of a file is skipped to the next that can, and told once.
+
+use super::{Job, MAX_HEADER_LINE, ReadOptions, pcd, ply, shown, text};
+use crate::{Error, error::message};
+
+/// Bytes of a header beyond which it is rather broken than long.
+const MAX_HEADER: usize = 16 * MAX_HEADER_LINE;
+
+/// What a file begins with, where one is looked for among other bytes.
+const MARKS: &[&[u8]] = &[
+    b"ply\nformat ",
+    b"ply\r\nformat ",
+    b"ply\rformat ",
+    b"ply\ncomment",
+    b"ply\r\ncomment",
+    b"ply\nobj_info",
+    b"# .PCD",
+    b"VERSION ",
+];
+
+/// What a file begins with where the one before ends.
+const BEGINNINGS: &[&[u8]] = &[b"ply\n", b"ply\r", b"ply ", b"#", b"VERSION ", b"FIELDS ", b"COLUMNS "];
+
+/// How long a file is behind its header.
+pub(super) enum Body {
+    /// So many bytes.
+    Bytes(usize),
+    /// So many lines that hold more than blanks and comments.
+    Lines(usize),
+    /// Two numbers of 32 bits, the first of which is the number of bytes behind them.
+    Sized,
+    /// Records of unequal length.
+    Records(ply::Records),
+}
+
+enum State {
+    /// A file may begin here.
+    Between,
+    /// What is here was told to be nothing.
+    Lost,
+    /// In a header, in the line that begins at `line`; none of its bytes before `looked` ends it.
+    Header { line: usize, looked: usize },
+    /// Behind the header. `at` is the first byte not counted yet, as a line or a record.
+    Body { body: Body, at: usize, looked: usize },
+}
+
+/// Finds files in a stream of bytes.
+pub(crate) struct Framing {
+    bytes: Vec<u8>,
+    /// Bytes of the stream before those.
+    before: u64,
+    limit: usize,
+    state: State,
+}
+
+/// What was found.
+pub(crate) enum Found {
+    /// The bytes of a file, which begins at this byte of the stream.
+    File(u64, Vec<u8>),
+    /// Bytes that are none, from which byte of the stream on and why.
+    Refused(u64, String),
+}
+
+impl Framing {
+    /// Files have at most `limit` bytes.
+    pub(crate) fn new(limit: usize) -> Self {
+        Self { bytes: Vec::new(), before: 0, limit, state: State::Between }
+    }
+
+    /// Takes the bytes that follow.
+    pub(crate) fn push(&mut self, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// What can be told of the bytes so far; nothing if more are needed.
+    pub(crate) fn next(&mut self) -> Option<Found> {
+        loop {
+            match &mut self.state {
+                State::Between => {
+                    let blank = |byte: &u8| byte.is_ascii_whitespace();
+                    let start = self.bytes.iter().position(|byte| !blank(byte)).unwrap_or(self.bytes.len());
+                    self.skip(start);
+                    match begins(&self.bytes, BEGINNINGS)? {
+                        true => self.state = State::Header { line: 0, looked: 0 },
+                        false => {
+                            let what =
+                                format!("'{}' begins no PLY or PCD", shown(&self.bytes[..self.bytes.len().min(16)]));
+                            return Some(self.refuse(what, 1));
+                        }
+                    }
+                }
+                State::Lost => {
+                    let places = 0..self.bytes.len();
+                    let found = places.into_iter().find(|&at| begins(&self.bytes[at..], MARKS) != Some(false));
+                    self.skip(found.unwrap_or(self.bytes.len()));
+                    // A mark that is not whole yet is waited for.
+                    if !begins(&self.bytes, MARKS)? {
+                        return None;
+                    }
+                    self.state = State::Header { line: 0, looked: 0 };
+                }
+                State::Header { line, looked } => {
+                    let end = header_end(&self.bytes, line, looked);
+                    let so_far = end.unwrap_or(self.bytes.len());
+                    if so_far > MAX_HEADER {
+                        return Some(self.refuse(format!("a header of more than {MAX_HEADER} bytes"), so_far));
+                    }
+                    match self.measure(end?) {
+                        Ok((body, at)) => self.state = State::Body { body, at, looked: at },
+                        Err(what) => return Some(self.refuse(what, so_far)),
+                    }
+                }
+                State::Body { body, at, looked } => {
+                    let found = body_end(&self.bytes, body, at, looked);
+                    let counted = *at;
+                    return match found {
+                        Ok(Some(end)) if end <= self.limit => Some(self.take(end)),
+                        Ok(None) if self.bytes.len() <= self.limit => None,
+                        Ok(_) => Some(self.refuse(too_long("more", self.limit), counted)),
+                        Err(what) => Some(self.refuse(what, counted)),
+                    };
+                }
+            }
+        }
+    }
+
+    /// What can be told of the bytes so far if no more come.
+    pub(crate) fn end(&mut self) -> Option<Found> {
+        match &self.state {
+            State::Lost => return None,
+            State::Between if self.bytes.is_empty() => return None,
+            State::Body { body: Body::Lines(1), at, .. } if !text::is_blank(self.bytes[*at..].trim_ascii()) => {
+                return Some(self.take(self.bytes.len()));
+            }
+            _ => {}
+        }
+        let what = format!("the stream ends after {} bytes of a frame; it is cut off", self.bytes.len());
+        Some(self.refuse(what, self.bytes.len()))
+    }
+
+    /// What follows the header that ends at `end`, and where that begins.
+    fn measure(&self, end: usize) -> Result<(Body, usize), String> {
+        let options = ReadOptions::default();
+        // Of the message only what is wrong is used.
+        let job =
+            Job { path: "".as_ref(), progress: &(), bytes: &self.bytes[..end], options: &options, triangles: false };
+        let measured = if self.bytes.starts_with(b"ply") { ply::body(&job) } else { pcd::body(&job) };
+        let (body, start, least) = measured.map_err(|error| match error {
+            Error::Malformed { place, what, .. } => format!("{place} of a header: {what}"),
+            other => other.to_string(),
+        })?;
+        match least.and_then(|least| least.checked_add(start)) {
+            Some(least) if least <= self.limit => Ok((body, start)),
+            Some(least) => Err(too_long(&least.to_string(), self.limit)),
+            None => Err(too_long("more", self.limit)),
+        }
+    }
+
+    /// Forgets the first bytes.
+    fn skip(&mut self, bytes: usize) {
+        self.bytes.drain(..bytes);
+        self.before += bytes as u64;
+    }
+
+    fn take(&mut self, end: usize) -> Found {
+        let (rest, start) = (self.bytes.split_off(end), self.before);
+        self.before += end as u64;
+        self.state = State::Between;
+        Found::File(start, std::mem::replace(&mut self.bytes, rest))
+    }
+
+    /// Goes on to the next mark behind these bytes.
+    fn refuse(&mut self, what: String, bytes: usize) -> Found {
+        let start = self.before;
+        self.skip(bytes);
+        self.state = State::Lost;
+        Found::Refused(start, message(&what))
+    }
+}
+
+fn too_long(bytes: &str, limit: usize) -> String {
+    format!("its header announces {bytes} bytes where {limit} are allowed; send fewer points or raise the limit")
+}
+
+/// Whether bytes begin as one of these; nothing if that cannot be told yet.
+fn begins(bytes: &[u8], marks: &[&[u8]]) -> Option<bool> {
+    let whole = marks.iter().any(|mark| bytes.starts_with(mark));
+    let may = || marks.iter().any(|mark| mark.starts_with(bytes));
+    if whole { Some(true) } else { (!may()).then_some(false) }
+}
+
+/// The first byte after the last line of a header, once that has come.
+fn header_end(bytes: &[u8], line: &mut usize, looked: &mut usize) -> Option<usize> {
+    let is_ply = bytes.starts_with(b"ply");
+    // Lines of old PLY files end in a carriage return.
+    let ends = |byte: &u8| *byte == b'\n' || is_ply && *byte == b'\r';
+    loop {
+        let Some(end) = bytes[*looked..].iter().position(ends).map(|len| *looked + len) else {
+            *looked = bytes.len();
+            return None;
+        };
+        let word = bytes[*line..end].split(u8::is_ascii_whitespace).find(|word| !word.is_empty()).unwrap_or_default();
+        let last = if is_ply { word == b"end_header" } else { word.eq_ignore_ascii_case(b"DATA") };
+        if last && bytes[end] == b'\r' {
+            // Whether a line feed belongs to it shows the next byte; without any there is no body either.
+            *looked = end;
+            let next = bytes.get(end + 1)?;
+            return Some(if *next == b'\n' { end + 2 } else { end + 1 });
+        }
+        (*line, *looked) = (end + 1, end + 1);
+        if last {
+            return Some(end + 1);
+        }
+    }
+}
+
+/// The first byte after a body, once that has come.
+fn body_end(bytes: &[u8], body: &mut Body, at: &mut usize, looked: &mut usize) -> Result<Option<usize>, String> {
+    match body {
+        Body::Bytes(len) => Ok(Some(at.saturating_add(*len)).filter(|&end| end <= bytes.len())),
+        Body::Sized => {
+            let Some(raw) = bytes.get(*at..*at + 8) else { return Ok(None) };
+            let len = u32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]) as usize;
+            *body = Body::Bytes(len.saturating_add(8));
+            body_end(bytes, body, at, looked)
+        }
+        Body::Records(records) => records.end(bytes, at),
+        Body::Lines(left) => {
+            while *left > 0 {
+                let Some(len) = bytes[*looked..].iter().position(|&byte| byte == b'\n') else {
+                    *looked = bytes.len();
+                    return Ok(None);
+                };
+                let end = *looked + len;
+                let line = bytes[*at..end].trim_ascii();
+                if line == b"ply" || [&b"# .PCD"[..], b"VERSION "].iter().any(|mark| line.starts_with(mark)) {
+                    return Err(format!("{left} lines of points are missing before the next header"));
+                }
+                *left -= usize::from(!text::is_blank(line));
+                (*at, *looked) = (end + 1, end + 1);
+            }
+            Ok(Some(*at))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pcd(encoding: &str, body: &[u8]) -> Vec<u8> {
+        let header = format!(
+            "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\n\
+             DATA {encoding}\n"
+        );
+        [header.as_bytes(), body].concat()
+    }
+
+    fn ply(format: &str, end: &str, faces: usize, body: &[u8]) -> Vec<u8> {
+        let header = format!(
+            "ply{end}format {format} 1.0{end}element vertex 2{end}property float x{end}property float y{end}\
+             property float z{end}element face {faces}{end}property list uchar int vertex_indices{end}end_header{end}"
+        );
+        [header.as_bytes(), body].concat()
+    }
+
+    /// A file of each kind that can be in a stream.
+    fn files() -> Vec<Vec<u8>> {
+        let points: Vec<u8> = (0..6).flat_map(|value| (value as f32).to_le_bytes()).collect();
+        let big: Vec<u8> = (0..6).flat_map(|value| (value as f32).to_be_bytes()).collect();
+        let faces = |one: [u8; 4]| [&points, &[3][..], &[one, one, one].concat(), &[0], &[1], &one].concat();
+        let packed = [&25_u32.to_le_bytes()[..], &24_u32.to_le_bytes(), &[23], &points].concat();
+        vec![
+            ply("ascii", "\n", 1, b"0 0 0\n\n1 1 1\n3 0 1 1\n"),
+            ply("binary_little_endian", "\n", 3, &faces(1_i32.to_le_bytes())),
+            pcd("ascii", b"0 0 0\n# a comment\n1 1 1\n"),
+            pcd("binary", &points),
+            ply("binary_big_endian", "\r\n", 0, &big),
+            pcd("binary_compressed", &packed),
+            ply("binary_little_endian", "\r", 0, &points),
+            pcd("binary", &points).split_off(12),
+        ]
+    }
+
+    /// What is found if bytes come in pieces of this size, and whether any come back.
+    fn found(bytes: &[u8], piece: usize) -> Vec<Found> {
+        let mut framing = Framing::new(1 << 20);
+        let mut all = Vec::new();
+        for piece in bytes.chunks(piece) {
+            framing.push(piece);
+            all.extend(std::iter::from_fn(|| framing.next()));
+        }
+        all.extend(framing.end());
+        assert!(framing.end().is_none() && framing.next().is_none(), "the end is told once");
+        all
+    }
+
+    fn whole(found: &[Found]) -> Vec<&[u8]> {
+        found.iter().filter_map(|found| if let Found::File(_, bytes) = found { Some(&**bytes) } else { None }).collect()
+    }
+
+    fn refused(found: &[Found]) -> Vec<(u64, &str)> {
+        let refused = |found| if let &Found::Refused(byte, ref what) = found { Some((byte, &**what)) } else { None };
+        found.iter().filter_map(refused).collect()
+    }
+
+    #[test]
+    fn files_of_every_kind_are_found_in_pieces_of_any_size() {
+        let files = files();
+        let stream = files.concat();
+        for piece in [1, 2, 3, 7, 64, 1000, stream.len()] {
+            let found = found(&stream, piece);
+            assert_eq!(whole(&found), files, "in pieces of {piece}");
+            assert_eq!(found.len(), files.len(), "and nothing else");
+        }
+        let mut at = 0;
+        for (found, file) in found(&stream, 5).iter().zip(&files) {
+            assert!(matches!(found, Found::File(start, _) if *start == at), "where each begins");
+            at += file.len() as u64;
+        }
+    }
+
+    #[test]
+    fn a_stream_cut_anywhere_gives_the_files_before_the_cut() {
+        let files = files();
+        let stream = files.concat();
+        let ends: Vec<usize> = files
+            .iter()
+            .scan(0, |end, file| {
+                *end += file.len();
+                Some(*end)
+            })
+            .collect();
+        for cut in 0..stream.len() {
+            let found = found(&stream[..cut], 64);
+            let before = ends.iter().filter(|&&end| end <= cut).count();
+            // Nobody can tell whether the last line of a text is whole if its line feed is missing.
+            let last = stream[..cut].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+            let in_text = stream[last..].iter().position(|&byte| byte == b'\n').map(|len| last + len + 1);
+            let without_feed = in_text.is_some_and(|end| ends.contains(&end)) && whole(&found).len() == before + 1;
+            assert!(whole(&found).len() == before || without_feed, "cut at {cut}");
+            let rest = !without_feed && cut > ends[..before].last().copied().unwrap_or(0);
+            assert_eq!(refused(&found).len(), usize::from(rest), "cut at {cut}: {:?}", refused(&found));
+        }
+    }
+
+    #[test]
+    fn what_is_no_file_is_told_once_and_skipped() {
+        let files = files();
+        let binary: Vec<u8> = (0..2000_u32).flat_map(|i| i.wrapping_mul(0x9E37_79B9).to_be_bytes()).collect();
+        for garbage in [&b"x"[..], b"hello\nply or not\n", b"pl", b"VERSIO", &[0; 40], &binary] {
+            for file in &files[..7] {
+                let stream = [file, garbage, &files[3], &files[0]].concat();
+                for piece in [1, 17, stream.len()] {
+                    let found = found(&stream, piece);
+                    assert_eq!(
+                        whole(&found),
+                        [file, &files[3], &files[0]],
+                        "{:?} in pieces of {piece}",
+                        shown(garbage)
+                    );
+                    let refused = refused(&found);
+                    assert_eq!((refused.len(), refused[0].0), (1, file.len() as u64), "once, with its byte");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn headers_that_lie_are_refused_before_their_bytes_have_come() {
+        let good = files().swap_remove(3);
+        let with = |from: &str, to: &str| {
+            let text = String::from_utf8_lossy(&pcd("binary", b"")).replace(from, to);
+            [text.as_bytes(), &good].concat()
+        };
+        let faces = |count: &str| {
+            ply("binary_little_endian", "\n", 0, b"")
+                .iter()
+                .map(|&byte| byte as char)
+                .collect::<String>()
+                .replace("face 0", count)
+        };
+        let vast = faces("face 18446744073709551615");
+        let cases = [
+            (with("POINTS 2", "POINTS 357913942"), "4294967"),
+            (with("POINTS 2", "POINTS 18446744073709551615"), "announces more"),
+            (with("COUNT 1 1 1", "COUNT 9999999999999999999 1 1"), "announces more"),
+            (with("COUNT 1 1 1", "COUNT 1 1 -1"), "no count"),
+            (with("DATA binary", "DATA ternary"), "unknown DATA"),
+            ([pcd("ascii", b"0 0 0\n"), good.clone()].concat(), "1 lines of points are missing"),
+            ([vast.as_bytes(), &good].concat(), "announces more"),
+        ];
+        for (stream, says) in cases {
+            let found = found(&stream, 11);
+            assert_eq!(whole(&found), [&*good], "what follows is read: {says}");
+            assert!(matches!(refused(&found)[..], [(0, what)] if what.contains(says)), "{says}: {:?}", refused(&found));
+        }
+        let endless = [b"# .PCD v0.7\n".repeat(100_000), good.clone()].concat();
+        assert_eq!(refused(&found(&endless, 1 << 16)).len(), 1, "a header without end");
+    }
+}

@@ -1,0 +1,53 @@
+//! Points strewn over surfaces that move.
+
+use std::sync::Arc;
+
+use super::{Frames, Surface, still};
+use crate::{Contents, Error, PointCloud, Progress, Timeline, sample::Strewn};
+
+/// The same points in all frames are had by the same random numbers.
+const SEED: u64 = 1;
+
+/// So many points on the surface of each frame.
+pub(super) struct Sampled {
+    frames: Arc<dyn Frames>,
+    count: usize,
+    /// Places on the first frame's mesh, and it.
+    first: Option<(Strewn, Arc<Contents>)>,
+}
+
+impl Sampled {
+    pub(super) fn new(frames: Arc<dyn Frames>, count: usize, progress: &dyn Progress) -> Result<Self, Error> {
+        let first = match frames.surface(0, progress)? {
+            Surface::Scene(_) => None,
+            Surface::Mesh(mesh) => Some((Strewn::new(&mesh, count, SEED, progress)?, mesh)),
+        };
+        Ok(Self { frames, count, first })
+    }
+
+    fn on(&self, mesh: &Contents, progress: &dyn Progress) -> Result<PointCloud, Error> {
+        match &self.first {
+            Some((strewn, first)) if strewn.fits(mesh.cloud.len()) && first.triangles == mesh.triangles => {
+                strewn.on(&mesh.cloud, progress)
+            }
+            _ => Strewn::new(mesh, self.count, SEED, progress)?.on(&mesh.cloud, progress),
+        }
+    }
+}
+
+impl Frames for Sampled {
+    fn timeline(&self) -> &Timeline {
+        self.frames.timeline()
+    }
+
+    fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
+        Ok(vec![Arc::new(match self.frames.surface(frame, progress)? {
+            Surface::Scene(scene) => still::sample(&scene, self.count, progress)?,
+            Surface::Mesh(mesh) => self.on(&mesh, progress)?,
+        })])
+    }
+
+    fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {
+        self.frames.surface(frame, progress)
+    }
+}

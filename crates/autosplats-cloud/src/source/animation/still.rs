@@ -1,0 +1,95 @@
+//! Scenes over time, and what stands still.
+
+use std::sync::{Arc, OnceLock};
+
+use super::{Frames, Surface};
+use crate::{Contents, Error, PointCloud, Progress, Scene, Timeline};
+
+/// Seconds that a scene without animation is shown for.
+const STILL: f64 = 10.0;
+
+/// A built-in scene.
+pub(super) struct MovingScene {
+    scene: Scene,
+    count: usize,
+    timeline: Timeline,
+    /// Points of a scene that does not move.
+    still: OnceLock<Arc<PointCloud>>,
+}
+
+impl MovingScene {
+    pub(super) fn new(scene: &Scene, count: usize, fps: f64) -> Result<Self, Error> {
+        let seconds = if scene.is_animated() { Scene::PERIOD } else { STILL };
+        let frames = (seconds * fps).round().max(1.0) as usize;
+        // Rates that are none end here, before their frames are counted.
+        Timeline::even(0, fps)?;
+        let timeline = Timeline::even(frames, frames as f64 / seconds)?;
+        Ok(Self { scene: scene.clone(), count, timeline, still: OnceLock::new() })
+    }
+
+    fn at(&self, frame: usize) -> Scene {
+        if !self.scene.is_animated() {
+            // Clones share what has been made.
+            self.scene.prepare();
+            return self.scene.clone();
+        }
+        let stamp = self.timeline.stamps().get(frame).copied().unwrap_or_default();
+        self.scene.at(self.scene.seconds() + stamp as f64 / 1e9)
+    }
+}
+
+impl Frames for MovingScene {
+    fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
+        if let Some(cloud) = self.still.get() {
+            return Ok(vec![Arc::clone(cloud)]);
+        }
+        let cloud = Arc::new(sample(&self.at(frame), self.count, progress)?);
+        if !self.scene.is_animated() {
+            // Who was first does not matter: both have made the same points.
+            return Ok(vec![self.still.get_or_init(|| cloud).clone()]);
+        }
+        Ok(vec![cloud])
+    }
+
+    fn surface(&self, frame: usize, _: &dyn Progress) -> Result<Surface, Error> {
+        Ok(Surface::Scene(self.at(frame)))
+    }
+}
+
+/// Points on a scene.
+pub(super) fn sample(scene: &Scene, count: usize, progress: &dyn Progress) -> Result<PointCloud, Error> {
+    scene.sample(count, &|done| {
+        progress.report(done);
+        !progress.cancelled()
+    })
+}
+
+/// A cloud or a mesh that does not move.
+pub(super) struct Still {
+    contents: Arc<Contents>,
+    timeline: Timeline,
+}
+
+impl Still {
+    pub(super) fn new(contents: Contents) -> Self {
+        Self { contents: Arc::new(contents), timeline: Timeline::new(vec![0]) }
+    }
+}
+
+impl Frames for Still {
+    fn timeline(&self) -> &Timeline {
+        &self.timeline
+    }
+
+    fn read(&self, _: usize, _: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
+        Ok(vec![Arc::new(self.contents.cloud.clone())])
+    }
+
+    fn surface(&self, _: usize, _: &dyn Progress) -> Result<Surface, Error> {
+        Ok(Surface::Mesh(Arc::clone(&self.contents)))
+    }
+}

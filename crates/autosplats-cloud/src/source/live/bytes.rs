@@ -1,0 +1,71 @@
+//! Files one after the other from a pipe.
+
+use std::{
+    io::{ErrorKind, Read},
+    path::Path,
+    sync::Arc,
+};
+
+use super::{LiveOptions, mailbox::Mailbox, now};
+use crate::{
+    Error, Progress, Update,
+    read::{Found, Framing},
+    read_bytes,
+};
+
+/// Bytes asked for at a time.
+const PIECE: usize = 1 << 16;
+
+/// Reads until the input ends or nobody wants its points.
+pub(super) fn read(mut input: impl Read, name: &Path, options: &LiveOptions, mailbox: &Mailbox) {
+    let mut framing = Framing::new(options.max_frame_bytes);
+    let mut piece = vec![0; PIECE];
+    loop {
+        let len = match input.read(&mut piece) {
+            Ok(len) => len,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(source) => {
+                mailbox.refuse(Error::Io { path: name.into(), source });
+                0
+            }
+        };
+        if mailbox.is_abandoned() {
+            return;
+        }
+        framing.push(&piece[..len]);
+        while let Some(found) = framing.next() {
+            deliver(found, name, options, mailbox);
+        }
+        if len == 0 {
+            framing.end().into_iter().for_each(|found| deliver(found, name, options, mailbox));
+            return;
+        }
+    }
+}
+
+fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) {
+    let refused = |byte: u64, what| Error::Malformed { path: name.into(), place: format!("byte {byte}"), what };
+    let error = match found {
+        Found::Refused(byte, what) => refused(byte, what),
+        Found::File(byte, bytes) => match read_bytes(name, &bytes, &options.read, &Until(mailbox)) {
+            Ok(cloud) => return mailbox.put(Update { channel: 0, stamp: now(), cloud: Arc::new(cloud) }),
+            // Places in a frame say nothing without where it begins.
+            Err(Error::Malformed { place, what, .. }) => refused(byte, format!("in a frame, {place}: {what}")),
+            Err(error) => error,
+        },
+    };
+    if !mailbox.is_abandoned() {
+        mailbox.refuse(error);
+    }
+}
+
+/// Stops when nobody wants the points.
+pub(super) struct Until<'a>(pub(super) &'a Mailbox);
+
+impl Progress for Until<'_> {
+    fn report(&self, _: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.is_abandoned()
+    }
+}

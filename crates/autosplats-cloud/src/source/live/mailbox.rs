@@ -1,0 +1,102 @@
+//! Where one thread leaves updates and another takes them: there is room for one of each channel.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Condvar, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+
+use crate::{Error, Next, Progress, Statistics, Update};
+
+/// Time between two looks at whether to stop waiting.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// The newest update of each channel.
+#[derive(Default)]
+pub(super) struct Mailbox {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    updates: BTreeMap<usize, Update>,
+    /// What was refused last, until somebody has heard of it.
+    refusal: Option<Error>,
+    statistics: Statistics,
+    ended: bool,
+    abandoned: bool,
+}
+
+impl Mailbox {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Leaves an update in place of the one before of its channel.
+    pub(super) fn put(&self, update: Update) {
+        let mut state = self.state();
+        let replaced = state.updates.insert(update.channel, update).is_some();
+        state.statistics.dropped += u64::from(replaced);
+        self.changed.notify_all();
+    }
+
+    /// Counts updates that came and were passed over.
+    pub(super) fn drop_updates(&self, updates: u64) {
+        self.state().statistics.dropped += updates;
+    }
+
+    pub(super) fn refuse(&self, error: Error) {
+        let mut state = self.state();
+        state.statistics.refused += 1;
+        state.statistics.last_refusal = Some(error.to_string());
+        state.refusal = Some(error);
+        self.changed.notify_all();
+    }
+
+    /// Nothing will be put any more.
+    pub(super) fn end(&self) {
+        self.state().ended = true;
+        self.changed.notify_all();
+    }
+
+    /// Nothing will be taken any more.
+    pub(super) fn abandon(&self) {
+        self.state().abandoned = true;
+    }
+
+    pub(super) fn is_abandoned(&self) -> bool {
+        self.state().abandoned
+    }
+
+    /// Takes an update, waiting for it if there is none.
+    pub(super) fn take(&self, patience: Duration, progress: &dyn Progress) -> Result<Next, Error> {
+        let start = Instant::now();
+        let mut state = self.state();
+        loop {
+            if let Some(refusal) = state.refusal.take() {
+                return Err(refusal);
+            }
+            if let Some((_, update)) = state.updates.pop_first() {
+                state.statistics.taken += 1;
+                return Ok(Next::Update(update));
+            }
+            if state.ended {
+                return Ok(Next::End);
+            }
+            let left = patience.saturating_sub(start.elapsed());
+            if left.is_zero() {
+                return Ok(Next::Nothing);
+            }
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let waited = self.changed.wait_timeout(state, left.min(LOOK));
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    pub(super) fn statistics(&self) -> Statistics {
+        self.state().statistics.clone()
+    }
+}

@@ -1,0 +1,222 @@
+//! Simulated scanners around something that moves, as the paper shows three of them [Paper, Figure 12].
+//!
+//! # How it works
+//!
+//! In each frame rays go out from every scanner, the same angle apart in azimuth and in elevation, and end at the first surface
+//! they meet ([`Target`]): what is hidden from a scanner is missing. Ranges get noise, some rays return nothing, and points
+//! are put where the scanner believes to stand, which may be a little off. All of it depends on the seed, the frame, the
+//! scanner and the ray alone, so threads change nothing.
+
+mod target;
+mod tree;
+
+use std::{f64::consts::TAU, sync::Arc};
+
+use glam::{DMat4, DQuat, DVec3};
+use rayon::prelude::*;
+
+use self::target::Target;
+use super::animation::{Frames, Surface};
+use crate::{Error, PointCloud, Progress, Scan, Timeline, memory::check_memory, progress::tick, sample::Random};
+
+/// Rays of a scanner, at most.
+const MAX_RAYS: u64 = 1 << 28;
+
+/// Bytes of a ray's outcome, twice.
+const BYTES_PER_RAY: u64 = 64;
+
+/// A simulated scanner. Lengths are in the unit of what it looks at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scanner {
+    /// Where it stands, and how it is turned: maps its own frame, x right, y down and z forward, to world coordinates. A
+    /// rotation and a translation.
+    pub world_from_sensor: DMat4,
+    /// Rays in a row.
+    pub columns: u32,
+    /// Rows of rays.
+    pub rows: u32,
+    /// Angle that a row covers, and the angle from the lowest row to the highest: degrees, up to 360 and 180.
+    pub fov_degrees: [f64; 2],
+    /// Standard deviation of ranges, from 0.
+    pub noise: f64,
+    /// Part of the rays that return nothing though they met something, 0 to 1.
+    pub dropouts: f64,
+    /// How far from its true place it believes to stand, from 0, in a random direction.
+    pub misplaced: f64,
+    /// By how much it believes to be turned otherwise than it is, degrees, about a random axis.
+    pub misturned_degrees: f64,
+}
+
+impl Default for Scanner {
+    fn default() -> Self {
+        Self {
+            world_from_sensor: DMat4::IDENTITY,
+            columns: 640,
+            rows: 480,
+            fov_degrees: [57.0, 43.0],
+            noise: 0.0,
+            dropouts: 0.0,
+            misplaced: 0.0,
+            misturned_degrees: 0.0,
+        }
+    }
+}
+
+/// How far above the horizon scanners are placed around something, degrees.
+const ABOVE: f64 = 15.0;
+
+/// Room that is left at the edges of what a scanner sees.
+const ROOM: f64 = 1.1;
+
+/// Noise of the first of several scanners, as a part of the radius of what they look at; the second has twice as much.
+const NOISE: f64 = 1e-3;
+
+impl Scanner {
+    /// `count` scanners around the box from `low` to `high`, equally far apart, slightly above it and looking at its centre,
+    /// each noisier than the one before.
+    pub fn around(low: DVec3, high: DVec3, up: DVec3, count: usize) -> Vec<Self> {
+        let up = up.normalize_or(DVec3::Z);
+        let (centre, radius) = (0.5 * (low + high), (0.5 * (high - low).length()).max(f64::MIN_POSITIVE));
+        let own = Self::default();
+        let distance = ROOM * radius / (0.5 * own.fov_degrees[1]).to_radians().sin();
+        let right = up.any_orthonormal_vector();
+        let placed = |index: usize| {
+            let around = DQuat::from_axis_angle(up, TAU * index as f64 / count as f64) * right;
+            let (sin, cos) = ABOVE.to_radians().sin_cos();
+            let eye = centre + distance * (cos * around + sin * up);
+            let world_from_sensor = looking(eye, centre, up);
+            Self { world_from_sensor, noise: NOISE * (index + 1) as f64 * radius, ..own.clone() }
+        };
+        (0..count).map(placed).collect()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let within = |name, value: f64, low: f64, high: f64, rule| {
+            if value >= low && value <= high { Ok(()) } else { Err(Error::BadValue { name, value, rule }) }
+        };
+        let rays = u64::from(self.columns) * u64::from(self.rows);
+        if rays == 0 || rays > MAX_RAYS {
+            return Err(Error::BadValue { name: "rays of a scanner", value: rays as f64, rule: "1 to 268435456" });
+        }
+        within("field of view", self.fov_degrees[0], 1e-6, 360.0, "above 0 and at most 360 degrees")?;
+        within("field of view", self.fov_degrees[1], 1e-6, 180.0, "above 0 and at most 180 degrees")?;
+        within("noise of a scanner", self.noise, 0.0, 1e9, "from 0 to 1e9")?;
+        within("dropouts of a scanner", self.dropouts, 0.0, 1.0, "from 0 to 1")?;
+        within("misplacement of a scanner", self.misplaced, 0.0, 1e9, "from 0 to 1e9")?;
+        within("misturning of a scanner", self.misturned_degrees, 0.0, 180.0, "from 0 to 180 degrees")?;
+        let pose = self.world_from_sensor;
+        let (det, place) = (pose.determinant(), pose.w_axis.truncate().length());
+        within("determinant of a scanner's pose", det, 1.0 - 1e-6, 1.0 + 1e-6, "1, as of a rotation")?;
+        within("distance of a scanner from the origin", place, 0.0, 1e9, "at most 1e9")
+    }
+
+    /// The pose that it believes to have.
+    fn believed(&self, random: &mut Random) -> DMat4 {
+        let (offset, axis) = (random.direction() * self.misplaced, random.direction());
+        let turn = DMat4::from_axis_angle(axis, self.misturned_degrees.to_radians());
+        DMat4::from_translation(offset) * self.world_from_sensor * turn
+    }
+
+    /// Direction of a ray in its own frame.
+    fn direction(&self, column: u32, row: u32) -> DVec3 {
+        let part = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count) - 0.5;
+        let azimuth = (self.fov_degrees[0] * part(column, self.columns)).to_radians();
+        let elevation = (self.fov_degrees[1] * part(row, self.rows)).to_radians();
+        let ((sin, cos), (down, level)) = (azimuth.sin_cos(), elevation.sin_cos());
+        DVec3::new(sin * level, down, cos * level)
+    }
+}
+
+/// The pose of a sensor at `eye` that looks at `centre`.
+fn looking(eye: DVec3, centre: DVec3, up: DVec3) -> DMat4 {
+    let forward = (centre - eye).normalize_or(DVec3::X);
+    let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+    let down = forward.cross(right);
+    DMat4::from_cols(right.extend(0.0), down.extend(0.0), forward.extend(0.0), eye.extend(1.0))
+}
+
+/// A point that came back, and its colour if there are any.
+type Seen = ([f32; 3], Option<[u8; 3]>);
+
+/// What scanners see of something that moves: a channel each.
+pub(super) struct Scanned {
+    frames: Arc<dyn Frames>,
+    scanners: Vec<Scanner>,
+    seed: u64,
+}
+
+impl Scanned {
+    pub(super) fn new(frames: Arc<dyn Frames>, scanners: Vec<Scanner>, seed: u64) -> Result<Self, Error> {
+        scanners.iter().try_for_each(Scanner::check)?;
+        if scanners.is_empty() {
+            return Err(Error::BadValue { name: "number of scanners", value: 0.0, rule: "at least 1" });
+        }
+        let rays = scanners.iter().map(|scanner| u64::from(scanner.columns) * u64::from(scanner.rows)).sum::<u64>();
+        check_memory(&format!("the rays of {} scanners", scanners.len()), rays.saturating_mul(BYTES_PER_RAY))?;
+        Ok(Self { frames, scanners, seed })
+    }
+
+    /// A number of its own for everything that is random.
+    fn random(&self, scanner: usize, frame: usize, ray: u64) -> Random {
+        let mut mixed = Random::new(self.seed, scanner as u64);
+        Random::new(Random::new(mixed.bits(), frame as u64).bits(), ray)
+    }
+
+    fn scan(&self, index: usize, frame: usize, target: &Target, progress: &dyn Progress) -> Result<PointCloud, Error> {
+        let scanner = &self.scanners[index];
+        // A pose is wrong in the same way in all frames.
+        let believed = scanner.believed(&mut self.random(index, usize::MAX, 0));
+        let pose = scanner.world_from_sensor;
+        let eye = pose.w_axis.truncate();
+        let origin = target.origin();
+        let row = |row: u32| {
+            if progress.cancelled() {
+                return Vec::new();
+            }
+            let mut waiting = Vec::new();
+            let seen = |column: u32| {
+                let direction = scanner.direction(column, row);
+                let hit = target.trace(eye, pose.transform_vector3(direction), &mut waiting)?;
+                let ray = u64::from(row) * u64::from(scanner.columns) + u64::from(column);
+                let mut random = self.random(index, frame, ray);
+                if random.unit() < scanner.dropouts {
+                    return None;
+                }
+                let range = hit.distance + scanner.noise * random.normal();
+                let place = believed.transform_point3(direction * range);
+                (range > 0.0).then(|| ((place - origin).as_vec3().to_array(), hit.color))
+            };
+            (0..scanner.columns).filter_map(seen).collect()
+        };
+        let rows: Vec<Vec<Seen>> = (0..scanner.rows).into_par_iter().map(row).collect();
+        tick(progress, (index + 1) as f32 / self.scanners.len() as f32)?;
+        let positions: Vec<[f32; 3]> = rows.iter().flatten().map(|(position, _)| *position).collect();
+        let name = Some(format!("scanner {}", index + 1));
+        let scan = Scan { name, world_from_sensor: believed, points: 0..positions.len() };
+        let mut cloud = PointCloud::new(origin, positions).with_scans(vec![scan]).with_crs(target.crs());
+        cloud.axes = target.axes();
+        if target.is_colored() {
+            cloud = cloud.with_colors(rows.iter().flatten().map(|(_, color)| color.unwrap_or_default()).collect())?;
+        }
+        Ok(cloud)
+    }
+}
+
+impl Frames for Scanned {
+    fn timeline(&self) -> &Timeline {
+        self.frames.timeline()
+    }
+
+    fn channels(&self) -> usize {
+        self.scanners.len()
+    }
+
+    fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
+        let target = Target::new(self.frames.surface(frame, progress)?)?;
+        (0..self.scanners.len()).map(|index| Ok(Arc::new(self.scan(index, frame, &target, progress)?))).collect()
+    }
+
+    fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {
+        self.frames.surface(frame, progress)
+    }
+}
