@@ -46,9 +46,11 @@ impl Part {
 
 /// The controls that can have the focus, in the order of Tab.
 fn controls(context: &Context) -> Vec<(Id, LayerId, Rect)> {
+    let order: Vec<LayerId> = context.memory(|memory| memory.layer_ids().collect());
     context.viewport(|viewport| {
         let mut layers: Vec<_> = viewport.prev_pass.widgets.layers().collect();
-        layers.sort_by_key(|(layer, _)| layer.order);
+        // Panels, then windows from the lowest to the topmost.
+        layers.sort_by_key(|(layer, _)| (layer.order, order.iter().position(|own| own == *layer)));
         let all = layers.into_iter().flat_map(|(layer, widgets)| widgets.iter().map(move |widget| (*layer, widget)));
         let usable = all.filter(|(_, widget)| widget.enabled && widget.sense.is_focusable());
         usable.map(|(layer, widget)| (widget.id, layer, widget.rect)).collect()

@@ -16,10 +16,7 @@ const MOUSE: [(&str, &str); 13] = [
     ("Shift", "Fly faster"),
     ("Arrow keys", "Turn the head"),
     ("Alt + left drag", "Turn the view while selecting"),
-    (
-        "Tab, Shift + Tab",
-        "From control to control, once F6 or a click has gone to one; Escape goes back to the picture",
-    ),
+    ("Tab, after F6", "From control to control; Escape goes back to the picture"),
     ("Enter in a dialog", "What it is for; Escape closes it"),
     ("Drag dots, arrows, rings", "Move the faces of the clipping box, or the selection; Escape gives it up"),
 ];

@@ -67,8 +67,9 @@ impl TargetFile {
         self.refused = None;
     }
 
-    /// Tells why `path` was not written; as a question if it may be all the same.
+    /// Tells why `path` was not written; as a question if it may be all the same. Another name can be typed.
     pub(super) fn refuse(&mut self, path: &Path, why: impl Into<String>, question: bool) {
+        self.fresh = true;
         self.refused = Some((path.into(), Refusal { why: why.into(), question }));
     }
 
@@ -129,7 +130,10 @@ impl TargetFile {
         let path = self.path();
         let named = !self.text.trim().is_empty() && problem.is_none();
         let write = |replace, answered| Some(Write { path: path.clone(), replace, answered });
-        if refused.is_some_and(|refusal| refusal.question) {
+        let question = refused.is_some_and(|refusal| refusal.question);
+        // What is typed next is no command while the dialog is open.
+        self.fresh |= enter && (question || !named);
+        if question {
             let replace = ui.add_enabled(named, egui::Button::new("Replace it"));
             return if replace.clicked() { write(true, true) } else { None };
         }

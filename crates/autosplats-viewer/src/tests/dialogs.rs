@@ -64,6 +64,7 @@ fn enter_writes_and_replaces_nothing() {
             window.press(Key::Enter);
             window.until("a question", |window| window.says("Replace it"));
             window.steps(20);
+            assert!(window.harness.ctx.text_edit_focused(), "{name}: another name can be typed");
         }
         assert_eq!(std::fs::read_to_string(&file).ok().as_deref(), Some("mine"), "{name}: nothing was replaced");
         assert!(is_open(&window, command), "{name}: the question stays");
@@ -119,7 +120,7 @@ fn a_name_that_cannot_be_written_is_told_in_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::with_statue();
     for (command, name, why) in [
-        (Command::Export, "points.unknown", "unknown"),
+        (Command::Export, "points.unknown", "tells no format"),
         (Command::Screenshot, "picture.bmp", "The name has to end in .png"),
         (Command::Film, "film.bmp", "The name has to end in .mp4"),
         (Command::SaveState, "", "This is a folder"),

@@ -23,12 +23,9 @@ impl Chance {
     }
 }
 
-/// Megabytes of memory that this program has in use.
-fn resident_mb() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
-    let pages: f64 = text.split_whitespace().nth(1)?.parse().ok()?;
-    Some(pages * 4096e-6)
-}
+/// Tells what is allocated and not freed: what a system has given a program says more of its allocator.
+#[global_allocator]
+static ALLOCATED: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;
 
 /// What is opened and closed.
 const SCENES: [&str; 4] = [STATUE, "scene:figure:5K", "scene:herd:3K", "/nowhere/absent.ply"];
@@ -113,11 +110,29 @@ fn anything(window: &mut Window, chance: &mut Chance) {
     window.steps(1 + chance.below(3));
 }
 
-/// Does anything for so long; memory may grow by so many megabytes.
+/// Closes everything and forgets what could be undone, which is kept on purpose; gives the megabytes that are left.
+fn rest(window: &mut Window) -> f64 {
+    let app = window.harness.state_mut();
+    app.loader.cancel_all();
+    app.history = crate::document::History::default();
+    app.version += 1;
+    window.until("everything is closed", |window| {
+        let app = window.app();
+        app.loader.jobs().is_empty() && app.document().layers.is_empty() && app.shot.is_none()
+    });
+    // What the threads still have in work is let go of, too.
+    for _ in 0..10 {
+        std::thread::sleep(Duration::from_millis(5));
+        window.step();
+    }
+    f64::from(ALLOCATED.current_usage_as_mb())
+}
+
+/// Does anything for so long; what is left when everything is closed may grow by so many megabytes.
 ///
-/// How much is open changes all the time, and with it memory. But everything is closed every now and then, so that the least
-/// memory of some minutes is what the program itself keeps. The first third fills what is kept on purpose, undo above all; what
-/// is more in the last third than in the middle one is lost.
+/// While things are open memory goes up and down by hundreds of megabytes, in which a leak would not be seen. So everything is
+/// closed every now and then, and what is still allocated counts. Buffers and caches are as large as they get after a third of
+/// the time; what is more in the last third than in the middle one, each at its least, is lost.
 fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     let mut window = Window::with_statue();
     let mut chance = Chance(seed);
@@ -125,19 +140,20 @@ fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     let (mut events, mut samples, mut next) = (0_u64, Vec::new(), 0.0);
     while start.elapsed().as_secs_f64() < seconds {
         anything(&mut window, &mut chance);
+        // Another backend would begin with buffers of its own, and what is left could not be compared.
+        window.harness.state_mut().look.backend = Backend::Cpu;
         events += 1;
-        let now = start.elapsed().as_secs_f64();
-        if now >= next {
-            next = now + (0.002 * seconds).min(0.25);
-            samples.extend(resident_mb());
+        if start.elapsed().as_secs_f64() >= next {
+            samples.push(rest(&mut window));
+            next = start.elapsed().as_secs_f64() + (0.03 * seconds).min(2.0);
         }
     }
-    let least = least(&samples, 10);
-    let peak = samples.iter().copied().fold(0.0, f64::max);
-    let what = format!("{events} rounds in {seconds:.0} s, seed {seed}");
-    let seen = format!("{what}: {least:.1?} MB at least in each tenth, {peak:.0} at most");
+    let (least, grown) = (least(&samples, 6), grown(&samples));
+    let what = format!("{events} rounds in {seconds:.0} s, seed {seed}, {} rests", samples.len());
+    let peak = ALLOCATED.peak_usage_as_mb();
+    let seen = format!("{what}: {least:.2?} MB at least in each sixth, {grown:.2} MB more at last; {peak:.0} at most");
     println!("{seen}");
-    assert!(grown(&samples) < allowed_mb, "memory grows: {seen}");
+    assert!(grown < allowed_mb, "memory grows: {seen}");
     assert!(events as f64 > 0.5 * seconds, "the window still answers: {seen}");
     window.until("it can still be used", |window| !window.app().navigation.is_moving());
 }
@@ -152,7 +168,7 @@ fn least(samples: &[f64], parts: usize) -> Vec<f64> {
 /// Megabytes that the last third has more than the middle one, each at its least.
 fn grown(samples: &[f64]) -> f64 {
     let least = least(samples, 3);
-    if least[1].is_finite() { least[2] - least[1] } else { 0.0 }
+    least[2] - least[1]
 }
 
 #[test]
@@ -165,7 +181,6 @@ fn growth_is_told_from_chance() {
     assert!(grown(&leaking) > 10.0, "0.1 MB a sample are seen: {}", grown(&leaking));
     let filling: Vec<f64> = steady.iter().zip(0..).map(|(own, second)| own.min(f64::from(second) * 2.0)).collect();
     assert!(grown(&filling).abs() < 2.0, "what fills at first is kept on purpose: {}", grown(&filling));
-    assert_eq!(grown(&[]), 0.0, "where memory cannot be asked for");
 }
 
 /// Other tests of this program run at the same time and have memory, too; this is for panics, and for what grows fast.
@@ -179,5 +194,5 @@ fn twenty_seconds_of_anything() {
 #[ignore = "takes ten minutes"]
 fn ten_minutes_of_anything() {
     let seconds = std::env::var("AUTOSPLATS_SOAK_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(600.0);
-    soak(seconds, 0x5EED_0002, 8.0);
+    soak(seconds, 0x5EED_0002, 2.0);
 }
