@@ -54,5 +54,6 @@ pub use source::{
 pub use write::{check_writable, write, written_formats};
 
 pub use source::animation::{Animation, Playback};
+pub use source::latest::{Arrival, Latest, LatestOptions, LatestStatistics};
 pub use source::live::{Live, LiveOptions};
 pub use source::scanner::Scanner;

@@ -1,6 +1,7 @@
 //! Where clouds come from.
 
 pub(crate) mod animation;
+pub(crate) mod latest;
 pub(crate) mod live;
 pub(crate) mod scanner;
 pub(crate) mod scene;
