@@ -47,13 +47,15 @@ pub use read::{
 };
 pub use sample::sample_surface;
 pub use source::{
-    Source, point_cloud2,
+    PlayOptions, Source,
+    animation::{Animation, Playback},
+    latest::{Arrival, Latest, LatestOptions, LatestStatistics},
+    live::{Live, LiveOptions},
+    player::Player,
+    point_cloud2,
     recording::{Recording, RecordingOptions, RecordingSummary, RecordingTopic, describe_recording, is_recording},
+    scanner::Scanner,
     scene::{Hit, Scene, View, parse_count},
     stream::{Next, Statistics, Stream, Timeline, Update},
 };
 pub use write::{check_writable, write, written_formats};
-
-pub use source::animation::{Animation, Playback};
-pub use source::live::{Live, LiveOptions};
-pub use source::scanner::Scanner;

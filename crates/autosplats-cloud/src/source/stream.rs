@@ -13,6 +13,12 @@ pub trait Stream: Send {
     /// The times of all frames, if they are known.
     fn timeline(&self) -> Option<&Timeline>;
 
+    /// The frames that together are seen at the time of `frame`, in order: of each channel the newest by then. Where all channels
+    /// have updates in every frame, that is the frame alone.
+    fn seen_at(&self, frame: usize) -> Vec<usize> {
+        vec![frame]
+    }
+
     /// Updates that each frame of the timeline has, one after the other; 1 but for several simulated scanners.
     fn updates_per_frame(&self) -> usize {
         1

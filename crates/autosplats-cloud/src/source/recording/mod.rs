@@ -157,19 +157,6 @@ impl Recording {
     pub fn channels(&self) -> &[String] {
         &self.channels
     }
-
-    /// The frames that together are seen at the time of `frame`: of each channel the last one until then, in order. After a
-    /// [seek](crate::Stream::seek) they show all that playing up to there would.
-    pub fn seen_at(&self, frame: usize) -> Vec<usize> {
-        let before = &self.frames[..self.frames.len().min(frame.saturating_add(1))];
-        let mut missing = vec![true; self.channels.len()];
-        let last = |(at, (_, channel)): (usize, &(Place, usize))| {
-            std::mem::replace(&mut missing[*channel], false).then_some(at)
-        };
-        let mut seen: Vec<usize> = before.iter().enumerate().rev().filter_map(last).collect();
-        seen.reverse();
-        seen
-    }
 }
 
 /// The frames of the channels' sensors, in their order, as the first messages that can be read say.

@@ -16,6 +16,14 @@ impl Stream for Recording {
         Some(&self.timeline)
     }
 
+    fn seen_at(&self, frame: usize) -> Vec<usize> {
+        let before = &self.frames[..self.frames.len().min(frame.saturating_add(1))];
+        let last = |channel| before.iter().rposition(|(_, of)| *of == channel);
+        let mut seen: Vec<usize> = (0..self.channels.len()).filter_map(last).collect();
+        seen.sort_unstable();
+        seen
+    }
+
     fn seek(&mut self, frame: usize) {
         self.position = frame;
     }

@@ -1,0 +1,135 @@
+//! What is to be seen of a stream at one moment.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use glam::DMat4;
+
+use super::latest::{Latest, LatestOptions};
+use crate::{Error, Next, PointCloud, Progress, Stream};
+
+/// How long a wait may last before somebody may cancel it.
+const STEP: Duration = Duration::from_millis(100);
+
+/// Plays a stream: makes the cloud that is to be seen at a frame of its timeline, or now.
+///
+/// A frame is the same points whatever was played before it.
+pub struct Player {
+    stream: Box<dyn Stream>,
+    options: LatestOptions,
+    latest: Latest,
+    /// The frame that was played last.
+    last: Option<usize>,
+}
+
+impl Player {
+    /// Plays a stream, and keeps what `options` say beside the newest points.
+    pub fn new(stream: Box<dyn Stream>, options: LatestOptions) -> Self {
+        Self { stream, latest: begin(&options), options, last: None }
+    }
+
+    /// What is played.
+    pub fn stream(&self) -> &dyn Stream {
+        &*self.stream
+    }
+
+    /// The points that are seen at a frame of the timeline: of each channel the newest by then, and what is kept of older ones.
+    /// What cannot be read is told as a note, once for each frame, and the points before it stay.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` asked to stop.
+    pub fn frame(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Error> {
+        if self.last == Some(frame) {
+            return Ok(self.latest.cloud());
+        }
+        let mut after = self.last;
+        if self.last.is_some_and(|last| last > frame) {
+            // What came later must not be seen.
+            self.latest = begin(&self.options);
+            (self.last, after) = (None, None);
+        }
+        for needed in self.needed(frame).into_iter().filter(|&needed| after.is_none_or(|after| needed > after)) {
+            self.stream.seek(needed);
+            for _ in 0..self.stream.updates_per_frame() {
+                match self.stream.next(Duration::ZERO, progress) {
+                    Ok(Next::Update(update)) => {
+                        self.latest.put(0, update);
+                    }
+                    Ok(Next::Nothing | Next::End) => break,
+                    Err(Error::Cancelled) => return Err(Error::Cancelled),
+                    Err(error) => {
+                        progress.note(&error.to_string());
+                        break;
+                    }
+                }
+            }
+        }
+        self.last = Some(frame);
+        Ok(self.latest.cloud())
+    }
+
+    /// The first frame, or of a live stream the first update, which is waited for no longer than `patience`.
+    ///
+    /// # Errors
+    /// Those of [`frame`](Self::frame) and [`next`](Self::next), [`Error::NoFrames`] if nothing comes.
+    pub fn first(&mut self, patience: Duration, progress: &dyn Progress) -> Result<Arc<PointCloud>, Error> {
+        if self.stream.timeline().is_some() {
+            return self.frame(0, progress);
+        }
+        let begun = Instant::now();
+        while let Some(left) = patience.checked_sub(begun.elapsed()) {
+            if let Some(cloud) = self.next(left.min(STEP), progress)? {
+                return Ok(cloud);
+            }
+        }
+        let why = format!("nothing came within {} s", patience.as_secs());
+        Err(Error::NoFrames { name: "the stream".into(), why })
+    }
+
+    /// The frames that a frame is made of, in order.
+    fn needed(&self, frame: usize) -> Vec<usize> {
+        if self.options.accumulate {
+            return (0..=frame).collect();
+        }
+        let mut needed = self.stream.seen_at(frame);
+        if let (Some(decay), Some(timeline)) = (self.options.decay, self.stream.timeline())
+            && let Some(&now) = timeline.stamps().get(frame)
+        {
+            let since = now.saturating_sub(i64::try_from(decay.as_nanos()).unwrap_or(i64::MAX));
+            let first = timeline.stamps().partition_point(|&stamp| stamp < since);
+            needed.extend(first..=frame);
+            needed.sort_unstable();
+            needed.dedup();
+        }
+        needed
+    }
+
+    /// The points that are seen once the next update of a live stream has come; `None` if none came within `patience`. What
+    /// cannot be read is told as a note.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` asked to stop; [`Error::NoFrames`] when the stream has ended.
+    pub fn next(&mut self, patience: Duration, progress: &dyn Progress) -> Result<Option<Arc<PointCloud>>, Error> {
+        match self.stream.next(patience, progress) {
+            Ok(Next::Update(update)) => {
+                self.latest.put(0, update);
+                Ok(Some(self.latest.cloud()))
+            }
+            Ok(Next::Nothing) => Ok(None),
+            Ok(Next::End) => Err(Error::NoFrames { name: "the stream".into(), why: "it has ended".into() }),
+            Err(Error::Cancelled) => Err(Error::Cancelled),
+            Err(error) => {
+                progress.note(&error.to_string());
+                Ok(None)
+            }
+        }
+    }
+}
+
+fn begin(options: &LatestOptions) -> Latest {
+    let mut latest = Latest::new(options.clone());
+    latest.add(DMat4::IDENTITY);
+    latest
+}
