@@ -1,6 +1,7 @@
 //! The command line as it is typed. What the flags mean together is decided in [`render::job`](crate::render).
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use autosplats::{Background, ColorMode, NormalSettings, Reconstruction, Shading};
 use autosplats_cloud::glam::DVec3;
@@ -11,7 +12,7 @@ use crate::bench::args::BenchArgs;
 use crate::choices::{AxesChoice, Backend, BacksChoice, Engine, Map, OrientChoice, Side};
 use crate::exit::EXIT_CODES;
 use crate::first_radius::FirstRadius;
-use crate::values::{self, Neighbors, Ortho};
+use crate::values::{self, FrameRange, Neighbors, Ortho};
 
 /// Turns raw point clouds into lit surfaces: no normals, no radii, no preprocessing.
 #[derive(Debug, Parser)]
@@ -57,7 +58,8 @@ pub(crate) enum Command {
 
 const INPUT_HELP: &str = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT], such as scene:statue or scene:herd:2M. Several inputs become one cloud.";
+generated scene as scene:NAME[:COUNT], such as scene:statue or scene:herd:2M. What moves is a folder or a quoted pattern of files, \
+a recording (.mcap .bag), or - for PLY and PCD files from standard input. Several inputs become one cloud.";
 
 const VIEW_EXAMPLES: &str = "\
 Examples:
@@ -101,6 +103,9 @@ Examples:
   autosplats render scan.laz -o print.png --supersample 2
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
+  autosplats render drive.mcap --decay 1s --frames 0..99 -o drive_%05d.png
+  autosplats render 'scans/frame_*.ply' --fps 25 -o scans.mp4
+  autosplats render scene:horse --scan 4 --color k-radius --frames 0..47 -o scanned_%03d.png
   autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
 
@@ -112,7 +117,8 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) input: InputArgs,
     /// Picture to write: .png (8 bit) or .exr (32-bit float: R G B A Z N.X N.Y N.Z radius kradius curvature index).
-    /// Can be given several times; an existing file is replaced
+    /// Can be given several times; an existing file is replaced. One name with a number, such as f_%05d.png, writes a picture
+    /// for each frame of what moves, and .mp4, .mkv, .webm or .mov a film, if ffmpeg is there
     #[arg(short, long = "out", value_name = "FILE", required = true)]
     pub(crate) outputs: Vec<PathBuf>,
     /// Width and height of the picture in pixels
@@ -121,6 +127,13 @@ pub(crate) struct RenderArgs {
     /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures
     #[arg(long, value_name = "FACTOR", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(crate) supersample: u32,
+    /// Frames of what moves to render, from 0, both ends included: 0..99, 50.., ..9 or 7 [default: all with a numbered name or
+    /// a film, else the first]
+    #[arg(long, value_name = "A..B", value_parser = values::frame_range, help_heading = "Points that move")]
+    pub(crate) frames: Option<FrameRange>,
+    /// Leave out frames whose picture is there already
+    #[arg(long, help_heading = "Points that move")]
+    pub(crate) resume: bool,
     #[command(flatten)]
     pub(crate) camera: CameraArgs,
     #[command(flatten)]
@@ -144,6 +157,35 @@ pub(crate) struct InputArgs {
     pub(crate) poses: Vec<String>,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
+    #[command(flatten)]
+    pub(crate) playing: PlayingArgs,
+}
+
+/// How what moves is played.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Points that move")]
+pub(crate) struct PlayingArgs {
+    /// Files of a sequence in a second, or times a second that a glTF or a scene is looked at [default: 10 or 30]
+    #[arg(long, value_name = "RATE", value_parser = values::rate)]
+    pub(crate) fps: Option<f64>,
+    /// Topic of a recording to play; can be given several times [default: all that have points]
+    #[arg(long = "topic", value_name = "NAME")]
+    pub(crate) topics: Vec<String>,
+    /// Coordinate frame of a recording that its points are brought into [default: the topmost that its sensors share]
+    #[arg(long, value_name = "FRAME")]
+    pub(crate) fixed_frame: Option<String>,
+    /// Keep the points of the last so many seconds, such as 2s or 500ms
+    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    pub(crate) decay: Option<Duration>,
+    /// Keep all points of the past, up to 100 million
+    #[arg(long, conflicts_with = "decay")]
+    pub(crate) accumulate: bool,
+    /// Strew so many points over the surface of each mesh in place of its corners, which move with it
+    #[arg(long, value_name = "COUNT", value_parser = values::count)]
+    pub(crate) strew: Option<usize>,
+    /// Put so many simulated scanners, 1 to 4, around each mesh or scene, each noisier than the one before, and take what they see
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u8).range(1..=4))]
+    pub(crate) scan: Option<u8>,
 }
 
 /// What files leave open.

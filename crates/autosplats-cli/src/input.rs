@@ -2,19 +2,25 @@
 
 use std::fs::{metadata, read_to_string};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
 use autosplats_cloud::{
-    Error, PointCloud, Progress, ReadOptions, Scene, Source, check_memory, read_mesh, sample_surface,
+    Error, LatestOptions, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, check_memory,
+    read_mesh, sample_surface,
 };
 use rayon::prelude::*;
 
-use crate::args::{InputArgs, ReadingArgs};
+use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
 use crate::progress::{Bar, Part};
 
 /// What begins the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
+
+/// How long the first points of something live are waited for.
+const FIRST_POINTS: Duration = Duration::from_secs(30);
 
 /// Fields left out, and inputs, that are named.
 const LISTED: usize = 10;
@@ -24,6 +30,23 @@ const LISTED: usize = 10;
 pub(crate) struct Inputs {
     list: Vec<Input>,
     options: ReadOptions,
+    play: PlayOptions,
+}
+
+impl PlayingArgs {
+    /// The flags as the library takes them.
+    pub(crate) fn options(&self) -> PlayOptions {
+        let Self { fps, topics, fixed_frame, decay, accumulate, strew, scan } = self;
+        PlayOptions {
+            fps: *fps,
+            topics: topics.clone(),
+            frame: fixed_frame.clone(),
+            sample: *strew,
+            scanners: scan.map(usize::from),
+            latest: LatestOptions { decay: *decay, accumulate: *accumulate, ..LatestOptions::default() },
+            ..PlayOptions::default()
+        }
+    }
 }
 
 impl ReadingArgs {
@@ -50,7 +73,7 @@ struct Input {
 impl Inputs {
     /// Looks at what was typed, without reading a point: names of scenes, existence of files, poses.
     pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
-        let InputArgs { poses, reading } = args;
+        let InputArgs { poses, reading, playing } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
         let generated = list.iter().map(|input| input.source.least_bytes()).sum();
         check_memory("the points of generated scenes", generated).map_err(read_failure)?;
@@ -74,7 +97,7 @@ impl Inputs {
                 })?;
             input.world_from_input = read_pose(Path::new(&matrix))?;
         }
-        Ok(Self { list, options: reading.options() })
+        Ok(Self { list, options: reading.options(), play: playing.options() })
     }
 
     /// Of several names the last is the output's.
@@ -88,7 +111,7 @@ impl Inputs {
     /// A built-in scene alone.
     pub(crate) fn scene(name: &str) -> Result<Self, Failure> {
         let input = Input::new(&format!("{SCENE_PREFIX}{name}"))?;
-        Ok(Self { list: vec![input], options: ReadOptions::default() })
+        Ok(Self { list: vec![input], options: ReadOptions::default(), play: PlayOptions::default() })
     }
 
     /// Asks for all the digits there are, for what is to be written again.
@@ -99,11 +122,15 @@ impl Inputs {
 
     /// The inputs as the viewer takes them.
     #[cfg(feature = "viewer")]
-    pub(crate) fn for_viewer(self) -> Vec<autosplats_viewer::Input> {
-        let Self { list, options } = self;
+    pub(crate) fn for_viewer(mut self, watch: bool) -> Vec<autosplats_viewer::Input> {
+        self.play.watch = watch;
+        let Self { list, options, play } = self;
+        // What would be passed over otherwise asks for files and scenes to be played as well.
+        let played = play.fps.is_some() || play.scanners.is_some() || play.sample.is_some();
         let input = |Input { name, source, world_from_input }| {
             let file = source.path().and_then(Path::file_name).map(|file| file.to_string_lossy().into_owned());
-            autosplats_viewer::Input { name: file.unwrap_or(name), source, options: options.clone(), world_from_input }
+            let (options, play) = (options.clone(), play.clone());
+            autosplats_viewer::Input { name: file.unwrap_or(name), source, options, play, played, world_from_input }
         };
         list.into_iter().map(input).collect()
     }
@@ -134,7 +161,31 @@ impl Inputs {
 
     /// Reads everything into one cloud.
     pub(crate) fn read(&self, quiet: bool) -> Result<PointCloud, Failure> {
-        self.read_each(quiet, |input, progress| input.source.read(&self.options, progress))
+        let made = self.play.scanners.is_some() || self.play.sample.is_some();
+        self.read_each(quiet, |input, progress| {
+            if !made && !input.source.moves() {
+                return input.source.read(&self.options, progress);
+            }
+            let mut player = input.source.play(&self.play, &self.options, progress)?;
+            player.first(FIRST_POINTS, progress).map(Arc::unwrap_or_clone)
+        })
+    }
+
+    /// Makes the inputs ready to be played, with their poses.
+    pub(crate) fn play(&self, quiet: bool) -> Result<Vec<(Player, DMat4)>, Failure> {
+        let open = |input: &Input| {
+            let bar = Bar::new(&format!("opening {}", input.name), quiet);
+            let player = input.source.play(&self.play, &self.options, &bar).map_err(|error| match error {
+                Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
+                error => read_failure(error),
+            })?;
+            if player.stream().timeline().is_none() {
+                let why = "is live, so that it has no frames to be counted; leave out --frames and the number in the output's name";
+                return Err(Failure::usage(format!("{} {why}", input.name)));
+            }
+            Ok((player, input.world_from_input))
+        };
+        self.list.iter().map(open).collect()
     }
 
     /// Reads meshes and strews `count` points over the surface of each, into one cloud.
@@ -212,7 +263,7 @@ impl Input {
                 };
                 Failure::new(Exit::Input, format!("{name}: {error}{hint}"))
             })?;
-            if metadata.is_dir() {
+            if metadata.is_dir() && matches!(source, Source::File(_)) {
                 return Err(Failure::new(Exit::Input, format!("{name}: a folder; name the files in it")));
             }
         }
@@ -226,6 +277,7 @@ impl Input {
                 format!("reading {}", path.file_name().unwrap_or(path.as_os_str()).to_string_lossy())
             }
             Source::Scene(..) => format!("generating {}", self.name),
+            Source::Sequence(_) | Source::Recording(_) | Source::StandardInput => format!("reading {}", self.name),
         }
     }
 }

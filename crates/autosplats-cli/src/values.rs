@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::time::Duration;
 
 use autosplats::{Background, ColorMode, MAX_SIDE, Reconstruction};
 use autosplats_cloud::glam::DVec3;
@@ -69,6 +70,46 @@ impl fmt::Display for Neighbors {
             Self::Count(k) => write!(f, "{k}"),
         }
     }
+}
+
+/// Frames from one to another, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FrameRange {
+    pub(crate) first: usize,
+    /// To the end, if it is not said.
+    pub(crate) last: Option<usize>,
+}
+
+/// `A..B`, `A..`, `..B` or `A`.
+pub(crate) fn frame_range(text: &str) -> Result<FrameRange, String> {
+    let number = |text: &str| text.parse().map_err(|_| "frames are A..B, A.., ..B or a number, from 0".to_owned());
+    let (first, last) = match text.split_once("..") {
+        None => (number(text)?, Some(number(text)?)),
+        Some((first, last)) => (
+            if first.is_empty() { 0 } else { number(first)? },
+            if last.is_empty() { None } else { Some(number(last)?) },
+        ),
+    };
+    if last.is_some_and(|last| last < first) {
+        return Err("the last frame comes before the first".into());
+    }
+    Ok(FrameRange { first, last })
+}
+
+/// Frames a second.
+pub(crate) fn rate(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|rate| *rate > 0.0 && *rate <= 1e5).ok_or("a rate is above 0 and at most 100000".into())
+}
+
+/// A time in seconds, or with `s`, `ms` or `min` behind it.
+pub(crate) fn duration(text: &str) -> Result<Duration, String> {
+    let units = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("", 1.0)];
+    let seconds = units.into_iter().find_map(|(unit, seconds)| {
+        let number: f64 = text.strip_suffix(unit)?.trim_end().parse().ok()?;
+        Some(number * seconds)
+    });
+    let seconds = seconds.filter(|seconds| *seconds >= 0.0 && *seconds <= 1e9);
+    seconds.map(Duration::from_secs_f64).ok_or("a time is a number with s, ms or min behind it, such as 2s".into())
 }
 
 /// A number of frames.
@@ -226,6 +267,26 @@ fn number<T: FromStr + Into<f64> + Copy>(text: &str) -> Option<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn frames_and_times() {
+        let range = |first, last| Ok(FrameRange { first, last });
+        assert_eq!(frame_range("3..7"), range(3, Some(7)));
+        assert_eq!(frame_range("3.."), range(3, None));
+        assert_eq!(frame_range("..7"), range(0, Some(7)));
+        assert_eq!(frame_range(".."), range(0, None));
+        assert_eq!(frame_range("5"), range(5, Some(5)));
+        for bad in ["", "a", "7..3", "1...3", "-1"] {
+            assert!(frame_range(bad).is_err(), "{bad} is no range");
+        }
+        assert_eq!(duration("2s"), Ok(Duration::from_secs(2)));
+        assert_eq!(duration("500 ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("1min"), Ok(Duration::from_secs(60)));
+        assert_eq!(duration("0.5"), Ok(Duration::from_millis(500)));
+        for bad in ["", "s", "-1s", "nan", "1e300", "2h"] {
+            assert!(duration(bad).is_err(), "{bad} is no time");
+        }
+    }
 
     #[test]
     fn sizes() {

@@ -13,7 +13,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), Failure> {
 
     crate::threads::start_threads(&args.run)?;
     let ViewArgs { inputs, input, state, watch, backend, run: _ } = args;
-    let inputs = Inputs::new(inputs, input)?.for_viewer();
+    let inputs = Inputs::new(inputs, input)?.for_viewer(*watch);
     let options = Options { inputs, state: state.clone(), watch: *watch, backend: backend.map(Into::into) };
     autosplats_viewer::run(options).map_err(|error| {
         let exit = if matches!(error, Error::State(_)) { Exit::Input } else { Exit::Device };

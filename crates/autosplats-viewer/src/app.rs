@@ -17,6 +17,7 @@ use crate::look::Look;
 use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
 use crate::panels::Panels;
+use crate::playing::Playing;
 use crate::rate::Rate;
 use crate::recording::Recording;
 use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
@@ -32,6 +33,7 @@ const REST: f64 = 0.12;
 pub(crate) struct App {
     pub(crate) history: History,
     pub(crate) loader: Loader,
+    pub(crate) playing: Playing,
     /// The layer that a file's points go to, where there is one already.
     pub(crate) loading: HashMap<JobId, LayerId>,
     pub(crate) render: RenderThread,
@@ -109,6 +111,7 @@ impl App {
         let mut app = Self {
             history: History::default(),
             loader: Loader::start(context.clone()),
+            playing: Playing::default(),
             loading: HashMap::new(),
             render: RenderThread::start(context.clone()),
             navigation: Navigation::new(),
@@ -181,6 +184,7 @@ impl App {
     /// Takes in what the threads have to say.
     fn receive(&mut self, context: &egui::Context) {
         self.follow_files();
+        self.follow_streams(context);
         let now = context.input(|input| input.time);
         let answers: Vec<_> = self.render.answers().collect();
         for answer in answers {

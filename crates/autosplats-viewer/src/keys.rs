@@ -198,6 +198,11 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         }
         Command::PasteView => context.send_viewport_cmd(egui::ViewportCommand::RequestPaste),
         Command::Dots => app.look.dots = !app.look.dots,
+        Command::Play => app.toggle_playing(),
+        Command::StepBack => app.playing.step(false),
+        Command::StepForward => app.playing.step(true),
+        Command::PlayFromHere => app.playing.clock.begin_here(),
+        Command::PlayToHere => app.playing.clock.end_here(),
         Command::Inputs => app.panels.inputs = !app.panels.inputs,
         Command::Look => app.panels.look = !app.panels.look,
         Command::Statistics => app.panels.statistics = !app.panels.statistics,

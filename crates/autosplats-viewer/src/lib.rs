@@ -21,6 +21,7 @@ mod opening;
 mod output;
 mod overlay;
 mod panels;
+mod playing;
 mod rate;
 mod recording;
 mod render;

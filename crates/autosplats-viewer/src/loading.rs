@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{Error, PointCloud, Progress, ReadOptions, Source};
+use autosplats::cloud::{Error, PlayOptions, PointCloud, Progress, ReadOptions, Source};
 use eframe::egui;
 
 use crate::threads::spawn;
@@ -30,6 +30,10 @@ pub struct Input {
     pub source: Source,
     /// How to read it.
     pub options: ReadOptions,
+    /// How to play it.
+    pub play: PlayOptions,
+    /// Whether it is played though it may stand still.
+    pub played: bool,
     /// From its own to world coordinates.
     pub world_from_input: DMat4,
 }
@@ -42,14 +46,25 @@ impl Input {
     pub fn parse(name: &str) -> Result<Self, Error> {
         let source = Source::parse(name)?;
         let name = source.path().and_then(Path::file_name).map_or(name.into(), |file| file.to_string_lossy().into());
-        Ok(Self { name, source, options: ReadOptions::default(), world_from_input: DMat4::IDENTITY })
+        Ok(Self::usual(name, source))
     }
 
     /// A file that was dropped or chosen.
     pub(crate) fn file(path: PathBuf) -> Self {
         let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
-        let options = ReadOptions::default();
-        Self { name, source: Source::File(path), options, world_from_input: DMat4::IDENTITY }
+        let source = Source::parse(&path.display().to_string()).unwrap_or(Source::File(path));
+        Self::usual(name, source)
+    }
+
+    /// Read in the usual way and left where it is.
+    fn usual(name: String, source: Source) -> Self {
+        let (options, play) = (ReadOptions::default(), PlayOptions::default());
+        Self { name, source, options, play, played: false, world_from_input: DMat4::IDENTITY }
+    }
+
+    /// Whether its points change.
+    pub(crate) fn moves(&self) -> bool {
+        self.played || self.source.moves()
     }
 }
 
@@ -126,6 +141,11 @@ impl Loader {
             }
         });
         Self { context, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
+    }
+
+    /// The window's.
+    pub(crate) fn context(&self) -> &egui::Context {
+        &self.context
     }
 
     /// Reads something; what comes of it arrives under the number returned.

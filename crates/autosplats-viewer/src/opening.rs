@@ -31,6 +31,11 @@ impl App {
                 self.watches.insert(path.into(), self.loader.watch(path.into()));
             }
         }
+        if input.moves() {
+            let context = self.loader.context().clone();
+            self.play(input, visible, tint, &context);
+            return;
+        }
         let job = self.loader.read(input);
         self.looks.insert(job, (visible, tint));
     }
@@ -75,7 +80,6 @@ impl App {
     /// Gives the points that have arrived to the layer of a job, which is made with the first of them. Undo takes none of this
     /// back. Says which layer it is, unless the user has removed it meanwhile.
     fn fill_layer(&mut self, input: &Input, job: JobId, cloud: Arc<PointCloud>) -> Option<LayerId> {
-        let first = self.document().layers.is_empty();
         let id = match self.loading.get(&job).copied() {
             Some(id) if self.document().layer(id).is_none() => {
                 self.loader.cancel(job);
@@ -84,6 +88,7 @@ impl App {
             }
             Some(id) => {
                 self.fill(id, &cloud);
+                self.look_anew(id, &cloud, false);
                 id
             }
             None => {
@@ -91,21 +96,28 @@ impl App {
                 let mut layer = Layer::new(&*input.name, path, Arc::clone(&cloud)).opened_at(input.world_from_input);
                 layer.incomplete = true;
                 (layer.visible, layer.tint) = self.looks.remove(&job).unwrap_or((true, None));
-                let id = layer.id;
+                let id = self.add_layer(layer, input);
                 self.loading.insert(job, id);
-                self.inputs.insert(id, input.clone());
-                self.settle(|document| {
-                    document.add(layer.clone());
-                });
                 id
             }
         };
+        Some(id)
+    }
+
+    /// Puts the first points of an input into the list, and stands where they are seen if they are the first of all.
+    pub(crate) fn add_layer(&mut self, layer: Layer, input: &Input) -> LayerId {
+        let first = self.document().layers.is_empty();
+        let (id, cloud) = (layer.id, Arc::clone(&layer.cloud));
+        self.inputs.insert(id, input.clone());
+        self.settle(|document| {
+            document.add(layer.clone());
+        });
         if first {
             self.first_camera = None;
         }
         let fitted = first && !std::mem::take(&mut self.camera_given);
         self.look_anew(id, &cloud, fitted);
-        Some(id)
+        id
     }
 
     /// After the points of a layer have changed: stands where all is seen, if that is asked for or nobody has moved.
@@ -131,8 +143,13 @@ impl App {
         }
     }
 
-    /// Gives up a layer that is still being read.
+    /// Gives up a layer that is still being read or played.
     pub(crate) fn give_up(&mut self, id: LayerId) {
+        if self.playing.stop(id) {
+            self.settle(|document| {
+                document.remove(id);
+            });
+        }
         let job = self.loading.iter().find_map(|(&job, &layer)| (layer == id).then_some(job));
         if let Some(job) = job {
             self.loader.cancel(job);
@@ -177,8 +194,11 @@ impl App {
     /// What an input was called when it was opened, as it could be typed.
     pub(crate) fn source_name(input: &Input) -> String {
         match &input.source {
-            Source::File(path) => std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string(),
-            Source::Scene(..) => input.name.clone(),
+            Source::File(path) | Source::Recording(path) => {
+                std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string()
+            }
+            Source::Sequence(name) => std::path::absolute(name).unwrap_or_else(|_| name.into()).display().to_string(),
+            Source::Scene(..) | Source::StandardInput => input.name.clone(),
         }
     }
 
@@ -207,7 +227,7 @@ impl App {
         let scene = match self.document().layers.as_slice() {
             [only] => self.inputs.get(&only.id).and_then(|input| match &input.source {
                 Source::Scene(scene, _) => Some(scene.view()),
-                Source::File(_) => None,
+                _ => None,
             }),
             _ => None,
         };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use autosplats::Camera;
 use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{Axes, DepthCamera, ReadOptions};
+use autosplats::cloud::{Axes, DepthCamera, ReadOptions, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::app::App;
@@ -92,7 +92,8 @@ impl State {
     /// What is open in `app`, or was to be.
     pub(crate) fn of(app: &App) -> Self {
         let layers = app.document().layers.iter().filter_map(|layer| {
-            let input = app.inputs.get(&layer.id)?;
+            // What came through a pipe cannot be had again.
+            let input = app.inputs.get(&layer.id).filter(|input| !matches!(input.source, Source::StandardInput))?;
             let (source, options) = (App::source_name(input), Options::of(input));
             Some(InputState { source, visible: layer.visible, tint: layer.tint, pose: layer.pose, options })
         });
@@ -102,7 +103,9 @@ impl State {
             let (visible, tint) = app.looks.get(&job.id).copied().unwrap_or((true, None));
             (&job.input, visible, tint)
         });
+        let waiting = waiting.chain(app.playing.waiting().map(|input| (input, true, None)));
         let absent = waiting.chain(app.failed.iter().map(|input| (input, true, None)));
+        let absent = absent.filter(|(input, ..)| !matches!(input.source, Source::StandardInput));
         let absent = absent.map(|(input, visible, tint)| InputState {
             source: App::source_name(input),
             visible,

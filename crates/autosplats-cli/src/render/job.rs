@@ -7,6 +7,7 @@ use autosplats::{Backend, Background, ColorMap, ColorMode, MAX_SIDE, Reconstruct
 use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
+use super::film::FilmJob;
 use super::render_failure;
 use crate::args::{LookArgs, RenderArgs, SurfaceArgs};
 use crate::choices::Map;
@@ -25,6 +26,8 @@ const BYTES_PER_PIXEL: u64 = 100;
 pub(super) struct Job {
     pub(super) inputs: Inputs,
     pub(super) pictures: Vec<Picture>,
+    /// In place of them, a picture for each frame.
+    pub(super) film: Option<FilmJob>,
     pub(super) save_camera: Option<PathBuf>,
     /// Of the pictures that are written.
     pub(super) size: [u32; 2],
@@ -41,9 +44,15 @@ pub(super) struct Job {
 impl Job {
     /// Checks the flags, the inputs' existence and the outputs' places.
     pub(super) fn new(args: RenderArgs) -> Result<Self, Failure> {
-        let RenderArgs { inputs, input, outputs, size, supersample, camera, surface, look, run, json } = args;
+        let RenderArgs { inputs, input, outputs, size, supersample, frames, resume, camera, surface, look, run, json } =
+            args;
         start_threads(&run)?;
-        let pictures = outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?;
+        let fps = input.playing.fps;
+        let film = FilmJob::new(&outputs, frames, resume, fps)?;
+        let pictures = match &film {
+            Some(_) => Vec::new(),
+            None => outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?,
+        };
         let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
         if needs_layers && supersample > 1 {
             return Err(Failure::usage(
@@ -56,7 +65,8 @@ impl Job {
         let save_camera = camera.save_camera.clone();
         let inputs = Inputs::new(&inputs, &input)?;
         let camera = CameraJob::new(&camera)?;
-        let targets = pictures.iter().map(|picture| &picture.path).chain(&save_camera);
+        let named = film.as_ref().and_then(FilmJob::first_file);
+        let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
         let mut seen = HashSet::new();
         for target in targets {
             if !seen.insert(target) {
@@ -77,6 +87,7 @@ impl Job {
         Ok(Self {
             inputs,
             pictures,
+            film,
             save_camera,
             size,
             supersample,

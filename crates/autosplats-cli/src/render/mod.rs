@@ -1,6 +1,7 @@
 //! `autosplats render`: read, look, draw, write, say what happened.
 
 mod camera;
+mod film;
 mod job;
 mod report;
 mod shrink;
@@ -20,13 +21,16 @@ use crate::input::Inputs;
 use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
 use crate::progress::Bar;
 
-/// Renders one picture to one file or several.
+/// Renders one picture to one file or several, or a picture for each frame of what moves.
 pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let mut job = Job::new(args)?;
     // A device that is not there says so before anything is read.
     let mut renderer = Renderer::with_backend(job.backend).map_err(render_failure)?;
     renderer.check(&job.settings).map_err(render_failure)?;
     let device = Device::of(&renderer);
+    if job.film.is_some() {
+        return film::run(&mut job, &mut renderer, &device);
+    }
 
     let started = Instant::now();
     let mut cloud = job.inputs.read(job.quiet)?;

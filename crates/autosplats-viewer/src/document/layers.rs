@@ -75,9 +75,14 @@ impl Document {
         });
     }
 
+    /// Says whether more points of a layer are to come, or others: then it cannot be edited.
+    pub(crate) fn set_incomplete(&mut self, id: LayerId, incomplete: bool) {
+        self.change(id, |layer| layer.incomplete = incomplete);
+    }
+
     /// Says that all points of a layer are there now: it can be edited.
     pub(crate) fn complete(&mut self, id: LayerId) {
-        self.change(id, |layer| layer.incomplete = false);
+        self.set_incomplete(id, false);
     }
 
     /// A part of what is shown, for looking at it as a whole: points taken evenly from all of it.

@@ -102,6 +102,12 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::PasteView, true);
     ui.separator();
     command_button(app, ui, Command::Dots, any);
+    ui.separator();
+    let [moves, timeline] = [!app.playing.is_empty(), app.playing.has_timeline()];
+    command_button(app, ui, Command::Play, moves);
+    for command in [Command::StepBack, Command::StepForward, Command::PlayFromHere, Command::PlayToHere] {
+        command_button(app, ui, command, timeline);
+    }
 }
 
 fn window(app: &mut App, ui: &mut egui::Ui) {

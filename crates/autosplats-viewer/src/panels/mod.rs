@@ -19,6 +19,7 @@ mod session;
 mod statistics;
 mod status;
 mod target_file;
+mod timeline;
 
 use eframe::egui;
 
@@ -123,6 +124,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     app.panels.focus.begin();
     menu::show(app, ui);
     status::show(app, ui);
+    timeline::show(app, ui);
     if app.panels.inputs {
         inputs::show(app, ui);
     }

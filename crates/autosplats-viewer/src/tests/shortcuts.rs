@@ -184,6 +184,16 @@ fn check(window: &mut Window, command: Command) {
             let wanted = view.eye + DVec3::new(0.25, 0.5, 0.0);
             assert!(now.eye.distance(wanted) < 1e-6, "{} is not {wanted}", now.eye);
         }
+        Command::Play => {
+            let playing = app.playing.clock.playing;
+            give(window, command);
+            assert_ne!(window.app().playing.clock.playing, playing, "it goes on, or stops");
+            give(window, command);
+        }
+        // What nothing moves for; what they do is tried in `playing`.
+        Command::StepBack | Command::StepForward | Command::PlayFromHere | Command::PlayToHere => {
+            assert_eq!(app.playing.clock.position(), 0.0, "there is no other time");
+        }
         Command::Dots => {
             assert_ne!(app.look.dots, dots, "the other kind of picture");
             window.settle();

@@ -1,0 +1,106 @@
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use autosplats::Backend;
+use eframe::egui;
+
+use crate::app::App;
+use crate::look::Look;
+use crate::{Input, Options};
+
+/// Frames of 40 points, each a step to the right of the one before.
+fn sequence(folder: &Path, frames: usize) -> String {
+    for frame in 0..frames {
+        let rows: String =
+            (0..40).map(|point| format!("{} {} {}\n", frame * 10 + point % 8, point / 8, point % 3)).collect();
+        std::fs::write(folder.join(format!("frame_{frame}.xyz")), rows).expect("a frame");
+    }
+    folder.display().to_string()
+}
+
+/// Lets the application take in what its threads have, until something is so.
+fn until(app: &mut App, context: &egui::Context, what: &str, done: impl Fn(&App) -> bool) {
+    let begun = Instant::now();
+    while !done(app) {
+        assert!(begun.elapsed() < Duration::from_secs(60), "{what} does not come");
+        app.follow_streams(context);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Least x of what is shown.
+fn left(app: &App) -> Option<f64> {
+    let layer = app.document().layers.first()?;
+    (0..layer.cloud.len()).map(|point| layer.cloud.world_position(point).x).reduce(f64::min)
+}
+
+fn app(name: &str, context: &egui::Context) -> App {
+    let input = Input::parse(name).expect("a folder");
+    let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
+    let mut app = App::new(options, Look::default(), Vec::new(), context);
+    // The context's clock stands still, and so does what is played.
+    until(&mut app, context, "the first frame", |app| left(app) == Some(0.0));
+    app
+}
+
+#[test]
+fn a_folder_is_played_by_the_clock() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let context = egui::Context::default();
+    let mut app = app(&sequence(folder.path(), 5), &context);
+    assert!((app.playing.clock.length() - 0.5).abs() < 1e-9, "ten a second: {}", app.playing.clock.length());
+    assert_eq!(app.playing.frame(), Some((0, 5)));
+    app.playing.clock.seek(0.35);
+    until(&mut app, &context, "the fourth frame", |app| left(app) == Some(30.0));
+    app.playing.step(true);
+    until(&mut app, &context, "the fifth frame", |app| left(app) == Some(40.0));
+    assert!(!app.playing.clock.playing, "whoever steps wants to look");
+    app.playing.step(true);
+    assert_eq!(app.playing.frame(), Some((4, 5)), "there is none behind the last");
+    app.playing.step(false);
+    until(&mut app, &context, "the fourth frame again", |app| left(app) == Some(30.0));
+}
+
+#[test]
+fn edits_are_not_played_over() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let context = egui::Context::default();
+    let mut app = app(&sequence(folder.path(), 5), &context);
+    let incomplete = |app: &App| app.document().layers[0].incomplete;
+    assert!(incomplete(&app), "what moves is not edited");
+    app.toggle_playing();
+    until(&mut app, &context, "a pause", |app| !incomplete(app));
+    app.edit_points("Delete", |document| {
+        let shown = document.shown();
+        document.select(&shown, |index| index < 7, crate::document::SelectMode::Replace);
+        document.delete_selected()
+    });
+    app.toggle_playing();
+    app.follow_streams(&context);
+    assert!(!app.playing.clock.playing, "it waits");
+    app.undo();
+    app.toggle_playing();
+    app.follow_streams(&context);
+    assert!(app.playing.clock.playing, "nothing would be lost any more");
+}
+
+#[test]
+fn what_is_removed_is_not_played_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let context = egui::Context::default();
+    let mut app = app(&sequence(folder.path(), 5), &context);
+    app.give_up(app.document().layers[0].id);
+    assert!(app.playing.is_empty() && app.document().layers.is_empty(), "nothing is left of it");
+}
+
+#[test]
+fn what_cannot_be_played_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let context = egui::Context::default();
+    let input = Input::parse(&folder.path().display().to_string()).expect("a folder");
+    let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
+    let mut app = App::new(options, Look::default(), Vec::new(), &context);
+    until(&mut app, &context, "the failure", |app| app.playing.is_empty());
+    assert_eq!(app.failed.len(), 1, "a session keeps its name");
+    assert!(app.document().layers.is_empty(), "and nothing is shown");
+}
