@@ -7,7 +7,7 @@ mod common;
 use std::{path::Path, sync::Mutex, time::Duration};
 
 use autosplats_cloud::{
-    Error, Next, Progress, Recording, RecordingOptions, Stream as _, Update, describe_recording,
+    Axes, Error, Next, Progress, Recording, RecordingOptions, Stream as _, Update, describe_recording,
     glam::{DMat4, DQuat, DVec3},
     is_recording,
     point_cloud2::Encoding,
@@ -259,6 +259,19 @@ fn transforms_bring_the_points_into_one_frame() {
 }
 
 #[test]
+fn which_way_is_up_is_the_common_frame_s() {
+    let encoding = Encoding::Cdr;
+    let topics = vec![("/points", POINTS, encoding), ("/tf_static", TRANSFORMS, encoding)];
+    let points = (0, START, cloud(0, "camera_optical", encoding));
+    let pose = (1, START, transforms(encoding, &[(0, "base", "camera_optical", [1.0; 3], [0.5, -0.5, 0.5, -0.5])]));
+    for (messages, axes) in [(vec![points.clone()], Axes::Camera), (vec![pose, points], Axes::ZUp)] {
+        let bytes = mcap(&topics, &messages, Style::of("none"));
+        let (mut recording, _) = open("a.mcap", &bytes, &RecordingOptions::default()).unwrap();
+        assert_eq!(play(&mut recording).0[0].cloud.axes(), Some(axes), "{} messages", messages.len());
+    }
+}
+
+#[test]
 fn transforms_that_make_no_sense_do_no_harm() {
     let encoding = Encoding::Cdr;
     let topics = vec![("/points", POINTS, encoding), ("/tf", TRANSFORMS, encoding), ("/other", POINTS, encoding)];
@@ -428,8 +441,10 @@ fn real_recordings_of_both_kinds_are_the_same_points() {
     let Some(folder) = data() else { return };
     let options = RecordingOptions { frame: Some("os1_lidar".into()), ..Default::default() };
     let mut of_kind = Vec::new();
-    for name in ["ouster_ros1.mcap", "ouster_ros2_cdr.mcap"] {
+    // Only one of them has transforms.
+    for (name, frame) in [("ouster_ros1.mcap", Some("os1_sensor")), ("ouster_ros2_cdr.mcap", None)] {
         let path = folder.join("sequences").join(name);
+        assert_eq!(describe_recording(&path, &()).unwrap().frame.as_deref(), frame, "{name}: the common frame");
         let (notes, mut recording) = (Notes::default(), Recording::open(&path, &options, &()).unwrap());
         let mut total = 0;
         let mut updates = Vec::new();
