@@ -176,6 +176,25 @@ fn the_same_frame_is_the_same_points_however_it_is_come_to() {
 }
 
 #[test]
+fn whoever_has_enough_can_stop_it_and_loses_nothing() {
+    struct Stop;
+    impl Progress for Stop {
+        fn report(&self, _fraction: f32) {}
+
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let (topics, messages) = ten(Encoding::Cdr);
+    let bytes = mcap(&topics, &messages, Style::of("zstd"));
+    let opened = Recording::from_bytes(Path::new("a.mcap"), bytes.clone(), &RecordingOptions::default(), &Stop);
+    assert!(matches!(opened.map(drop), Err(Error::Cancelled)), "while it is opened");
+    let (mut recording, _) = open("a.mcap", &bytes, &RecordingOptions::default()).unwrap();
+    assert!(matches!(recording.next(Duration::ZERO, &Stop), Err(Error::Cancelled)), "while it is played");
+    assert_eq!(play(&mut recording).0.len(), 10, "no frame was passed over");
+}
+
+#[test]
 fn several_topics_are_channels_and_may_be_chosen() {
     let topics =
         vec![("/rear", POINTS, Encoding::Cdr), ("/front", POINTS, Encoding::Cdr), ("/third", POINTS, Encoding::Cdr)];
