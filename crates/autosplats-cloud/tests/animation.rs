@@ -203,7 +203,7 @@ fn moving_triangle(weights: &[f32]) -> Vec<u8> {
         accessors.push(format!(r#"{{"bufferView":{index},"componentType":5126,"count":{count},"type":"{kind}"}}"#));
         values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     }
-    let mut json = format!(
+    let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0,"translation":[5,0,0]}}],
         "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{{"POSITION":1}}]}}]}}],
         "animations":[{{"channels":[{{"sampler":0,"target":{{"node":0,"path":"weights"}}}},
@@ -214,9 +214,14 @@ fn moving_triangle(weights: &[f32]) -> Vec<u8> {
         views.join(","),
         accessors.join(",")
     );
+    glb(json, &bytes)
+}
+
+/// A binary glTF.
+fn glb(mut json: String, bytes: &[u8]) -> Vec<u8> {
     json.extend(std::iter::repeat_n(' ', json.len().next_multiple_of(4) - json.len()));
     let chunk = |kind: &[u8], content: &[u8]| [&(content.len() as u32).to_le_bytes()[..], kind, content].concat();
-    let chunks = [chunk(b"JSON", json.as_bytes()), chunk(b"BIN\0", &bytes)].concat();
+    let chunks = [chunk(b"JSON", json.as_bytes()), chunk(b"BIN\0", bytes)].concat();
     [&b"glTF"[..], &2_u32.to_le_bytes(), &(chunks.len() as u32 + 12).to_le_bytes(), &chunks].concat()
 }
 
@@ -277,6 +282,31 @@ fn broken_animations_of_gltf_are_refused() {
     for end in ends {
         // One of them is the time of the end: no value may ask for more than memory has.
         let _ = play(&[&whole[..end], &longest, &whole[end + 4..]].concat());
+    }
+}
+
+#[test]
+fn a_small_gltf_cannot_keep_anyone_busy() {
+    // A thousand channels share numbers that take no bytes, and a thousand targets the vertices.
+    let channels = [r#"{"sampler":0,"target":{"node":0,"path":"weights"}}"#; 1000].join(",");
+    let targets = [r#"{"POSITION":0}"#; 1000].join(",");
+    let count = 100_000;
+    let accessor = |kind: &str| format!(r#"{{"componentType":5126,"count":{count},"type":"{kind}"}}"#);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.glb");
+    for (channels, weights) in [(&*channels, "0"), ("", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1")] {
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"buffers":[],"bufferViews":[],
+            "meshes":[{{"weights":[{weights}],"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{targets}]}}]}}],
+            "animations":[{{"channels":[{channels}],"samplers":[{{"input":1,"output":1}}]}}],
+            "accessors":[{},{}]}}"#,
+            accessor("VEC3"),
+            accessor("SCALAR")
+        );
+        std::fs::write(&path, glb(json, &[])).unwrap();
+        let played = Animation::gltf(&path, 10.0, &()).and_then(|moving| moving.play().next(Duration::ZERO, &()));
+        let message = played.unwrap_err().to_string();
+        assert!(message.contains("too often") || message.contains("too many"), "{message}");
     }
 }
 

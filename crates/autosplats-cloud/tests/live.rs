@@ -186,6 +186,8 @@ fn of_a_watched_folder_the_newest_file_is_shown() {
         std::fs::rename(elsewhere.path().join(format!("{count}.ply")), folder.path().join(name)).unwrap();
     }
     assert_eq!(update(&mut live).cloud.len(), 9, "the newest, 12, which comes behind 9 in the order of numbers");
+    std::fs::remove_file(folder.path().join("frame_12.ply")).unwrap();
+    assert_eq!(live.next(Duration::from_millis(250), &()).unwrap(), Next::Nothing, "what is gone changes nothing");
     let statistics = live.statistics();
     assert!(statistics.taken + statistics.dropped <= 5, "those between are counted if they were seen: {statistics:?}");
 }

@@ -83,12 +83,27 @@ pub(in super::super) fn animation(job: &Job<'_>) -> Result<Option<(f64, usize)>,
     let Some(animation) = root.animations.first() else { return Ok(None) };
     let inputs = || animation.samplers.iter().map(|sampler| sampler.input);
     let buffers = load(job, &root, container.chunk, inputs())?;
-    let mut end = 0.0_f64;
+    let (mut end, mut left) = (0.0_f64, most_numbers(job, &buffers));
     for input in inputs() {
         let times = Values::find(job, &root, &buffers, input, &[1])?.numbers(job, part(0.0))?;
+        spend(job, &mut left, times.len())?;
         end = times.into_iter().fold(end, f64::max);
     }
     Ok(Some((end, root.animations.len())))
+}
+
+/// Numbers that a byte of the files may become by being used in several ways.
+const MAX_NUMBERS_PER_BYTE: usize = 64;
+
+/// Numbers that an animation may have, whatever its file says.
+fn most_numbers(job: &Job<'_>, buffers: &Buffers<'_>) -> usize {
+    job.bytes.len().saturating_add(buffers.len_beside()).saturating_mul(MAX_NUMBERS_PER_BYTE)
+}
+
+fn spend(job: &Job<'_>, left: &mut usize, numbers: usize) -> Result<(), Error> {
+    let what = "it uses its numbers again and again, too often for a file of this size; export it again";
+    *left = left.checked_sub(numbers).ok_or_else(|| job.malformed("animation 0", what))?;
+    Ok(())
 }
 
 fn load<'a>(
@@ -109,6 +124,7 @@ impl Pose {
         let Some(Animation { channels, samplers }) = root.animations.first() else { return Ok(Self { nodes }) };
         let accessors = samplers.iter().flat_map(|sampler| [sampler.input, sampler.output]);
         let buffers = load(job, root, chunk, accessors)?;
+        let mut left = most_numbers(job, &buffers);
         for (number, Channel { sampler, target }) in channels.iter().enumerate() {
             job.go_on()?;
             let Some(node) = target.node else { continue };
@@ -124,6 +140,7 @@ impl Pose {
                 return Err(job.malformed(place, "there is no such sampler; export the file again"));
             };
             let curve = Curve::of(job, root, &buffers, sampler, width)?;
+            spend(job, &mut left, curve.times.len() + curve.values.len())?;
             let value = curve.at(seconds, &*target.path == "rotation");
             let pose = nodes.entry(node).or_default();
             match &*target.path {

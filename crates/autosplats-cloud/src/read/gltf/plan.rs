@@ -136,7 +136,9 @@ impl<'a> Plan<'a> {
     /// Refuses meshes shown so often that a small file would fill the memory.
     pub(super) fn check_size(&self, job: &Job<'_>, bytes: usize) -> Result<(), Error> {
         let bound = bytes.saturating_mul(MAX_POINTS_PER_BYTE).max(ALWAYS);
-        let most = self.points.max(if job.triangles { self.corners } else { 0 });
+        let moved = |shown: &Shown<'_>| shown.count.saturating_mul(shown.targets().count());
+        let moved = self.shown.iter().map(moved).fold(0, usize::saturating_add);
+        let most = self.points.max(moved).max(if job.triangles { self.corners } else { 0 });
         if most > bound {
             let what =
                 format!("they show {most} points, too many for a file of {bytes} bytes; split it or export it again");

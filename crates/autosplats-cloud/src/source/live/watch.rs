@@ -49,7 +49,9 @@ pub(super) fn watch(path: &Path, options: &ReadOptions, mailbox: &Mailbox) {
     let (mut known, mut pending): (Option<Seen>, Option<Seen>) = (None, None);
     while !mailbox.is_abandoned() {
         let files = look(path);
-        let newest = files.iter().max_by(|a, b| a.order(b));
+        // When the newest is taken away, those before it are still those before it.
+        let follows = |file: &&Seen| known.as_ref().is_none_or(|known| file.is_newer(known) || file.path == known.path);
+        let newest = files.iter().filter(follows).max_by(|a, b| a.order(b));
         match newest {
             Some(newest) if Some(newest) == known.as_ref() => pending = None,
             Some(newest) if Some(newest) == pending.as_ref() => {
