@@ -67,6 +67,9 @@ Examples:
   autosplats view a.e57 b.e57 --pose b.e57=b.txt
   autosplats view result.ply --watch
   autosplats scene:statue:1M
+  autosplats drive.mcap --decay 1s
+  autosplats 'scans/frame_*.ply' --fps 25
+  producer | autosplats view -
   autosplats --state survey.json survey.laz
 
 In the window H shows what keys and mouse do.";
@@ -78,7 +81,8 @@ pub(crate) struct ViewArgs {
         value_name = "INPUT",
         help = "\
 A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
-generated scene as scene:NAME[:COUNT]. None opens an empty window to drop files on."
+generated scene as scene:NAME[:COUNT]. What moves is a folder or a quoted pattern of files, a recording (.mcap .bag), or - for PLY \
+and PCD files from standard input. None opens an empty window to drop files on."
     )]
     pub(crate) inputs: Vec<String>,
     #[command(flatten)]
@@ -105,7 +109,7 @@ Examples:
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
   autosplats render drive.mcap --decay 1s --frames 0..99 -o drive_%05d.png
   autosplats render 'scans/frame_*.ply' --fps 25 -o scans.mp4
-  autosplats render scene:horse --scan 4 --color k-radius --frames 0..47 -o scanned_%03d.png
+  autosplats render scene:figure --scan 4 --color k-radius --frames 0..47 -o scanned_%03d.png
   autosplats render scene:cathedral:10M -o cathedral.png --occlusion 2 --json
   autosplats render scan.laz -o a.png --save-camera cam.json; autosplats render new.laz -o b.png --camera cam.json";
 

@@ -20,7 +20,7 @@ use crate::progress::{Bar, Part};
 const SCENE_PREFIX: &str = "scene:";
 
 /// How long the first points of something live are waited for.
-const FIRST_POINTS: Duration = Duration::from_secs(30);
+pub(crate) const FIRST_POINTS: Duration = Duration::from_secs(30);
 
 /// Fields left out, and inputs, that are named.
 const LISTED: usize = 10;
@@ -135,6 +135,11 @@ impl Inputs {
         list.into_iter().map(input).collect()
     }
 
+    /// The first of them.
+    pub(crate) fn only(&self) -> &Source {
+        &self.list[0].source
+    }
+
     /// The files among the inputs.
     pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
         self.list.iter().filter_map(|input| input.source.path())
@@ -174,7 +179,7 @@ impl Inputs {
     /// Makes the inputs ready to be played, with their poses.
     pub(crate) fn play(&self, quiet: bool) -> Result<Vec<(Player, DMat4)>, Failure> {
         let open = |input: &Input| {
-            let bar = Bar::new(&format!("opening {}", input.name), quiet);
+            let bar = Bar::on_file("opening", Path::new(&input.name), quiet);
             let player = input.source.play(&self.play, &self.options, &bar).map_err(|error| match error {
                 Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
                 error => read_failure(error),

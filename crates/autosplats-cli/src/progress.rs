@@ -43,6 +43,13 @@ impl Bar {
         bar
     }
 
+    /// Starts a task to which the notes on `input` belong.
+    pub(crate) fn on_input(task: &str, input: &str, quiet: bool) -> Self {
+        let mut bar = Self::new(task, quiet);
+        bar.subject = input.into();
+        bar
+    }
+
     fn tell(&self, subject: &str, note: &str) {
         if !self.quiet {
             self.bar.suspend(|| eprintln!("note: {subject}: {note}"));

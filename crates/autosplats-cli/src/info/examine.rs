@@ -6,8 +6,8 @@ use std::sync::{Mutex, PoisonError};
 use autosplats::guess_axes;
 use autosplats_cloud::glam::DVec3;
 use autosplats_cloud::{
-    Attribute, Description, Error, FieldValues, PointCloud, Progress, ReadOptions, Scene, Unit, check_memory, describe,
-    read_with,
+    Attribute, Description, Error, FieldValues, PlayOptions, PointCloud, Progress, ReadOptions, RecordingSummary,
+    Scene, Source, Unit, check_memory, describe, describe_recording, read_with,
 };
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ use super::spacing;
 use super::statistics::{Statistics, Values};
 use crate::args::InputArgs;
 use crate::exit::Failure;
-use crate::input::{Inputs, read_failure};
+use crate::input::{FIRST_POINTS, Inputs, read_failure};
 use crate::progress::Bar;
 
 /// Bytes of a file from which on it is read alone: reading one uses all cores, and two might not fit into memory.
@@ -66,11 +66,12 @@ impl Examiner {
     pub(super) fn examine(&self, name: &str) -> Examination {
         let mut report = Report { input: name.into(), ..Report::default() };
         let outcome = Inputs::new(&[name.into()], &InputArgs::default()).and_then(|inputs| {
-            let path = inputs.files().next();
-            match path {
-                Some(path) => self.file(path, &mut report).map_err(read_failure),
-                None => self.scene(name, &mut report).map_err(read_failure),
+            match inputs.only() {
+                Source::File(path) => self.file(path, &mut report),
+                Source::Scene(..) => self.scene(name, &mut report),
+                moving => self.moving(name, moving, &mut report),
             }
+            .map_err(read_failure)
         });
         report.error = outcome.as_ref().err().map(|failure| failure.message.clone());
         Examination { report, failure: outcome.err() }
@@ -98,6 +99,32 @@ impl Examiner {
         Ok(())
     }
 
+    /// Tells what moves by what its container says and by its first points.
+    fn moving(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
+        let bar = Bar::new(&format!("reading {name}"), self.quiet);
+        let listener = Listener { bar: &bar, notes: Mutex::default() };
+        report.format = Some("files that follow each other".into());
+        if let Source::Recording(path) = source {
+            let summary = describe_recording(path, &listener)?;
+            report.file_bytes = path.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
+            report.describe_recording(&summary);
+        }
+        let play = PlayOptions::default();
+        let mut player = source.play(&play, &self.options, &listener)?;
+        if let Some(timeline) = player.stream().timeline() {
+            let seconds = timeline.duration().as_secs_f64();
+            report.details.insert(0, detail("frames", format!("{} in {seconds:.2} s", timeline.len())));
+        }
+        let cloud = player.first(FIRST_POINTS, &listener)?;
+        for note in listener.notes.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            report.warn(note);
+        }
+        drop(bar);
+        report.warn("points, bounds and attributes are those of the first frame".into());
+        report.scan(&cloud, &[]);
+        Ok(())
+    }
+
     fn scene(&self, name: &str, report: &mut Report) -> Result<(), Error> {
         let (scene, count) = Scene::parse(name)?;
         let _alone = (count as u64 * 16 >= LARGE).then(|| self.large.lock().unwrap_or_else(PoisonError::into_inner));
@@ -112,7 +139,26 @@ impl Examiner {
     }
 }
 
+fn detail(name: impl Into<String>, value: impl Into<String>) -> Detail {
+    Detail { name: name.into(), value: value.into() }
+}
+
 impl Report {
+    /// Takes over what a recording says of itself.
+    fn describe_recording(&mut self, summary: &RecordingSummary) {
+        let RecordingSummary { format, topics, frames, frame, notes, .. } = summary;
+        self.format = Some(format.clone());
+        self.details.extend(topics.iter().map(|topic| {
+            let played = if topic.points { ", played" } else { "" };
+            detail(&topic.name, format!("{} × {}{played}", topic.messages, topic.type_name))
+        }));
+        if !frames.is_empty() {
+            self.details.push(detail("coordinate frames", frames.join(", ")));
+        }
+        self.details.extend(frame.iter().map(|frame| detail("points are brought into", frame)));
+        notes.iter().for_each(|note| self.warn(note.clone()));
+    }
+
     fn warn(&mut self, warning: String) {
         if !self.warnings.contains(&warning) {
             self.warnings.push(warning);

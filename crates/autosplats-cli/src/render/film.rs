@@ -115,7 +115,7 @@ pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Re
         camera::save(path, &camera)?;
     }
     let rate = film.fps.unwrap_or_else(|| scene.rate());
-    let bar = Bar::new(&format!("rendering {} frames", frames.len()), job.quiet);
+    let bar = Bar::on_input(&format!("rendering {} frames", frames.len()), &scene.names, job.quiet);
     let begun = Instant::now();
     let (mut written, mut kept, mut milliseconds) = (0, 0, 0.0);
     let (sender, queue) = sync_channel(QUEUE);
@@ -270,7 +270,7 @@ impl Moving {
     /// Places the camera so that it sees what there is from the first frame to the last, and settles what follows from the
     /// points.
     fn place(&mut self, job: &mut Job, frames: &std::ops::Range<usize>) -> Result<(Camera, Axes), Failure> {
-        let bar = Bar::new("placing the camera", job.quiet);
+        let bar = Bar::on_input("placing the camera", &self.names, job.quiet);
         let last = frames.len() - 1;
         let count = frames.len().min(PLACED_BY);
         let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
