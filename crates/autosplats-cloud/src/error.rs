@@ -91,6 +91,14 @@ pub enum Error {
         /// What is wrong with it.
         why: String,
     },
+    /// An address of live points makes no sense, or nobody is there.
+    #[error("{address}: {what}")]
+    Live {
+        /// The address that was given.
+        address: String,
+        /// What is wrong with it, and the remedy.
+        what: String,
+    },
     /// [`Progress::cancelled`](crate::Progress::cancelled) asked to stop.
     #[error("cancelled")]
     Cancelled,

@@ -46,6 +46,8 @@ pub use read::{
     read_mesh, read_mesh_bytes, read_with,
 };
 pub use sample::sample_surface;
+#[cfg(feature = "zenoh")]
+pub use source::live;
 pub use source::{
     Source, point_cloud2,
     scene::{Hit, Scene, View, parse_count},

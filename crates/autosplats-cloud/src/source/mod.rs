@@ -1,5 +1,7 @@
 //! Where clouds come from.
 
+#[cfg(feature = "zenoh")]
+pub mod live;
 pub mod point_cloud2;
 pub(crate) mod scene;
 pub(crate) mod stream;

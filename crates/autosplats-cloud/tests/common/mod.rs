@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
 pub(crate) mod ros;
+#[cfg(feature = "zenoh")]
+pub(crate) mod zenoh_peer;
 
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, glam::DVec3, read};
 
