@@ -11,7 +11,13 @@
 
 mod meter;
 mod mutate;
+#[allow(clippy::unwrap_used, reason = "it was written for tests")]
+#[path = "../../crates/autosplats-cloud/tests/common/recording.rs"]
+mod recording;
+#[path = "../../crates/autosplats-cloud/tests/common/ros.rs"]
+mod ros;
 mod seeds;
+mod target;
 
 use std::{
     collections::HashSet,
@@ -25,7 +31,7 @@ use std::{
 };
 
 use anyhow::{Context as _, Result, bail, ensure};
-use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions, describe_bytes, read_bytes, read_mesh_bytes};
+use autosplats_cloud::{Error, PointCloud, Progress, ReadOptions};
 use clap::Parser;
 
 use crate::mutate::{Random, mutate, repair_pages};
@@ -212,7 +218,7 @@ impl<'a> Run<'a> {
     fn go(mut self, limit: &Limit) -> Result<usize> {
         let name = format!("a.{}", self.seeds.extension);
         for (index, file) in self.seeds.files.iter().enumerate().take(self.seeds.own) {
-            let read = read_bytes(Path::new(&name), file, &ReadOptions::default(), &());
+            let read = target::read(Path::new(&name), file, &ReadOptions::default(), false, &());
             read.with_context(|| format!("seed {index} of .{} is not read", self.seeds.extension))?;
         }
         let start = Instant::now();
@@ -269,13 +275,7 @@ impl<'a> Run<'a> {
         let before = Instant::now();
         let (outcome, memory) = meter::measured(|| {
             catch_unwind(AssertUnwindSafe(|| {
-                let described = describe_bytes(name, &bytes, &options).map(|description| description.format);
-                let read = if mesh {
-                    read_mesh_bytes(name, &bytes, &options, &watcher).map(|contents| contents.cloud.len())
-                } else {
-                    read_bytes(name, &bytes, &options, &watcher).map(|cloud| cloud.len())
-                };
-                (described, read)
+                (target::describe(name, &bytes, &options), target::read(name, &bytes, &options, mesh, &watcher))
             }))
         });
         let time = before.elapsed();

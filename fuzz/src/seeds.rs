@@ -4,7 +4,12 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3};
-use autosplats_cloud::{FieldValues, PointCloud, Scan, write};
+use autosplats_cloud::{FieldValues, PointCloud, Scan, point_cloud2::Encoding, write};
+
+use crate::{
+    recording::{Message, POINTS as CLOUDS, Style, TRANSFORMS, Topic, bag, mcap},
+    ros::{Cloud2, F32, transforms},
+};
 
 /// Files of one format.
 pub(crate) struct Seeds {
@@ -50,6 +55,10 @@ pub(crate) fn all() -> Result<Vec<Seeds>> {
         seeds("pcd.bin", vec![sweep(5)]),
         seeds("pgm", vec![pgm(), b"P2\n# a\n3 2\n65535\n0 1000 2000\n3000 65535 7\n".to_vec()]),
         seeds("png", vec![png()?]),
+        seeds("mcap", recordings("zstd", mcap)),
+        seeds("bag", recordings("bz2", bag)),
+        seeds("ros1", vec![cloud2().message(Encoding::Ros1, false)]),
+        seeds("cdr", vec![cloud2().message(Encoding::Cdr, false), cloud2().message(Encoding::Cdr, true)]),
     ])
 }
 
@@ -283,4 +292,27 @@ fn png() -> Result<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     depths.write_to(&mut bytes, image::ImageFormat::Png)?;
     Ok(bytes.into_inner())
+}
+
+/// A message of points, with a colour, several values of one name and gaps.
+fn cloud2() -> Cloud2 {
+    let positions: Vec<[f32; 3]> = (0..POINTS).map(|i| [i as f32, (i * i % 7) as f32, 0.5]).collect();
+    let mut message = Cloud2::xyz(&positions, 32);
+    message.fields.extend([("intensity", 12, F32, 1), ("rgb", 16, F32, 1), ("pair", 20, 4, 2), ("t", 24, 8, 1)]);
+    message
+}
+
+/// Points of two topics and transforms, compressed in every way, with an index and without.
+fn recordings(compressed: &'static str, write: fn(&[Topic], &[Message], Style) -> Vec<u8>) -> Vec<Vec<u8>> {
+    let encoding = Encoding::Ros1;
+    let topics: [Topic; 3] = [("/a", CLOUDS, encoding), ("/b", CLOUDS, encoding), ("/tf", TRANSFORMS, encoding)];
+    let turn = [0.0, 0.0, 0.6, 0.8];
+    let pose = |stamp| transforms(encoding, &[(stamp, "map", "lidar", [1.0, 2.0, 3.0], turn)]);
+    let cloud = cloud2().message(encoding, false);
+    let messages: [Message; 5] =
+        [(2, 1, pose(1)), (0, 2, cloud.clone()), (1, 3, cloud.clone()), (2, 4, pose(4)), (0, 5, cloud)];
+    let styles = ["none", "lz4", compressed].into_iter().flat_map(|compression| {
+        [true, false].map(|indexed| Style { indexed, closed: indexed, ..Style::of(compression) })
+    });
+    styles.map(|style| write(&topics, &messages, style)).collect()
 }

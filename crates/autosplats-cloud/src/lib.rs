@@ -50,6 +50,7 @@ pub use sample::sample_surface;
 pub use source::live;
 pub use source::{
     Source, point_cloud2,
+    recording::{Recording, RecordingOptions, RecordingSummary, RecordingTopic, describe_recording, is_recording},
     scene::{Hit, Scene, View, parse_count},
     stream::{Next, Statistics, Stream, Timeline, Update},
 };

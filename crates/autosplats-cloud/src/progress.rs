@@ -45,3 +45,24 @@ pub(crate) fn tick(progress: &dyn Progress, fraction: f32) -> Result<(), Error> 
     progress.report(fraction);
     Ok(())
 }
+
+/// A part of some work, which reports for itself from 0 to 1.
+pub(crate) struct Part<'a> {
+    pub(crate) whole: &'a dyn Progress,
+    pub(crate) start: f32,
+    pub(crate) len: f32,
+}
+
+impl Progress for Part<'_> {
+    fn report(&self, fraction: f32) {
+        self.whole.report(self.start + self.len * fraction);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.whole.cancelled()
+    }
+
+    fn note(&self, note: &str) {
+        self.whole.note(note);
+    }
+}

@@ -184,6 +184,8 @@ fn no_returns_are_left_out_and_what_is_no_number_stays() {
     let options = ReadOptions { keep_no_returns: true, ..ReadOptions::default() };
     let kept = point_cloud2::decode(Path::new("a"), &message.cdr(), Encoding::Cdr, &options).unwrap();
     assert_eq!(kept.cloud.len(), 10, "unless they are wanted");
+    let nothing = decode(&Cloud2::xyz(&[[0.0; 3]; 5], 12).cdr(), Encoding::Cdr).unwrap();
+    assert_eq!((nothing.cloud.len(), nothing.no_returns), (0, 5), "the sky");
 }
 
 #[test]

@@ -233,27 +233,37 @@ fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
 /// Scanners write (0, 0, 0) where nothing came back. One such point alone may be a real one, unless a sensor stands there.
 fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
     let total = cloud.len();
-    let count = take_out_no_returns(cloud, if format.sensor_frame { 1 } else { 2 });
+    let least = if format.sensor_frame { 1 } else { 2 };
+    let count = take_out_no_returns(cloud, |count| (least..total).contains(&count));
     if count > 0 {
         job.note(format!("dropped {count} of {total} points at (0, 0, 0), where nothing was measured"));
     }
 }
 
-/// Takes the points at (0, 0, 0) out if there are `least` and others as well, and returns how many they were.
-pub(crate) fn take_out_no_returns(cloud: &mut PointCloud, least: usize) -> usize {
-    // About no origin, positions are world coordinates.
+/// Takes the points at (0, 0, 0) out if so many are no points, and returns how many they were.
+pub(crate) fn take_out_no_returns(cloud: &mut PointCloud, if_so_many: impl Fn(usize) -> bool) -> usize {
+    // About no origin, positions are world coordinates; of zeros no bit is set but the sign.
     let exact = cloud.origin() == DVec3::ZERO && cloud.residuals().is_none();
+    let zero = |[x, y, z]: &[f32; 3]| (x.to_bits() | y.to_bits() | z.to_bits()) << 1 == 0;
     let absent = |i: usize| {
-        if exact { cloud.positions()[i] == [0.0; 3] } else { cloud.world_position(i) == DVec3::ZERO }
+        if exact { zero(&cloud.positions()[i]) } else { cloud.world_position(i) == DVec3::ZERO }
     };
-    let count = (0..cloud.len()).into_par_iter().filter(|&i| absent(i)).count();
-    if count < least || count == cloud.len() {
+    let count = if exact {
+        let zeros = |points: &[[f32; 3]]| points.iter().map(|point| usize::from(zero(point))).sum::<usize>();
+        cloud.positions().par_chunks(BLOCK).map(zeros).sum()
+    } else {
+        (0..cloud.len()).into_par_iter().filter(|&i| absent(i)).count()
+    };
+    if count == 0 || !if_so_many(count) {
         return 0;
     }
     let keep: Vec<bool> = (0..cloud.len()).into_par_iter().map(|i| !absent(i)).collect();
     cloud.retain(|i| keep[i]);
     count
 }
+
+/// Points that are looked at as one piece of work.
+const BLOCK: usize = 1 << 14;
 
 /// Bytes of a header line beyond which it is rather broken than long.
 const MAX_HEADER_LINE: usize = 1 << 16;

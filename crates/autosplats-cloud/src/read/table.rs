@@ -249,14 +249,22 @@ impl Table<'_> {
 
         let [x, y, z] = xyz;
         let floats = xyz.iter().all(|column| column.scalar == Scalar::F32 && column.stride == x.stride);
+        // Within one record, and not each in a run of its own.
+        let first = x.offset.min(y.offset).min(z.offset);
+        let together = x.offset.max(y.offset).max(z.offset) - first + 4 <= x.stride;
         let adjacent = y.offset == x.offset + 4 && z.offset == x.offset + 8;
-        let positions = if origin == DVec3::ZERO && floats && adjacent && !self.big_endian {
+        let positions = if origin == DVec3::ZERO && floats && together && adjacent && !self.big_endian {
             // The common case, and the fast one: twelve bytes in a row, copied as they are.
-            collect("positions", self.count, job, part, |i| {
-                let at = x.offset + i * x.stride;
+            self.collect("positions", x, job, part, |record| {
                 let mut raw = [0; 12];
-                raw.copy_from_slice(&self.bytes[at..at + 12]);
+                raw.copy_from_slice(&record[..12]);
                 bytemuck::cast::<[u8; 12], [[u8; 4]; 3]>(raw).map(f32::from_le_bytes)
+            })
+        } else if origin == DVec3::ZERO && floats && together {
+            let offsets = xyz.each_ref().map(|column| column.offset - first);
+            let start = Column { offset: first, ..x.clone() };
+            self.collect("positions", &start, job, part, |record| {
+                offsets.map(|offset| f32::read(record, offset, self.big_endian))
             })
         } else if origin == DVec3::ZERO && floats {
             let xyz = xyz.each_ref();
@@ -265,6 +273,25 @@ impl Table<'_> {
             collect("positions", self.count, job, part, |i| (world(i) - origin).as_vec3().to_array())
         };
         Ok((origin, positions?))
+    }
+
+    /// As [`collect`], of what begins where the values of a column are: the last point's may end with its last value.
+    fn collect<T: Send>(
+        &self,
+        what: &str,
+        column: &Column,
+        job: &Job<'_>,
+        part: Part,
+        value: impl Fn(&[u8]) -> T + Sync + Send,
+    ) -> Result<Vec<T>, Error> {
+        let mut values = Vec::new();
+        reserve(&mut values, self.count, what)?;
+        for block in blocks(self.count) {
+            job.tick(part.start + part.len * block.start as f32 / self.count as f32)?;
+            let records = self.bytes[column.offset + block.start * column.stride..].par_chunks(column.stride.max(1));
+            values.par_extend(records.take(block.len()).map(&value));
+        }
+        Ok(values)
     }
 
     /// What `f32` lost of the positions, if all digits are wanted and some are lost.
@@ -306,7 +333,9 @@ impl Table<'_> {
     fn field(&self, job: &Job<'_>, column: &Column, part: Part) -> Result<FieldValues, Error> {
         macro_rules! typed {
             ($variant:ident) => {
-                FieldValues::$variant(collect(&column.name, self.count, job, part, |i| self.value(column, i))?)
+                FieldValues::$variant(
+                    self.collect(&column.name, column, job, part, |record| Number::read(record, 0, self.big_endian))?,
+                )
             };
         }
         Ok(match column.scalar {

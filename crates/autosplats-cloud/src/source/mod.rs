@@ -3,6 +3,7 @@
 #[cfg(feature = "zenoh")]
 pub mod live;
 pub mod point_cloud2;
+pub(crate) mod recording;
 pub(crate) mod scene;
 pub(crate) mod stream;
 pub(crate) mod wire;

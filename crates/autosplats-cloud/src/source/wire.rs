@@ -3,13 +3,16 @@
 use std::borrow::Cow;
 
 /// How a ROS message is written as bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// As ROS 1 does: little-endian and without gaps.
     Ros1,
     /// As ROS 2 does, CDR: four bytes say the byte order, numbers are aligned.
     Cdr,
 }
+
+/// What data compressed by Zstandard begin with.
+pub(crate) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
 /// What is wrong with some bytes, and at which of them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,6 +71,10 @@ impl<'a> Wire<'a> {
         let Some([first, kind, _, _]) = bytes.first_chunk::<4>() else {
             return Err(Fault::new(0, "the four bytes that begin a CDR message are not there; it is cut off"));
         };
+        if bytes.starts_with(ZSTD) {
+            let what = "each message of this recording is compressed by itself; 'ros2 bag convert' undoes that";
+            return Err(Fault::new(0, what));
+        }
         let alignment = match (first, kind) {
             (0, 0 | 1) => 8,
             // The second version aligns numbers of eight bytes to four, and is the same otherwise.

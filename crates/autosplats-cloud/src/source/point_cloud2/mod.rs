@@ -58,7 +58,8 @@ pub fn decode(name: &Path, bytes: &[u8], encoding: Encoding, options: &ReadOptio
         let table = Table { bytes: &rows, count, big_endian: *big_endian, columns, packed_rgb: true, done: 0.0 };
         table.into_cloud(&job, &place)?
     };
-    let no_returns = if options.keep_no_returns { 0 } else { take_out_no_returns(&mut cloud, 1) };
+    // Even all of them: a sensor may see nothing for a while.
+    let no_returns = take_out_no_returns(&mut cloud, |_| !options.keep_no_returns);
     let axes = if frame_id.contains("optical") { Axes::Camera } else { Axes::ZUp };
     let mut cloud = cloud.with_axes(axes);
     if !MAPS.contains(&&*frame_id.to_lowercase()) && !cloud.is_empty() {

@@ -1,0 +1,95 @@
+//! Pieces of a recording, mostly compressed.
+
+use std::{borrow::Cow, io::Read, ops::Range};
+
+use crate::{memory::check_memory, read::guard, source::wire::Fault};
+
+/// A run of records that is compressed as one.
+#[derive(Clone, Debug)]
+pub(super) struct Chunk {
+    /// Bytes of the file that hold it, compressed.
+    pub(super) data: Range<usize>,
+    /// Bytes it has unpacked, as the file claims.
+    pub(super) size: u64,
+    /// CRC-32 of what it has unpacked; 0 if the file has none.
+    pub(super) crc: u32,
+    pub(super) compression: String,
+    /// The file ends inside of it.
+    pub(super) cut: Option<Fault>,
+}
+
+/// The records of a chunk. Of one that is cut off, what can be had: perhaps not whole records.
+///
+/// No more is allocated than there is in it, whatever it claims.
+pub(super) fn unpack<'a>(file: &'a [u8], chunk: &Chunk) -> Result<Cow<'a, [u8]>, String> {
+    let data = file.get(chunk.data.clone()).ok_or("it does not lie within the file")?;
+    if chunk.compression.is_empty() || chunk.compression == "none" {
+        if chunk.size != data.len() as u64 && chunk.cut.is_none() {
+            return Err(format!("it has {} bytes and claims {}", data.len(), chunk.size));
+        }
+        check(data, chunk)?;
+        return Ok(Cow::Borrowed(data));
+    }
+    check_memory("a chunk of the recording", chunk.size).map_err(|error| error.to_string())?;
+    // Claims beyond that are believed as far as they come true.
+    let mut content = Vec::with_capacity((chunk.size as usize).min(data.len().saturating_mul(64)));
+    let mut read = |decoder: &mut dyn Read| {
+        let outcome = decoder.take(chunk.size).read_to_end(&mut content);
+        if chunk.cut.is_some() { Ok(()) } else { outcome.map(drop).map_err(|error| error.to_string()) }
+    };
+    guard(|| match &*chunk.compression {
+        "zstd" => read(&mut Zstd { data, frame: None }),
+        "lz4" => read(&mut lz4_flex::frame::FrameDecoder::new(data)),
+        "bz2" => read(&mut bzip2::read::MultiBzDecoder::new(data)),
+        other => Err(format!("it is compressed by '{}', which is not read", crate::read::shown(other.as_bytes()))),
+    })?;
+    if content.len() as u64 != chunk.size && chunk.cut.is_none() {
+        return Err(format!("it makes {} bytes and claims {}", content.len(), chunk.size));
+    }
+    check(&content, chunk)?;
+    Ok(Cow::Owned(content))
+}
+
+fn check(content: &[u8], chunk: &Chunk) -> Result<(), String> {
+    if chunk.crc == 0 || chunk.cut.is_some() || crc32fast::hash(content) == chunk.crc {
+        Ok(())
+    } else {
+        Err("its checksum is wrong; the file is damaged, copy it again".into())
+    }
+}
+
+/// Zstandard frames one after the other.
+struct Zstd<'a> {
+    data: &'a [u8],
+    frame: Option<Box<ruzstd::decoding::StreamingDecoder<&'a [u8], ruzstd::decoding::FrameDecoder>>>,
+}
+
+/// A frame may ask for a window of this size, and of more if it is large itself.
+const WINDOW: u64 = 16 << 20;
+
+/// Bytes unpacked at once.
+const STEP: usize = 1 << 17;
+
+impl Read for Zstd<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        use ruzstd::decoding::StreamingDecoder;
+        loop {
+            if let Some(mut frame) = self.frame.take() {
+                // Of a frame that is cut off, no more is lost than this.
+                let len = buffer.len().min(STEP);
+                let read = frame.read(&mut buffer[..len])?;
+                if read > 0 || buffer.is_empty() {
+                    self.frame = Some(frame);
+                    return Ok(read);
+                }
+                self.data = frame.into_inner();
+            }
+            if self.data.is_empty() {
+                return Ok(0);
+            }
+            let most = WINDOW.max((self.data.len() as u64) << 14);
+            let frame = StreamingDecoder::new_with_max_window_size(self.data, most).map_err(std::io::Error::other)?;
+            self.frame = Some(Box::new(frame));
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The files of a recording, and the bytes of their messages.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    chunk::unpack,
+    index::{Container, Index, Place, Record},
+};
+use crate::{
+    Error, Progress, ReadOptions,
+    error::message,
+    progress::Part,
+    read::{Bytes, Job, check_not_lfs_pointer},
+    source::wire::ZSTD,
+};
+
+/// One file, mapped, and what is where in it.
+pub(super) struct File {
+    pub(super) path: PathBuf,
+    pub(super) bytes: Bytes,
+    pub(super) index: Index,
+    pub(super) container: Container,
+    /// The chunk that was read last: messages are next to each other.
+    unpacked: Option<(usize, Result<Unpacked, String>)>,
+}
+
+enum Unpacked {
+    /// As it lies in the file.
+    There,
+    Made(Vec<u8>),
+}
+
+impl File {
+    pub(super) fn open(path: &Path, progress: &dyn Progress) -> Result<Self, Error> {
+        let bytes = Bytes::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        Self::of(path, bytes, progress)
+    }
+
+    pub(super) fn of_bytes(path: &Path, bytes: Vec<u8>, progress: &dyn Progress) -> Result<Self, Error> {
+        Self::of(path, Bytes::Read(bytes), progress)
+    }
+
+    fn of(path: &Path, bytes: Bytes, progress: &dyn Progress) -> Result<Self, Error> {
+        let options = ReadOptions::default();
+        let job = Job { path, progress, bytes: &bytes, options: &options, triangles: false };
+        check_not_lfs_pointer(&job)?;
+        let Some((mut container, first)) = Container::of(&bytes) else {
+            return Err(if bytes.is_empty() {
+                job.malformed("byte 0", "the file is empty; copy it again")
+            } else if bytes.starts_with(SQLITE) {
+                job.unsupported(CONVERT)
+            } else if bytes.starts_with(b"#ROSBAG") {
+                job.unsupported(
+                    "bags older than version 2.0 are not read; 'rosbag fix' or 'rosbag reindex' renews them",
+                )
+            } else if bytes.starts_with(ZSTD) {
+                job.unsupported("the whole file is compressed; 'zstd -d' unpacks it")
+            } else {
+                job.malformed("byte 0", "this begins neither an MCAP file nor a ROS 1 bag")
+            });
+        };
+        let index = Index::of(&mut container, &bytes, first, progress)?;
+        if index.topics.is_empty()
+            && let Some(fault) = index.faults.first()
+        {
+            return Err(job.malformed(fault.place(), &*fault.what));
+        }
+        Ok(Self { path: path.into(), bytes, index, container, unpacked: None })
+    }
+
+    /// The bytes of a message.
+    pub(super) fn message(&mut self, place: &Place) -> Result<&[u8], Error> {
+        let Self { path, bytes, index, container, unpacked } = self;
+        let offset = place.chunk.map_or(place.at, |chunk| index.chunks[chunk].data.start);
+        let malformed =
+            |what: &str| Error::Malformed { path: path.clone(), place: format!("byte {offset}"), what: message(what) };
+        let records = match place.chunk {
+            None => &**bytes,
+            Some(number) => {
+                let chunk = &index.chunks[number];
+                if unpacked.as_ref().is_none_or(|(last, _)| *last != number) {
+                    // The last one's memory is free before more is taken.
+                    *unpacked = None;
+                    let content = unpack(bytes, chunk).map(|content| match content {
+                        std::borrow::Cow::Borrowed(_) => Unpacked::There,
+                        std::borrow::Cow::Owned(made) => Unpacked::Made(made),
+                    });
+                    *unpacked = Some((number, content));
+                }
+                match &unpacked.as_ref().map(|(_, content)| content) {
+                    Some(Ok(Unpacked::Made(made))) => made,
+                    Some(Err(what)) => return Err(malformed(&format!("a chunk cannot be read: {what}"))),
+                    Some(Ok(Unpacked::There)) | None => &bytes[chunk.data.clone()],
+                }
+            }
+        };
+        match container.record(records, place.at) {
+            Ok((Record::Message(number, _, data), _)) if index.numbers.get(&number) == Some(&place.topic) => Ok(data),
+            Ok(_) => Err(malformed("the index leads to something that is no message of its topic")),
+            Err(fault) => Err(malformed(&fault.what)),
+        }
+    }
+
+    /// The byte of the file at which a message is, or the chunk that it is in.
+    pub(super) fn offset(&self, place: &Place) -> usize {
+        place.chunk.map_or(place.at, |chunk| self.index.chunks[chunk].data.start)
+    }
+}
+
+/// What databases of SQLite begin with, and what they are told.
+const SQLITE: &[u8] = b"SQLite format 3\0";
+const CONVERT: &str =
+    "ROS 2 bags in SQLite are not read; 'ros2 bag convert' or 'mcap convert' makes an MCAP file of one";
+
+/// What the folder of a ROS 2 bag is known by.
+const METADATA: &str = "metadata.yaml";
+
+/// Whether a path is one that [`Recording::open`](super::Recording::open) is for: by its name, or as a folder by what is in it.
+pub fn is_recording(path: &Path) -> bool {
+    path.join(METADATA).is_file() || ["mcap", "bag", "db3"].iter().any(|extension| has_extension(path, extension))
+}
+
+fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
+}
+
+/// A file, or all of a folder in order.
+pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Vec<File>, Error> {
+    if !path.is_dir() {
+        return Ok(vec![File::open(path, progress)?]);
+    }
+    let io = |source| Error::Io { path: path.into(), source };
+    let mut parts = parts(&std::fs::read_to_string(path.join(METADATA)).unwrap_or_default());
+    if parts.is_empty() {
+        for entry in std::fs::read_dir(path).map_err(io)? {
+            parts.extend(entry.map_err(io)?.file_name().into_string());
+        }
+        parts.retain(|name| has_extension(Path::new(name), "mcap") || has_extension(Path::new(name), "db3"));
+        parts.sort_unstable();
+    }
+    if parts.is_empty() {
+        return Err(Error::Unsupported { path: path.into(), what: "the folder has no MCAP files".into() });
+    }
+    let len = 1.0 / parts.len() as f32;
+    let open = |(index, name): (usize, &String)| {
+        File::open(&path.join(name), &Part { whole: progress, start: len * index as f32, len })
+    };
+    parts.iter().enumerate().map(open).collect()
+}
+
+/// The files that `metadata.yaml` lists: of YAML no more is needed than the lines of one list.
+fn parts(metadata: &str) -> Vec<String> {
+    let lines = metadata.lines().skip_while(|line| line.trim() != "relative_file_paths:").skip(1);
+    let items = lines.map_while(|line| line.trim().strip_prefix("- "));
+    items.map(|name| name.trim().trim_matches(['"', '\'']).to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parts;
+
+    #[test]
+    fn the_list_of_files_is_found() {
+        let metadata = "rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n    - a_0.mcap\n    - \"a_1.mcap\"\n  \
+                        duration:\n    nanoseconds: 1\n  files:\n    - path: a_0.mcap\n";
+        assert_eq!(parts(metadata), ["a_0.mcap", "a_1.mcap"], "in order, and nothing else");
+        assert!(parts("a: b\n").is_empty(), "no list");
+    }
+}

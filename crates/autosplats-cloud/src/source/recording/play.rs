@@ -1,0 +1,85 @@
+//! Messages to updates, as a stream.
+
+use std::time::Duration;
+
+use super::{Recording, index::Place};
+use crate::{
+    Axes, Error, PointCloud, Progress,
+    source::{
+        point_cloud2,
+        stream::{Next, Statistics, Stream, Timeline, Update},
+    },
+};
+
+impl Stream for Recording {
+    fn timeline(&self) -> Option<&Timeline> {
+        Some(&self.timeline)
+    }
+
+    fn seek(&mut self, frame: usize) {
+        self.position = frame;
+    }
+
+    fn next(&mut self, _patience: Duration, progress: &dyn Progress) -> Result<Next, Error> {
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let Some(&(place, channel)) = self.frames.get(self.position) else { return Ok(Next::End) };
+        self.position += 1;
+        match self.update(&place, channel, progress) {
+            Ok(update) => {
+                self.statistics.taken += 1;
+                Ok(Next::Update(update))
+            }
+            Err(error) => {
+                self.statistics.refused += 1;
+                self.statistics.last_refusal = Some(error.to_string());
+                Err(error)
+            }
+        }
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.statistics.clone()
+    }
+}
+
+impl Recording {
+    fn update(&mut self, place: &Place, channel: usize, progress: &dyn Progress) -> Result<Update, Error> {
+        let topic = &self.channels[channel];
+        let file = &mut self.files[place.file];
+        let encoding = file.index.topics[place.topic].encoding.unwrap_or(point_cloud2::Encoding::Cdr);
+        let (path, at) = (file.path.clone(), file.offset(place));
+        let message = file.message(place)?;
+        let message =
+            point_cloud2::decode(&path, message, encoding, &self.options.read).map_err(|error| match error {
+                Error::Malformed { path, place, what } => {
+                    Error::Malformed { path, place: format!("byte {at}, {place} of a message of {topic}"), what }
+                }
+                other => other,
+            })?;
+        let stamp = if message.stamp == 0 { place.time } else { message.stamp };
+        let mut cloud = message.cloud;
+        let told = &mut self.told[channel];
+        if let Some(pose) = self.transforms.pose(&message.frame_id, stamp) {
+            let optical = self.transforms.target().is_some_and(|frame| frame.contains("optical"));
+            if !cloud.is_empty() {
+                // It is all in one frame now, so that there is one answer to which way is up.
+                let axes = if optical { Axes::Camera } else { Axes::ZUp };
+                cloud = PointCloud::merge(vec![(cloud, pose)]).with_axes(axes);
+            }
+        } else if self.transforms.target().is_some() && !*told {
+            *told = true;
+            let frame = &message.frame_id;
+            let note = format!("{topic}: no transforms lead from '{frame}' to the common frame; its points stay in it");
+            progress.note(&crate::error::message(&note));
+        }
+        if message.no_returns > 0 && !*told {
+            *told = true;
+            let (count, total) = (message.no_returns, message.no_returns + cloud.len());
+            let note = format!("{topic}: dropped {count} of {total} points at (0, 0, 0), where nothing was measured");
+            progress.note(&crate::error::message(&note));
+        }
+        Ok(Update { channel, stamp, cloud: cloud.into() })
+    }
+}
