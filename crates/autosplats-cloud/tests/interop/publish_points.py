@@ -18,7 +18,7 @@ CLOUD = "sensor_msgs/msg/PointCloud2"
 
 
 def cloud(frame, little_endian):
-    """Point i is at (i / 2, -i, i % 7), and i + 0.25 bright, on ring i % 128."""
+    """Point i is at (1 + i / 2, -i, i % 7), and i + 0.25 bright, on ring i % 128."""
     order = "<" if little_endian else ">"
     kinds = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), ("ring", "u2")]
     offsets = [0, 4, 8, 16, 20]
@@ -27,7 +27,7 @@ def cloud(frame, little_endian):
     )
     i = np.arange(POINTS)
     points = np.zeros(POINTS, kind)
-    points["x"], points["y"], points["z"] = i / 2, -i, i % 7
+    points["x"], points["y"], points["z"] = 1 + i / 2, -i, i % 7
     points["intensity"], points["ring"] = i + 0.25, i % 128
 
     types = STORE.types

@@ -19,6 +19,8 @@ use super::address::Address;
 pub(super) const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
 /// Tokens that are remembered: as many as large fleets have publishers.
 const MAX_TOKENS: usize = 20_000;
+/// Bytes of a key: Zenoh allows more, ROS does not use them.
+const MAX_KEY: usize = 1024;
 /// Topics that a message names.
 const NAMED: usize = 5;
 
@@ -75,6 +77,11 @@ fn ros_type(kind: &str) -> String {
     kind.strip_suffix('_').unwrap_or(&kind).to_owned()
 }
 
+/// Whether a key can be kept and shown.
+pub(super) fn is_name(key: &str) -> bool {
+    key.len() <= MAX_KEY && !key.contains(char::is_control)
+}
+
 /// All publishers that are known of.
 #[derive(Debug, Default)]
 pub(super) struct Graph {
@@ -91,6 +98,7 @@ impl Graph {
     /// A token is there.
     pub(super) fn insert(&mut self, token: &str) {
         if self.publishers.len() < MAX_TOKENS
+            && is_name(token)
             && let Some(topic) = Topic::of_token(token)
         {
             self.publishers.insert(token.to_owned(), topic);
@@ -188,6 +196,7 @@ mod tests {
             "@ros2_lv/0/7f3a/0/14/MS/%/%/talker/%x/sensor_msgs::msg::dds_::PointCloud2_/RIHS01_9198/::,:,:,:,,",
             "@ros2_lv/0/7f3a/0/0/NN/%/%/talker",
             "@ros2_lv/x/7f3a/0/13/MP/%/%/talker/%image/a/b/c",
+            "@/1a2b/@ros2_lv/MP/a\u{1b}[2Jb/sensor_msgs§msg§PointCloud2/:::",
             "@ros2_lv",
             "",
         ] {

@@ -47,6 +47,8 @@ fn run(address: &Address, shared: &Arc<Shared>) {
             return;
         }
     };
+    // Before the first message can come.
+    look(&session, shared);
     let mut heard = BTreeMap::new();
     let mut tokens = Vec::new();
     let keys = if address.topic.is_empty() { Vec::new() } else { address.keys() };
@@ -60,10 +62,8 @@ fn run(address: &Address, shared: &Arc<Shared>) {
         shared.lock().refuse(format!("nothing can be subscribed to: {error}"));
     }
     while !shared.stopped(LOOK) {
-        let info = session.info();
-        let others = info.routers_zid().wait().chain(info.peers_zid().wait()).collect();
-        let mut state = shared.lock();
-        state.others(others);
+        look(&session, shared);
+        let state = shared.lock();
         let mut wanted = Vec::new();
         if state.listen && !heard.contains_key("**") {
             wanted.push("**".to_owned());
@@ -80,7 +80,14 @@ fn run(address: &Address, shared: &Arc<Shared>) {
     }
 }
 
-/// What holds a subscription.
+/// Who is there?
+fn look(session: &Session, shared: &Shared) {
+    let info = session.info();
+    let others = info.routers_zid().wait().chain(info.peers_zid().wait()).collect();
+    shared.lock().others(others);
+}
+
+/// What holds subscriptions.
 type Heard = BTreeMap<String, Subscriber<()>>;
 
 /// Subscribes to messages.

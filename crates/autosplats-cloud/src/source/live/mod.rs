@@ -7,7 +7,7 @@
 //! that what nobody takes costs next to nothing. A thread of ours holds the connection (`link.rs`), and what publishers declare
 //! of themselves (`graph.rs`) says why nothing comes, if nothing does.
 //!
-//! Zenoh is licensed under EPL-2.0 or Apache-2.0, at our choice, and asks for Rust 1.75.
+//! Zenoh is licensed under EPL-2.0 or Apache-2.0, at our choice. It asks for Rust 1.75, and what it needs for 1.88.
 
 mod address;
 mod graph;

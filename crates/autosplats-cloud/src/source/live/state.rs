@@ -9,7 +9,7 @@ use zenoh::{bytes::ZBytes, session::ZenohId};
 
 use super::{
     address::Address,
-    graph::{Graph, Topic},
+    graph::{Graph, Topic, is_name},
 };
 use crate::Statistics;
 
@@ -75,6 +75,9 @@ impl Shared {
     pub(super) fn put(&self, key: &str, payload: ZBytes) {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let arrival = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+        if !is_name(key) {
+            return self.lock().refuse("a message under a name that is none".into());
+        }
         let topic = Topic::of_key(key);
         let mut state = self.lock();
         let known = state.channels.iter().position(|channel| channel.topic.same(&topic));
@@ -200,7 +203,9 @@ mod tests {
         for number in 0..1000 {
             shared.put(&format!("topic{number}"), ZBytes::from(vec![0]));
         }
+        shared.put("a\u{1b}[2Jb", ZBytes::new());
+        shared.put(&"a".repeat(2000), ZBytes::new());
         let state = shared.lock();
-        assert_eq!((state.channels.len(), state.statistics.refused), (64, 936), "no more of them");
+        assert_eq!((state.channels.len(), state.statistics.refused), (64, 938), "no more of them");
     }
 }

@@ -47,7 +47,8 @@ fn find(address: &Address, shared: &Shared, patience: Duration) -> Result<Vec<To
     while begin.elapsed() < patience {
         let mut state = shared.lock();
         // Those who declare themselves do so at once.
-        state.listen = state.graph.len() == 0 && begin.elapsed() > patience / 2;
+        let nobody = state.connection.connected && state.graph.len() == 0;
+        state.listen |= nobody && begin.elapsed() > patience / 2;
         let now = state.graph.len() + state.channels.len();
         drop(state);
         if now != known {
