@@ -7,7 +7,7 @@ mod common;
 use std::{
     io::{BufRead as _, BufReader},
     net::TcpListener,
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
@@ -19,9 +19,9 @@ use autosplats_cloud::{
 use common::{
     positions,
     ros::Cloud2,
-    zenoh_peer::{bridge_token, client, free_port, listener, rmw_key, rmw_token},
+    zenoh_peer::{answering, bridge_token, client, free_port, listener, rmw_key, rmw_token},
 };
-use zenoh::{Session, Wait as _};
+use zenoh::{Session, Wait as _, qos::CongestionControl};
 
 /// Long enough for anything that is going to happen.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -56,7 +56,8 @@ fn next(live: &mut Live, send: impl Fn()) -> Update {
 }
 
 fn put(session: &Session, key: &str, message: &[u8]) {
-    session.put(key, message).wait().unwrap();
+    // Otherwise the sender itself drops messages when the machine is busy.
+    session.put(key, message).congestion_control(CongestionControl::Block).wait().unwrap();
 }
 
 #[test]
@@ -74,6 +75,16 @@ fn points_of_nodes_and_of_the_bridge_arrive_as_they_were_sent() {
             assert_eq!(live.statistics().waiting, None, "nothing is waited for");
         }
     }
+}
+
+#[test]
+#[ignore = "needs a network with multicast, which nobody else uses for this topic"]
+fn whoever_answers_on_the_network_is_heard() {
+    let there = answering(free_port());
+    let mut live = live_at("zenoh:///autosplats_test/points");
+    let message = Cloud2::xyz(&positions(10), 12).cdr();
+    let update = next(&mut live, || put(&there, &rmw_key(0, "autosplats_test/points"), &message));
+    assert_eq!(update.cloud.len(), 10, "found");
 }
 
 #[test]
@@ -313,20 +324,45 @@ fn topics_of_nobody_are_an_error_with_a_remedy() {
 }
 
 /// A Python of which `rosbags` writes the messages and `eclipse-zenoh` sends them.
-#[test]
-#[ignore = "needs AUTOSPLATS_PYTHON: a Python that has eclipse-zenoh, rosbags and numpy"]
-fn points_of_another_implementation_arrive() {
+fn python(port: u16) -> Child {
     let python = std::env::var_os("AUTOSPLATS_PYTHON")
         .expect("AUTOSPLATS_PYTHON must name a Python that has eclipse-zenoh, rosbags and numpy");
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interop/publish_points.py");
-    let port = free_port();
     let mut command = Command::new(python);
     let mut other =
         command.arg(script).arg(port.to_string()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let mut line = String::new();
     BufReader::new(other.stdout.take().unwrap()).read_line(&mut line).unwrap();
     assert_eq!(line.trim(), "publishing", "the script failed; what it says is above");
+    other
+}
 
+#[test]
+#[ignore = "needs AUTOSPLATS_PYTHON: a Python that has eclipse-zenoh, rosbags and numpy"]
+fn who_is_killed_and_started_again_is_heard_again() {
+    let port = free_port();
+    let mut other = python(port);
+    let mut live = live(port, "front/points");
+    for round in 0..3 {
+        next(&mut live, || {});
+        until(&live, "counted", |told| told.reconnected == round);
+        other.kill().unwrap();
+        other.wait().unwrap();
+        until(&live, "noticed", |told| {
+            told.waiting.as_ref().is_some_and(|why| why.ends_with("the connection is lost"))
+        });
+        while live.next(Duration::ZERO, &()).unwrap() != Next::Nothing {}
+        other = python(port);
+    }
+    drop(other.stdin.take());
+    other.wait().unwrap();
+}
+
+#[test]
+#[ignore = "needs AUTOSPLATS_PYTHON: a Python that has eclipse-zenoh, rosbags and numpy"]
+fn points_of_another_implementation_arrive() {
+    let port = free_port();
+    let mut other = python(port);
     let found = topics(&format!("zenoh://127.0.0.1:{port}"), PATIENCE).unwrap();
     let names: Vec<_> = found.iter().map(|topic| (&*topic.name, topic.has_points(), topic.domain)).collect();
     assert_eq!(names, [("/front/points", true, Some(0)), ("/rear/points", true, None)], "both ways of naming");

@@ -16,7 +16,7 @@ use common::{
     ros::Cloud2,
     zenoh_peer::{client, free_port, listener, rmw_key},
 };
-use zenoh::Wait as _;
+use zenoh::{Wait as _, qos::CongestionControl};
 
 fn now() -> i64 {
     UNIX_EPOCH.elapsed().unwrap().as_nanos() as i64
@@ -38,7 +38,9 @@ fn measure(count: usize, step: u32, seconds: u64) {
     let mut message = Cloud2 { stamp: 0, ..Cloud2::xyz(&positions(count), step) }.cdr();
     let bytes = message.len();
     let sent = thread::spawn(move || {
-        let publisher = sensor.declare_publisher(rmw_key(0, "points")).wait().unwrap();
+        // The sender's side drops messages too, by default, when the machine is busy; those are none of ours.
+        let publisher = sensor.declare_publisher(rmw_key(0, "points"));
+        let publisher = publisher.congestion_control(CongestionControl::Block).wait().unwrap();
         while !publisher.matching_status().wait().unwrap().matching() {
             thread::sleep(Duration::from_millis(10));
         }

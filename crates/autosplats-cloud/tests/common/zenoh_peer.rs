@@ -14,12 +14,14 @@ pub(crate) fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).unwrap().port()
 }
 
-fn open(mode: &str, way: &str, port: u16) -> Session {
+fn open(mode: &str, way: &str, port: u16, calls: bool) -> Session {
     let mut config = Config::default();
+    // Who is called from the network has to be reached from there.
+    let host = if calls { "0.0.0.0" } else { "127.0.0.1" };
     for (name, value) in [
         ("mode", format!("{mode:?}")),
-        (way, format!(r#"["tcp/127.0.0.1:{port}"]"#)),
-        ("scouting/multicast/enabled", "false".into()),
+        (way, format!(r#"["tcp/{host}:{port}"]"#)),
+        ("scouting/multicast/enabled", calls.to_string()),
         ("scouting/gossip/enabled", "false".into()),
     ] {
         config.insert_json5(name, &value).unwrap();
@@ -29,12 +31,17 @@ fn open(mode: &str, way: &str, port: u16) -> Session {
 
 /// One that others connect to.
 pub(crate) fn listener(mode: &str, port: u16) -> Session {
-    open(mode, "listen/endpoints", port)
+    open(mode, "listen/endpoints", port, false)
+}
+
+/// One that answers who calls out on the network.
+pub(crate) fn answering(port: u16) -> Session {
+    open("peer", "listen/endpoints", port, true)
 }
 
 /// One that connects to another.
 pub(crate) fn client(port: u16) -> Session {
-    open("client", "connect/endpoints", port)
+    open("client", "connect/endpoints", port, false)
 }
 
 /// Declares a publisher as rmw_zenoh does.

@@ -43,6 +43,9 @@ impl Address {
         } else {
             Some(host(authority).ok_or_else(|| bad(format!("'{authority}' is no host and port; it must be {FORM}")))?)
         };
+        if topic.contains(char::is_control) {
+            return Err(bad("no name of a topic has line breaks or the like in it".into()));
+        }
         if let Err(error) = zenoh::key_expr::KeyExpr::new(if topic.is_empty() { "**" } else { topic }) {
             let why = crate::error::message(&error.to_string());
             return Err(bad(format!("'{topic}' is no name of a topic, nor a pattern with * and ** of some: {why}")));
