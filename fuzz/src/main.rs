@@ -14,6 +14,7 @@ mod mutate;
 #[allow(clippy::unwrap_used, reason = "it was written for tests")]
 #[path = "../../crates/autosplats-cloud/tests/common/recording.rs"]
 mod recording;
+#[allow(dead_code, reason = "tests use the rest")]
 #[path = "../../crates/autosplats-cloud/tests/common/ros.rs"]
 mod ros;
 mod seeds;

@@ -1,5 +1,7 @@
 //! Points per second from PointCloud2 messages in memory, one core: `cargo bench -p autosplats-cloud --bench point_cloud2
-//! [-- POINTS]`.
+//! [-- POINTS | RECORDING...]`.
+//!
+//! Of recordings, how long they take to be opened and played, on all cores.
 //!
 //! Beside each layout stands how long it takes in copies of the same bytes into fresh memory. The general path is what any
 //! layout takes: here the same points with x and y stored the other way round. The best of many rounds is printed, as the
@@ -11,17 +13,26 @@
 #[path = "../tests/common/ros.rs"]
 mod ros;
 
-use std::{hint::black_box, path::Path, time::Instant};
+use std::{
+    hint::black_box,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use autosplats_cloud::{
-    ReadOptions,
+    Next, ReadOptions, Recording, RecordingOptions, Stream as _,
     point_cloud2::{Encoding, decode},
 };
 use ros::{Cloud2, F32};
 
 fn main() {
     // Cargo adds --bench.
-    let points = std::env::args().skip(1).find(|arg| arg != "--bench").map_or(1_000_000, |arg| arg.parse().unwrap());
+    let args: Vec<String> = std::env::args().skip(1).filter(|arg| arg != "--bench").collect();
+    let points = match args.first().map(|arg| arg.parse()) {
+        Some(Err(_)) => return args.iter().for_each(|file| play(Path::new(file))),
+        Some(Ok(points)) => points,
+        None => 1_000_000,
+    };
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().unwrap();
     println!("{points} points, one core");
     let positions: Vec<[f32; 3]> =
@@ -47,6 +58,29 @@ fn time(what: &str, points: usize, copy: f64, message: &[u8]) -> f64 {
     let rate = points as f64 / seconds / 1e6;
     println!("{rate:>7.1} M points/s, {:.2} copies of its bytes: {what}", seconds / copy);
     seconds
+}
+
+fn play(path: &Path) {
+    let open = || Recording::open(path, &RecordingOptions::default(), &()).unwrap();
+    let opening = best(open);
+    let mut recording = open();
+    let frames = recording.timeline().unwrap().len();
+    let start = Instant::now();
+    let (mut points, rounds) = (0, 10);
+    for _ in 0..rounds {
+        recording.seek(0);
+        while let Next::Update(update) = recording.next(Duration::ZERO, &()).unwrap() {
+            points += update.cloud.len();
+        }
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "opened in {:.2} ms, {:.1} frames and {:.1} M points/s: {}",
+        opening * 1e3,
+        (rounds * frames) as f64 / seconds,
+        points as f64 / seconds / 1e6,
+        path.display()
+    );
 }
 
 /// Seconds of the fastest round.

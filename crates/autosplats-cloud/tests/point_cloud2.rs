@@ -285,6 +285,8 @@ fn messages_cut_or_changed_anywhere_do_no_harm() {
             }
         }
     }
+    let packed = decode(b"\x28\xb5\x2f\xfd....", Encoding::Cdr).unwrap_err().to_string();
+    assert!(packed.contains("ros2 bag convert"), "messages that are compressed by themselves: {packed}");
     let mut claims = Cloud2::xyz(&[], 12).cdr();
     let fields = 4 + 8 + 8 + 8 + 8;
     claims[fields..fields + 4].copy_from_slice(&5_000_000_u32.to_le_bytes());

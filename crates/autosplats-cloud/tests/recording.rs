@@ -7,7 +7,7 @@ mod common;
 use std::{path::Path, sync::Mutex, time::Duration};
 
 use autosplats_cloud::{
-    Error, Next, Progress, Recording, RecordingOptions, Stream as _, Update, describe_recording,
+    Axes, Error, Next, Progress, Recording, RecordingOptions, Stream as _, Update, describe_recording,
     glam::{DMat4, DQuat, DVec3},
     is_recording,
     point_cloud2::Encoding,
@@ -176,6 +176,25 @@ fn the_same_frame_is_the_same_points_however_it_is_come_to() {
 }
 
 #[test]
+fn whoever_has_enough_can_stop_it_and_loses_nothing() {
+    struct Stop;
+    impl Progress for Stop {
+        fn report(&self, _fraction: f32) {}
+
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let (topics, messages) = ten(Encoding::Cdr);
+    let bytes = mcap(&topics, &messages, Style::of("zstd"));
+    let opened = Recording::from_bytes(Path::new("a.mcap"), bytes.clone(), &RecordingOptions::default(), &Stop);
+    assert!(matches!(opened.map(drop), Err(Error::Cancelled)), "while it is opened");
+    let (mut recording, _) = open("a.mcap", &bytes, &RecordingOptions::default()).unwrap();
+    assert!(matches!(recording.next(Duration::ZERO, &Stop), Err(Error::Cancelled)), "while it is played");
+    assert_eq!(play(&mut recording).0.len(), 10, "no frame was passed over");
+}
+
+#[test]
 fn several_topics_are_channels_and_may_be_chosen() {
     let topics =
         vec![("/rear", POINTS, Encoding::Cdr), ("/front", POINTS, Encoding::Cdr), ("/third", POINTS, Encoding::Cdr)];
@@ -255,6 +274,19 @@ fn transforms_bring_the_points_into_one_frame() {
             let error = open("a", &bytes, &options).map(drop).unwrap_err().to_string();
             assert!(error.contains("'moon'") && error.contains("base, lidar, map"), "{error}");
         }
+    }
+}
+
+#[test]
+fn which_way_is_up_is_the_common_frame_s() {
+    let encoding = Encoding::Cdr;
+    let topics = vec![("/points", POINTS, encoding), ("/tf_static", TRANSFORMS, encoding)];
+    let points = (0, START, cloud(0, "camera_optical", encoding));
+    let pose = (1, START, transforms(encoding, &[(0, "base", "camera_optical", [1.0; 3], [0.5, -0.5, 0.5, -0.5])]));
+    for (messages, axes) in [(vec![points.clone()], Axes::Camera), (vec![pose, points], Axes::ZUp)] {
+        let bytes = mcap(&topics, &messages, Style::of("none"));
+        let (mut recording, _) = open("a.mcap", &bytes, &RecordingOptions::default()).unwrap();
+        assert_eq!(play(&mut recording).0[0].cloud.axes(), Some(axes), "{} messages", messages.len());
     }
 }
 
@@ -428,8 +460,10 @@ fn real_recordings_of_both_kinds_are_the_same_points() {
     let Some(folder) = data() else { return };
     let options = RecordingOptions { frame: Some("os1_lidar".into()), ..Default::default() };
     let mut of_kind = Vec::new();
-    for name in ["ouster_ros1.mcap", "ouster_ros2_cdr.mcap"] {
+    // Only one of them has transforms.
+    for (name, frame) in [("ouster_ros1.mcap", Some("os1_sensor")), ("ouster_ros2_cdr.mcap", None)] {
         let path = folder.join("sequences").join(name);
+        assert_eq!(describe_recording(&path, &()).unwrap().frame.as_deref(), frame, "{name}: the common frame");
         let (notes, mut recording) = (Notes::default(), Recording::open(&path, &options, &()).unwrap());
         let mut total = 0;
         let mut updates = Vec::new();

@@ -1,6 +1,6 @@
 """Writes recordings by programs of others, and what points are in them: recordings.py FOLDER [SEED].
 
-Needs rosbags, mcap, mcap-ros2-support and numpy. Layouts are drawn by lot; the same seed makes the same ones. Beside each
+Needs what requirements.txt beside it lists. Layouts are drawn by lot; the same seed makes the same ones. Beside each
 recording NAME stands NAME.json: for every frame its topic, stamp and columns in the common coordinate frame, null for what
 is no number, and for a recording with transforms the place of the sensor.
 """

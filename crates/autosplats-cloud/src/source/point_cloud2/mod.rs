@@ -2,8 +2,8 @@
 //!
 //! # How it works
 //!
-//! The message says itself where each value of a point lies, so that it is a [table](crate::read::Table) as PLY and PCD
-//! are. All it says is checked against the bytes there are before anything is allocated.
+//! The message says itself where each value of a point lies, so that it is a table of columns as PLY and PCD are. All it says
+//! is checked against the bytes there are before anything is allocated.
 
 mod layout;
 
@@ -16,6 +16,7 @@ pub use super::wire::Encoding;
 use super::wire::{Wire, header};
 use crate::{
     Axes, Error, PointCloud, ReadOptions, Scan,
+    error::message,
     read::{Job, Table, take_out_no_returns},
 };
 
@@ -79,5 +80,5 @@ pub(crate) fn stamp_and_frame(bytes: &[u8], encoding: Encoding) -> Option<(i64, 
 
 /// ROS 1 once wrote a slash before the names of frames; they are the same ones.
 pub(crate) fn frame_name(name: &str) -> String {
-    name.strip_prefix('/').unwrap_or(name).to_owned()
+    message(name.strip_prefix('/').unwrap_or(name))
 }

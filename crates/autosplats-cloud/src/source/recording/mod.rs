@@ -102,6 +102,7 @@ impl Recording {
         let mut summary = RecordingSummary::of(&files);
         let unsupported = |what: String| Error::Unsupported { path: path.into(), what: crate::error::message(&what) };
         let mut channels: Vec<String> = summary.points().map(|topic| topic.name.clone()).collect();
+        channels.dedup();
         if channels.is_empty() {
             return Err(unsupported(format!(
                 "there are no PointCloud2 messages; its topics: {}",

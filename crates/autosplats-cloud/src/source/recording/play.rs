@@ -61,18 +61,23 @@ impl Recording {
         let stamp = if message.stamp == 0 { place.time } else { message.stamp };
         let mut cloud = message.cloud;
         let told = &mut self.told[channel];
-        if let Some(pose) = self.transforms.pose(&message.frame_id, stamp) {
-            let optical = self.transforms.target().is_some_and(|frame| frame.contains("optical"));
-            if !cloud.is_empty() {
-                // It is all in one frame now, so that there is one answer to which way is up.
-                let axes = if optical { Axes::Camera } else { Axes::ZUp };
-                cloud = PointCloud::merge(vec![(cloud, pose)]).with_axes(axes);
+        if let Some(target) = self.transforms.target() {
+            // It is all in one frame then, so that there is one answer to which way is up.
+            let axes = if target.contains("optical") { Axes::Camera } else { Axes::ZUp };
+            match self.transforms.pose(&message.frame_id, stamp) {
+                Some(pose) if !cloud.is_empty() => {
+                    cloud = PointCloud::merge(vec![(cloud, pose)]).with_axes(axes);
+                }
+                Some(_) => {}
+                None if *told => {}
+                None => {
+                    *told = true;
+                    let frame = &message.frame_id;
+                    let note =
+                        format!("{topic}: no transforms lead from '{frame}' to '{target}'; its points stay in it");
+                    progress.note(&crate::error::message(&note));
+                }
             }
-        } else if self.transforms.target().is_some() && !*told {
-            *told = true;
-            let frame = &message.frame_id;
-            let note = format!("{topic}: no transforms lead from '{frame}' to the common frame; its points stay in it");
-            progress.note(&crate::error::message(&note));
         }
         if message.no_returns > 0 && !*told {
             *told = true;
