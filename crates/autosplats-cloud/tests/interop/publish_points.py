@@ -1,6 +1,6 @@
 """Publishes PointCloud2 messages over Zenoh as rmw_zenoh and the bridge from DDS do, until its input ends.
 
-Usage: publish_points.py PORT. Needs eclipse-zenoh, rosbags and numpy. None of the bytes are made by the code under test:
+Usage: publish_points.py PORT. Needs what requirements.txt lists. None of the bytes are made by the code under test:
 rosbags writes the messages, numpy the points.
 """
 
