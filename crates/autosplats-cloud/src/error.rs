@@ -93,7 +93,7 @@ pub enum Error {
     },
     /// An address of live points makes no sense, or nobody is there.
     #[error("{address}: {what}")]
-    Live {
+    Remote {
         /// The address that was given.
         address: String,
         /// What is wrong with it, and the remedy.

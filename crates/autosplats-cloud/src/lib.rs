@@ -47,7 +47,7 @@ pub use read::{
 };
 pub use sample::sample_surface;
 #[cfg(feature = "zenoh")]
-pub use source::live;
+pub use source::remote;
 pub use source::{
     Source, point_cloud2,
     recording::{Recording, RecordingOptions, RecordingSummary, RecordingTopic, describe_recording, is_recording},

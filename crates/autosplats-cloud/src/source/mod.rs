@@ -1,9 +1,9 @@
 //! Where clouds come from.
 
-#[cfg(feature = "zenoh")]
-pub mod live;
 pub mod point_cloud2;
 pub(crate) mod recording;
+#[cfg(feature = "zenoh")]
+pub mod remote;
 pub(crate) mod scene;
 pub(crate) mod stream;
 pub(crate) mod wire;

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant, UNIX_EPOCH},
 };
 
-use autosplats_cloud::{Next, ReadOptions, Stream as _, live::Live};
+use autosplats_cloud::{Next, ReadOptions, Stream as _, remote::Remote};
 use common::{
     positions,
     ros::Cloud2,
@@ -34,7 +34,7 @@ fn measure(count: usize, step: u32, seconds: u64) {
     let port = free_port();
     let _router = listener("router", port);
     let sensor = client(port);
-    let mut live = Live::open(&format!("zenoh://127.0.0.1:{port}/points"), &ReadOptions::default()).unwrap();
+    let mut live = Remote::open(&format!("zenoh://127.0.0.1:{port}/points"), &ReadOptions::default()).unwrap();
     let mut message = Cloud2 { stamp: 0, ..Cloud2::xyz(&positions(count), step) }.cdr();
     let bytes = message.len();
     let sent = thread::spawn(move || {

@@ -26,7 +26,7 @@ pub(super) struct Address {
 
 impl Address {
     pub(super) fn parse(url: &str) -> Result<Self, Error> {
-        let bad = |what: String| Error::Live { address: crate::error::message(url), what };
+        let bad = |what: String| Error::Remote { address: crate::error::message(url), what };
         let rest = url.strip_prefix(PREFIX).ok_or_else(|| bad(format!("it must be {FORM}")))?;
         let (rest, query) = rest.split_once('?').map_or((rest, None), |(rest, query)| (rest, Some(query)));
         let domain = match query.map(|query| query.strip_prefix("domain=").and_then(|number| number.parse().ok())) {

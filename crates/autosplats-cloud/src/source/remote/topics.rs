@@ -29,11 +29,11 @@ const LOOK: Duration = Duration::from_millis(50);
 /// none of ROS are, are only looked for if nobody else is there, by listening to all that is sent.
 ///
 /// # Errors
-/// [`Error::Live`] if the address makes no sense or nobody is there.
+/// [`Error::Remote`] if the address makes no sense or nobody is there.
 pub fn topics(url: &str, patience: Duration) -> Result<Vec<Topic>, Error> {
     let address = Address::parse(url)?;
     let address = Address { topic: String::new(), ..address };
-    let failed = |what| Error::Live { address: crate::error::message(url), what };
+    let failed = |what| Error::Remote { address: crate::error::message(url), what };
     let shared = Arc::new(Shared::default());
     link::start(address.clone(), shared.clone()).map_err(|error| failed(format!("no thread can be had: {error}")))?;
     let found = find(&address, &shared, patience);

@@ -14,7 +14,7 @@ use std::{
 
 use autosplats_cloud::{
     Next, ReadOptions, Statistics, Stream as _, Update,
-    live::{Live, Topic, topics},
+    remote::{Remote, Topic, topics},
 };
 use common::{
     positions,
@@ -26,12 +26,12 @@ use zenoh::{Session, Wait as _, qos::CongestionControl};
 /// Long enough for anything that is going to happen.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn live(port: u16, topic: &str) -> Live {
-    Live::open(&format!("zenoh://127.0.0.1:{port}/{topic}"), &ReadOptions::default()).unwrap()
+fn live(port: u16, topic: &str) -> Remote {
+    Remote::open(&format!("zenoh://127.0.0.1:{port}/{topic}"), &ReadOptions::default()).unwrap()
 }
 
 /// Waits until the statistics say so.
-fn until(live: &Live, what: &str, holds: impl Fn(&Statistics) -> bool) {
+fn until(live: &Remote, what: &str, holds: impl Fn(&Statistics) -> bool) {
     let begin = Instant::now();
     while !holds(&live.statistics()) {
         assert!(begin.elapsed() < PATIENCE, "{what}: {:?}", live.statistics());
@@ -39,12 +39,12 @@ fn until(live: &Live, what: &str, holds: impl Fn(&Statistics) -> bool) {
     }
 }
 
-fn connected(live: &Live) {
+fn connected(live: &Remote) {
     until(live, "connected", |told| told.waiting.as_ref().is_none_or(|why| !why.starts_with("no router")));
 }
 
 /// The next points, while `send` sends again and again: what is sent before others heard of a subscription is lost.
-fn next(live: &mut Live, send: impl Fn()) -> Update {
+fn next(live: &mut Remote, send: impl Fn()) -> Update {
     let begin = Instant::now();
     while begin.elapsed() < PATIENCE {
         send();
@@ -203,7 +203,7 @@ fn it_waits_for_a_router_and_comes_back_to_one() {
 fn it_says_why_nothing_comes() {
     let port = free_port();
     let there = listener("peer", port);
-    let told = |what: &str, live: &Live, expected: &str| {
+    let told = |what: &str, live: &Remote, expected: &str| {
         until(live, what, |told| told.waiting.as_ref().is_some_and(|why| why == expected));
     };
     let live = live(port, "points");
@@ -237,8 +237,8 @@ fn it_says_why_nothing_comes() {
     until(&unknown, "unknown", |told| told.waiting.as_ref().is_some_and(|why| why.contains("no machine is known as")));
 }
 
-fn live_at(url: &str) -> Live {
-    Live::open(url, &ReadOptions::default()).unwrap()
+fn live_at(url: &str) -> Remote {
+    Remote::open(url, &ReadOptions::default()).unwrap()
 }
 
 #[test]
@@ -320,7 +320,7 @@ fn topics_of_nobody_are_an_error_with_a_remedy() {
     let error = topics(&url, Duration::from_secs(2)).unwrap_err().to_string();
     assert!(error.starts_with(&url) && error.contains("nobody listens there; start one there"), "{error}");
     assert!(begin.elapsed() < Duration::from_secs(3), "patience is kept");
-    assert!(Live::open("zenoh://127.0.0.1", &ReadOptions::default()).is_err(), "no topic is named");
+    assert!(Remote::open("zenoh://127.0.0.1", &ReadOptions::default()).is_err(), "no topic is named");
 }
 
 /// A Python of which `rosbags` writes the messages and `eclipse-zenoh` sends them.

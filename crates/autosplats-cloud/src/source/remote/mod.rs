@@ -1,8 +1,8 @@
-//! Live points of ROS 2 over Zenoh: nodes that run rmw_zenoh, or any behind the bridge from DDS.
+//! Remote points of ROS 2 over Zenoh: nodes that run rmw_zenoh, or any behind the bridge from DDS.
 //!
 //! # How it works
 //!
-//! A [`Live`] subscribes to a topic in the two ways it may be named. Zenoh's threads put each message into the one place that its
+//! A [`Remote`] subscribes to a topic in the two ways it may be named. Zenoh's threads put each message into the one place that its
 //! channel has, so that the newest wins and nothing queues; it is decoded when it is [taken](crate::Stream::next), so
 //! that what nobody takes costs next to nothing. A thread of ours holds the connection (`link.rs`), and what publishers declare
 //! of themselves (`graph.rs`) says why nothing comes, if nothing does.
@@ -36,7 +36,7 @@ use crate::{Error, Progress, ReadOptions};
 const ASK: Duration = Duration::from_millis(50);
 
 /// Whether a name is an address of live points, right or wrong.
-pub fn is_live(name: &str) -> bool {
+pub fn is_remote(name: &str) -> bool {
     name.starts_with(address::PREFIX)
 }
 
@@ -44,7 +44,7 @@ pub fn is_live(name: &str) -> bool {
 ///
 /// Each topic is a [channel](Update::channel), counted as they are first heard. Stamps are those that the messages have, or when
 /// they came if they have none. They are handed on as they come, older ones behind newer ones too.
-pub struct Live {
+pub struct Remote {
     address: Address,
     options: ReadOptions,
     shared: Arc<Shared>,
@@ -52,7 +52,7 @@ pub struct Live {
     told: Vec<bool>,
 }
 
-impl Live {
+impl Remote {
     /// Begins to listen to `zenoh://HOST:PORT/TOPIC?domain=N`.
     ///
     /// The port is 7447 if none is named, and without a host whoever is found on the local network is asked, a router on
@@ -63,16 +63,16 @@ impl Live {
     /// [`Statistics::waiting`].
     ///
     /// # Errors
-    /// [`Error::Live`] if the address makes no sense or names no topic.
+    /// [`Error::Remote`] if the address makes no sense or names no topic.
     pub fn open(url: &str, options: &ReadOptions) -> Result<Self, Error> {
         let address = Address::parse(url)?;
         if address.topic.is_empty() {
             let what = "no topic is named; name one behind the host, as in zenoh://HOST/points, or ** for all".into();
-            return Err(Error::Live { address: url.into(), what });
+            return Err(Error::Remote { address: url.into(), what });
         }
         let shared = Arc::new(Shared::default());
         link::start(address.clone(), shared.clone())
-            .map_err(|error| Error::Live { address: url.into(), what: format!("no thread can be had: {error}") })?;
+            .map_err(|error| Error::Remote { address: url.into(), what: format!("no thread can be had: {error}") })?;
         Ok(Self { address, options: options.clone(), shared, told: Vec::new() })
     }
 
@@ -107,7 +107,7 @@ impl Live {
     }
 }
 
-impl Stream for Live {
+impl Stream for Remote {
     fn timeline(&self) -> Option<&Timeline> {
         None
     }
@@ -138,7 +138,7 @@ impl Stream for Live {
     }
 }
 
-impl Drop for Live {
+impl Drop for Remote {
     fn drop(&mut self) {
         self.shared.stop();
     }
