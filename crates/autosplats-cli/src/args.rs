@@ -46,6 +46,8 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Say what is in files: points, bounds, attributes, units, spacing
     Info(InfoArgs),
+    /// List what robots publish over Zenoh, points first (in builds with the feature 'zenoh')
+    Topics(TopicsArgs),
     /// Time each stage and pass of a frame
     Bench(BenchArgs),
     /// Say what this machine can do, and whether the program works on it
@@ -475,6 +477,27 @@ others shown."
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) reading: ReadingArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+const TOPICS_EXAMPLES: &str = "\
+Examples:
+  autosplats topics zenoh://192.168.1.20
+  autosplats topics 'zenoh:///?domain=3' --json
+  autosplats zenoh://192.168.1.20/lidar/points --decay 1s";
+
+#[derive(Args, Debug)]
+#[command(after_help = TOPICS_EXAMPLES)]
+pub(crate) struct TopicsArgs {
+    /// Where a router or a node listens: zenoh://HOST[:PORT][/?domain=N]; zenoh:/// looks around on this network
+    pub(crate) address: String,
+    /// How long to listen at most
+    #[arg(long, value_name = "TIME", default_value = "5s", value_parser = values::duration)]
+    pub(crate) wait: Duration,
+    /// One JSON object a line for each topic on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }

@@ -283,6 +283,7 @@ impl Input {
             }
             Source::Scene(..) => format!("generating {}", self.name),
             Source::Sequence(_) | Source::Recording(_) | Source::StandardInput => format!("reading {}", self.name),
+            Source::Remote(_) => format!("waiting for {}", self.name),
         }
     }
 }

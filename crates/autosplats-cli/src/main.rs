@@ -21,6 +21,7 @@ mod pages;
 mod progress;
 mod render;
 mod threads;
+mod topics;
 mod values;
 mod view;
 
@@ -75,6 +76,7 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
         Some(Command::Normals(args)) => normals::run(&args),
         Some(Command::Demo(args)) => demo::run(&args),
         Some(Command::Info(args)) => info::run(&args),
+        Some(Command::Topics(args)) => topics::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Doctor(args)) => doctor::run(&args),
         Some(Command::Completions(args)) => pages::completions(&args),

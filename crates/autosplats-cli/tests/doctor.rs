@@ -50,8 +50,8 @@ fn a_temporary_folder_that_is_none_is_named() {
     assert!(text.contains("broken") && text.contains("absent cannot be written"), "{text}");
 }
 
-const COMMANDS: [&str; 10] =
-    ["view", "render", "convert", "normals", "demo", "info", "bench", "doctor", "completions", "man"];
+const COMMANDS: [&str; 11] =
+    ["view", "render", "convert", "normals", "demo", "info", "topics", "bench", "doctor", "completions", "man"];
 
 #[test]
 fn completions_know_all_commands() {

@@ -99,6 +99,14 @@ pub enum Error {
         /// Why it cannot be.
         why: String,
     },
+    /// An address of live points makes no sense, or nobody is there.
+    #[error("{address}: {what}")]
+    Remote {
+        /// The address that was given.
+        address: String,
+        /// What is wrong with it, and the remedy.
+        what: String,
+    },
     /// [`Progress::cancelled`](crate::Progress::cancelled) asked to stop.
     #[error("cancelled")]
     Cancelled,

@@ -46,6 +46,8 @@ pub use read::{
     read_mesh, read_mesh_bytes, read_with,
 };
 pub use sample::sample_surface;
+#[cfg(feature = "zenoh")]
+pub use source::remote;
 pub use source::{
     PlayOptions, Source,
     animation::{Animation, Playback},

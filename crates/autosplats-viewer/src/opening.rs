@@ -198,6 +198,7 @@ impl App {
                 std::path::absolute(path).unwrap_or_else(|_| path.clone()).display().to_string()
             }
             Source::Sequence(name) => std::path::absolute(name).unwrap_or_else(|_| name.into()).display().to_string(),
+            Source::Remote(address) => address.clone(),
             Source::Scene(..) | Source::StandardInput => input.name.clone(),
         }
     }

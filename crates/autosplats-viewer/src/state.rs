@@ -175,7 +175,8 @@ impl State {
             app.settle(|document| document.clip = clip);
         }
         for InputState { source, visible, tint, pose, options } in inputs {
-            let name = if source.starts_with("scene:") { source } else { folder.join(source).display().to_string() };
+            let address = source.starts_with("scene:") || source.contains("://");
+            let name = if address { source } else { folder.join(source).display().to_string() };
             match Input::parse(&name) {
                 // Named when the program was started, too.
                 Ok(input)

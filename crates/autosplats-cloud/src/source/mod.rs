@@ -6,6 +6,8 @@ pub(crate) mod live;
 pub(crate) mod player;
 pub mod point_cloud2;
 pub(crate) mod recording;
+#[cfg(feature = "zenoh")]
+pub mod remote;
 pub(crate) mod scanner;
 pub(crate) mod scene;
 pub(crate) mod stream;
@@ -29,6 +31,8 @@ use crate::{Error, PointCloud, Progress, ReadOptions, Scene, read_mesh, read_wit
 
 /// What begins the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
+/// What begins the address of points over Zenoh.
+const REMOTE_PREFIX: &str = "zenoh://";
 /// Bytes that a generated point takes: position and colour.
 const BYTES_PER_GENERATED_POINT: u64 = 16;
 /// Files of a sequence that are shown in a second.
@@ -51,6 +55,8 @@ pub enum Source {
     Recording(PathBuf),
     /// PLY and PCD files, one after the other, from standard input.
     StandardInput,
+    /// Topics of ROS 2 over Zenoh, by their address; played with the feature `zenoh` only.
+    Remote(String),
 }
 
 /// How what moves is played.
@@ -75,7 +81,7 @@ pub struct PlayOptions {
 }
 
 impl Source {
-    /// What a name means: `scene:NAME[:COUNT][@SECONDS]`; `-`, standard input; a folder, or a pattern with `*` or `?` that is no
+    /// What a name means: `scene:NAME[:COUNT][@SECONDS]`; `zenoh://[HOST[:PORT]]/TOPIC`; `-`, standard input; a folder, or a pattern with `*` or `?` that is no
     /// file, for a sequence or a recording; a recording by its extension (`.mcap`, `.bag`, `.db3`); or else a file, which need
     /// not exist.
     ///
@@ -88,6 +94,8 @@ impl Source {
             Ok(Self::Scene(scene, count))
         } else if name == "-" {
             Ok(Self::StandardInput)
+        } else if name.starts_with(REMOTE_PREFIX) {
+            Ok(Self::Remote(name.into()))
         } else if is_recording(path) {
             Ok(Self::Recording(path.into()))
         } else if path.is_dir() || name.contains(['*', '?']) && !path.exists() {
@@ -101,7 +109,7 @@ impl Source {
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::File(path) | Self::Recording(path) => Some(path),
-            Self::Scene(..) | Self::Sequence(_) | Self::StandardInput => None,
+            Self::Scene(..) | Self::Sequence(_) | Self::StandardInput | Self::Remote(_) => None,
         }
     }
 
@@ -115,7 +123,7 @@ impl Source {
 
     /// Whether its points change by themselves. Files and scenes can be [played](Self::play) as well.
     pub fn moves(&self) -> bool {
-        matches!(self, Self::Sequence(_) | Self::Recording(_) | Self::StandardInput)
+        matches!(self, Self::Sequence(_) | Self::Recording(_) | Self::StandardInput | Self::Remote(_))
     }
 
     /// Reads or generates the cloud; of what moves, the first.
@@ -152,6 +160,13 @@ impl Source {
             Self::StandardInput => {
                 let options = LiveOptions { read: options.clone(), ..LiveOptions::default() };
                 return Self::plain(Live::bytes(std::io::stdin(), "standard input", &options)?, play);
+            }
+            #[cfg(feature = "zenoh")]
+            Self::Remote(address) => return Self::plain(remote::Remote::open(address, options)?, play),
+            #[cfg(not(feature = "zenoh"))]
+            Self::Remote(address) => {
+                let why = "this build has no Zenoh; it takes one with the feature 'zenoh'".into();
+                return Err(Error::NoFrames { name: address.clone(), why });
             }
             Self::Sequence(name) if play.watch => return Self::plain(Live::watch(name.as_ref(), options)?, play),
             Self::Sequence(name) => Animation::sequence(name, play.fps.unwrap_or(SEQUENCE_FPS), options, progress)?,
@@ -205,6 +220,7 @@ mod tests {
         assert!(matches!(kind("drive.mcap"), Source::Recording(_)), "by its extension");
         assert!(matches!(kind("a.ply"), Source::File(_)), "it need not exist");
         assert!(matches!(kind("-"), Source::StandardInput), "as everywhere");
+        assert!(matches!(kind("zenoh://robot/points"), Source::Remote(_)), "an address");
         assert!(matches!(kind("scene:statue:1K"), Source::Scene(_, 1000)), "a scene");
         std::fs::write(path("metadata.yaml"), "rosbag2_bagfile_information:").expect("a file");
         assert!(matches!(kind(&path("")), Source::Recording(_)), "a folder of ROS 2");

@@ -75,6 +75,8 @@ pub struct Statistics {
     pub last_refusal: Option<String>,
     /// Times that a connection was made anew.
     pub reconnected: u64,
+    /// Why nothing comes over a connection, in a line, while that is so.
+    pub waiting: Option<String>,
 }
 
 /// When the frames of a stream happen, in order.

@@ -10,6 +10,8 @@ use std::{
 
 pub(crate) mod recording;
 pub(crate) mod ros;
+#[cfg(feature = "zenoh")]
+pub(crate) mod zenoh_peer;
 
 use autosplats_cloud::{Axes, Error, FieldValues, PointCloud, glam::DVec3, read};
 

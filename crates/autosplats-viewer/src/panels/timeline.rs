@@ -61,7 +61,10 @@ fn statistics(app: &App, ui: &mut egui::Ui) {
             ui.weak(format!("{} dropped", statistics.dropped))
                 .on_hover_text("Newer points came before they were shown");
         }
-        ui.weak(format!("{} received", statistics.taken));
+        match statistics.waiting {
+            Some(why) => ui.weak(why),
+            None => ui.weak(format!("{} received", statistics.taken)),
+        };
         ui.strong("live");
     }
 }

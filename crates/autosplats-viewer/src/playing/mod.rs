@@ -78,6 +78,7 @@ impl Playing {
                 refused: sum.refused + next.refused,
                 last_refusal: next.last_refusal.or(sum.last_refusal),
                 reconnected: sum.reconnected + next.reconnected,
+                waiting: next.waiting.or(sum.waiting),
             }
         })
     }

@@ -1,0 +1,160 @@
+//! The thread that holds the connection.
+//!
+//! # How it works
+//!
+//! Opening and closing wait for the network, so that a thread of its own does both and whoever takes points never waits for it.
+//! It asks again until somebody answers. From then on Zenoh itself asks again when the connection is lost; the
+//! thread only watches who is there, and follows what bridges begin to publish.
+
+use std::{
+    collections::BTreeMap,
+    io,
+    net::{TcpStream, ToSocketAddrs as _},
+    sync::Arc,
+    thread,
+    time::Duration,
+};
+
+use zenoh::{
+    Config, Session, Wait as _,
+    pubsub::Subscriber,
+    sample::{Sample, SampleKind},
+};
+
+use super::{address::Address, graph::Graph, state::Shared};
+
+/// Between two attempts to open a connection.
+const RETRY: Duration = Duration::from_secs(1);
+/// Between two looks at who is there.
+const LOOK: Duration = Duration::from_millis(100);
+/// For an answer to why nobody answers.
+const PROBE: Duration = Duration::from_secs(1);
+/// What nodes of rmw_zenoh connect to, since they do not call out on the network.
+const OWN_ROUTER: &str = "tcp/localhost:7447";
+
+/// Begins to hear what an address means, until it is [stopped](Shared::stop).
+pub(super) fn start(address: Address, shared: Arc<Shared>) -> io::Result<()> {
+    thread::Builder::new().name("zenoh link".into()).spawn(move || run(&address, &shared)).map(drop)
+}
+
+fn run(address: &Address, shared: &Arc<Shared>) {
+    let session = loop {
+        match open(address) {
+            Ok(session) => break session,
+            Err(fault) => shared.lock().connection.fault = Some(fault),
+        }
+        if shared.stopped(RETRY) {
+            return;
+        }
+    };
+    // Before the first message can come.
+    look(&session, shared);
+    let mut heard = BTreeMap::new();
+    let mut tokens = Vec::new();
+    let keys = if address.topic.is_empty() { Vec::new() } else { address.keys() };
+    let declared = keys.into_iter().try_for_each(|key| hear(&session, key, shared, &mut heard)).and_then(|()| {
+        Graph::keys(address).iter().try_for_each(|key| {
+            tokens.push(watch(&session, key, shared)?);
+            Ok(())
+        })
+    });
+    if let Err(error) = declared {
+        shared.lock().refuse(format!("nothing can be subscribed to: {error}"));
+    }
+    while !shared.stopped(LOOK) {
+        look(&session, shared);
+        let state = shared.lock();
+        let mut wanted = Vec::new();
+        if state.listen && !heard.contains_key("**") {
+            wanted.push("**".to_owned());
+        }
+        if address.is_pattern() {
+            wanted.extend(state.graph.bridged(address).into_iter().filter(|key| !heard.contains_key(key)));
+        }
+        drop(state);
+        for key in wanted {
+            if let Err(error) = hear(&session, key, shared, &mut heard) {
+                shared.lock().refuse(error.to_string());
+            }
+        }
+    }
+}
+
+/// Who is there?
+fn look(session: &Session, shared: &Shared) {
+    let info = session.info();
+    let others = info.routers_zid().wait().chain(info.peers_zid().wait()).collect();
+    shared.lock().others(others);
+}
+
+/// What holds subscriptions.
+type Heard = BTreeMap<String, Subscriber<()>>;
+
+/// Subscribes to messages.
+fn hear(session: &Session, key: String, shared: &Arc<Shared>, heard: &mut Heard) -> zenoh::Result<()> {
+    let shared = shared.clone();
+    let put = move |sample: Sample| {
+        if sample.kind() == SampleKind::Put {
+            shared.put(sample.key_expr().as_str(), sample.payload().clone());
+        }
+    };
+    heard.insert(key.clone(), session.declare_subscriber(key).callback(put).wait()?);
+    Ok(())
+}
+
+/// Subscribes to tokens of publishers, those included that are there already.
+fn watch(session: &Session, key: &str, shared: &Arc<Shared>) -> zenoh::Result<Subscriber<()>> {
+    let shared = shared.clone();
+    let seen = move |sample: Sample| {
+        let graph = &mut shared.lock().graph;
+        match sample.kind() {
+            SampleKind::Put => graph.insert(sample.key_expr().as_str()),
+            SampleKind::Delete => graph.remove(sample.key_expr().as_str()),
+        }
+    };
+    session.liveliness().declare_subscriber(key.to_owned()).history(true).callback(seen).wait()
+}
+
+/// Connects, or says why that cannot be.
+fn open(address: &Address) -> Result<Session, String> {
+    let config = config(address).map_err(|error| error.to_string())?;
+    zenoh::open(config).wait().map_err(|error| match &address.host {
+        Some((host, port)) => why_unreachable(host, *port),
+        None => error.to_string(),
+    })
+}
+
+/// A client of the host that is named; otherwise a peer that finds others and listens to nobody it did not find.
+fn config(address: &Address) -> zenoh::Result<Config> {
+    let mut config = Config::default();
+    let (mode, endpoint) = match address.endpoint() {
+        Some(endpoint) => ("client", endpoint),
+        None => ("peer", OWN_ROUTER.into()),
+    };
+    let scouting = if address.host.is_none() { "true" } else { "false" };
+    for (name, value) in [
+        ("mode", serde_json::to_string(mode)?.as_str()),
+        ("connect/endpoints", &serde_json::to_string(&[endpoint])?),
+        ("connect/retry", r#"{ "period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 2 }"#),
+        ("listen/endpoints", "[]"),
+        ("scouting/multicast/enabled", scouting),
+        ("scouting/multicast/listen", "false"),
+    ] {
+        config.insert_json5(name, value)?;
+    }
+    Ok(config)
+}
+
+/// Zenoh only says that it cannot connect.
+fn why_unreachable(host: &str, port: u16) -> String {
+    let bare = host.trim_start_matches('[').trim_end_matches(']');
+    let Some(first) = (bare, port).to_socket_addrs().ok().and_then(|mut addresses| addresses.next()) else {
+        return format!("no machine is known as '{host}'");
+    };
+    match TcpStream::connect_timeout(&first, PROBE) {
+        Ok(_) => "something else answers there".into(),
+        Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => "nobody listens there".into(),
+        Err(error) if error.kind() == io::ErrorKind::TimedOut => "the machine does not answer".into(),
+        Err(error) => error.to_string(),
+    }
+}
