@@ -53,7 +53,9 @@ fn points_outside_the_picture() {
 fn files_that_are_no_clouds() {
     let folder = Folder::with_sphere();
     folder.fail(&render("missing.ply"), 3, &["missing.ply"]);
-    folder.fail(&render("."), 3, &["folder"]);
+    std::fs::create_dir(folder.path("nothing")).expect("a folder");
+    folder.fail(&render("nothing"), 3, &["nothing", "no files in this folder"]);
+    folder.fail(&render("nothing/*.ply"), 3, &["nothing/*.ply", "no file has such a name"]);
     folder.write("unknown.doc", "no points\n");
     folder.fail(&render("unknown.doc"), 3, &["unknown.doc", "PLY"]);
     folder.write("empty.ply", "");

@@ -103,7 +103,6 @@ impl Examiner {
     fn moving(&self, name: &str, source: &Source, report: &mut Report) -> Result<(), Error> {
         let bar = Bar::new(&format!("reading {name}"), self.quiet);
         let listener = Listener { bar: &bar, notes: Mutex::default() };
-        report.format = Some("files that follow each other".into());
         if let Source::Recording(path) = source {
             let summary = describe_recording(path, &listener)?;
             report.file_bytes = path.metadata().ok().filter(|data| data.is_file()).map(|data| data.len());
@@ -120,6 +119,7 @@ impl Examiner {
             report.warn(note);
         }
         drop(bar);
+        report.format.get_or_insert_with(|| "files that follow each other".into());
         report.warn("points, bounds and attributes are those of the first frame".into());
         report.scan(&cloud, &[]);
         Ok(())

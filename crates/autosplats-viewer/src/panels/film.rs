@@ -3,13 +3,14 @@
 use std::sync::{Arc, OnceLock};
 
 use autosplats::{Camera, MAX_SIDE};
+use autosplats_film::{Error, Target, has_ffmpeg};
 use eframe::egui;
 
 use super::target_file::{TargetFile, Words};
 use crate::animation::{path, turntable};
 use crate::app::App;
 use crate::output;
-use crate::recording::{Recording, Target, has_ffmpeg};
+use crate::recording::Recording;
 use crate::threads::spawn;
 
 /// What is being asked and what is being played.
@@ -185,7 +186,8 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
         film.target.forget();
     }
     let problem = match Target::new(&film.target.path()) {
-        Err(problem) => Some(problem),
+        Err(Error::Name { why, .. }) => Some(why[..1].to_uppercase() + &why[1..]),
+        Err(error) => Some(error.to_string()),
         Ok(Target::Film(_)) if ffmpeg == Some(false) => {
             Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
         }

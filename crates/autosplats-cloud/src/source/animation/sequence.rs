@@ -98,7 +98,9 @@ fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
 fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<PathBuf>, Error> {
     let no_frames = |why: String| Error::NoFrames { name: name.into(), why };
     if files.is_empty() {
-        return Err(no_frames("there are no files".into()));
+        let folder = Path::new(name).is_dir();
+        let why = if folder { "there are no files in this folder" } else { "no file has such a name" };
+        return Err(no_frames(why.into()));
     }
     let looked =
         files.into_par_iter().filter(|file| is_named_as_cloud(file)).map(|file| (describe(&file, options), file));
