@@ -128,9 +128,9 @@ impl Inputs {
         // What would be passed over otherwise asks for files and scenes to be played as well.
         let played = play.fps.is_some() || play.scanners.is_some() || play.sample.is_some();
         let input = |Input { name, source, world_from_input }| {
-            let file = source.path().and_then(Path::file_name).map(|file| file.to_string_lossy().into_owned());
             let (options, play) = (options.clone(), play.clone());
-            autosplats_viewer::Input { name: file.unwrap_or(name), source, options, play, played, world_from_input }
+            let name = source.short_name().unwrap_or(name);
+            autosplats_viewer::Input { name, source, options, play, played, world_from_input }
         };
         list.into_iter().map(input).collect()
     }

@@ -102,7 +102,8 @@ struct WishKey {
     size: [u32; 2],
     look: Look,
     axes: Axes,
-    moving: bool,
+    /// Whether another one is to follow soon.
+    hurried: bool,
 }
 
 impl App {
@@ -238,11 +239,16 @@ impl App {
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
             axes: self.up_axis,
-            budget_ms: moving.then(|| {
-                let both_ms = self.look.moving_ms;
-                self.turns.as_ref().map_or(both_ms, |turns| turns.budget_ms(both_ms))
-            }),
+            budget_ms: self
+                .both_ms(moving)
+                .map(|both_ms| self.turns.as_ref().map_or(both_ms, |turns| turns.budget_ms(both_ms))),
         }
+    }
+
+    /// Milliseconds that a picture and the window may take: as the view moves, or until the next frame of what is played.
+    fn both_ms(&self, moving: bool) -> Option<f64> {
+        let least_ms = self.look.moving_ms;
+        if moving { Some(least_ms) } else { self.playing.frame_ms().map(|frame_ms| frame_ms.max(least_ms)) }
     }
 
     /// Asks for a picture if it would be another one than was asked for last.
@@ -272,7 +278,8 @@ impl App {
         // It lies over the picture here, where it stays as large when pictures become coarse.
         look.settings.shading.legend = false;
         let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
-        let key = WishKey { version, camera, size, look, axes, moving };
+        let hurried = self.both_ms(moving).is_some();
+        let key = WishKey { version, camera, size, look, axes, hurried };
         if self.wished.as_ref() != Some(&key) {
             self.render.wish(Wish { settings: key.look.settings.clone(), ..self.wish(size, moving) });
             self.wished = Some(key);
@@ -285,9 +292,9 @@ impl App {
         let Some(turns) = &mut self.turns else { return };
         turns.begin();
         let now = context.input(|input| input.time);
-        let longest = turns.longest(self.look.moving_ms);
-        let moves = now - self.moved < REST && self.awaited;
-        if let Some(answer) = moves.then(|| self.render.answer_within(longest)).flatten() {
+        let both_ms = self.both_ms(now - self.moved < REST).filter(|_| self.awaited);
+        let longest = both_ms.and_then(|both_ms| Some(self.turns.as_ref()?.longest(both_ms)));
+        if let Some(answer) = longest.and_then(|longest| self.render.answer_within(longest)) {
             self.take(answer, now);
         }
         if let Some(turns) = &mut self.turns {

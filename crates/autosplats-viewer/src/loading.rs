@@ -1,6 +1,6 @@
 //! Reading beside the window: points are shown as they arrive, and changed files read again.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -45,7 +45,7 @@ impl Input {
     /// [`Error::UnknownScene`] and [`Error::BadScene`].
     pub fn parse(name: &str) -> Result<Self, Error> {
         let source = Source::parse(name)?;
-        let name = source.path().and_then(Path::file_name).map_or(name.into(), |file| file.to_string_lossy().into());
+        let name = source.short_name().unwrap_or_else(|| name.into());
         Ok(Self::usual(name, source))
     }
 

@@ -113,6 +113,16 @@ impl Source {
         }
     }
 
+    /// The last part of its path, pattern or address; none of what has no such thing.
+    pub fn short_name(&self) -> Option<String> {
+        let path = match self {
+            Self::File(path) | Self::Recording(path) => path,
+            Self::Sequence(name) | Self::Remote(name) => Path::new(name),
+            Self::Scene(..) | Self::StandardInput => return None,
+        };
+        path.file_name().map(|name| name.to_string_lossy().into_owned())
+    }
+
     /// Bytes that will be taken at least, as far as that is known without a look at it.
     pub fn least_bytes(&self) -> u64 {
         match self {
@@ -221,6 +231,11 @@ mod tests {
         assert!(matches!(kind("a.ply"), Source::File(_)), "it need not exist");
         assert!(matches!(kind("-"), Source::StandardInput), "as everywhere");
         assert!(matches!(kind("zenoh://robot/points"), Source::Remote(_)), "an address");
+        let short = |name: &str| kind(name).short_name();
+        assert_eq!(short("a/b/scan.ply").as_deref(), Some("scan.ply"));
+        assert_eq!(short("a/f_*.ply").as_deref(), Some("f_*.ply"));
+        assert_eq!(short("zenoh://robot/points").as_deref(), Some("points"));
+        assert_eq!(short("-"), None, "a pipe is called as it is");
         assert!(matches!(kind("scene:statue:1K"), Source::Scene(_, 1000)), "a scene");
         std::fs::write(path("metadata.yaml"), "rosbag2_bagfile_information:").expect("a file");
         assert!(matches!(kind(&path("")), Source::Recording(_)), "a folder of ROS 2");

@@ -17,12 +17,12 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         ui.horizontal(|ui| {
             let timeline = app.playing.has_timeline();
             if timeline {
-                button(app, ui, Command::StepBack, "⏮");
+                button(app, ui, Command::StepBack, Sign::Back);
             }
-            let sign = if app.playing.clock.playing { "⏸" } else { "▶" };
+            let sign = if app.playing.clock.playing { Sign::Pause } else { Sign::Play };
             button(app, ui, Command::Play, sign);
             if timeline {
-                button(app, ui, Command::StepForward, "⏭");
+                button(app, ui, Command::StepForward, Sign::Forward);
             }
             // From the right what is small, then the time with all that is left.
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -38,9 +38,46 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     app.panels.focus.part(shown.response.rect);
 }
 
-fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: &str) {
+/// What is drawn on a button: the fonts have no such signs.
+#[derive(Clone, Copy)]
+enum Sign {
+    Play,
+    Pause,
+    Back,
+    Forward,
+}
+
+impl Sign {
+    /// Draws it about the middle of a button.
+    fn draw(self, painter: &egui::Painter, middle: egui::Pos2, color: egui::Color32) {
+        let bar = |x: f32| {
+            let rect = egui::Rect::from_center_size(middle + egui::vec2(x, 0.0), egui::vec2(2.5, 10.0));
+            painter.rect_filled(rect, 0.0, color);
+        };
+        // Towards the right, or the left.
+        let arrow = |x: f32, to: f32| {
+            let corners = [[x - to, -5.0], [x + to, 0.0], [x - to, 5.0]].map(|[x, y]| middle + egui::vec2(x, y));
+            painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, egui::Stroke::NONE));
+        };
+        match self {
+            Self::Play => arrow(0.0, 4.5),
+            Self::Pause => [-3.0, 3.0].into_iter().for_each(bar),
+            Self::Back => {
+                bar(-5.0);
+                arrow(1.0, -4.0);
+            }
+            Self::Forward => {
+                arrow(-1.0, 4.0);
+                bar(5.0);
+            }
+        }
+    }
+}
+
+fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: Sign) {
     let tip = format!("{} ({})", command.tooltip(), command.key(ui.ctx()));
-    let response = ui.button(sign).on_hover_text(tip);
+    let response = ui.add(egui::Button::new("").min_size(egui::vec2(30.0, 0.0))).on_hover_text(tip);
+    sign.draw(ui.painter(), response.rect.center(), ui.style().interact(&response).fg_stroke.color);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, command.label()));
     if response.clicked() {
         let context = ui.ctx().clone();

@@ -17,6 +17,9 @@ use crate::app::App;
 use crate::document::{Layer, LayerId};
 use crate::loading::Input;
 
+/// Milliseconds that a picture of something live may take, whenever the next one comes.
+const LIVE_MS: f64 = 100.0;
+
 /// All that moves.
 #[derive(Default)]
 pub(crate) struct Playing {
@@ -67,6 +70,18 @@ impl Playing {
     /// Whether a part of it is live.
     pub(crate) fn is_live(&self) -> bool {
         self.streams.iter().any(|moving| matches!(moving.thread.timeline(), Some(None)))
+    }
+
+    /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second.
+    pub(crate) fn frame_ms(&self) -> Option<f64> {
+        if !self.clock.playing || self.is_empty() {
+            return None;
+        }
+        let each = self
+            .timelines()
+            .filter(|timeline| timeline.len() > 1)
+            .map(|timeline| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
+        each.chain(self.is_live().then_some(LIVE_MS)).reduce(f64::min)
     }
 
     /// What became of all updates.
