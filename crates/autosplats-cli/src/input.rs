@@ -126,8 +126,16 @@ impl Inputs {
         self.play.watch = watch;
         let Self { list, options, play } = self;
         // What would be passed over otherwise asks for files and scenes to be played as well.
-        let played = play.fps.is_some() || play.scanners.is_some() || play.sample.is_some();
+        let made = play.scanners.is_some() || play.sample.is_some();
+        let looked_at = |source: &Source| match source {
+            Source::Scene(..) => true,
+            Source::File(path) => {
+                path.extension().is_some_and(|end| end.eq_ignore_ascii_case("glb") || end.eq_ignore_ascii_case("gltf"))
+            }
+            _ => false,
+        };
         let input = |Input { name, source, world_from_input }| {
+            let played = made || play.fps.is_some() && looked_at(&source);
             let (options, play) = (options.clone(), play.clone());
             let name = source.short_name().unwrap_or(name);
             autosplats_viewer::Input { name, source, options, play, played, world_from_input }

@@ -46,6 +46,9 @@ impl Film {
         let part = temporary(path).map_err(|source| Error::Io { path: path.into(), source })?;
         let mut command = command(&part);
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+        // Ctrl-C is for us: what is not finished is removed then.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(Error::NoFfmpeg)?;
         let input = child.stdin.take();
         let words = child.stderr.take().map(|mut pipe| {

@@ -20,7 +20,7 @@ mod film;
 mod target;
 
 pub use film::{Film, has_ffmpeg};
-pub use target::{Frames, Target};
+pub use target::{Frames, Target, has_number};
 
 use std::path::PathBuf;
 

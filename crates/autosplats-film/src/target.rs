@@ -76,8 +76,13 @@ impl Frames {
     }
 }
 
-/// Whether the name says where a number goes.
-pub(crate) fn number(name: &str) -> Option<(std::ops::Range<usize>, usize)> {
+/// Whether a name says where a number goes, as `f_%05d.png`.
+pub fn has_number(name: &str) -> bool {
+    number(name).is_some()
+}
+
+/// Where the number goes, and how many digits it has at least.
+fn number(name: &str) -> Option<(std::ops::Range<usize>, usize)> {
     name.match_indices('%').find_map(|(start, _)| {
         let rest = &name[start + 1..];
         let end = rest.find('d')?;
@@ -111,6 +116,7 @@ mod tests {
         assert_eq!(file("%d.png", 12), "12.png", "as wide as it is");
         assert_eq!(file("100%_done.png", 1), "100%_done_00001.png", "a percent sign alone is one");
         assert_eq!(file("f%02d.png", 12345), "f12345.png", "no digit is lost");
+        assert!(has_number("f%02d.png") && !has_number("50%.png"), "a percent sign alone is none");
         for name in ["film", "film.gif", "a%d_%d.png"] {
             assert!(matches!(Target::new(Path::new(name)), Err(Error::Name { .. })), "{name} is none");
         }

@@ -180,6 +180,10 @@ impl App {
     /// Reads the file of an input again; one with edits is only told about, as they are of the points it had.
     pub(crate) fn reload_layer(&mut self, id: LayerId) {
         let Some(input) = self.inputs.get(&id).cloned() else { return };
+        if input.moves() {
+            self.messages.note(format!("{} is played as it was opened; open it anew for what has changed", input.name));
+            return;
+        }
         if self.history.is_unsaved(id) {
             self.messages.note(format!("{} has changed; it was not read again, as it has edits here", input.name));
             return;

@@ -180,8 +180,8 @@ impl State {
             match Input::parse(&name) {
                 // Named when the program was started, too.
                 Ok(input)
-                    if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input)) => {
-                }
+                    if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input))
+                        || app.playing.has(&App::source_name(&input)) => {}
                 Ok(input) => {
                     let input = Input { world_from_input: pose, options: options.read(), ..input };
                     app.open_as(input, visible, tint);

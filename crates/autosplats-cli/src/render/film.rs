@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-use autosplats::{Camera, Counts, Image, Renderer, Timings};
+use autosplats::{Camera, ColorMode, Counts, Image, Renderer, Timings};
 use autosplats_cloud::glam::DMat4;
 use autosplats_cloud::{Axes, LocalMetres, Player, PointCloud, Progress};
-use autosplats_film::{Error, Film, Frames, Target, has_ffmpeg};
+use autosplats_film::{Error, Film, Frames, Target, has_ffmpeg, has_number};
 use serde::Serialize;
 
 use super::job::Job;
@@ -48,7 +48,7 @@ impl FilmJob {
         let many = |path: &PathBuf| {
             let name = path.to_string_lossy();
             let film = Target::new(path).is_ok_and(|target| matches!(target, Target::Film(_)));
-            film || name.contains('%') && Target::new(path).is_ok()
+            film || has_number(&name) && Target::new(path).is_ok()
         };
         if frames.is_none() && !resume && !outputs.iter().any(many) {
             return Ok(None);
@@ -114,6 +114,7 @@ pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Re
     if let Some(path) = &job.save_camera {
         camera::save(path, &camera)?;
     }
+    scene.settle_range(job, renderer, &camera, axes, frames.start)?;
     let rate = film.fps.unwrap_or_else(|| scene.rate());
     let bar = Bar::on_input(&format!("rendering {} frames", frames.len()), &scene.names, job.quiet);
     let begun = Instant::now();
@@ -122,7 +123,8 @@ pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Re
     let (size, alpha) = (job.size, job.transparent());
     let target = film.target.clone();
     std::thread::scope(|scope| {
-        let writer = scope.spawn(move || write(&queue, &target, size, rate, alpha));
+        let count = frames.len();
+        let writer = scope.spawn(move || write(&queue, &target, count, size, rate, alpha));
         let rendered = (|sender: SyncSender<(usize, Image)>| {
             for frame in frames.clone() {
                 if interrupt::requested() {
@@ -137,7 +139,7 @@ pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Re
                     continue;
                 }
                 let started = Instant::now();
-                let cloud = scene.frame(frame, axes, &bar)?;
+                let cloud = scene.frame(frame, axes, &Notes(&bar))?;
                 let read_ms = super::milliseconds_since(started);
                 let shot = scene.draw(job, renderer, &cloud, &camera)?;
                 milliseconds += shot.timings.frame;
@@ -181,6 +183,21 @@ pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Re
         );
     }
     Ok(())
+}
+
+/// Tells what frames have to say; how far each is counts for nothing in all of them.
+struct Notes<'a>(&'a Bar);
+
+impl Progress for Notes<'_> {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+
+    fn note(&self, note: &str) {
+        self.0.note(note);
+    }
 }
 
 /// A picture and what is known of it.
@@ -253,7 +270,7 @@ impl Moving {
             }
             None => PointCloud::default(),
         };
-        if self.metres.is_none() {
+        if self.metres.is_none() && !cloud.is_empty() {
             self.metres = cloud.local_metres(None);
         }
         if let Some(metres) = &self.metres {
@@ -289,15 +306,31 @@ impl Moving {
         job.camera.place(&all, job.inputs.only_scene(), job.size)
     }
 
-    /// Renders a frame. The range of a colour map is that of the first one, so that colours mean the same in all.
-    fn draw(
-        &self,
+    /// Takes the range of a colour map from the first frame, so that colours mean the same in all.
+    fn settle_range(
+        &mut self,
         job: &mut Job,
         renderer: &mut Renderer,
-        cloud: &PointCloud,
         camera: &Camera,
-    ) -> Result<Shot, Failure> {
+        axes: Axes,
+        first: usize,
+    ) -> Result<(), Failure> {
+        let plain = matches!(job.settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
+        if job.settings.shading.range.is_none() && !plain {
+            let cloud = self.frame(first, axes, &())?;
+            let range = self.draw(job, renderer, &cloud, camera)?.counts.value_range;
+            job.settings.shading.range = range.map(|ends| ends.map(|end| end as f32));
+        }
+        Ok(())
+    }
+
+    /// Renders a frame.
+    fn draw(&self, job: &Job, renderer: &mut Renderer, cloud: &PointCloud, camera: &Camera) -> Result<Shot, Failure> {
         let mut settings = job.settings.clone();
+        if cloud.is_empty() {
+            // No points have no colours either, and show the background.
+            settings.shading.color = ColorMode::Plain;
+        }
         settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
         let frame = renderer.render(cloud, camera, job.rendered_size(), &settings).map_err(render_failure)?;
         let image = if job.supersample > 1 {
@@ -306,10 +339,6 @@ impl Moving {
             let Image { width, height, ref pixels, .. } = *frame.image;
             Image { width, height, pixels: pixels.clone(), linear: Vec::new() }
         };
-        let shading = &mut job.settings.shading;
-        if shading.range.is_none() {
-            shading.range = frame.counts.value_range.map(|ends| ends.map(|end| end as f32));
-        }
         Ok(Shot { image, counts: frame.counts, timings: frame.timings })
     }
 }
@@ -318,6 +347,7 @@ impl Moving {
 fn write(
     queue: &Receiver<(usize, Image)>,
     target: &Target,
+    count: usize,
     size: [u32; 2],
     rate: f64,
     alpha: bool,
@@ -328,13 +358,16 @@ fn write(
             // What is there of the film is gone before Ctrl-C ends the program.
             let _writing = interrupt::writing();
             let mut film = Film::begin(path, size, rate).map_err(film_failure)?;
+            let mut added = 0;
             for (_, image) in queue {
                 film.add(&image).map_err(film_failure)?;
+                added += 1;
             }
             if interrupt::requested() {
                 return Err(Failure::interrupted());
             }
-            film.finish().map_err(film_failure)
+            // Whoever sent too few says why.
+            if added == count { film.finish().map_err(film_failure) } else { Ok(()) }
         }
     }
 }
@@ -344,5 +377,5 @@ fn write_frame(names: &Frames, frame: usize, image: &Image, alpha: bool) -> Resu
 }
 
 fn film_failure(error: Error) -> Failure {
-    Failure::new(Exit::Output, error)
+    if interrupt::requested() { Failure::interrupted() } else { Failure::new(Exit::Output, error) }
 }

@@ -8,14 +8,18 @@ use std::{
 use glam::DMat4;
 
 use super::latest::{Latest, LatestOptions};
-use crate::{Error, Next, PointCloud, Progress, Stream};
+use crate::{Error, Next, PointCloud, Progress, Stream, Update};
 
 /// How long a wait may last before somebody may cancel it.
 const STEP: Duration = Duration::from_millis(100);
 
+/// Frames before one that cannot be read among which one is looked for that can.
+const STEPS_BACK: usize = 16;
+
 /// Plays a stream: makes the cloud that is to be seen at a frame of its timeline, or now.
 ///
-/// A frame is the same points whatever was played before it.
+/// A frame is the same points whatever was played before it, but for those that [decay](LatestOptions::decay) where frames cannot
+/// be read or channels have different rates: it counts from the newest of their channel.
 pub struct Player {
     stream: Box<dyn Stream>,
     options: LatestOptions,
@@ -50,24 +54,41 @@ impl Player {
             self.latest = begin(&self.options);
             (self.last, after) = (None, None);
         }
+        let fresh = after.is_none();
         for needed in self.needed(frame).into_iter().filter(|&needed| after.is_none_or(|after| needed > after)) {
-            self.stream.seek(needed);
-            for _ in 0..self.stream.updates_per_frame() {
-                match self.stream.next(Duration::ZERO, progress) {
-                    Ok(Next::Update(update)) => {
-                        self.latest.put(0, update);
-                    }
-                    Ok(Next::Nothing | Next::End) => break,
-                    Err(Error::Cancelled) => return Err(Error::Cancelled),
-                    Err(error) => {
-                        progress.note(&error.to_string());
-                        break;
-                    }
+            // Whoever comes here without what was before sees that instead of a frame that cannot be read, as all others do.
+            let least = if fresh { needed.saturating_sub(STEPS_BACK) } else { needed };
+            for other in (least..=needed).rev() {
+                if self.put(other, progress)? {
+                    break;
                 }
             }
         }
         self.last = Some(frame);
         Ok(self.latest.cloud())
+    }
+
+    /// Reads a frame; says whether that was possible.
+    fn put(&mut self, frame: usize, progress: &dyn Progress) -> Result<bool, Error> {
+        // By the time of the timeline, which is in order, and no two are of the same time: what messages say of themselves may
+        // stand still or overtake each other.
+        let stamp = self.stream.timeline().and_then(|timeline| timeline.stamps().get(frame).copied());
+        self.stream.seek(frame);
+        for _ in 0..self.stream.updates_per_frame() {
+            match self.stream.next(Duration::ZERO, progress) {
+                Ok(Next::Update(update)) => {
+                    let stamp = stamp.map_or(update.stamp, |stamp| stamp.saturating_add(frame as i64));
+                    self.latest.put(0, Update { stamp, ..update });
+                }
+                Ok(Next::Nothing | Next::End) => return Ok(false),
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                Err(error) => {
+                    progress.note(&error.to_string());
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
     }
 
     /// The first frame, or of a live stream the first update, which is waited for no longer than `patience`.

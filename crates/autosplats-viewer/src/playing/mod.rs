@@ -17,7 +17,7 @@ use crate::app::App;
 use crate::document::{Layer, LayerId};
 use crate::loading::Input;
 
-/// Milliseconds that a picture of something live may take, whenever the next one comes.
+/// Milliseconds that a picture of something that moves may take at most, and of what is live, whenever the next one comes.
 const LIVE_MS: f64 = 100.0;
 
 /// All that moves.
@@ -27,6 +27,8 @@ pub(crate) struct Playing {
     streams: Vec<Moving>,
     /// When the clock was advanced last, seconds of the window.
     time: Option<f64>,
+    /// The time of points with edits that are not saved.
+    edited_at: Option<f64>,
 }
 
 /// An input that moves.
@@ -50,6 +52,11 @@ impl Playing {
         let before = self.streams.len();
         self.streams.retain(|moving| moving.layer != Some(id));
         self.streams.len() < before
+    }
+
+    /// Whether something of this name is played.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.streams.iter().any(|moving| App::source_name(&moving.input) == name)
     }
 
     /// What is open but has no points yet.
@@ -81,7 +88,7 @@ impl Playing {
             .timelines()
             .filter(|timeline| timeline.len() > 1)
             .map(|timeline| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
-        each.chain(self.is_live().then_some(LIVE_MS)).reduce(f64::min)
+        each.chain(self.is_live().then_some(LIVE_MS)).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
     }
 
     /// What became of all updates.
@@ -109,16 +116,23 @@ impl Playing {
     pub(crate) fn step(&mut self, forward: bool) {
         self.clock.playing = false;
         let position = self.position();
-        let times = self.timelines().filter_map(|timeline| {
-            let frame = timeline.frame_at(position);
-            let other = if forward { frame + 1 } else { frame.checked_sub(1)? };
-            let stamps = timeline.stamps();
-            Some((stamps.get(other)? - stamps.first()?) as f64 * 1e-9)
-        });
-        let next = if forward { times.reduce(f64::min) } else { times.reduce(f64::max) };
+        // Times since the first frame: the one that is shown now, and those to choose from.
+        let mut now = 0;
+        let mut times: Vec<i64> = Vec::new();
+        for timeline in self.timelines() {
+            let first = timeline.stamps().first().copied().unwrap_or_default();
+            let since = |stamp: &i64| stamp.saturating_sub(first);
+            now = now.max(timeline.stamps().get(timeline.frame_at(position)).map_or(0, since));
+            times.extend(timeline.stamps().iter().map(since));
+        }
+        let next = if forward {
+            times.into_iter().filter(|&time| time > now).min()
+        } else {
+            times.into_iter().filter(|&time| time < now).max()
+        };
         if let Some(next) = next {
             // Half a nanosecond, lest rounding falls short of the frame.
-            self.clock.seek(next + 0.5e-9);
+            self.clock.seek(next as f64 * 1e-9 + 0.5e-9);
         }
     }
 
@@ -163,8 +177,11 @@ impl App {
         for (number, news) in news.into_iter().enumerate() {
             let name = self.playing.streams[number].input.name.clone();
             news.notes.into_iter().for_each(|note| self.messages.note(format!("{name}: {note}")));
-            if let Some(failure) = news.failure {
-                self.messages.error(failure);
+            if let Some(ending) = news.ending {
+                match ending {
+                    Ok(()) => self.messages.note(format!("{name} has ended")),
+                    Err(failure) => self.messages.error(failure),
+                }
                 ended.push(number);
             }
             if let Some(cloud) = news.cloud {
@@ -181,17 +198,22 @@ impl App {
         }
         let open: Vec<LayerId> = self.document().layers.iter().map(|layer| layer.id).collect();
         self.playing.streams.retain(|moving| moving.layer.is_none_or(|id| open.contains(&id)));
-        if self.playing.clock.playing && self.playing.has_timeline() {
+        if self.playing.clock.playing && self.playing.timelines().any(|timeline| timeline.len() > 1) {
             context.request_repaint();
         }
     }
 
-    /// Points that stand still can be edited; what moves on would lose that, and waits.
+    /// Points that stand still can be edited; what moves on would lose that, and stays at the time of the edits.
     fn keep_edits(&mut self) {
         let layers: Vec<LayerId> = self.playing.streams.iter().filter_map(|moving| moving.layer).collect();
         let unsaved = layers.iter().find(|id| self.history.is_unsaved(**id)).copied();
-        if let Some(id) = unsaved.filter(|_| self.playing.clock.playing) {
+        let position = self.playing.clock.position();
+        let edited_at = unsaved.map(|_| self.playing.edited_at.unwrap_or(position));
+        self.playing.edited_at = edited_at;
+        let moves = self.playing.clock.playing || edited_at.is_some_and(|at| at != position);
+        if let (Some(id), Some(at)) = (unsaved.filter(|_| moves), edited_at) {
             self.playing.clock.playing = false;
+            self.playing.clock.seek(at);
             let name = self.document().layer(id).map(|layer| layer.name.clone()).unwrap_or_default();
             self.messages.note(format!("{name} has edits that are not saved; export or undo them to play on"));
         }
@@ -206,13 +228,7 @@ impl App {
     fn show_frame(&mut self, number: usize, cloud: &Arc<PointCloud>) {
         let moving = &self.playing.streams[number];
         match moving.layer {
-            Some(id) if self.history.is_unsaved(id) => {}
-            Some(id) => {
-                self.fill(id, cloud);
-                if self.stands_by_itself() && self.playing.clock.position() == 0.0 {
-                    self.first_view();
-                }
-            }
+            Some(id) => self.fill(id, cloud),
             None if cloud.is_empty() => {}
             None => {
                 let Moving { input, visible, tint, .. } = moving;

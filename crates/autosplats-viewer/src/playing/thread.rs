@@ -3,13 +3,16 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use autosplats::cloud::{Error, PointCloud, Progress, Statistics, Timeline};
+use autosplats::cloud::{Error, PointCloud, Progress, ReadOptions, Statistics, Timeline};
 use eframe::egui;
 
 use crate::loading::Input;
 
 /// How long a live stream may keep silent before it is asked whether it is still wanted.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Notes that wait to be told.
+const MOST_NOTES: usize = 20;
 
 /// What has come since it was asked last.
 #[derive(Default)]
@@ -18,8 +21,8 @@ pub(crate) struct News {
     pub(crate) cloud: Option<Arc<PointCloud>>,
     /// What is to be told.
     pub(crate) notes: Vec<String>,
-    /// Why there will be no more.
-    pub(crate) failure: Option<String>,
+    /// That there will be no more, and what went wrong if something did.
+    pub(crate) ending: Option<Result<(), String>>,
 }
 
 /// What window and thread share.
@@ -58,12 +61,13 @@ impl StreamThread {
         let theirs = Arc::clone(&shared);
         crate::threads::spawn("play", move || {
             let work = std::panic::AssertUnwindSafe(|| run(&input, &theirs, &context));
-            let failure = match std::panic::catch_unwind(work) {
-                Ok(Ok(())) | Ok(Err(Error::Cancelled)) => return,
-                Ok(Err(error)) => error.to_string(),
-                Err(_) => format!("{}: playing it failed, which is a bug of this program", input.name),
+            let ending = match std::panic::catch_unwind(work) {
+                Ok(Ok(())) => Ok(()),
+                Ok(Err(Error::Cancelled)) => return,
+                Ok(Err(error)) => Err(error.to_string()),
+                Err(_) => Err(format!("{}: playing it failed, which is a bug of this program", input.name)),
             };
-            theirs.lock().news.failure = Some(failure);
+            theirs.lock().news.ending = Some(ending);
             context.request_repaint();
         });
         Self { shared }
@@ -118,16 +122,22 @@ impl Progress for Follower<'_> {
     }
 
     fn note(&self, note: &str) {
-        self.0.lock().news.notes.push(note.into());
+        let notes = &mut self.0.lock().news.notes;
+        // A window that is not drawn takes none of them.
+        if notes.len() < MOST_NOTES && notes.iter().all(|known| known != note) {
+            notes.push(note.into());
+        }
     }
 }
 
 fn run(input: &Input, shared: &Shared, context: &egui::Context) -> Result<(), Error> {
     let follower = Follower(shared);
-    let mut player = input.source.play(&input.play, &input.options, &follower)?;
+    let options = ReadOptions { exact: true, ..input.options.clone() };
+    let mut player = input.source.play(&input.play, &options, &follower)?;
     let timeline = player.stream().timeline().cloned().map(Arc::new);
     shared.lock().timeline = Some(timeline.clone());
     let mut shown = None;
+    let mut any = false;
     loop {
         let wanted = {
             let mut post = shared.lock();
@@ -143,7 +153,10 @@ fn run(input: &Input, shared: &Shared, context: &egui::Context) -> Result<(), Er
             shown = Some(wanted);
             Some(player.frame(wanted, &follower)?)
         } else {
-            player.next(PATIENCE, &follower)?
+            match player.next(PATIENCE, &follower) {
+                Err(Error::NoFrames { .. }) if any => return Ok(()),
+                next => next?,
+            }
         };
         let mut post = shared.lock();
         let news = cloud.filter(|_| timeline.is_some() || !post.paused);
@@ -151,6 +164,7 @@ fn run(input: &Input, shared: &Shared, context: &egui::Context) -> Result<(), Er
         let changed = news.is_some() || statistics != post.statistics;
         post.statistics = statistics;
         if news.is_some() {
+            any = true;
             post.news.cloud = news;
         }
         drop(post);
