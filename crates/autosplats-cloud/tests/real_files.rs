@@ -6,25 +6,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
-use std::{
-    io::Write as _,
-    path::{Path, PathBuf},
-};
+mod common;
+
+use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Axes, PointCloud, ReadOptions, describe, glam::DVec3, read, read_mesh};
-
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    if folder.join("README.md").exists() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    // Past the test harness, which would swallow what a passing test prints.
-    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
-    std::io::stderr().write_all(message.as_bytes()).unwrap();
-    None
-}
+use common::shared_data;
 
 fn load(folder: &Path, file: &str) -> PointCloud {
     read(&folder.join(file), &()).unwrap_or_else(|error| panic!("{error}"))
@@ -79,7 +66,7 @@ const CASES: &[Case] = &[
 
 #[test]
 fn real_files_are_what_others_say() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     for &(file, count, low, high, fields, colored) in CASES {
         let cloud = load(&folder, file);
         assert_eq!(cloud.len(), count, "{file}");
@@ -93,7 +80,7 @@ fn real_files_are_what_others_say() {
 
 #[test]
 fn sequences_are_what_others_say() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let all = |folder: PathBuf, extension: &str| {
         let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
         let mut files: Vec<_> = files.filter(|path| path.extension().is_some_and(|found| found == extension)).collect();
@@ -119,7 +106,7 @@ fn sequences_are_what_others_say() {
 
 #[test]
 fn particulars_of_real_files() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let people = load(&folder, "scans/five_people.pcd");
     let holes = people.positions().iter().filter(|point| point.iter().any(|value| !value.is_finite())).count();
     assert_eq!((holes, people.axes()), (68_125, Some(Axes::Camera)), "an image of a depth camera, with holes");
@@ -155,7 +142,7 @@ fn particulars_of_real_files() {
 
 #[test]
 fn meshes_have_the_triangles_that_others_say() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let mesh = |file: &str| {
         read_mesh(&folder.join(file), &ReadOptions::default(), &()).unwrap_or_else(|error| panic!("{error}"))
     };
@@ -191,7 +178,7 @@ fn meshes_have_the_triangles_that_others_say() {
 
 #[test]
 fn malformed_files_are_told_or_read() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let folder = folder.join("malformed");
     // Points that can be vouched for, or words the error must contain.
     let expected: &[(&str, Result<usize, &str>)] = &[
@@ -249,7 +236,7 @@ fn malformed_files_are_told_or_read() {
 
 #[test]
 fn sensors_stand_where_it_is_sure() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let at_the_origin = [
         "scans/pump_room.e57",
         "scans/spherical.e57",

@@ -13,9 +13,10 @@ use autosplats_cloud::{
     point_cloud2::Encoding,
 };
 use common::{
-    Random, data, positions,
+    Random, positions,
     recording::{Message, POINTS, Style, TRANSFORMS, Topic, bag, mcap},
     ros::{Cloud2, transforms},
+    shared_data,
 };
 
 const START: i64 = 1_700_000_000_000_000_000;
@@ -457,7 +458,7 @@ fn the_parts_of_a_folder_are_one_recording() {
 
 #[test]
 fn real_recordings_of_both_kinds_are_the_same_points() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let options = RecordingOptions { frame: Some("os1_lidar".into()), ..Default::default() };
     let mut of_kind = Vec::new();
     // Only one of them has transforms.

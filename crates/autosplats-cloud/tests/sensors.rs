@@ -5,8 +5,7 @@
 mod common;
 
 use std::{
-    io::Write as _,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Mutex,
     time::{Duration, Instant},
 };
@@ -16,7 +15,7 @@ use autosplats_cloud::{
     glam::{DMat4, DQuat, DVec3},
     read_bytes, read_with, write,
 };
-use common::{Random, colors, pcd_bytes, positions, rich_cloud};
+use common::{Random, colors, pcd_bytes, positions, rich_cloud, shared_data};
 
 #[derive(Default)]
 struct Ear(Mutex<Vec<String>>);
@@ -41,18 +40,6 @@ fn load(name: &str, bytes: &[u8]) -> PointCloud {
 
 fn error(name: &str, bytes: &[u8]) -> String {
     noted(name, bytes, &ReadOptions::default()).unwrap_err().to_string()
-}
-
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    if folder.join("README.md").exists() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
-    std::io::stderr().write_all(message.as_bytes()).unwrap();
-    None
 }
 
 fn bounds(cloud: &PointCloud) -> [DVec3; 2] {
@@ -439,7 +426,7 @@ fn written_pcd_reads_back() {
 
 #[test]
 fn real_sweeps() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let check = |file: &str, count: usize, low: [f64; 3], high: [f64; 3], fields: &[(&str, f64)]| {
         let cloud = read_with(&folder.join(file), &ReadOptions::default(), &()).unwrap();
         assert_eq!(
@@ -475,7 +462,7 @@ fn real_sweeps() {
 
 #[test]
 fn a_real_depth_image() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data() else { return };
     let camera = DepthCamera { fx: 518.0, fy: 519.0, cx: 325.5, cy: 253.5, scale: 1000.0 };
     let options = ReadOptions { depth_camera: Some(camera), ..ReadOptions::default() };
     let path = folder.join("sequences/rgbd_kinect/depth_1.pgm");

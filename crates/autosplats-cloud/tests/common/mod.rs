@@ -189,17 +189,3 @@ pub(crate) fn ptx_bytes(count: usize) -> Vec<u8> {
     let scan = |rows: &[String]| format!("{}\n1\n{map}{}", rows.len(), rows.concat());
     (scan(first) + &scan(second)).into_bytes()
 }
-
-/// The folder of the real files that are shared by all who work on this, if it is there.
-pub(crate) fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    if folder.join("README.md").exists() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    // Past the test harness, which would swallow what a passing test prints.
-    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
-    std::io::Write::write_all(&mut std::io::stderr(), message.as_bytes()).unwrap();
-    None
-}
