@@ -148,7 +148,8 @@ pub(crate) struct RenderArgs {
     pub(crate) look: LookArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
-    /// Print counts, device, camera, outputs and milliseconds per stage as one JSON object on standard output
+    /// Print counts, device, camera, outputs and milliseconds per stage as one JSON object on standard output; of frames, one
+    /// a line for each
     #[arg(long, help_heading = "Running")]
     pub(crate) json: bool,
 }

@@ -1,5 +1,5 @@
 //! Puts the picture into the window, by a pass of its own that reads one texture once a pixel: what egui draws its panels with
-//! takes five times as long for that, which counts where the window is drawn by the processor.
+//! takes several times as long for that, which counts where the window is drawn by the processor.
 
 use std::sync::Arc;
 
