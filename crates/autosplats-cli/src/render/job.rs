@@ -156,6 +156,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         ellipses: surface.ellipses,
         grid_culling: !surface.no_grid_culling,
         depth_refinement: !surface.no_depth_refinement,
+        ..Reconstruction::default()
     };
     let shading = Shading {
         color: look.color,

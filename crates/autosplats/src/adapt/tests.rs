@@ -12,6 +12,7 @@ use super::{AdaptRules, Adapter, DepthNoise};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{FitRules, Surfel, Surfels, fit};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
+use crate::search::past::Past;
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, Random, noisy};
 
@@ -72,7 +73,7 @@ impl Case {
         let fit_rules = FitRules { k: K, splat_scale: 1.0, longest: 1.0, adaptive: true, keep_outliers: false };
         let fitted = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
-            screen_grid::search(&screen, queries, &view, &rules, &mut neighborhoods);
+            screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
             let mut surfels = Surfels::new();
             fit(&screen, queries, &neighborhoods, &view, &fit_rules, &mut surfels);
             surfels

@@ -6,10 +6,12 @@
 
 mod fit;
 mod lens;
+mod reproject;
 
 pub(crate) use fit::up;
 pub use fit::{ViewDirection, guess_axes};
 pub use lens::Lens;
+pub(crate) use reproject::{Reprojection, Seen};
 
 use glam::{DVec3, Mat3, Vec3};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::camera::View;
+use crate::camera::{Reprojection, View};
 
 /// The camera and the settings, as `shared/frame.wgsl` has them.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -30,17 +30,20 @@ pub(crate) struct FrameUniform {
     pub(crate) first_radius: f32,
     /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     pub(crate) longest: f32,
-    pub(crate) unused_0: u32,
-    pub(crate) unused_1: u32,
+    pub(crate) past_near: f32,
+    pub(crate) past_perspective: u32,
+    /// Columns, each padded to four numbers.
+    pub(crate) past_rotation: [[f32; 4]; 3],
+    pub(crate) past_shift: [f32; 3],
+    /// 0 if nothing is known of the last frame.
+    pub(crate) past_focal_px: f32,
 }
 
 impl FrameUniform {
     /// The camera; settings are the simplest there are.
     pub(crate) fn new(view: &View, k: u32) -> Self {
-        let column = |axis: glam::Vec3| [axis.x, axis.y, axis.z, 0.0];
-        let axes = view.view_from_world;
         Self {
-            view_from_world: [column(axes.x_axis), column(axes.y_axis), column(axes.z_axis)],
+            view_from_world: columns(view.view_from_world),
             eye_local: view.eye_local.to_array(),
             focal_px: view.focal_px,
             size: [view.width, view.height],
@@ -56,8 +59,29 @@ impl FrameUniform {
             gap_growth: f32::INFINITY,
             first_radius: 1.0,
             longest: 1.0,
-            unused_0: 0,
-            unused_1: 0,
+            past_near: 0.0,
+            past_perspective: 0,
+            past_rotation: [[0.0; 4]; 3],
+            past_shift: [0.0; 3],
+            past_focal_px: 0.0,
         }
     }
+
+    /// The same, with the last frame to look back into.
+    pub(crate) fn after(self, past: &Reprojection) -> Self {
+        let Reprojection { rotation, shift, view } = past;
+        Self {
+            past_near: view.near,
+            past_perspective: view.perspective.into(),
+            past_rotation: columns(*rotation),
+            past_shift: shift.to_array(),
+            past_focal_px: view.focal_px,
+            ..self
+        }
+    }
+}
+
+/// A matrix as uniforms have it.
+fn columns(matrix: glam::Mat3) -> [[f32; 4]; 3] {
+    [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| [axis.x, axis.y, axis.z, 0.0])
 }

@@ -10,10 +10,11 @@ use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{AdaptRules, Adapter, DepthNoise};
-use crate::camera::{Camera, View};
+use crate::camera::{Camera, Seen, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
+use crate::search::past::Past;
 use crate::search::{Neighborhoods, SearchCounts, SearchEngine, SearchRules, screen_grid};
 use crate::shade::{Image, Scene, linear_steps, shade};
 use crate::splat::{Attributes, PointColors, Splatter};
@@ -22,6 +23,7 @@ use crate::splat::{Attributes, PointColors, Splatter};
 #[derive(Debug)]
 pub(super) struct CpuRenderer {
     projector: Projector,
+    past: Past,
     neighborhoods: Neighborhoods,
     surfels: Surfels,
     adapter: Adapter,
@@ -44,6 +46,7 @@ impl Default for CpuRenderer {
     fn default() -> Self {
         Self {
             projector: Projector::default(),
+            past: Past::default(),
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
             adapter: Adapter::default(),
@@ -105,6 +108,7 @@ impl CpuRenderer {
         let settings_splat = &settings.reconstruction;
         let Self {
             projector,
+            past,
             neighborhoods,
             surfels,
             adapter,
@@ -138,11 +142,17 @@ impl CpuRenderer {
             adapter.begin(screen, &view, settings_splat.k);
             clock.lap(|timings| &mut timings.adapt)?;
         }
+        if settings_splat.remembers() && given.is_none() {
+            past.begin(Seen { view, origin: cloud.origin() }, settings_splat.k);
+        } else {
+            past.forget();
+        }
+        clock.lap(|timings| &mut timings.search)?;
         surfels.clear();
         splatter.begin(&view);
         let nothing = DepthNoise::default();
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
-        let reconstruct = Reconstruct { screen, view: &view, settings, sensors, depth_noise, given };
+        let reconstruct = Reconstruct { screen, view: &view, settings, past, sensors, depth_noise, given };
         let mut search_counts =
             reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock)?;
         recovered.clear();
@@ -170,6 +180,7 @@ impl CpuRenderer {
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);
+        past.end();
 
         let dropped = screen.dropped;
         let counts = Counts {
@@ -197,6 +208,7 @@ struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     settings: &'a Settings,
+    past: &'a Past,
     sensors: &'a Sensors,
     depth_noise: &'a DepthNoise,
     given: Option<GivenPlanes<'a>>,
@@ -213,7 +225,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock<'_>,
     ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, settings, sensors, depth_noise, given } = *self;
+        let Self { screen, view, settings, past, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -229,11 +241,12 @@ impl Reconstruct<'_> {
             gap_factor: settings.gap_factor,
         };
         match settings.engine {
-            SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, neighborhoods),
+            SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, past, neighborhoods),
             SearchEngine::SplatCommunication | SearchEngine::KdTree { .. } => {
                 unreachable!("refused before the frame begins")
             }
         }
+        past.keep(screen, queries, neighborhoods);
         clock.lap(|timings| &mut timings.search)?;
 
         let rules = FitRules {

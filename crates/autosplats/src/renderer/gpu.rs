@@ -12,7 +12,7 @@ use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check
 use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
-use crate::camera::{Camera, View};
+use crate::camera::{Camera, Reprojection, Seen, View};
 use crate::fit::Surfel;
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::Sensors;
@@ -21,6 +21,7 @@ use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, R
 use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, check_engine, compile, convergence};
+use crate::search::past::gpu::{PastPasses, past_buffer};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
@@ -68,6 +69,7 @@ type SearchKind = (Discriminant<SearchEngine>, u32);
 struct Passes {
     project: ProjectPasses,
     search: Option<(SearchKind, Box<dyn EnginePasses>)>,
+    past: PastPasses,
     fit: FitPasses,
     /// Once there was a cloud with sensors.
     orient: Option<OrientPasses>,
@@ -83,6 +85,7 @@ struct Shape {
     size: [u32; 2],
     halves: bool,
     search: SearchKind,
+    coherent: bool,
     adaptive: bool,
     depth_refinement: bool,
     channels: Channels,
@@ -98,6 +101,8 @@ struct Shape {
 #[derive(Debug)]
 struct Prepared {
     shape: Shape,
+    /// How the last frame was seen, if there was one.
+    seen: Option<Seen>,
     screen: ScreenBuffers,
     /// [`Surfel`] per query.
     surfels: wgpu::Buffer,
@@ -123,6 +128,7 @@ impl GpuRenderer {
             passes: Passes {
                 project: ProjectPasses::new(&gpu, gpu.int64_atomics())?,
                 search: None,
+                past: PastPasses::new(&gpu)?,
                 fit: FitPasses::new(&gpu)?,
                 orient: None,
                 adapt: None,
@@ -279,7 +285,7 @@ impl GpuRenderer {
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, view, settings, &uniform);
+        prepared.tell(gpu, frame, Seen { view: *view, origin: cloud.origin() }, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -354,7 +360,8 @@ impl GpuRenderer {
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, view, settings, &uniform.into_format(texture.format()));
+        let now = Seen { view: *view, origin: cloud.origin() };
+        prepared.tell(gpu, frame, now, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
@@ -372,6 +379,7 @@ impl GpuRenderer {
             size,
             halves,
             search: (discriminant(&settings.reconstruction.engine), settings.reconstruction.k),
+            coherent: settings.reconstruction.remembers(),
             adaptive: settings.reconstruction.adaptive,
             depth_refinement: settings.reconstruction.depth_refinement,
             channels: Channels {
@@ -392,7 +400,7 @@ impl GpuRenderer {
         // The old buffers go before the new ones come.
         self.prepared = None;
         let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
-        let Passes { project, search, fit, orient, adapt, splat, shade } = passes;
+        let Passes { project, search, past, fit, orient, adapt, splat, shade } = passes;
         if sensors.is_some() && orient.is_none() {
             *orient = Some(OrientPasses::new(gpu)?);
         }
@@ -410,6 +418,7 @@ impl GpuRenderer {
         let (Some((_, search)), Some((_, splat))) = (search, splat) else { return Ok(()) };
         let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
+        let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
         let surfels = surfel_buffer(gpu, screen.capacity)?;
         let adapt = match adapt {
             Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
@@ -423,7 +432,8 @@ impl GpuRenderer {
             if let Some((passes, buffers)) = &adapt {
                 steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
             }
-            let buffers = SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods };
+            let buffers =
+                SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods, past: &past_radii };
             let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
             for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
                 if round == Round::Recovered {
@@ -439,19 +449,22 @@ impl GpuRenderer {
                 }
                 steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
             }
+            if shape.coherent {
+                steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
+            }
             let refine = shape.depth_refinement;
             steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
             steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
             Ok::<_, Error>((steps, convergence))
         })??;
-        self.prepared = Some(Prepared { shape, screen, surfels, layers, picture, convergence, steps });
+        self.prepared = Some(Prepared { shape, seen: None, screen, surfels, layers, picture, convergence, steps });
         Ok(())
     }
 }
 
 impl Prepared {
     /// Tells the passes what the next frame is to be.
-    fn tell(&mut self, gpu: &Gpu, frame: &wgpu::Buffer, view: &View, settings: &Settings, shading: &ShadeUniform) {
+    fn tell(&mut self, gpu: &Gpu, frame: &wgpu::Buffer, now: Seen, settings: &Settings, shading: &ShadeUniform) {
         let Settings { reconstruction, .. } = settings;
         let rules = SearchRules {
             k: reconstruction.k,
@@ -471,8 +484,11 @@ impl Prepared {
                 SearchEngine::KdTree { first_radius } => first_radius,
                 _ => 0.0,
             },
-            ..FrameUniform::new(view, reconstruction.k)
+            ..FrameUniform::new(&now.view, reconstruction.k)
         };
+        // Steps that are made anew leave nothing to look back at, and those of another k are.
+        let past = self.seen.replace(now).filter(|_| self.shape.coherent);
+        let told = past.map_or(told, |past| told.after(&Reprojection::new(&now, &past)));
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
         self.picture.write(gpu, shading, &settings.shading);
     }

@@ -20,6 +20,8 @@ pub(crate) struct SearchBuffers<'a> {
     pub(crate) screen: &'a ScreenBuffers,
     /// `Neighborhood` of `shared/surfel.wgsl` for each query, in the order of the queries.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
+    /// Of each pixel of the last frame the bits of a k-radius, 0 for none; of no use unless `frame` tells of that frame.
+    pub(crate) past: &'a wgpu::Buffer,
 }
 
 /// An engine's compiled passes, good for one k.
@@ -79,8 +81,8 @@ pub(crate) fn compile(gpu: &Gpu, engine: SearchEngine, k: u32) -> Result<Box<dyn
 
 impl EnginePasses for SearchPasses {
     fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<EngineSteps, Error> {
-        let SearchBuffers { frame, screen, neighborhoods, .. } = buffers;
-        let round = |round| self.steps(gpu, frame, screen, neighborhoods, round);
+        let SearchBuffers { frame, screen, neighborhoods, past, .. } = buffers;
+        let round = |round| self.steps(gpu, frame, screen, neighborhoods, past, round);
         Ok(EngineSteps { rounds: [Round::Active, Round::Recovered].map(round), convergence: None })
     }
 }

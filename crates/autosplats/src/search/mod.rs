@@ -19,6 +19,7 @@
 pub(crate) mod gpu;
 pub(crate) mod kd_tree;
 pub(crate) mod moments;
+pub(crate) mod past;
 pub(crate) mod screen_grid;
 pub(crate) mod select;
 pub(crate) mod splat_communication;

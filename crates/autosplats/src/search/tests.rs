@@ -3,12 +3,13 @@
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
 
+use super::past::Past;
 use super::{LANES, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts, SearchRules, screen_grid};
 use crate::camera::{Camera, Projection, View};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::test_clouds::{self, EYE, Positions};
 
-type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &mut Neighborhoods);
+type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &Past, &mut Neighborhoods);
 const ENGINES: [(&str, Search); 1] = [("screen grid", screen_grid::search)];
 
 const KS: [u32; 5] = [1, 3, 10, 16, 64];
@@ -211,7 +212,7 @@ fn every_cloud_with_every_rule() {
                     for (engine, search) in ENGINES {
                         for queries in [&all, &third, &single] {
                             let mut neighborhoods = Neighborhoods::default();
-                            search(&screen, queries, &view, &rules, &mut neighborhoods);
+                            search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
                             let outcome = compare(&oracle, &radii, queries, &rules, &neighborhoods);
                             let projection = camera.projection;
                             assert!(outcome.is_ok(), "{engine}, {name}, {projection:?}, {rules:?}: {outcome:?}");
@@ -238,7 +239,7 @@ fn comparison_sees_each_kind_of_error() {
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
     let outcome = |rules: SearchRules, spoil: fn(&mut Neighborhoods)| {
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(&screen, &queries, &view, &rules, &mut neighborhoods);
+        screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
         spoil(&mut neighborhoods);
         compare(&oracle, &radii, &queries, &self::rules(10), &neighborhoods)
     };
@@ -282,7 +283,7 @@ fn ties_belong() {
         let middle = screen.points.iter().position(|p| at(p) == [0.0, 0.0, 64.0]).expect("a point in the middle");
         for (engine, search) in ENGINES {
             let mut neighborhoods = Neighborhoods::default();
-            search(&screen, &[middle as u32], &view, &rules(k), &mut neighborhoods);
+            search(&screen, &[middle as u32], &view, &rules(k), &Past::default(), &mut neighborhoods);
             let found = found(&neighborhoods, 0);
             assert_eq!(found.count as usize, count, "{engine}, k = {k}: neighbours");
             assert_eq!(found.k_radius as f32, squared.sqrt(), "{engine}, k = {k}: k-radius");
@@ -303,7 +304,7 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
     let queries: Vec<u32> = (0..screen.points.len() as u32).step_by(101).collect();
     for (engine, search) in ENGINES {
         let mut neighborhoods = Neighborhoods::default();
-        search(&screen, &queries, &view, &rules, &mut neighborhoods);
+        search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
         let SearchCounts { outliers, clamped, bounded } = neighborhoods.counts;
         assert!(bounded > 0, "{engine}: none meets the bound");
         assert_eq!(outliers + clamped, bounded, "{engine}: nothing else ends a search here");
@@ -338,7 +339,7 @@ fn huge_coordinates_reach_no_sum() {
             let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
             for (engine, search) in ENGINES {
                 let mut neighborhoods = Neighborhoods::default();
-                search(&screen, &queries, &view, &rules, &mut neighborhoods);
+                search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
                 for index in 0..queries.len() {
                     let found = found(&neighborhoods, index);
                     let sums = found.second.iter().sum::<f64>() + found.offset.element_sum() + found.k_radius;

@@ -3,6 +3,7 @@
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
 override FIRST_REACH: f32;
+override SLACK: f32;
 override MAX_CANDIDATES: u32;
 override CROWDED: u32;
 override BOUND_STEP: f32;

@@ -315,6 +315,40 @@ fn the_same_frame_twice_is_the_same_to_the_byte() {
     assert!(first == picture(&cloud), "what was rendered in between leaves no trace");
 }
 
+/// A renderer that has seen other views, sizes and points before makes the same picture, to the byte.
+#[test]
+fn the_frames_before_leave_no_trace() {
+    let settings = Settings { all_layers: true, ..Settings::default() };
+    let (cloud, camera) = scene("herd", 100_000);
+    let (other, _) = scene("statue", 50_000);
+    let step = |part: f64| Camera { eye: camera.eye + part * (camera.look_at - camera.eye), ..camera };
+    let frames = [
+        (&cloud, step(0.0), SIZE),
+        (&cloud, step(0.0), SIZE),
+        (&cloud, step(0.02), SIZE),
+        (&cloud, step(0.3), SIZE),
+        (&other, step(0.3), SIZE),
+        (&cloud, step(0.31), [SIZE[0] / 2, SIZE[1]]),
+        (&cloud, step(0.31), SIZE),
+    ];
+    for mut renderer in [Some(Renderer::new()), gpu()].into_iter().flatten() {
+        for (at, (cloud, camera, size)) in frames.iter().enumerate() {
+            let picture = |renderer: &mut Renderer, settings: &Settings| {
+                let frame = renderer.render(cloud, camera, *size, settings).expect("a picture");
+                let depths: Vec<u32> = frame.layers.depth.iter().map(|depth| depth.to_bits()).collect();
+                (frame.image.pixels.clone(), frame.counts, depths)
+            };
+            let after = picture(&mut renderer, &settings);
+            let backend = if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu };
+            let mut fresh = Renderer::with_backend(backend).expect("a device");
+            assert!(picture(&mut fresh, &settings) == after, "{backend:?}, frame {at}");
+            let reconstruction = Reconstruction { coherent: false, ..settings.reconstruction.clone() };
+            let alone = Settings { reconstruction, ..settings.clone() };
+            assert!(picture(&mut fresh, &alone) == after, "{backend:?}, frame {at}, each by itself");
+        }
+    }
+}
+
 #[test]
 fn nothing_to_see_is_no_trouble() {
     let Some(mut gpu) = gpu() else { return };

@@ -11,6 +11,7 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
+use crate::search::past::Past;
 use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE};
@@ -33,7 +34,7 @@ impl Case {
         let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor };
         let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
-            screen_grid::search(&screen, queries, &view, &rules, &mut neighborhoods);
+            screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);
             neighborhoods
         });
         Self { screen, view, neighborhoods }

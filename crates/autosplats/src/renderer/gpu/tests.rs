@@ -14,6 +14,7 @@ fn is_raster(pass: &PassSource) -> bool {
 fn passes() -> impl Iterator<Item = &'static PassSource> {
     let stages = [
         crate::project::gpu::PASSES,
+        crate::search::past::gpu::PASSES,
         crate::search::screen_grid::gpu::PASSES,
         crate::search::splat_communication::gpu::PASSES,
         crate::search::splat_communication::gpu::RASTER_PASSES,

@@ -186,7 +186,7 @@ impl KdTreePasses {
 
     /// Builds the tree and searches it.
     fn steps_in(&self, gpu: &Gpu, buffers: SearchBuffers<'_>, tree: &TreeBuffers) -> [Vec<Step>; 2] {
-        let SearchBuffers { frame, cloud, screen, neighborhoods } = buffers;
+        let SearchBuffers { frame, cloud, screen, neighborhoods, .. } = buffers;
         // Room for the tree's points is room for one chunk of the cloud; an empty cloud has none.
         let [chunk] = cloud.chunks() else { return [Vec::new(), Vec::new()] };
         let mut first = self.build(gpu, frame, chunk, tree);

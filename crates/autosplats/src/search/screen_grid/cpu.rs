@@ -10,6 +10,7 @@ use super::window::Window;
 use crate::camera::View;
 use crate::project::ScreenPoints;
 use crate::search::moments::{squared_distances, sum_moments};
+use crate::search::past::{Past, Trust};
 use crate::search::select::{GROUP, kth_smallest, largest_below};
 use crate::search::{
     BOUND_STEP, CROWDED, EarlyEnd, LANES, Lanes, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts,
@@ -26,12 +27,14 @@ const REACH: [f32; 2] = [0.8, 4.0];
 /// A radius that has to grow grows at least by this factor.
 pub(super) const LEAST_GROWTH: f32 = 1.3;
 
-/// Finds the neighbourhoods of `queries`, indices of screen points, ascending.
+/// Finds the neighbourhoods of `queries`, indices of screen points, ascending. What is known of the `past` decides what is
+/// read first, not what is found.
 pub(crate) fn search(
     screen: &ScreenPoints,
     queries: &[u32],
     view: &View,
     rules: &SearchRules,
+    past: &Past,
     neighborhoods: &mut Neighborhoods,
 ) {
     neighborhoods.blocks.resize(queries.len().div_ceil(LANES), NeighborhoodBlock::default());
@@ -42,7 +45,8 @@ pub(crate) fn search(
         .map_init(Scratch::default, |scratch, (blocks, queries)| {
             // Tasks are cut the same for any number of threads, and so must be what they start from.
             scratch.reach = 1.0;
-            search_blocks(&Task { screen, view, rules }, queries, blocks, scratch)
+            scratch.trust = Trust::default();
+            search_blocks(&Task { screen, view, rules, past }, queries, blocks, scratch)
         })
         .reduce(SearchCounts::default, |a, b| a + b);
 }
@@ -53,6 +57,7 @@ struct Task<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     rules: &'a SearchRules,
+    past: &'a Past,
 }
 
 /// Memory of one thread.
@@ -65,11 +70,13 @@ struct Scratch {
     sorted: Vec<f32>,
     /// Mean k-radius of the block before, in first search radii. A guess: it decides what is read first, not what is found.
     reach: f32,
+    /// In the radii of the last frame.
+    trust: Trust,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { candidates: Vec::new(), squared: Vec::new(), sorted: Vec::new(), reach: 1.0 }
+        Self { candidates: Vec::new(), squared: Vec::new(), sorted: Vec::new(), reach: 1.0, trust: Trust::default() }
     }
 }
 
@@ -82,6 +89,8 @@ struct Block {
     radius: Lanes,
     /// Neighbours up to this squared distance are summed.
     threshold: Lanes,
+    /// K-radius by the last frame; 0 if it does not tell.
+    likely: Lanes,
     pending: [bool; LANES],
 }
 
@@ -110,8 +119,8 @@ fn search_block<S: Simd>(
     scratch: &mut Scratch,
     counts: &mut SearchCounts,
 ) {
-    let Task { screen, view, rules } = *task;
-    let mut block = Block::new(task, queries, scratch.reach);
+    let Task { screen, view, rules, .. } = *task;
+    let mut block = Block::new(task, queries, scratch.reach, &mut scratch.trust);
     while block.pending.contains(&true) {
         let (window, group) = block.next_window(task);
         let everything = window.is_all();
@@ -183,6 +192,9 @@ fn search_block<S: Simd>(
         }
     }
     scratch.reach = block.reach(queries.len(), out, rules.k);
+    if let Some(missed) = block.missed(queries.len(), out, rules.k) {
+        scratch.trust.learn(missed);
+    }
 }
 
 /// What is to be done with a point whose window was read.
@@ -214,7 +226,7 @@ struct Known {
 
 /// Applies the rules to a point one by one, whose squared distances up to the known radius are given ascending.
 fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known) -> Verdict {
-    let Task { screen, view, rules } = *task;
+    let Task { screen, view, rules, .. } = *task;
     let Known { radius, exact, upper, crowded } = known;
     match rules.early_end(squared, block.initial_radius.0[lane], radius) {
         Some(EarlyEnd::Outlier) => return Verdict::Outlier,
@@ -283,15 +295,17 @@ fn unruled<S: Simd>(
 
 impl Block {
     #[inline(always)]
-    fn new(task: &Task, queries: &[u32], reach: f32) -> Self {
-        let Task { screen, view, rules } = *task;
+    fn new(task: &Task, queries: &[u32], reach: f32, trust: &mut Trust) -> Self {
+        let Task { screen, view, rules, past } = *task;
         let mut block = Self {
             position: [Lanes::default(); 3],
             initial_radius: Lanes::default(),
             radius: Lanes::default(),
             threshold: Lanes::default(),
+            likely: Lanes::default(),
             pending: [true; LANES],
         };
+        let looks_back = trust.looks_back();
         for lane in 0..LANES {
             let query = queries[lane.min(queries.len() - 1)];
             let point = &screen.points[query as usize];
@@ -300,9 +314,16 @@ impl Block {
             }
             let radius = screen.density.initial_radius(point, rules.k, view);
             block.initial_radius.0[lane] = radius;
+            let (mut likely, mut slack) = (reach * radius, FIRST_REACH);
+            if looks_back && let Some(past_radius) = past.radius(point.position_view, radius) {
+                block.likely.0[lane] = past_radius;
+                if let Some(past_slack) = trust.slack() {
+                    (likely, slack) = (past_radius, past_slack);
+                }
+            }
             // A radius that rounds to nothing would never grow.
-            block.radius.0[lane] = (FIRST_REACH * reach * radius).max(f32::MIN_POSITIVE);
-            block.threshold.0[lane] = (reach * radius) * (reach * radius);
+            block.radius.0[lane] = (slack * likely).max(f32::MIN_POSITIVE);
+            block.threshold.0[lane] = likely * likely;
             block.pending[lane] = lane < queries.len();
         }
         block
@@ -316,6 +337,13 @@ impl Block {
         let (count, sum) = ratios.fold((0.0, 0.0), |(count, sum), ratio| (count + 1.0, sum + ratio));
         let [least, most] = REACH;
         (sum / f32::max(count, 1.0)).clamp(least, most)
+    }
+
+    /// By what factor the likely radii would have had to be larger for all of the first `lanes` lanes; `None` if there is none.
+    #[inline(always)]
+    fn missed(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> Option<f32> {
+        let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32 && self.likely.0[lane] > 0.0);
+        full.map(|lane| out.k_radius.0[lane] / self.likely.0[lane]).reduce(f32::max)
     }
 
     /// How far the search of a point goes at most.

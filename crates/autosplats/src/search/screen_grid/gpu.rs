@@ -4,6 +4,7 @@ use super::cpu::{FIRST_REACH, LEAST_GROWTH};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers, WorkPass};
+use crate::search::past;
 use crate::search::{BOUND_STEP, CROWDED, MARGIN_PX, MAX_CANDIDATES};
 
 #[cfg(test)]
@@ -42,7 +43,11 @@ struct RoundPasses {
 
 impl RoundPasses {
     fn new(gpu: &Gpu, k: u32, four: bool, round: Round) -> Result<Self, Error> {
+        let [least, most] = past::gpu::CONSTANTS;
         let common = [
+            least,
+            most,
+            past::gpu::SLACK_CONSTANT,
             ("ROUND", f64::from(round as u32)),
             ("K", k.into()),
             ("FIRST_REACH", FIRST_REACH.into()),
@@ -84,10 +89,11 @@ impl SearchPasses {
         frame: &wgpu::Buffer,
         screen: &ScreenBuffers,
         neighborhoods: &wgpu::Buffer,
+        past: &wgpu::Buffer,
         round: Round,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, cell_start, points, queries, left, .. } = screen;
-        let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods, left];
+        let buffers = [frame, counters, density, cell_start, points, queries, neighborhoods, left, past];
         let RoundPasses { four, one } = &self.rounds[round as usize];
         match four {
             Some(four) => vec![

@@ -4,7 +4,7 @@
 // the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. Unlike on the CPU no two
 // queries share a window, and a window has no depths: nothing is gained by leaving out what has been read.
 //
-// Reads: counters, density, cell_start, points, queries, left. Writes: neighborhoods, counters.
+// Reads: counters, density, cell_start, points, queries, left, past. Writes: neighborhoods, counters.
 
 #import frame
 #import groups
@@ -16,6 +16,7 @@
 #import window_points
 #import nearest
 #import search_task
+#import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -24,6 +25,7 @@
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
 @group(0) @binding(6) var<storage, read_write> neighborhoods: array<Neighborhood>;
 @group(0) @binding(7) var<storage, read> left: array<u32>;
+@group(0) @binding(8) var<storage, read> past: array<u32>;
 
 override LEAST_GROWTH: f32;
 // Whether only those queries are searched for that `search_four` left.
@@ -118,8 +120,9 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
 fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
+    let likely = past_radius(center, initial_radius);
     // A radius that rounds to nothing would never grow.
-    var radius = max(FIRST_REACH * initial_radius, MIN_POSITIVE);
+    var radius = max(select(FIRST_REACH * initial_radius, SLACK * likely, likely > 0.0), MIN_POSITIVE);
     var window = window_grown(window_of_sphere(center, radius), strip_px);
     var len = window_len(window, task.strip_px, CROWDED);
     // A point alone in its cell may look into a crowd; a smaller window will do there.

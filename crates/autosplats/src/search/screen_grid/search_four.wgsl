@@ -8,7 +8,7 @@
 // neighbourhood that none of the rules can end early is settled so. What is left is for `search`, which knows all the rules:
 // gaps, outliers, crowds, many points in the same place.
 //
-// Reads: counters, density, cell_start, points, queries. Writes: neighborhoods, left, counters.
+// Reads: counters, density, cell_start, points, queries, past. Writes: neighborhoods, left, counters.
 
 #import frame
 #import groups
@@ -19,6 +19,7 @@
 #import window
 #import window_points
 #import search_task
+#import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -27,6 +28,7 @@
 @group(0) @binding(5) var<storage, read> queries: array<u32>;
 @group(0) @binding(6) var<storage, read_write> neighborhoods: array<Neighborhood>;
 @group(0) @binding(7) var<storage, read_write> left: array<u32>;
+@group(0) @binding(8) var<storage, read> past: array<u32>;
 
 override K: u32;
 
@@ -210,7 +212,12 @@ fn is_unbounded(center: vec3f, radius: f32) -> bool {
 fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
     var found = vec4f(MOST);
     var open = valid;
-    var radius = max(FIRST_REACH * initial_radius, vec4f(MIN_POSITIVE));
+    var radius = FIRST_REACH * initial_radius;
+    for (var lane = 0u; lane < 4u; lane++) {
+        let likely = past_radius(center(four, lane), initial_radius[lane]);
+        radius[lane] = select(radius[lane], SLACK * likely, likely > 0.0);
+    }
+    radius = max(radius, vec4f(MIN_POSITIVE));
     let outlier_radius = frame.outlier_growth * initial_radius;
     // Up to here no gap begins and nothing is an outlier.
     let unruled = min(frame.gap_growth * initial_radius, outlier_radius);

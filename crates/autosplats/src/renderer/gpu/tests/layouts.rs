@@ -63,8 +63,11 @@ fn mirrored() -> [Mirrored; 9] {
                 gap_growth,
                 first_radius,
                 longest,
-                unused_0,
-                unused_1,
+                past_near,
+                past_perspective,
+                past_rotation,
+                past_shift,
+                past_focal_px,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),

@@ -9,6 +9,7 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{DeviceCloud, ProjectRules, Projector, ScreenPoints, Uploader};
+use crate::search::past::gpu::past_buffer;
 use crate::test_clouds::{self, EYE, Random};
 
 const SIZE: [u32; 2] = [121, 90];
@@ -54,8 +55,14 @@ fn find(gpu: &Gpu, passes: &KdTreePasses, positions: &[[f32; 3]], view: &View, k
     let told = FrameUniform { first_radius, ..FrameUniform::new(view, k) };
     gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
     let tree = TreeBuffers::new(gpu, cloud.len()).expect("room");
-    let buffers =
-        SearchBuffers { frame: &frame, cloud: &device_cloud, screen: &uploaded, neighborhoods: &neighborhoods };
+    let past = past_buffer(gpu, None).expect("room");
+    let buffers = SearchBuffers {
+        frame: &frame,
+        cloud: &device_cloud,
+        screen: &uploaded,
+        neighborhoods: &neighborhoods,
+        past: &past,
+    };
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     passes.steps_in(gpu, buffers, &tree).iter().flatten().for_each(|step| recorder.run(step));
     recorder.finish();

@@ -4,27 +4,51 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
 use super::*;
-use crate::camera::{Camera, Projection, View};
+use crate::camera::{Camera, Projection, Reprojection, Seen, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
+use crate::search::past::Past;
+use crate::search::past::gpu::past_buffer;
 use crate::search::{LANES, Lanes, NeighborhoodBlock, Neighborhoods, SearchRules, screen_grid};
-use crate::test_clouds::{self, EYE};
+use crate::test_clouds::{self, EYE, Random};
 
 const KS: [u32; 6] = [1, 3, 10, 16, 17, 64];
 
 /// The frame as the device is told of it.
 pub(crate) fn frame_buffer(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu::Buffer {
-    let told = FrameUniform {
+    frame_buffer_with(gpu, &told(view, rules))
+}
+
+/// The same, after a frame that was seen by the same view and left these k-radii, and a buffer with them.
+pub(crate) fn frame_buffer_after(
+    gpu: &Gpu,
+    view: &View,
+    rules: &SearchRules,
+    radii: Option<&[f32]>,
+) -> (wgpu::Buffer, wgpu::Buffer) {
+    let Some(radii) = radii else {
+        return (frame_buffer(gpu, view, rules), past_buffer(gpu, None).expect("room"));
+    };
+    let seen = Seen { view: *view, origin: DVec3::ZERO };
+    let told = told(view, rules).after(&Reprojection::new(&seen, &seen));
+    (frame_buffer_with(gpu, &told), gpu.storage_with("past", radii).expect("room"))
+}
+
+fn told(view: &View, rules: &SearchRules) -> FrameUniform {
+    FrameUniform {
         outlier_growth: rules.outlier_radius(1.0),
         gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
         // Of a screen with a point a pixel there is more room than points, which is no wrong bound.
         halves: 1,
         ..FrameUniform::new(view, rules.k)
-    };
+    }
+}
+
+fn frame_buffer_with(gpu: &Gpu, told: &FrameUniform) -> wgpu::Buffer {
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&told));
+    gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(told));
     frame
 }
 
@@ -112,13 +136,14 @@ fn on_device(
     screen: &ScreenPoints,
     view: &View,
     rules: &SearchRules,
+    radii: Option<&[f32]>,
 ) -> (Vec<Moments>, [usize; 2]) {
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
-    let frame = frame_buffer(gpu, view, rules);
+    let (frame, past) = frame_buffer_after(gpu, view, rules, radii);
     let mut recorder = Recorder::new(gpu, &Clock::Off);
     for round in [Round::Active, Round::Recovered] {
-        passes.steps(gpu, &frame, &buffers, &neighborhoods, round).iter().for_each(|step| recorder.run(step));
+        passes.steps(gpu, &frame, &buffers, &neighborhoods, &past, round).iter().for_each(|step| recorder.run(step));
     }
     recorder.finish();
     let found: Vec<Neighborhood> = read_back(gpu, &neighborhoods, screen.points.len()).expect("neighbourhoods");
@@ -132,7 +157,7 @@ pub(crate) fn on_host(screen: &ScreenPoints, view: &View, rules: &SearchRules) -
     let mut counted = [0; 2];
     for queries in [&screen.active, &screen.passive] {
         let mut neighborhoods = Neighborhoods::default();
-        screen_grid::search(screen, queries, view, rules, &mut neighborhoods);
+        screen_grid::search(screen, queries, view, rules, &Past::default(), &mut neighborhoods);
         all.extend(host_moments(&neighborhoods, queries.len()));
         counted[0] += neighborhoods.counts.clamped;
         counted[1] += neighborhoods.counts.bounded;
@@ -156,7 +181,7 @@ fn the_device_finds_what_the_host_finds() {
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
                     for (form, passes) in &forms {
                         let case = format!("{form}, {case}");
-                        let (device, counted) = on_device(&gpu, passes, &screen, &view, &rules);
+                        let (device, counted) = on_device(&gpu, passes, &screen, &view, &rules, None);
                         assert_eq!(device.len(), host.len(), "{case}: every point is a query");
                         for (device, host) in device.iter().zip(&host) {
                             if let Err(error) = device.compare(host) {
@@ -207,7 +232,7 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
         let (screen, view) = screen(&test_clouds::outliers(count), &cameras()[1], [400, 400], k);
         let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
         let passes = SearchPasses::new(&gpu, k).expect("passes");
-        let (found, [clamped, bounded]) = on_device(&gpu, &passes, &screen, &view, &rules);
+        let (found, [clamped, bounded]) = on_device(&gpu, &passes, &screen, &view, &rules, None);
         let queries = [&screen.active[..], &screen.passive].concat();
         let fewer = found.iter().filter(|found| found.count < k as f32).count();
         assert!(bounded > 0 && clamped <= bounded, "k = {k}: {clamped} clamped, {bounded} bounded");
@@ -237,7 +262,7 @@ fn crowded_small_pictures_are_bounded_alike() {
             let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
             let counted = on_host(&screen, &view, &rules).1;
             for (form, passes) in forms(&gpu, k) {
-                let found = on_device(&gpu, &passes, &screen, &view, &rules).1;
+                let found = on_device(&gpu, &passes, &screen, &view, &rules, None).1;
                 assert_eq!(found, counted, "{size:?}, k = {k}, {form}: clamped and bounded");
             }
         }
@@ -257,8 +282,8 @@ fn huge_coordinates_reach_no_sum() {
             let (screen, view) = screen(&positions, &cameras()[1], [90, 70], k);
             let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
             let (host, counted) = on_host(&screen, &view, &rules);
-            assert_eq!(on_device(&gpu, &passes, &screen, &view, &rules).1, counted, "{near} + {huge}, k = {k}");
-            for (device, host) in on_device(&gpu, &passes, &screen, &view, &rules).0.iter().zip(&host) {
+            assert_eq!(on_device(&gpu, &passes, &screen, &view, &rules, None).1, counted, "{near} + {huge}, k = {k}");
+            for (device, host) in on_device(&gpu, &passes, &screen, &view, &rules, None).0.iter().zip(&host) {
                 assert_eq!(device.compare(host), Ok(()), "{near} + {huge} points, k = {k}");
             }
         }
@@ -289,7 +314,7 @@ fn tall_pictures_are_searched_to_the_end() {
                 let (host, counted_by_host) = on_host(&screen, &view, &rules);
                 for (form, passes) in forms(&gpu, k) {
                     let case = format!("{form}, {name}, {rules:?}");
-                    let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules);
+                    let (device, counted) = on_device(&gpu, &passes, &screen, &view, &rules, None);
                     let different = device.iter().zip(&host).filter(|(device, host)| device.compare(host).is_err());
                     let different = different.count();
                     assert!(different * 1000 <= host.len(), "{case}: {different} of {} differ", host.len());
@@ -326,9 +351,33 @@ fn all_at_the_same_distance_are_neighbours() {
             let (host, _) = on_host(&screen, &view, &rules);
             assert!(lambda.is_some() || host[middle].count > 100.0, "{rules:?}: {:?}", host[middle]);
             for (form, passes) in forms(&gpu, k) {
-                let (device, _) = on_device(&gpu, &passes, &screen, &view, &rules);
+                let (device, _) = on_device(&gpu, &passes, &screen, &view, &rules, None);
                 for (device, host) in device.iter().zip(&host) {
                     assert_eq!(device.compare(host), Ok(()), "{form}, {rules:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Whatever the last frame is said to have found, the same is found, to the bit.
+#[test]
+fn the_past_changes_nothing() {
+    let Some(gpu) = test_gpu() else { return };
+    let mut random = Random::new(5);
+    for k in [1, 10, 17] {
+        let forms = forms(&gpu, k);
+        for (name, positions) in test_clouds::all(4000) {
+            let (screen, view) = screen(&positions, &cameras()[0], [121, 90], k);
+            let pasts = [past::tests::found(&screen, &view, k), past::tests::garbage(&screen, &view, k, &mut random)];
+            for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
+                for (form, passes) in &forms {
+                    let without = on_device(&gpu, passes, &screen, &view, &rules, None);
+                    for radii in &pasts {
+                        let with = on_device(&gpu, passes, &screen, &view, &rules, Some(radii));
+                        assert!(with == without, "{form}, {name}, {rules:?}");
+                    }
                 }
             }
         }

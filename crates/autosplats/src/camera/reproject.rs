@@ -1,0 +1,101 @@
+//! From one frame into the one before it.
+
+use glam::{DVec3, Mat3, Vec3};
+
+use super::View;
+
+/// A view of a cloud: what a later frame needs to look back into it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Seen {
+    pub(crate) view: View,
+    /// The cloud's origin, world coordinates.
+    pub(crate) origin: DVec3,
+}
+
+/// Takes view-space positions of a frame into the view space of an earlier one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reprojection {
+    pub(crate) rotation: Mat3,
+    /// Added after the rotation.
+    pub(crate) shift: Vec3,
+    /// The earlier frame's.
+    pub(crate) view: View,
+}
+
+impl Reprojection {
+    /// From the frame seen `now` into the `past` one.
+    pub(crate) fn new(now: &Seen, past: &Seen) -> Self {
+        let rotation = past.view.view_from_world.as_dmat3();
+        // The one from the other in f64: clouds far from each other have eyes far from their origins.
+        let between = now.view.eye_local.as_dvec3() + (now.origin - past.origin) - past.view.eye_local.as_dvec3();
+        Self {
+            rotation: (rotation * now.view.view_from_world.as_dmat3().transpose()).as_mat3(),
+            shift: (rotation * between).as_vec3(),
+            view: past.view,
+        }
+    }
+
+    /// Where a view-space position was.
+    #[inline(always)]
+    pub(crate) fn position(&self, position_view: [f32; 3]) -> Vec3 {
+        self.rotation * Vec3::from(position_view) + self.shift
+    }
+
+    /// The pixel of the earlier frame that showed a view-space position, or whatever was before it: row by row.
+    #[inline(always)]
+    pub(crate) fn pixel(&self, position_view: [f32; 3]) -> Option<usize> {
+        let position = self.position(position_view);
+        let [x, y] = self.view.to_pixel(position);
+        // What is not a number is in no picture.
+        let inside = (x >= 0.0) & (x < self.view.width as f32) & (y >= 0.0) & (y < self.view.height as f32);
+        (inside & (position.z > self.view.near)).then(|| y as usize * self.view.width as usize + x as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, Projection};
+
+    fn seen(eye: DVec3, origin: DVec3, projection: Projection) -> Seen {
+        let camera = Camera { eye, look_at: DVec3::new(1e6, 0.0, 0.0), up: DVec3::Z, projection };
+        Seen { view: camera.view(origin, [320, 200]).expect("a view"), origin }
+    }
+
+    #[test]
+    fn a_point_is_found_where_it_was_seen() {
+        let corner = DVec3::new(1e6, 0.0, 0.0);
+        for projection in [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(6.0)] {
+            let past = seen(corner + DVec3::new(-7.0, 1.0, 2.0), corner + 3.0, projection);
+            let now = seen(corner + DVec3::new(-6.0, -2.0, 1.0), corner - 1.0, projection);
+            let reprojection = Reprojection::new(&now, &past);
+            for point in
+                [DVec3::ZERO, DVec3::new(0.5, 0.7, -0.3), DVec3::new(-1.0, 0.1, 1.2)].map(|point| corner + point)
+            {
+                let [now, past] = [now, past].map(|seen| seen.view.to_view((point - seen.origin).as_vec3().to_array()));
+                let found = reprojection.position(now.to_array());
+                assert!(found.distance(past) < 1e-5, "{projection:?}, {point}: {found}, not {past}");
+                let [x, y] = reprojection.view.to_pixel(past);
+                let pixel = reprojection.pixel(now.to_array());
+                assert_eq!(pixel, Some(y as usize * 320 + x as usize), "{projection:?}, {point}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_outside_or_behind_has_no_pixel() {
+        let corner = DVec3::new(1e6, 0.0, 0.0);
+        let projection = Projection::PerspectiveFovDeg(40.0);
+        let past = seen(corner + DVec3::new(-2.0, 0.0, 0.0), corner, projection);
+        let now = seen(corner + DVec3::new(-9.0, 0.0, 0.0), corner, projection);
+        let reprojection = Reprojection::new(&now, &past);
+        let pixel = |point: [f64; 3]| {
+            let local = DVec3::from(point).as_vec3().to_array();
+            reprojection.pixel(now.view.to_view(local).to_array())
+        };
+        assert!(pixel([0.0; 3]).is_some(), "in the middle of both");
+        assert_eq!(pixel([0.0, 2.0, 0.0]), None, "beside the picture");
+        assert_eq!(pixel([-5.0, 0.0, 0.0]), None, "behind the earlier eye");
+        assert_eq!(reprojection.pixel([f32::NAN; 3]), None, "nowhere");
+    }
+}

@@ -1,0 +1,16 @@
+// Forgets the k-radii of the frame before, once nothing is searched for any more.
+//
+// Writes: past.
+
+#import frame
+#import groups
+
+@group(0) @binding(1) var<storage, read_write> past: array<u32>;
+
+@compute @workgroup_size(256)
+fn clear_past(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index < arrayLength(&past) {
+        past[index] = 0u;
+    }
+}

@@ -1,0 +1,58 @@
+//! The k-radii of the last frame on the GPU.
+
+use super::{LIKELY, SLACK};
+use crate::Error;
+use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::project::gpu::{ScreenBuffers, Work};
+
+#[cfg(test)]
+pub(crate) const PASSES: &[PassSource] = &[CLEAR_PAST, KEEP_PAST];
+const CLEAR_PAST: PassSource = PassSource::new("search/past/clear_past", include_str!("clear_past.wgsl"));
+const KEEP_PAST: PassSource = PassSource::new("search/past/keep_past", include_str!("keep_past.wgsl"));
+
+/// The overrides of passes that read `shared/past.wgsl`.
+pub(crate) const CONSTANTS: [(&str, f64); 2] = [("LEAST_LIKELY", LIKELY[0] as f64), ("MOST_LIKELY", LIKELY[1] as f64)];
+/// And of those that take a slack.
+pub(crate) const SLACK_CONSTANT: (&str, f64) = ("SLACK", SLACK as f64);
+
+/// Room for the k-radii of pictures of `size`; for none if it is `None`.
+///
+/// # Errors
+/// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+pub(crate) fn past_buffer(gpu: &Gpu, size: Option<[u32; 2]>) -> Result<wgpu::Buffer, Error> {
+    gpu.storage::<u32>("k-radii of the last frame", size.map_or(0, |[width, height]| width as usize * height as usize))
+}
+
+/// The passes that keep what was found.
+#[derive(Debug)]
+pub(crate) struct PastPasses {
+    clear: Pass,
+    keep: Pass,
+}
+
+impl PastPasses {
+    /// Compiles them.
+    ///
+    /// # Errors
+    /// [`Error::Device`].
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        Ok(Self { clear: Pass::new(gpu, &CLEAR_PAST, &[])?, keep: Pass::new(gpu, &KEEP_PAST, &[])? })
+    }
+
+    /// Keeps the k-radii of both rounds in `past`; to be run after the last search.
+    pub(crate) fn steps(
+        &self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        screen: &ScreenBuffers,
+        neighborhoods: &wgpu::Buffer,
+        past: &wgpu::Buffer,
+    ) -> [Step; 2] {
+        let ScreenBuffers { size: [width, height], counters, points, queries, .. } = screen;
+        let keep = [frame, counters, points, queries, neighborhoods, past];
+        [
+            self.clear.step(gpu, &[frame, past], (width * height).div_ceil(256)),
+            self.keep.step(gpu, &keep, screen.groups(Work::Queries256)),
+        ]
+    }
+}

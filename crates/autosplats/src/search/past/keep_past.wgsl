@@ -1,0 +1,25 @@
+// Keeps the k-radii found, for the next frame to start from: the greatest of each pixel, so that it is always the same one.
+//
+// Reads: counters, points, queries, neighborhoods. Writes: past.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import surfel
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(3) var<storage, read> queries: array<u32>;
+@group(0) @binding(4) var<storage, read> neighborhoods: array<Neighborhood>;
+@group(0) @binding(5) var<storage, read_write> past: array<atomic<u32>>;
+
+@compute @workgroup_size(256)
+fn keep_past(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] || neighborhoods[index].count < f32(frame.k) {
+        return;
+    }
+    let pixel = pixel_xy(points[queries[index]].pixel);
+    atomicMax(&past[pixel.y * frame.size.x + pixel.x], bitcast<u32>(neighborhoods[index].k_radius));
+}
