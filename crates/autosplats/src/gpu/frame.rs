@@ -37,6 +37,11 @@ pub(crate) struct FrameUniform {
     pub(crate) past_shift: [f32; 3],
     /// 0 if nothing is known of the last frame.
     pub(crate) past_focal_px: f32,
+    /// By which share of the way surfels are drawn towards the last frame's surface.
+    pub(crate) smoothing: f32,
+    pub(crate) unused_0: u32,
+    pub(crate) unused_1: u32,
+    pub(crate) unused_2: u32,
 }
 
 impl FrameUniform {
@@ -64,6 +69,10 @@ impl FrameUniform {
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],
             past_focal_px: 0.0,
+            smoothing: 0.0,
+            unused_0: 0,
+            unused_1: 0,
+            unused_2: 0,
         }
     }
 

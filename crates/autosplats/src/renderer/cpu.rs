@@ -10,7 +10,7 @@ use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{AdaptRules, Adapter, DepthNoise};
-use crate::camera::{Camera, Seen, View};
+use crate::camera::{Camera, Reprojection, Seen, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
@@ -39,7 +39,7 @@ pub(super) struct CpuRenderer {
     image: Image,
     linear: [f32; 256],
     /// Of the last frame.
-    view: Option<View>,
+    seen: Option<Seen>,
 }
 
 impl Default for CpuRenderer {
@@ -58,7 +58,7 @@ impl Default for CpuRenderer {
             splatter: Splatter::default(),
             image: Image::default(),
             linear: linear_steps(),
-            view: None,
+            seen: None,
         }
     }
 }
@@ -77,7 +77,7 @@ pub(super) fn check_engine(engine: SearchEngine) -> Result<(), Error> {
 impl CpuRenderer {
     /// See [`Renderer::surfels`](super::Renderer::surfels).
     pub(super) fn surfels(&self) -> Vec<PointSurfel> {
-        self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
+        self.seen.map_or_else(Vec::new, |Seen { view, .. }| point_surfels(&self.surfels, &view))
     }
 
     /// See [`Renderer::render_while`](super::Renderer::render_while); `given` planes are drawn instead of what a search would
@@ -97,7 +97,7 @@ impl CpuRenderer {
         }
         let wanted = Wanted::new(cloud, settings)?;
         // From here on nothing fails, but it may be given up; then there are no surfels.
-        self.view = None;
+        let before = self.seen.take();
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
@@ -119,7 +119,7 @@ impl CpuRenderer {
             recovered,
             splatter,
             image,
-            view: last_view,
+            seen: last_seen,
             ..
         } = self;
         let mut clock = Clock::start(go_on);
@@ -142,8 +142,9 @@ impl CpuRenderer {
             adapter.begin(screen, &view, settings_splat.k);
             clock.lap(|timings| &mut timings.adapt)?;
         }
+        let now = Seen { view, origin: cloud.origin() };
         if settings_splat.remembers() && given.is_none() {
-            past.begin(Seen { view, origin: cloud.origin() }, settings_splat.k);
+            past.begin(now, settings_splat.k);
         } else {
             past.forget();
         }
@@ -152,7 +153,8 @@ impl CpuRenderer {
         splatter.begin(&view);
         let nothing = DepthNoise::default();
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
-        let reconstruct = Reconstruct { screen, view: &view, settings, past, sensors, depth_noise, given };
+        let before = before.map(|before| Reprojection::new(&now, &before));
+        let reconstruct = Reconstruct { screen, view: &view, settings, past, before, sensors, depth_noise, given };
         let mut search_counts =
             reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock)?;
         recovered.clear();
@@ -179,7 +181,7 @@ impl CpuRenderer {
         let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
-        *last_view = Some(view);
+        *last_seen = Some(now);
         past.end();
 
         let dropped = screen.dropped;
@@ -209,6 +211,8 @@ struct Reconstruct<'a> {
     view: &'a View,
     settings: &'a Settings,
     past: &'a Past,
+    /// The last frame, if it was drawn to its end.
+    before: Option<Reprojection>,
     sensors: &'a Sensors,
     depth_noise: &'a DepthNoise,
     given: Option<GivenPlanes<'a>>,
@@ -225,7 +229,7 @@ impl Reconstruct<'_> {
         splatter: &mut Splatter,
         clock: &mut Clock<'_>,
     ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, settings, past, sensors, depth_noise, given } = *self;
+        let Self { screen, view, settings, past, before, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -268,6 +272,11 @@ impl Reconstruct<'_> {
         sensors.orient(&mut surfels[first..], view);
         clock.lap(|timings| &mut timings.fit)?;
 
+        if let Some(before) = before
+            && settings.smoothing() > 0.0
+        {
+            splatter.smooth(&mut surfels[first..], &before, settings.smoothing(), view);
+        }
         splatter.add(surfels, first, view);
         clock.lap(|timings| &mut timings.splat)?;
         Ok(neighborhoods.counts)

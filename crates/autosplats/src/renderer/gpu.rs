@@ -86,6 +86,7 @@ struct Shape {
     halves: bool,
     search: SearchKind,
     coherent: bool,
+    smooth: bool,
     adaptive: bool,
     depth_refinement: bool,
     channels: Channels,
@@ -380,6 +381,7 @@ impl GpuRenderer {
             halves,
             search: (discriminant(&settings.reconstruction.engine), settings.reconstruction.k),
             coherent: settings.reconstruction.remembers(),
+            smooth: settings.reconstruction.smoothing() > 0.0,
             adaptive: settings.reconstruction.adaptive,
             depth_refinement: settings.reconstruction.depth_refinement,
             channels: Channels {
@@ -447,6 +449,9 @@ impl GpuRenderer {
                 if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
                     steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
                 }
+                if shape.smooth {
+                    steps.push(splat.step_over_time(gpu, frame, &screen, &surfels, &layers, round));
+                }
                 steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
             }
             if shape.coherent {
@@ -478,6 +483,7 @@ impl Prepared {
             longest: reconstruction.longest(),
             keep_outliers: reconstruction.outlier_expansions.is_none().into(),
             splat_scale: reconstruction.splat_scale,
+            smoothing: reconstruction.smoothing(),
             outlier_growth: rules.outlier_radius(1.0),
             gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
             first_radius: match reconstruction.engine {
@@ -487,7 +493,7 @@ impl Prepared {
             ..FrameUniform::new(&now.view, reconstruction.k)
         };
         // Steps that are made anew leave nothing to look back at, and those of another k are.
-        let past = self.seen.replace(now).filter(|_| self.shape.coherent);
+        let past = self.seen.replace(now).filter(|_| self.shape.coherent || self.shape.smooth);
         let told = past.map_or(told, |past| told.after(&Reprojection::new(&now, &past)));
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
         self.picture.write(gpu, shading, &settings.shading);

@@ -55,6 +55,12 @@ pub struct Reconstruction {
     ///
     /// [`Renderer`]: crate::Renderer
     pub coherent: bool,
+    /// Temporal smoothing, for live points that are noisy anew in each frame: surfaces are averaged over about so many frames
+    /// of the same [`Renderer`], 1 to 32. 1, the default, takes each frame by itself. What moves lags behind, unless it moves by
+    /// more than half its k-radius a frame; a frame then depends on those before.
+    ///
+    /// [`Renderer`]: crate::Renderer
+    pub frames_averaged: u32,
 }
 
 impl Default for Reconstruction {
@@ -71,6 +77,7 @@ impl Default for Reconstruction {
             grid_culling: true,
             depth_refinement: true,
             coherent: true,
+            frames_averaged: 1,
         }
     }
 }
@@ -79,6 +86,11 @@ impl Reconstruction {
     /// What the paper does: one point a pixel, k = 10 for all, and each frame by itself.
     pub fn paper() -> Self {
         Self { points_per_pixel: 1, adaptive: false, coherent: false, ..Self::default() }
+    }
+
+    /// By which share of the way surfels are drawn towards the last frame's surface; 0 for none.
+    pub(super) fn smoothing(&self) -> f32 {
+        1.0 - 1.0 / self.frames_averaged as f32
     }
 
     /// Longest ellipse, semi-major over semi-minor axis.
@@ -106,8 +118,16 @@ impl Settings {
         fn within(name: &'static str, ok: bool, value: impl ToString, range: &'static str) -> Result<(), Error> {
             if ok { Ok(()) } else { Err(Error::Setting { name, value: value.to_string(), range }) }
         }
-        let Reconstruction { k, points_per_pixel, engine, outlier_expansions, gap_factor, splat_scale, .. } =
-            self.reconstruction;
+        let Reconstruction {
+            k,
+            points_per_pixel,
+            engine,
+            outlier_expansions,
+            gap_factor,
+            splat_scale,
+            frames_averaged,
+            ..
+        } = self.reconstruction;
         within("k", (1..=64).contains(&k), k, "within 1 to 64")?;
         within("points_per_pixel", (1..=2).contains(&points_per_pixel), points_per_pixel, "1 or 2")?;
         if let SearchEngine::KdTree { first_radius: r } = engine {
@@ -118,6 +138,7 @@ impl Settings {
         let lambda = gap_factor.unwrap_or(4.0);
         within("gap_factor", lambda > 1.0 && lambda.is_finite(), lambda, "above 1")?;
         within("splat_scale", (0.01..=10.0).contains(&splat_scale), splat_scale, "within 0.01 to 10")?;
+        within("frames_averaged", (1..=32).contains(&frames_averaged), frames_averaged, "within 1 to 32")?;
         within("occlusion", (0.0..=10.0).contains(&self.shading.occlusion), self.shading.occlusion, "within 0 to 10")?;
         if let Some([low, high]) = self.shading.range {
             within(

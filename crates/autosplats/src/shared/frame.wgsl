@@ -34,6 +34,11 @@ struct Frame {
     past_rotation: mat3x3f,
     past_shift: vec3f,
     past_focal_px: f32,
+    // By which share of the way surfels are drawn towards the last frame's surface.
+    smoothing: f32,
+    unused_0: u32,
+    unused_1: u32,
+    unused_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,5 +1,6 @@
 // Temporal coherence: what the last frame found where a point was then; search/past/mod.rs tells more. Imports: frame. The
-// including pass binds `past`, of each pixel of that frame the bits of a k-radius, 0 where there is none.
+// including pass binds `past`, of each pixel of that frame the bits of a k-radius, 0 where there is none;
+// a single element if no radii are kept.
 
 // Least and most radius to start from, in first search radii.
 override LEAST_LIKELY: f32;
@@ -17,6 +18,10 @@ fn past_radius(position_view: vec3f, initial_radius: f32) -> f32 {
         return 0.0;
     }
     let pixel = vec2u(at);
-    let radius = bitcast<f32>(past[pixel.y * frame.size.x + pixel.x]);
+    let place = pixel.y * frame.size.x + pixel.x;
+    if place >= arrayLength(&past) {
+        return 0.0;
+    }
+    let radius = bitcast<f32>(past[place]);
     return select(0.0, radius, radius >= LEAST_LIKELY * initial_radius && radius <= MOST_LIKELY * initial_radius);
 }

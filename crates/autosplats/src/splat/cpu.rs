@@ -5,11 +5,12 @@ use rayon::prelude::*;
 use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
 use super::centers::add_centers;
+use super::over_time::smooth;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_REACH;
 use super::trim::{Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
-use crate::camera::View;
+use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
 use crate::project::Sixteenths;
 
@@ -37,6 +38,12 @@ impl Splatter {
     pub(crate) fn begin(&mut self, view: &View) {
         self.used = 0;
         clear(&mut self.depth, view);
+    }
+
+    /// Draws `surfels` towards the surface that the last frame showed, by `share` of the way: temporal smoothing. For frames
+    /// after one that was drawn to its end.
+    pub(crate) fn smooth(&self, surfels: &mut [Surfel], past: &Reprojection, share: f32, view: &View) {
+        smooth(surfels, &self.layers, past, share, view);
     }
 
     /// Visibility pass: draws the surfels from index `first` on into the depth map [Paper, §7].

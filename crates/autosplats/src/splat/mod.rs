@@ -17,6 +17,7 @@ mod centers;
 mod cpu;
 pub(crate) mod gpu;
 mod layers;
+mod over_time;
 mod raster;
 mod setup;
 #[cfg(test)]

@@ -68,6 +68,10 @@ fn mirrored() -> [Mirrored; 9] {
                 past_rotation,
                 past_shift,
                 past_focal_px,
+                smoothing,
+                unused_0,
+                unused_1,
+                unused_2,
             }
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),

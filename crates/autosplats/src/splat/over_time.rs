@@ -1,0 +1,72 @@
+//! Temporal smoothing: surfels drawn towards the surface that the last frame showed.
+//!
+//! Points that a live scanner measures anew for each frame have other noise each time, and surfaces that stand still shiver. A
+//! surfel looks back to where it lay in the last frame. If the surface seen there is near and faces the same way, it is taken
+//! for the same one, and the surfel moves towards it, along its normal, and turns towards it, by a share of the way: so noise
+//! is averaged over frames, with weights that fade, and nothing is kept but the last frame's picture. What moves is drawn
+//! behind by as many frames; what moves by more than [`NEAR`] k-radii a frame is left alone.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::GBuffer;
+use crate::camera::{Reprojection, View};
+use crate::fit::Surfel;
+
+/// How far away the same surface may have been in the last frame, in k-radii of the surfel.
+pub(super) const NEAR: f32 = 0.5;
+/// Cosine of the angle by which it may face another way.
+pub(super) const ALIKE: f32 = 0.7;
+
+/// Draws `surfels` towards the surface `last` shown, by `share` of the way, 0 to below 1.
+pub(crate) fn smooth(surfels: &mut [Surfel], last: &GBuffer, past: &Reprojection, share: f32, view: &View) {
+    surfels.par_iter_mut().with_min_len(1024).for_each(|surfel| {
+        if let Some(surface) = seen_before(surfel, last, past) {
+            draw_towards(surfel, &surface, share, view);
+        }
+    });
+}
+
+/// A surface of the last frame, in view space.
+struct Surface {
+    /// Unit normal, to the same side as the surfel's.
+    normal: Vec3,
+    /// How far the surfel lies in front of it.
+    distance: f32,
+}
+
+/// The same surface in the last frame.
+fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<Surface> {
+    let pixel = past.pixel(surfel.center)?;
+    let width = past.view.width as usize;
+    let [x, y] = [pixel % width, pixel / width];
+    let at = last.index(x, y);
+    if last.weight[at] == 0.0 {
+        return None;
+    }
+    let seen = past.view.unproject([x as f32 + 0.5, y as f32 + 0.5], last.depth[at]);
+    let normal = Vec3::from(last.normal[at]);
+    let distance = normal.dot(past.position(surfel.center) - seen);
+    let normal = past.rotation.transpose() * normal;
+    let facing = normal.dot(surfel.normal.into());
+    let is_same = distance.abs() <= NEAR * surfel.k_radius && facing.abs() >= ALIKE && surfel.radius > 0.0;
+    is_same.then(|| Surface { normal: normal * facing.signum(), distance: distance * facing.signum() })
+}
+
+fn draw_towards(surfel: &mut Surfel, surface: &Surface, share: f32, view: &View) {
+    let &Surface { normal: then, distance } = surface;
+    let center = Vec3::from(surfel.center) - share * distance * then;
+    let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
+    let now = Vec3::from(surfel.normal);
+    let normal = (now + share * (then - now)).normalize();
+    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+    let major_axis = Vec3::from(surfel.major_axis);
+    surfel.normal = normal.to_array();
+    surfel.major_axis = (major_axis - normal * normal.dot(major_axis)).normalize().to_array();
+    let [x, y] = view.to_pixel(center);
+    // A centre beside the picture has no pixel to be hidden at.
+    if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {
+        surfel.center = center.to_array();
+        surfel.pixel = (y as u32) << 16 | x as u32;
+    }
+}
