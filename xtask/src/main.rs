@@ -2,7 +2,9 @@
 
 mod formats;
 mod layers;
+mod peers;
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
@@ -11,12 +13,15 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 const USAGE: &str = "\
 usage: cargo xtask test               format, lints, build, tests, documentation, the rules between crates and stages,
-                                  and a minute of broken files
+                                  Zenoh and programs of others, and a minute of broken files
        cargo xtask fuzz [OPTIONS]     broken files for every reader, as long as wanted; --help tells the options
        cargo xtask quality [OPTIONS]  docs/QUALITY.md, from pictures held against the exact surface, in some ten minutes;
                                   --quick and --only NAME take some of them, --out DIR writes elsewhere
        cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
                                   with --check only whether it is what this build makes";
+
+/// What everything is built with, so that what Zenoh needs is built once, and nothing beside it twice.
+const FEATURES: [&str; 2] = ["--features", "autosplats-cli/zenoh"];
 
 /// Seconds that the tests feed broken files to the readers.
 const FUZZ_SECONDS: &str = "60";
@@ -71,6 +76,14 @@ fn test(root: &Path) -> Result<()> {
     step("test data", &|| find_data(root))?;
     step("graphics device", &find_device)?;
     step("screen in memory", &find_screen)?;
+    let python = RefCell::new(Err(String::new()));
+    step("programs of others", &|| {
+        *python.borrow_mut() = peers::find_python(root)?;
+        if let Err(why) = &*python.borrow() {
+            eprintln!("LEFT OUT: the tests with recordings and messages of other programs: {why}");
+        }
+        Ok(())
+    })?;
     step("stages import in one direction", &|| layers::check(&root.join("crates/autosplats/src")))?;
     step("autosplats-cloud never reaches wgpu", &|| check_dependencies(root))?;
     step("format", &|| {
@@ -79,16 +92,28 @@ fn test(root: &Path) -> Result<()> {
     })?;
     step("lints", &|| {
         component("clippy", "clippy")?;
-        cargo(root, &["clippy", "--locked", "--workspace", "--all-targets", "--", "-D", "warnings"])
+        let clippy = ["clippy", "--locked", "--workspace"];
+        let deny = ["--", "-D", "warnings"];
+        cargo(root, &[&clippy[..], &FEATURES, &["--all-targets"], &deny].concat())?;
+        // As it is built by default, of which a few lines are others.
+        cargo(root, &[&clippy[..], &deny].concat())
     })?;
-    step("build", &|| cargo(root, &["test", "--locked", "--workspace", "--no-run"]))?;
-    step("tests", &|| cargo(root, &["test", "--locked", "--workspace"]))?;
+    let tests = |more: &[&str]| cargo(root, &[&["test", "--locked", "--workspace"][..], &FEATURES, more].concat());
+    step("build", &|| tests(&["--no-run"]))?;
+    step("tests", &|| tests(&[]))?;
+    if let Ok(python) = &*python.borrow() {
+        step("tests with programs of others", &|| peers::test(root, python))?;
+    }
     step("broken files", &|| fuzz(root, &["--seconds", FUZZ_SECONDS]))?;
     step("documentation", &|| {
         let mut command = cargo_command(root);
-        run(command.args(["doc", "--locked", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+        command.args(["doc", "--locked", "--workspace", "--no-deps"]).args(FEATURES);
+        run(command.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
     println!("\nall passed in {:.0} s", start.elapsed().as_secs_f64());
+    if let Err(why) = &*python.borrow() {
+        eprintln!("LEFT OUT: the tests with recordings and messages of other programs: {why}");
+    }
     Ok(())
 }
 

@@ -178,7 +178,7 @@ pub(crate) struct PlayingArgs {
     /// Topic of a recording to play; can be given several times [default: all that have points]
     #[arg(long = "topic", value_name = "NAME")]
     pub(crate) topics: Vec<String>,
-    /// Coordinate frame of a recording that its points are brought into [default: the topmost that its sensors share]
+    /// Coordinate frame that points of a recording or over Zenoh are brought into [default: the topmost of their sensors]
     #[arg(long, value_name = "FRAME")]
     pub(crate) fixed_frame: Option<String>,
     /// Keep the points of the last so many seconds, such as 2s or 500ms

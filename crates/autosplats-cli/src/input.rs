@@ -75,6 +75,9 @@ impl Inputs {
     pub(crate) fn new(names: &[String], args: &InputArgs) -> Result<Self, Failure> {
         let InputArgs { poses, reading, playing } = args;
         let mut list = names.iter().map(|name| Input::new(name)).collect::<Result<Vec<_>, _>>()?;
+        if list.iter().filter(|input| matches!(input.source, Source::StandardInput)).count() > 1 {
+            return Err(Failure::usage("-: standard input can be read only once; name it once"));
+        }
         let generated = list.iter().map(|input| input.source.least_bytes()).sum();
         check_memory("the points of generated scenes", generated).map_err(read_failure)?;
         if reading.columns.is_some() && list.iter().all(|input| matches!(input.source, Source::Scene(..))) {
@@ -357,6 +360,16 @@ fn parse_pose(text: &str) -> Result<DMat4, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn standard_input_is_one_input() {
+        let new = |names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|&name| name.into()).collect();
+            Inputs::new(&names, &InputArgs::default()).map(drop).map_err(|failure| failure.message)
+        };
+        assert_eq!(new(&["-"]), Ok(()), "once");
+        assert!(new(&["-", "scene:statue:1K", "-"]).is_err_and(|told| told.contains("only once")), "twice");
+    }
 
     #[test]
     fn poses() -> Result<(), String> {

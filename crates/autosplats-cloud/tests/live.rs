@@ -127,6 +127,34 @@ fn waiting_ends_when_it_is_told_to() {
 }
 
 #[test]
+fn a_thread_that_panics_does_not_end_without_a_word() {
+    struct Mistake(Vec<u8>);
+    impl Read for Mistake {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            assert!(!self.0.is_empty(), "an oversight\nof ours");
+            let len = self.0.len();
+            buffer[..len].copy_from_slice(&self.0);
+            self.0.clear();
+            Ok(len)
+        }
+    }
+    let mut live = Live::bytes(Mistake(pcd_bytes("binary", 10)), "standard input", &LiveOptions::default()).unwrap();
+    let mut told = Vec::new();
+    loop {
+        match live.next(PATIENCE, &()) {
+            Ok(Next::Update(update)) => assert_eq!(update.cloud.len(), 10, "what came before is there"),
+            Ok(Next::Nothing) => panic!("it must end: {:?}", live.statistics()),
+            Ok(Next::End) => break,
+            Err(error) => told.push(error.to_string()),
+        }
+    }
+    let [told] = &told[..] else { panic!("it is told once: {told:?}") };
+    assert!(told.starts_with("standard input: ") && told.contains("an oversight"), "{told}");
+    assert!(!told.contains(char::is_control), "in a line: {told:?}");
+    assert_eq!((live.statistics().taken, live.statistics().refused), (1, 1), "and counted");
+}
+
+#[test]
 fn an_empty_input_ends_at_once() {
     let mut live = Live::bytes(std::io::empty(), "-", &LiveOptions::default()).unwrap();
     assert_eq!(live.next(PATIENCE, &()).unwrap(), Next::End, "no bytes at all");
@@ -190,4 +218,36 @@ fn of_a_watched_folder_the_newest_file_is_shown() {
     assert_eq!(live.next(Duration::from_millis(250), &()).unwrap(), Next::Nothing, "what is gone changes nothing");
     let statistics = live.statistics();
     assert!(statistics.taken + statistics.dropped <= 5, "those between are counted if they were seen: {statistics:?}");
+}
+
+#[test]
+fn a_folder_that_fills_faster_than_it_is_looked_at_is_shown_nevertheless() {
+    let [folder, elsewhere] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let pattern = folder.path().join("scan_*.ply");
+    let lives = [folder.path(), &pattern].map(|path| Live::watch(path, &ReadOptions::default()).unwrap());
+    let begun = Instant::now();
+    let seconds = Duration::from_secs(3);
+    // Thirty a second, each put there at once; others of no such name beside them.
+    let mut written = 0;
+    while begun.elapsed() < seconds {
+        written += 1;
+        for (name, count) in [(format!("other_{written}.xyz"), 5000), (format!("scan_{written}.ply"), written)] {
+            let made = elsewhere.path().join(&name);
+            put(count, &made);
+            std::fs::rename(made, folder.path().join(name)).unwrap();
+        }
+        std::thread::sleep((Duration::from_millis(33) * written as u32).saturating_sub(begun.elapsed()));
+    }
+    assert!(written > 30, "only {written} were written");
+    for (which, mut live) in ["folder", "pattern"].into_iter().zip(lives) {
+        let told = live.statistics();
+        assert!(told.dropped > 10, "{which}: those before the newest were read or seen all the while: {told:?}");
+        loop {
+            let count = update(&mut live).cloud.len();
+            assert!(which == "folder" || count <= written, "only what the pattern stands for");
+            if count == written {
+                break;
+            }
+        }
+    }
 }

@@ -1,8 +1,18 @@
 //! What is seen of a stream at one moment.
 
-use std::{path::Path, time::Duration};
+use std::{
+    collections::VecDeque,
+    io::Read,
+    path::Path,
+    sync::Arc,
+    thread::sleep,
+    time::{Duration, Instant},
+};
 
-use autosplats_cloud::{LatestOptions, PlayOptions, Player, PointCloud, ReadOptions, Source};
+use autosplats_cloud::{
+    Error, LatestOptions, Live, LiveOptions, Next, PlayOptions, Player, PointCloud, Progress, ReadOptions, Source,
+    Statistics, Stream, Timeline, Update, glam::DVec3,
+};
 
 /// A folder of frames of three points each, the first of which lies as far to the right as the frame's number.
 fn folder(frames: usize) -> tempfile::TempDir {
@@ -61,4 +71,71 @@ fn what_is_kept_is_seen() {
     assert_eq!(seen(decay, 5), [3, 4, 5], "a quarter of a second at ten a second");
     let accumulate = LatestOptions { accumulate: true, ..LatestOptions::default() };
     assert_eq!(seen(accumulate, 5), [0, 1, 2, 3, 4, 5], "all");
+}
+
+/// Updates at these stamps, in milliseconds, one after the other.
+struct Stamps(VecDeque<i64>);
+
+impl Stream for Stamps {
+    fn timeline(&self) -> Option<&Timeline> {
+        None
+    }
+
+    fn seek(&mut self, _: usize) {}
+
+    fn next(&mut self, _: Duration, _: &dyn Progress) -> Result<Next, Error> {
+        let Some(milliseconds) = self.0.pop_front() else { return Ok(Next::End) };
+        let cloud = PointCloud::new(DVec3::ZERO, vec![[milliseconds as f32, 0.0, 0.0]]);
+        Ok(Next::Update(Update { channel: 0, stamp: milliseconds * 1_000_000, cloud: Arc::new(cloud) }))
+    }
+
+    fn statistics(&self) -> Statistics {
+        Statistics::default()
+    }
+}
+
+#[test]
+fn what_became_of_updates_is_told() {
+    let stamps = Stamps([100, 200, 200, 150, 300, 0, 10, 20, 30, 40].into());
+    let mut player = Player::new(Box::new(stamps), LatestOptions::default());
+    let mut seen = Vec::new();
+    while let Ok(Some(cloud)) = player.next(Duration::ZERO, &()) {
+        seen.push(cloud.world_position(0).x as i64);
+    }
+    assert_eq!(seen, [100, 200, 200, 200, 300, 300, 300, 300, 30, 40], "a clock that is set back is followed");
+    let told = player.latest_statistics();
+    assert_eq!((told.shown, told.late, told.duplicates, told.restarted), (5, 4, 1, 1), "{told:?}");
+}
+
+/// Gives a byte at a time, and takes its time for it.
+struct Slow(VecDeque<u8>, Duration);
+
+impl Read for Slow {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        sleep(self.1);
+        let Some(byte) = self.0.pop_front() else { return Ok(0) };
+        buffer[0] = byte;
+        Ok(1)
+    }
+}
+
+#[test]
+fn as_long_as_bytes_of_the_first_frame_come_it_is_waited_for() {
+    let slow = |text: &str, pause| {
+        let input = Slow(text.bytes().collect(), pause);
+        let live = Live::bytes(input, "standard input", &LiveOptions::default()).expect("a thread");
+        Player::new(Box::new(live), LatestOptions::default())
+    };
+    let frame = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                 end_header\n1 2 3\n";
+    let (patience, begun) = (Duration::from_millis(400), Instant::now());
+    let cloud = slow(frame, Duration::from_millis(10)).first(patience, &()).expect("the frame, in the end");
+    assert_eq!(cloud.world_position(0), DVec3::new(1.0, 2.0, 3.0), "all of it");
+    assert!(begun.elapsed() > patience, "which took longer than nothing is waited for");
+    let told =
+        |text: &str| slow(text, Duration::from_millis(10)).first(patience, &()).map_err(|error| error.to_string());
+    let garbage = "no frame ".repeat(1000);
+    assert!(told(&garbage).is_err_and(|why| why.contains("nothing came")), "bytes of no frame are nothing to wait for");
+    let silence = slow(frame, Duration::from_secs(2)).first(patience, &());
+    assert!(silence.is_err_and(|why| why.to_string().contains("nothing came")), "nor is silence");
 }

@@ -160,6 +160,35 @@ fn the_writer_of_the_format_makes_files_that_are_read() {
 }
 
 #[test]
+fn a_folder_that_lacks_a_part_plays_the_others() {
+    let (topics, messages) = ten(Encoding::Cdr);
+    let folder = tempfile::tempdir().unwrap();
+    let [first, last] = [&messages[..8], &messages[14..]];
+    for (name, messages) in [("a_0.mcap", first), ("a_2.mcap", last)] {
+        std::fs::write(folder.path().join(name), mcap(&topics, messages, Style::of("zstd"))).unwrap();
+    }
+    let parts = "    - a_0.mcap\n    - a_1.mcap\n    - a_2.mcap\n    - a_3.mcap\n";
+    let metadata = format!("rosbag2_bagfile_information:\n  relative_file_paths:\n{parts}  duration: 1\n");
+    std::fs::write(folder.path().join("metadata.yaml"), metadata).unwrap();
+    std::fs::write(folder.path().join("a_3.mcap"), "").unwrap();
+    let notes = Notes::default();
+    let mut recording = Recording::open(folder.path(), &RecordingOptions::default(), &notes).unwrap();
+    let (updates, refusals) = play(&mut recording);
+    let stamps: Vec<i64> = updates.iter().map(|update| (update.stamp - START) * 10 / SECOND).collect();
+    assert_eq!((stamps, refusals.len()), (vec![0, 1, 2, 3, 7, 8, 9], 0), "what is there");
+    let notes = notes.all();
+    let told =
+        |name: &str| notes.iter().filter(|note| note.contains("a part is left out") && note.contains(name)).count();
+    assert_eq!([notes.len(), told("a_1.mcap"), told("a_3.mcap")], [2, 1, 1], "each once: {notes:?}");
+    assert_eq!((recording.statistics().refused, &recording.summary().notes), (2, &notes), "and counted");
+    for name in ["a_0.mcap", "a_2.mcap"] {
+        std::fs::remove_file(folder.path().join(name)).unwrap();
+    }
+    let none = Recording::open(folder.path(), &RecordingOptions::default(), &()).map(drop).unwrap_err().to_string();
+    assert!(none.contains("a_0.mcap"), "none is there: {none}");
+}
+
+#[test]
 fn the_same_frame_is_the_same_points_however_it_is_come_to() {
     let (topics, messages) = ten(Encoding::Cdr);
     let bytes = mcap(&topics, &messages, Style::of("zstd"));

@@ -13,13 +13,15 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Next, ReadOptions, Statistics, Stream as _, Update,
-    remote::{Remote, Topic, topics},
+    Next, Progress, Statistics, Stream as _, Update,
+    glam::DVec3,
+    point_cloud2::Encoding,
+    remote::{Remote, RemoteOptions, Topic, topics},
 };
 use common::{
     positions,
-    ros::Cloud2,
-    zenoh_peer::{answering, bridge_token, client, free_port, listener, rmw_key, rmw_token},
+    ros::{Cloud2, transforms},
+    zenoh_peer::{TRANSFORM, answering, bridge_token, cache, client, free_port, listener, rmw_key, rmw_token},
 };
 use zenoh::{Session, Wait as _, qos::CongestionControl};
 
@@ -27,7 +29,7 @@ use zenoh::{Session, Wait as _, qos::CongestionControl};
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn live(port: u16, topic: &str) -> Remote {
-    Remote::open(&format!("zenoh://127.0.0.1:{port}/{topic}"), &ReadOptions::default()).unwrap()
+    Remote::open(&format!("zenoh://127.0.0.1:{port}/{topic}"), &RemoteOptions::default()).unwrap()
 }
 
 /// Waits until the statistics say so.
@@ -238,7 +240,7 @@ fn it_says_why_nothing_comes() {
 }
 
 fn live_at(url: &str) -> Remote {
-    Remote::open(url, &ReadOptions::default()).unwrap()
+    Remote::open(url, &RemoteOptions::default()).unwrap()
 }
 
 #[test]
@@ -266,6 +268,116 @@ fn several_topics_are_several_channels() {
     let expected = [("/front/points", 1), ("/rear/points", 2), ("/robot/points", 3)];
     assert!(seen.iter().map(|(name, count)| (&**name, *count)).eq(expected), "{seen:?}");
     assert_eq!(live.statistics().refused, 0, "what is not of points was never heard");
+}
+
+/// A frame within its parent, moved and not turned, as a message.
+fn transform(stamp: i64, parent: &str, child: &str, x: f64) -> Vec<u8> {
+    transforms(Encoding::Cdr, &[(stamp, parent, child, [x, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])])
+}
+
+/// One point at the sensor's (1, 2, 3).
+fn one_point(stamp: i64) -> Vec<u8> {
+    Cloud2 { stamp, ..Cloud2::xyz(&[[1.0, 2.0, 3.0]], 12) }.cdr()
+}
+
+const SECOND: i64 = 1_000_000_000;
+const NOW: i64 = 1_700_000_000 * SECOND;
+
+#[test]
+fn sensors_are_where_their_robot_says() {
+    for (points, [tf, tf_static]) in [
+        (rmw_key(0, "points"), ["tf", "tf_static"].map(|name| format!("0/{name}/{TRANSFORM}/RIHS01_00"))),
+        ("points".to_owned(), ["tf", "tf_static"].map(str::to_owned)),
+    ] {
+        let port = free_port();
+        let there = listener("peer", port);
+        let mut live = live(port, "points");
+        // From one second to the next the robot goes from 10 to 20; the points are from between.
+        let sent = [
+            (tf_static.clone(), transform(0, "base", "lidar", 100.0)),
+            (tf.clone(), transform(NOW, "odom", "base", 10.0)),
+            (tf.clone(), transform(NOW + SECOND, "odom", "base", 20.0)),
+            (points.clone(), one_point(NOW + SECOND / 4)),
+        ];
+        let update = next(&mut live, || sent.iter().for_each(|(key, message)| put(&there, key, message)));
+        assert_eq!(update.cloud.world_position(0), DVec3::new(113.5, 2.0, 3.0), "{points}");
+        assert_eq!(update.cloud.scans()[0].position(), DVec3::new(112.5, 0.0, 0.0), "the sensor, {points}");
+        assert_eq!((live.channels(), live.statistics().refused), (vec!["/points".into()], 0), "{points}");
+        // Later than all that is known of the robot; in order behind what is sent again and again.
+        while live.next(Duration::from_millis(200), &()).unwrap() != Next::Nothing {}
+        put(&there, &points, &one_point(NOW + 5 * SECOND));
+        let Next::Update(update) = live.next(PATIENCE, &()).unwrap() else { panic!("nothing came") };
+        assert_eq!(update.cloud.world_position(0).x, 121.0, "where it was last, {points}");
+        put(&there, &tf, b"nonsense");
+        until(&live, "what is no message is counted", |told| told.refused == 1);
+        let why = live.statistics().last_refusal.unwrap();
+        assert!(why.starts_with("/tf: byte 0: "), "{why}");
+    }
+}
+
+#[test]
+fn transforms_that_were_sent_before_anybody_listened_are_asked_for() {
+    let typed = format!("0/tf_static/{TRANSFORM}/RIHS01_00");
+    for (points, key, asked) in [
+        (rmw_key(0, "points"), &*typed, format!("{typed}/@adv/pub/7f3a/1/_")),
+        (rmw_key(0, "points"), &*typed, format!("7f3a/{typed}")),
+        ("points".into(), "tf_static", "tf_static/@adv/pub/7f3a/1/_".into()),
+        ("points".into(), "tf_static", "@/7f3a/@ros2_pub_cache/tf_static".into()),
+    ] {
+        let port = free_port();
+        let there = listener("router", port);
+        // Two nodes, each of which says where one of two frames is.
+        let nodes = [("base", "lidar", 10.0), ("map", "base", 20.0)].map(|(parent, child, x)| {
+            let node = client(port);
+            let token = rmw_token(&node, "tf_static", TRANSFORM, 7);
+            let kept = cache(&node, asked.clone(), key.into(), transform(0, parent, child, x));
+            (node, token, kept)
+        });
+        let mut live = live(port, "points");
+        let update = next(&mut live, || put(&there, &points, &one_point(NOW)));
+        assert_eq!(update.cloud.world_position(0).x, 31.0, "of both, asked for as {asked}");
+        drop(nodes);
+    }
+}
+
+/// Keeps what it is told.
+#[derive(Default)]
+struct Notes(std::sync::Mutex<Vec<String>>);
+
+impl Progress for Notes {
+    fn report(&self, _: f32) {}
+
+    fn note(&self, note: &str) {
+        self.0.lock().unwrap().push(note.into());
+    }
+}
+
+#[test]
+fn a_frame_that_is_asked_for_is_told_until_it_is_there() {
+    let port = free_port();
+    let there = listener("peer", port);
+    let options = RemoteOptions { frame: Some("map".into()), ..RemoteOptions::default() };
+    let mut live = Remote::open(&format!("zenoh://127.0.0.1:{port}/robot/points"), &options).unwrap();
+    let key = rmw_key(0, "robot/points");
+    let update = next(&mut live, || put(&there, &key, &one_point(NOW)));
+    assert_eq!(update.cloud.world_position(0).x, 1.0, "as the sensor saw it");
+    let notes = Notes::default();
+    let mut place = |message: &[u8]| {
+        put(&there, &format!("0/robot/tf/{TRANSFORM}/RIHS01_00"), message);
+        thread::sleep(Duration::from_millis(200));
+        while live.next(Duration::ZERO, &notes).unwrap() != Next::Nothing {}
+        put(&there, &key, &one_point(NOW));
+        let Next::Update(update) = live.next(PATIENCE, &notes).unwrap() else { panic!("nothing came") };
+        update.cloud.world_position(0).x
+    };
+    assert_eq!(place(&transform(NOW, "base", "lidar", 10.0)), 1.0, "there is no such frame yet");
+    assert_eq!(place(&transform(NOW, "map", "base", 20.0)), 31.0, "now there is");
+    // A robot that is put elsewhere; then its clock goes back, and only what it says from then on counts.
+    assert_eq!(place(&transform(NOW + SECOND, "map", "base", 50.0)), 31.0, "later than the points");
+    assert_eq!(place(&transform(NOW - 60 * SECOND, "map", "base", 70.0)), 81.0, "the only one");
+    drop(live);
+    let notes = notes.0.into_inner().unwrap();
+    assert!(notes.len() <= 1 && notes.iter().all(|note| note.contains("'map'")), "told once: {notes:?}");
 }
 
 #[test]
@@ -320,7 +432,7 @@ fn topics_of_nobody_are_an_error_with_a_remedy() {
     let error = topics(&url, Duration::from_secs(2)).unwrap_err().to_string();
     assert!(error.starts_with(&url) && error.contains("nobody listens there; start one there"), "{error}");
     assert!(begin.elapsed() < Duration::from_secs(3), "patience is kept");
-    assert!(Remote::open("zenoh://127.0.0.1", &ReadOptions::default()).is_err(), "no topic is named");
+    assert!(Remote::open("zenoh://127.0.0.1", &RemoteOptions::default()).is_err(), "no topic is named");
 }
 
 /// A Python of which `rosbags` writes the messages and `eclipse-zenoh` sends them.
@@ -365,18 +477,27 @@ fn points_of_another_implementation_arrive() {
     let mut other = python(port);
     let found = topics(&format!("zenoh://127.0.0.1:{port}"), PATIENCE).unwrap();
     let names: Vec<_> = found.iter().map(|topic| (&*topic.name, topic.has_points(), topic.domain)).collect();
-    assert_eq!(names, [("/front/points", true, Some(0)), ("/rear/points", true, None)], "both ways of naming");
-    for (topic, frame) in [("front/points", "front_lidar"), ("rear/points", "rear_lidar")] {
+    assert_eq!(names[..2], [("/front/points", true, Some(0)), ("/rear/points", true, None)], "both ways of naming");
+    let others = [("/tf", Some(0)), ("/tf", None), ("/tf_static", Some(0)), ("/tf_static", None)];
+    let mut found: Vec<_> = names[2..].iter().map(|&(name, _, domain)| (name, domain)).collect();
+    found.sort_by_key(|&(name, domain)| (name, domain.is_none()));
+    assert_eq!(found, others, "and what has no points");
+    for (topic, frame, x) in [("front/points", "front_lidar", 1.0), ("rear/points", "rear_lidar", -1.0)] {
         let mut live = live(port, topic);
         let Next::Update(Update { stamp, cloud, .. }) = live.next(PATIENCE, &()).unwrap() else {
             panic!("nothing came: {:?}", live.statistics());
         };
         assert_eq!((stamp, cloud.len()), (1_700_000_000_123_456_789, 1000), "{topic}");
-        assert_eq!(cloud.scans()[0].name.as_deref(), Some(frame), "{topic}");
+        let scan = &cloud.scans()[0];
+        assert_eq!(scan.name.as_deref(), Some(frame), "{topic}");
+        // What is fixed was sent once, before anybody listened.
+        let place = DVec3::new(10.0 + x, 20.0, 0.5);
+        assert_eq!(scan.position(), place, "{topic}: where the robot says that its sensor is");
         let (light, ring) = (cloud.field("Intensity").unwrap(), cloud.field("Ring").unwrap());
         for i in 0..1000 {
             let of = i as f64;
-            assert_eq!(cloud.world_position(i).to_array(), [1.0 + of / 2.0, -of, of % 7.0], "point {i} of {topic}");
+            let wanted = place + DVec3::new(1.0 + of / 2.0, -of, of % 7.0);
+            assert_eq!(cloud.world_position(i), wanted, "point {i} of {topic}");
             assert_eq!([light.values.get(i), ring.values.get(i)], [of + 0.25, of % 128.0], "point {i} of {topic}");
         }
     }

@@ -1,5 +1,5 @@
 //! How fast live points are, and that they take no more memory by time. Measurements, which take minutes:
-//! `cargo test --release --features zenoh --test live_speed -- --ignored --nocapture`.
+//! `cargo test --release -p autosplats-cloud --features zenoh --test remote_speed -- --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
@@ -10,7 +10,10 @@ use std::{
     time::{Duration, Instant, UNIX_EPOCH},
 };
 
-use autosplats_cloud::{Next, ReadOptions, Stream as _, remote::Remote};
+use autosplats_cloud::{
+    Next, Stream as _,
+    remote::{Remote, RemoteOptions},
+};
 use common::{
     positions,
     ros::Cloud2,
@@ -34,7 +37,7 @@ fn measure(count: usize, step: u32, seconds: u64) {
     let port = free_port();
     let _router = listener("router", port);
     let sensor = client(port);
-    let mut live = Remote::open(&format!("zenoh://127.0.0.1:{port}/points"), &ReadOptions::default()).unwrap();
+    let mut live = Remote::open(&format!("zenoh://127.0.0.1:{port}/points"), &RemoteOptions::default()).unwrap();
     let mut message = Cloud2 { stamp: 0, ..Cloud2::xyz(&positions(count), step) }.cdr();
     let bytes = message.len();
     let sent = thread::spawn(move || {

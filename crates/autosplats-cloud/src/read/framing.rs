@@ -72,6 +72,11 @@ impl Framing {
         Self { bytes: Vec::new(), before: 0, limit, state: State::Between }
     }
 
+    /// Whether the bytes so far are the beginning of a file, as far as can be told.
+    pub(crate) fn is_within(&self) -> bool {
+        matches!(self.state, State::Header { .. } | State::Body { .. })
+    }
+
     /// Takes the bytes that follow.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);

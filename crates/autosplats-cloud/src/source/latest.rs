@@ -8,10 +8,11 @@ use std::{
 
 use glam::DMat4;
 
+use super::clock::{Clock, Order};
 use crate::{PointCloud, Update};
 
-/// A clock that goes back by more than this was set anew, or a recording has begun again; by less, messages have overtaken
-/// each other.
+/// A clock that goes back by more than this was set anew, or a recording has begun again; by less, messages may have overtaken
+/// each other, unless several in a row are older than the newest and in order among themselves.
 const JUMP: Duration = Duration::from_secs(1);
 
 /// What [`Latest`] keeps beside the newest points.
@@ -36,7 +37,8 @@ impl Default for LatestOptions {
 pub enum Arrival {
     /// It is shown.
     Shown,
-    /// It is shown, and what was known of its sensor is forgotten: the clock has gone back too far.
+    /// It is shown, and what was known of its sensor before its clock went back is forgotten: it went back by more than a second
+    /// and more than is kept, or this is the fourth in a row that is older than the newest and newer than the one before it.
     Restarted,
     /// Older than what had come before, and than all that is kept.
     Late,
@@ -49,8 +51,10 @@ pub enum Arrival {
 pub struct LatestStatistics {
     /// Updates that were shown.
     pub shown: u64,
-    /// Updates refused as too late or as known already.
-    pub refused: u64,
+    /// Updates refused as older than all that is kept.
+    pub late: u64,
+    /// Updates refused as of a time of which there were points already.
+    pub duplicates: u64,
     /// Times that a clock went back and its sensor was begun anew.
     pub restarted: u64,
     /// Updates given up since there were more points than are kept.
@@ -77,6 +81,9 @@ pub struct Latest {
 struct Sensor {
     /// In the order of stamps.
     kept: VecDeque<Kept>,
+    clock: Clock,
+    /// The first arrival that may be of a clock that was set back.
+    since: u64,
     /// Whether what comes next takes the place of all that is kept.
     restarts: bool,
 }
@@ -130,26 +137,33 @@ impl Latest {
         assert!(stream < self.poses.len(), "stream {stream} of {}", self.poses.len());
         let Update { channel, stamp, cloud } = update;
         let sensor = self.sensors.entry((stream, channel)).or_default();
-        if std::mem::take(&mut sensor.restarts) {
-            sensor.kept.clear();
+        if sensor.restarts {
+            *sensor = Sensor::default();
+        }
+        let keeps = self.options.decay.unwrap_or_default();
+        let mut restarted = false;
+        match sensor.clock.hear(stamp, keeps.max(JUMP)) {
+            Order::Onward => {}
+            Order::Behind { first } => sensor.since = if first { self.arrivals } else { sensor.since },
+            // Where everything is kept, late points are shown as any, so that none need to go for them.
+            Order::Restarted { first } if first || !self.options.accumulate => {
+                let since = if first { self.arrivals } else { sensor.since };
+                sensor.kept.retain(|kept| kept.arrival >= since);
+                self.statistics.restarted += 1;
+                restarted = true;
+            }
+            Order::Restarted { .. } => {}
         }
         let newest = sensor.kept.back().map_or(i64::MIN, |kept| kept.stamp);
         let behind = Duration::from_nanos(newest.saturating_sub(stamp).max(0).unsigned_abs());
-        let keeps = self.options.decay.unwrap_or_default();
-        let restarted = behind > keeps.max(JUMP);
-        if restarted {
-            sensor.kept.clear();
-            self.statistics.restarted += 1;
-        }
         let at = sensor.kept.partition_point(|kept| kept.stamp < stamp);
-        let refused = if sensor.kept.get(at).is_some_and(|kept| kept.stamp == stamp) {
-            Some(Arrival::Duplicate)
-        } else {
-            (!restarted && behind > keeps && !self.options.accumulate).then_some(Arrival::Late)
-        };
-        if let Some(refused) = refused {
-            self.statistics.refused += 1;
-            return refused;
+        if sensor.kept.get(at).is_some_and(|kept| kept.stamp == stamp) {
+            self.statistics.duplicates += 1;
+            return Arrival::Duplicate;
+        }
+        if behind > keeps && !self.options.accumulate {
+            self.statistics.late += 1;
+            return Arrival::Late;
         }
         sensor.kept.insert(at, Kept { stamp, arrival: self.arrivals, cloud });
         self.arrivals += 1;

@@ -1,6 +1,7 @@
 //! Where clouds come from.
 
 pub(crate) mod animation;
+mod clock;
 pub(crate) mod latest;
 pub(crate) mod live;
 pub(crate) mod player;
@@ -66,7 +67,8 @@ pub struct PlayOptions {
     pub fps: Option<f64>,
     /// Topics of a recording; all of them if there are none.
     pub topics: Vec<String>,
-    /// Coordinate frame of a recording that its points are brought into; see [`RecordingOptions::frame`].
+    /// Coordinate frame of a recording, or of robots heard over Zenoh, that points are brought into; see
+    /// [`RecordingOptions::frame`].
     pub frame: Option<String>,
     /// Points that are strewn over a mesh in place of its vertices.
     pub sample: Option<usize>,
@@ -172,7 +174,10 @@ impl Source {
                 return Self::plain(Live::bytes(std::io::stdin(), "standard input", &options)?, play);
             }
             #[cfg(feature = "zenoh")]
-            Self::Remote(address) => return Self::plain(remote::Remote::open(address, options)?, play),
+            Self::Remote(address) => {
+                let options = remote::RemoteOptions { frame: play.frame.clone(), read: options.clone() };
+                return Self::plain(remote::Remote::open(address, &options)?, play);
+            }
             #[cfg(not(feature = "zenoh"))]
             Self::Remote(address) => {
                 let why = "this build has no Zenoh; it takes one with the feature 'zenoh'".into();

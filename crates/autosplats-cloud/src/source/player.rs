@@ -7,7 +7,7 @@ use std::{
 
 use glam::DMat4;
 
-use super::latest::{Latest, LatestOptions};
+use super::latest::{Latest, LatestOptions, LatestStatistics};
 use crate::{Error, Next, PointCloud, Progress, Stream, Update};
 
 /// How long a wait may last before somebody may cancel it.
@@ -31,12 +31,20 @@ pub struct Player {
 impl Player {
     /// Plays a stream, and keeps what `options` say beside the newest points.
     pub fn new(stream: Box<dyn Stream>, options: LatestOptions) -> Self {
-        Self { stream, latest: begin(&options), options, last: None }
+        let mut latest = Latest::new(options.clone());
+        latest.add(DMat4::IDENTITY);
+        Self { stream, latest, options, last: None }
     }
 
     /// What is played.
     pub fn stream(&self) -> &dyn Stream {
         &*self.stream
+    }
+
+    /// What became of the updates that the stream handed out: shown, late, known already. What it dropped or refused itself is in
+    /// its own [statistics](Stream::statistics).
+    pub fn latest_statistics(&self) -> LatestStatistics {
+        self.latest.statistics()
     }
 
     /// The points that are seen at a frame of the timeline: of each channel the newest by then, and what is kept of older ones.
@@ -51,7 +59,7 @@ impl Player {
         let mut after = self.last;
         if self.last.is_some_and(|last| last > frame) {
             // What came later must not be seen.
-            self.latest = begin(&self.options);
+            self.latest.forget(0);
             (self.last, after) = (None, None);
         }
         let fresh = after.is_none();
@@ -91,7 +99,8 @@ impl Player {
         Ok(true)
     }
 
-    /// The first frame, or of a live stream the first update, which is waited for no longer than `patience`.
+    /// The first frame, or of a live stream the first update, which is waited for no longer than `patience`, counted anew as long
+    /// as [bytes](Stream::received) of it come.
     ///
     /// # Errors
     /// Those of [`frame`](Self::frame) and [`next`](Self::next), [`Error::NoFrames`] if nothing comes.
@@ -99,10 +108,14 @@ impl Player {
         if self.stream.timeline().is_some() {
             return self.frame(0, progress);
         }
-        let begun = Instant::now();
-        while let Some(left) = patience.checked_sub(begun.elapsed()) {
+        let (mut since, mut received) = (Instant::now(), self.stream.received());
+        while let Some(left) = patience.checked_sub(since.elapsed()) {
             if let Some(cloud) = self.next(left.min(STEP), progress)? {
                 return Ok(cloud);
+            }
+            let now = self.stream.received();
+            if now > received {
+                (since, received) = (Instant::now(), now);
             }
         }
         let why = format!("nothing came within {} s", patience.as_secs());
@@ -147,10 +160,4 @@ impl Player {
             }
         }
     }
-}
-
-fn begin(options: &LatestOptions) -> Latest {
-    let mut latest = Latest::new(options.clone());
-    latest.add(DMat4::IDENTITY);
-    latest
 }

@@ -37,6 +37,12 @@ pub trait Stream: Send {
 
     /// What became of the updates so far.
     fn statistics(&self) -> Statistics;
+
+    /// Bytes that have come of updates so far, whole or not, for whoever waits for the first: while they become more, something is
+    /// on its way. 0 where nobody counts them.
+    fn received(&self) -> u64 {
+        0
+    }
 }
 
 /// What [`Stream::next`] found.

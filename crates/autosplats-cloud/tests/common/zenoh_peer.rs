@@ -2,7 +2,10 @@
 
 use std::net::TcpListener;
 
-use zenoh::{Config, Session, Wait as _, liveliness::LivelinessToken};
+use zenoh::{Config, Session, Wait as _, liveliness::LivelinessToken, query::Queryable};
+
+/// The type of transforms as rmw_zenoh writes it into keys.
+pub(crate) const TRANSFORM: &str = "tf2_msgs::msg::dds_::TFMessage_";
 
 /// The key of a topic as rmw_zenoh names it; the hash is any.
 pub(crate) fn rmw_key(domain: u32, topic: &str) -> String {
@@ -56,4 +59,10 @@ pub(crate) fn bridge_token(session: &Session, topic: &str) -> LivelinessToken {
     let topic = topic.replace('/', "§");
     let key = format!("@/{}/@ros2_lv/MP/{topic}/sensor_msgs§msg§PointCloud2/:::", session.zid());
     session.liveliness().declare_token(key).wait().unwrap()
+}
+
+/// Keeps a message for whoever comes later, under a key of its own, and answers with the key of the message.
+pub(crate) fn cache(session: &Session, asked: String, key: String, message: Vec<u8>) -> Queryable<()> {
+    let answer = move |query: zenoh::query::Query| query.reply(key.clone(), message.clone()).wait().unwrap();
+    session.declare_queryable(asked).callback(answer).wait().unwrap()
 }

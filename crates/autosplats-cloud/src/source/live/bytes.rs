@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{LiveOptions, mailbox::Mailbox, now};
+use super::{LiveOptions, guarded, mailbox::Mailbox, now};
 use crate::{
     Error, Progress, Update,
     read::{Found, Framing},
@@ -36,6 +36,10 @@ pub(super) fn read(mut input: impl Read, name: &Path, options: &LiveOptions, mai
         while let Some(found) = framing.next() {
             deliver(found, name, options, mailbox);
         }
+        // What is no file is nothing to wait for.
+        if framing.is_within() {
+            mailbox.receive(len);
+        }
         if len == 0 {
             framing.end().into_iter().for_each(|found| deliver(found, name, options, mailbox));
             return;
@@ -47,7 +51,7 @@ fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) 
     let refused = |byte: u64, what| Error::Malformed { path: name.into(), place: format!("byte {byte}"), what };
     let error = match found {
         Found::Refused(byte, what) => refused(byte, what),
-        Found::File(byte, bytes) => match read_bytes(name, &bytes, &options.read, &Until(mailbox)) {
+        Found::File(byte, bytes) => match guarded(name, || read_bytes(name, &bytes, &options.read, &Until(mailbox))) {
             Ok(cloud) => return mailbox.put(Update { channel: 0, stamp: now(), cloud: Arc::new(cloud) }),
             // Places in a frame say nothing without where it begins.
             Err(Error::Malformed { place, what, .. }) => refused(byte, format!("in a frame, {place}: {what}")),

@@ -24,6 +24,8 @@ struct State {
     /// What was refused last, until somebody has heard of it.
     refusal: Option<Error>,
     statistics: Statistics,
+    /// Bytes of files that have come, whole or not.
+    received: u64,
     ended: bool,
     abandoned: bool,
 }
@@ -94,6 +96,15 @@ impl Mailbox {
             let waited = self.changed.wait_timeout(state, left.min(LOOK));
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
+    }
+
+    /// Counts bytes that have come of a file.
+    pub(super) fn receive(&self, bytes: usize) {
+        self.state().received += bytes as u64;
+    }
+
+    pub(super) fn received(&self) -> u64 {
+        self.state().received
     }
 
     pub(super) fn statistics(&self) -> Statistics {

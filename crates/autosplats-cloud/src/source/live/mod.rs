@@ -3,7 +3,8 @@
 //! # How it works
 //!
 //! A thread waits for what comes, decodes it and puts it into a [`Mailbox`], where it takes the place of what nobody has
-//! taken yet. So nothing queues, however slow the taker is.
+//! taken yet. So nothing queues, however slow the taker is. Should reading panic, which is a mistake of ours, that is an error
+//! of the stream like any other, which goes on with what comes next.
 
 mod bytes;
 mod mailbox;
@@ -11,13 +12,14 @@ mod watch;
 
 use std::{
     io::Read,
-    path::Path,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, SystemTime},
 };
 
 use self::mailbox::Mailbox;
-use crate::{Error, Next, Progress, ReadOptions, Statistics, Stream, Timeline};
+use crate::{Error, Next, Progress, ReadOptions, Statistics, Stream, Timeline, error::message};
 
 /// Points that others send or write: a [`Stream`] without a timeline, of which the newest are at hand.
 pub struct Live {
@@ -52,8 +54,9 @@ impl Live {
         Self::start(&name.clone(), move |mailbox| bytes::read(input, name.as_ref(), &options, mailbox))
     }
 
-    /// A file, each time it has changed, or the newest file of a folder, once it has not changed for a tenth of a second. What
-    /// is not there yet is waited for. The stamps are the times at which that was noticed.
+    /// A file, each time it has changed, or the newest of a folder or of those that a pattern like `scans/*.ply` stands for, once
+    /// it has not changed for a tenth of a second. What is not there yet is waited for. The stamps are the times at which
+    /// that was noticed.
     ///
     /// # Errors
     /// [`Error::Io`] if there can be no thread.
@@ -65,8 +68,11 @@ impl Live {
     fn start(name: &str, work: impl FnOnce(&Mailbox) + Send + 'static) -> Result<Self, Error> {
         let mailbox = Arc::new(Mailbox::default());
         let filled = Arc::clone(&mailbox);
+        let path = PathBuf::from(name);
         let work = move || {
-            work(&filled);
+            if let Err(error) = guarded(&path, || Ok(work(&filled))) {
+                filled.refuse(error);
+            }
             filled.end();
         };
         let spawned = std::thread::Builder::new().name("live points".into()).spawn(work);
@@ -89,12 +95,27 @@ impl Stream for Live {
     fn statistics(&self) -> Statistics {
         self.mailbox.statistics()
     }
+
+    fn received(&self) -> u64 {
+        self.mailbox.received()
+    }
 }
 
 impl Drop for Live {
     fn drop(&mut self) {
         self.mailbox.abandon();
     }
+}
+
+/// Does something that must not end a thread without a word: a panic becomes an error.
+fn guarded<T>(name: &Path, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    // What is left half done belongs to the frame that failed, and to nobody after it.
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let said = panic.downcast_ref::<&str>().map(|said| (*said).to_owned());
+        let said = said.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+        let what = message(&format!("reading has failed by a mistake of this program, please report it: {said}"));
+        Err(Error::Unsupported { path: name.into(), what })
+    })
 }
 
 /// Nanoseconds since 1970.

@@ -124,10 +124,17 @@ fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }
 
-/// A file, or all of a folder in order.
-pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Vec<File>, Error> {
+/// The files of a recording, and what is the matter with those of a folder that cannot be opened.
+pub(super) struct Parts {
+    pub(super) files: Vec<File>,
+    /// A line for each.
+    pub(super) missing: Vec<String>,
+}
+
+/// A file, or all of a folder in order. Of a folder whatever can be opened is played.
+pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Parts, Error> {
     if !path.is_dir() {
-        return Ok(vec![File::open(path, progress)?]);
+        return Ok(Parts { files: vec![File::open(path, progress)?], missing: Vec::new() });
     }
     let io = |source| Error::Io { path: path.into(), source };
     let mut parts = parts(&std::fs::read_to_string(path.join(METADATA)).unwrap_or_default());
@@ -142,10 +149,21 @@ pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Vec<Fil
         return Err(Error::Unsupported { path: path.into(), what: "the folder has no MCAP files".into() });
     }
     let len = 1.0 / parts.len() as f32;
-    let open = |(index, name): (usize, &String)| {
-        File::open(&path.join(name), &Part { whole: progress, start: len * index as f32, len })
-    };
-    parts.iter().enumerate().map(open).collect()
+    let (mut files, mut missing, mut first) = (Vec::new(), Vec::new(), None);
+    for (index, name) in parts.iter().enumerate() {
+        match File::open(&path.join(name), &Part { whole: progress, start: len * index as f32, len }) {
+            Ok(file) => files.push(file),
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            Err(error) => {
+                missing.push(message(&format!("a part is left out: {error}")));
+                first = first.or(Some(error));
+            }
+        }
+    }
+    match first {
+        Some(error) if files.is_empty() => Err(error),
+        _ => Ok(Parts { files, missing }),
+    }
 }
 
 /// The files that `metadata.yaml` lists: of YAML no more is needed than the lines of one list.

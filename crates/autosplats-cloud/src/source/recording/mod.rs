@@ -14,7 +14,7 @@ mod index;
 mod mcap;
 mod play;
 mod summary;
-mod transforms;
+pub(super) mod transforms;
 
 use std::{collections::HashMap, path::Path};
 
@@ -23,7 +23,7 @@ pub use self::{
     summary::{RecordingSummary, RecordingTopic},
 };
 use self::{
-    files::{File, open_files},
+    files::{File, Parts, open_files},
     index::{Kind, Place, Topic},
     transforms::Transforms,
 };
@@ -70,8 +70,8 @@ pub struct Recording {
 impl Recording {
     /// Opens an MCAP file, a ROS 1 bag or the folder of a ROS 2 bag. No points are read yet, but all transforms.
     ///
-    /// What cannot be played, as the end of a recording that was cut off, is told as a [note](Progress::note) and counted as
-    /// [refused](Statistics::refused).
+    /// What cannot be played, as the end of a recording that was cut off or a part that a folder lacks, is told as a
+    /// [note](Progress::note) and counted as [refused](Statistics::refused).
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Malformed`] if nothing can be played, [`Error::Unsupported`] if it has no such points, and
@@ -90,16 +90,13 @@ impl Recording {
         options: &RecordingOptions,
         progress: &dyn Progress,
     ) -> Result<Self, Error> {
-        Self::of(name, vec![File::of_bytes(name, bytes, &indexing(progress))?], options, progress)
+        let files = vec![File::of_bytes(name, bytes, &indexing(progress))?];
+        Self::of(name, Parts { files, missing: Vec::new() }, options, progress)
     }
 
-    fn of(
-        path: &Path,
-        mut files: Vec<File>,
-        options: &RecordingOptions,
-        progress: &dyn Progress,
-    ) -> Result<Self, Error> {
-        let mut summary = RecordingSummary::of(&files);
+    fn of(path: &Path, parts: Parts, options: &RecordingOptions, progress: &dyn Progress) -> Result<Self, Error> {
+        let mut summary = RecordingSummary::of(&parts);
+        let Parts { mut files, missing } = parts;
         let unsupported = |what: String| Error::Unsupported { path: path.into(), what: crate::error::message(&what) };
         let mut channels: Vec<String> = summary.points().map(|topic| topic.name.clone()).collect();
         channels.dedup();
@@ -129,6 +126,11 @@ impl Recording {
         let timeline = Timeline::new(frames.iter().map(|(place, _)| place.time).collect());
 
         let mut statistics = Statistics::default();
+        for told in missing {
+            progress.note(&told);
+            statistics.refused += 1;
+            statistics.last_refusal = Some(told);
+        }
         for file in &files {
             for fault in &file.index.faults {
                 let told = format!("{}: {}", fault.place(), fault.what);

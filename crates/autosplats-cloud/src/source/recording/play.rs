@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{Recording, index::Place};
 use crate::{
-    Axes, Error, PointCloud, Progress,
+    Error, Progress,
     source::{
         point_cloud2,
         stream::{Next, Statistics, Stream, Timeline, Update},
@@ -69,22 +69,12 @@ impl Recording {
         let stamp = if message.stamp == 0 { place.time } else { message.stamp };
         let mut cloud = message.cloud;
         let told = &mut self.told[channel];
-        if let Some(target) = self.transforms.target() {
-            // It is all in one frame then, so that there is one answer to which way is up.
-            let axes = if target.contains("optical") { Axes::Camera } else { Axes::ZUp };
-            match self.transforms.pose(&message.frame_id, stamp) {
-                Some(pose) if !cloud.is_empty() => {
-                    cloud = PointCloud::merge(vec![(cloud, pose)]).with_axes(axes);
-                }
-                Some(_) => {}
-                None if *told => {}
-                None => {
-                    *told = true;
-                    let frame = &message.frame_id;
-                    let note =
-                        format!("{topic}: no transforms lead from '{frame}' to '{target}'; its points stay in it");
-                    progress.note(&crate::error::message(&note));
-                }
+        if let Some(placement) = self.transforms.placement(&message.frame_id, stamp) {
+            let missing;
+            (cloud, missing) = placement.apply(cloud);
+            if let Some(missing) = missing.filter(|_| !*told) {
+                *told = true;
+                progress.note(&crate::error::message(&format!("{topic}: {missing}")));
             }
         }
         if message.no_returns > 0 && !*told {

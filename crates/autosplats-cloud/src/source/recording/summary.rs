@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use super::{
-    files::File,
+    files::{File, Parts},
     index::{Kind, Topic},
 };
 
@@ -43,7 +43,7 @@ pub struct RecordingTopic {
 const LISTED: usize = 20;
 
 impl RecordingSummary {
-    pub(super) fn of(files: &[File]) -> Self {
+    pub(super) fn of(Parts { files, missing }: &Parts) -> Self {
         let mut topics: BTreeMap<(&str, &str), RecordingTopic> = BTreeMap::new();
         let mut kinds: Vec<String> = Vec::new();
         let mut times = None;
@@ -69,12 +69,13 @@ impl RecordingSummary {
         }
         let times = times.unwrap_or_default();
         let faults = files.iter().flat_map(|file| &file.index.faults);
+        let faults = faults.map(|fault| crate::error::message(&format!("{}: {}", fault.place(), fault.what)));
         Self {
             format: kinds.join(", "),
             topics: topics.into_values().collect(),
             start: times.start,
             duration: Duration::from_nanos(times.end.abs_diff(times.start)),
-            notes: faults.map(|fault| crate::error::message(&format!("{}: {}", fault.place(), fault.what))).collect(),
+            notes: missing.iter().cloned().chain(faults).collect(),
             ..Self::default()
         }
     }

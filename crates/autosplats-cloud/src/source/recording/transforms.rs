@@ -1,6 +1,9 @@
 //! Where the frames of a robot are to each other, at any time.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
+    time::Duration,
+};
 
 use glam::{DMat4, DQuat, DVec3, DVec4};
 use rayon::prelude::*;
@@ -11,9 +14,11 @@ use super::{
     index::{Container, Kind, Place, Record},
 };
 use crate::{
-    Error, Progress,
+    Axes, Error, PointCloud, Progress,
+    error::message,
     progress::tick,
     source::{
+        clock::{Clock, Order},
         point_cloud2::frame_name,
         wire::{Encoding, Fault, Wire, header},
     },
@@ -21,7 +26,7 @@ use crate::{
 
 /// A tree of frames, each within its parent as that was measured at some times.
 #[derive(Debug, Default)]
-pub(super) struct Transforms {
+pub(in crate::source) struct Transforms {
     edges: BTreeMap<String, Edge>,
     /// The frame that all points are brought into.
     target: Option<String>,
@@ -34,7 +39,9 @@ struct Edge {
     /// The same at all times.
     fixed: bool,
     /// By time.
-    poses: Vec<(i64, Pose)>,
+    poses: VecDeque<(i64, Pose)>,
+    /// Of poses that come as they are sent.
+    clock: Clock,
 }
 
 /// Maps a frame to its parent.
@@ -57,6 +64,13 @@ const LEAST_TRANSFORM: usize = 72;
 
 /// Chunks that are read at the same time.
 const BATCH: usize = 16;
+
+/// Poses that are heard are kept for so long, by their stamps: points come later than they were measured, by less than this.
+const KEPT: Duration = Duration::from_secs(10);
+/// Poses of a frame that are kept at most: a thousand a second.
+const MOST_POSES: usize = 10_000;
+/// Frames that are known at most: whoever makes up more is no robot.
+const MOST_FRAMES: usize = 4096;
 
 /// No place on Earth, nor around it, is further from another than this, in metres.
 const FARTHEST: f64 = 1e12;
@@ -88,17 +102,19 @@ impl Transforms {
             }
         }
         if let Some(what) = lost {
-            progress.note(&crate::error::message(&format!("some transforms cannot be read: {what}")));
+            progress.note(&message(&format!("some transforms cannot be read: {what}")));
         }
         for Edge { poses, .. } in transforms.edges.values_mut() {
-            poses.sort_by_key(|(stamp, _)| *stamp);
-            poses.dedup_by_key(|(stamp, _)| *stamp);
+            let mut sorted = Vec::from(std::mem::take(poses));
+            sorted.sort_by_key(|(stamp, _)| *stamp);
+            sorted.dedup_by_key(|(stamp, _)| *stamp);
+            *poses = sorted.into();
         }
         Ok(transforms)
     }
 
     fn insert(&mut self, fixed: bool, Sample { stamp, parent, child, pose }: Sample) {
-        let edge = self.edges.entry(child).or_insert_with(|| Edge { parent, fixed, poses: Vec::new() });
+        let edge = self.edges.entry(child).or_insert_with(|| Edge::new(parent, fixed));
         // One that is said to be fixed and moves nevertheless, moves; of several fixed ones the last is meant.
         match (edge.fixed, fixed) {
             (false, true) => return,
@@ -106,11 +122,34 @@ impl Transforms {
             (false, false) => {}
         }
         edge.fixed = fixed;
-        edge.poses.push((stamp, pose));
+        edge.poses.push_back((stamp, pose));
+    }
+
+    /// Takes a message as it is sent, in any order. Of each frame the poses of the last ten seconds are kept; a clock that was
+    /// set back begins anew.
+    pub(in crate::source) fn hear(&mut self, message: &[u8], fixed: bool, arrival: i64) -> Result<(), String> {
+        let samples = parse(message, Encoding::Cdr, arrival);
+        let samples = samples.map_err(|fault| format!("{}: {}", fault.place(), fault.what))?;
+        for Sample { stamp, parent, child, pose } in samples {
+            if self.edges.len() >= MOST_FRAMES && !self.edges.contains_key(&child) {
+                return Err(format!("there are {MOST_FRAMES} other frames already; '{child}' is left out"));
+            }
+            let edge = self.edges.entry(child).or_insert_with(|| Edge::new(parent.clone(), fixed));
+            if edge.parent != parent {
+                *edge = Edge::new(parent, fixed);
+            }
+            edge.hear(fixed, stamp, pose);
+        }
+        Ok(())
+    }
+
+    /// Whether a frame is a part of the tree.
+    pub(in crate::source) fn knows(&self, frame: &str) -> bool {
+        self.edges.contains_key(frame) || self.edges.values().any(|edge| edge.parent == frame)
     }
 
     /// Chooses the frame that points of these sensors' frames are brought into: the wanted one, or the topmost.
-    pub(super) fn choose(&mut self, sensors: &[String], wanted: Option<String>) -> Result<(), String> {
+    pub(in crate::source) fn choose(&mut self, sensors: &[String], wanted: Option<String>) -> Result<(), String> {
         if let Some(wanted) = wanted {
             let known = self.frames(sensors);
             if !known.contains(&wanted) {
@@ -120,13 +159,12 @@ impl Transforms {
             return Ok(());
         }
         // Without any transforms there is nothing to bring into one frame, nor of a sensor outside of the tree.
-        let parents: BTreeSet<&String> = self.edges.values().map(|edge| &edge.parent).collect();
-        let mut inside = sensors.iter().filter(|&sensor| self.edges.contains_key(sensor) || parents.contains(sensor));
+        let mut inside = sensors.iter().filter(|sensor| self.knows(sensor));
         self.target = inside.find_map(|sensor| Some(self.to_root(sensor, 0)?.1.to_owned()));
         Ok(())
     }
 
-    pub(super) fn target(&self) -> Option<&str> {
+    pub(in crate::source) fn target(&self) -> Option<&str> {
         self.target.as_deref()
     }
 
@@ -137,9 +175,18 @@ impl Transforms {
         all.into_iter().filter(|name| !name.is_empty()).cloned().collect()
     }
 
-    /// Maps a frame to the common one as it was at a time; nothing if they do not hang together.
-    pub(super) fn pose(&self, frame: &str, stamp: i64) -> Option<DMat4> {
-        let Some(target) = self.target().filter(|target| *target != frame) else { return Some(DMat4::IDENTITY) };
+    /// Where points of a frame belong that were measured at a time; nothing if there is no common frame.
+    pub(in crate::source) fn placement(&self, frame: &str, stamp: i64) -> Option<Placement> {
+        let target = self.target()?.to_owned();
+        let pose = self.pose(frame, &target, stamp);
+        Some(Placement { frame: frame.to_owned(), target, pose })
+    }
+
+    /// Maps a frame to another as it was at a time; nothing if they do not hang together.
+    fn pose(&self, frame: &str, target: &str, stamp: i64) -> Option<DMat4> {
+        if frame == target {
+            return Some(DMat4::IDENTITY);
+        }
         let (up, root) = self.to_root(frame, stamp)?;
         let (down, other) = self.to_root(target, stamp)?;
         (root == other).then(|| down.inverse() * up)
@@ -157,12 +204,61 @@ impl Transforms {
     }
 }
 
+/// Where points of a frame belong.
+pub(in crate::source) struct Placement {
+    frame: String,
+    target: String,
+    pose: Option<DMat4>,
+}
+
+impl Placement {
+    /// Brings points there; if no transforms lead there, they stay as they are, and that is told.
+    pub(in crate::source) fn apply(self, cloud: PointCloud) -> (PointCloud, Option<String>) {
+        let Self { frame, target, pose } = self;
+        // It is all in one frame then, so that there is one answer to which way is up.
+        let axes = if target.contains("optical") { Axes::Camera } else { Axes::ZUp };
+        match pose {
+            Some(pose) if !cloud.is_empty() => (PointCloud::merge(vec![(cloud, pose)]).with_axes(axes), None),
+            Some(_) => (cloud, None),
+            None => (cloud, Some(format!("no transforms lead from '{frame}' to '{target}'; its points stay in it"))),
+        }
+    }
+}
+
 impl Edge {
+    fn new(parent: String, fixed: bool) -> Self {
+        Self { parent, fixed, poses: VecDeque::new(), clock: Clock::default() }
+    }
+
+    /// Takes a pose as it is sent.
+    fn hear(&mut self, fixed: bool, stamp: i64, pose: Pose) {
+        // As in recordings: one that is said to be fixed and moves nevertheless, moves; of several fixed ones the last is meant.
+        match (self.fixed, fixed) {
+            (false, true) => return,
+            (true, _) => self.poses.clear(),
+            (false, false) => {}
+        }
+        self.fixed = fixed;
+        if !fixed && matches!(self.clock.hear(stamp, KEPT), Order::Restarted { .. }) {
+            self.poses.clear();
+        }
+        let at = self.poses.partition_point(|(time, _)| *time < stamp);
+        match self.poses.get_mut(at) {
+            Some(known) if known.0 == stamp => known.1 = pose,
+            _ => self.poses.insert(at, (stamp, pose)),
+        }
+        let newest = self.poses.back().map_or(stamp, |(time, _)| *time);
+        let oldest = newest.saturating_sub(KEPT.as_nanos() as i64);
+        while self.poses.len() > MOST_POSES || self.poses.front().is_some_and(|(time, _)| *time < oldest) {
+            self.poses.pop_front();
+        }
+    }
+
     /// The pose at a time, between those before and after it; the first before all, the last after.
     fn at(&self, stamp: i64) -> Pose {
         let after = self.poses.partition_point(|(time, _)| *time <= stamp);
         match (after.checked_sub(1).map(|before| self.poses[before]), self.poses.get(after)) {
-            (Some((from, a)), Some((to, b))) => {
+            (Some((from, a)), Some(&(to, b))) => {
                 let share = stamp.abs_diff(from) as f64 / to.abs_diff(from) as f64;
                 Pose {
                     rotation: a.rotation.slerp(b.rotation, share),

@@ -1,5 +1,6 @@
 //! Where live points come from: `zenoh://HOST:PORT/TOPIC?domain=N`.
 
+use super::frames::TRANSFORMS;
 use crate::Error;
 
 /// What begins an address of live points.
@@ -10,6 +11,9 @@ const FORM: &str = "zenoh://HOST:PORT/TOPIC?domain=N, where HOST, :PORT and ?dom
 const PORT: u16 = 7447;
 /// The type of message as rmw_zenoh writes it into keys.
 pub(super) const POINTS: &str = "sensor_msgs::msg::dds_::PointCloud2_";
+
+/// The type of messages of transforms.
+const TRANSFORM: &str = "tf2_msgs::msg::dds_::TFMessage_";
 
 /// An address, taken apart.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,6 +85,44 @@ impl Address {
         let typed = format!("{}/{topic}/{POINTS}/*", self.domain_key());
         if self.is_pattern() { vec![typed] } else { vec![typed, topic.clone()] }
     }
+
+    /// The keys under which the transforms of its robots are heard, named in the same two ways: those beside the topic and those
+    /// of all namespaces around it, as far as they are no pattern. None without a topic.
+    pub(super) fn transform_keys(&self) -> Vec<String> {
+        let domain = self.domain_key();
+        let named = |name: String| [format!("{domain}/{name}/{TRANSFORM}/*"), name];
+        let names = self.namespaces().into_iter().flat_map(|space| TRANSFORMS.map(|name| format!("{space}{name}")));
+        names.flat_map(named).collect()
+    }
+
+    /// The keys to ask for transforms that do not change and were sent before anybody listened, since ROS has their publishers
+    /// keep them: in the cache of Zenoh's advanced publisher, of rmw_zenoh and the bridge from 1.3 on, or before that in
+    /// one that is asked with the session before the key, by the bridge with a name of its own as well.
+    pub(super) fn history_keys(&self) -> Vec<String> {
+        let domain = self.domain_key();
+        let [_, fixed] = TRANSFORMS;
+        let asked = |space: String| {
+            let (bare, typed) = (format!("{space}{fixed}"), format!("{domain}/{space}{fixed}/{TRANSFORM}/*"));
+            [
+                format!("{typed}/@adv/**"),
+                format!("*/{typed}"),
+                format!("{bare}/@adv/**"),
+                format!("@/*/@ros2_pub_cache/{bare}"),
+                format!("@ros2_pub_cache/*/{bare}"),
+            ]
+        };
+        self.namespaces().into_iter().flat_map(asked).collect()
+    }
+
+    /// What stands before the names of topics in the namespaces that the topic is in: nothing, then `robot/`, and so on.
+    fn namespaces(&self) -> Vec<String> {
+        if self.topic.is_empty() {
+            return Vec::new();
+        }
+        let plain = &self.topic[..self.topic.find('*').unwrap_or(self.topic.len())];
+        let slashes = plain.match_indices('/').map(|(at, _)| plain[..=at].to_owned());
+        std::iter::once(String::new()).chain(slashes).collect()
+    }
 }
 
 /// Host and port; an IPv6 address is in brackets.
@@ -114,9 +156,18 @@ mod tests {
         assert_eq!((&*address.topic, address.domain), ("front/points", Some(42)), "slashes at the ends mean nothing");
         let keys = ["42/front/points/sensor_msgs::msg::dds_::PointCloud2_/*", "front/points"];
         assert_eq!(address.keys(), keys, "both ways of naming it");
+        let transforms = "42/tf/tf2_msgs::msg::dds_::TFMessage_/* tf 42/tf_static/tf2_msgs::msg::dds_::TFMessage_/* tf_static \
+                          42/front/tf/tf2_msgs::msg::dds_::TFMessage_/* front/tf \
+                          42/front/tf_static/tf2_msgs::msg::dds_::TFMessage_/* front/tf_static";
+        assert_eq!(address.transform_keys().join(" "), transforms, "beside it and around it");
+        let history = address.history_keys();
+        assert!(history.contains(&"front/tf_static/@adv/**".into()) && history.len() == 10, "{history:?}");
+        assert_eq!(Address::parse("zenoh://robot/a/*/points")?.transform_keys().len(), 8, "those before it are there");
         let all = Address::parse("zenoh://robot/**")?;
+        assert_eq!(all.transform_keys().len(), 4, "a pattern has no namespaces");
         assert_eq!(all.keys(), ["*/**/sensor_msgs::msg::dds_::PointCloud2_/*"], "never all there is");
-        assert_eq!(Address::parse("zenoh://robot")?.topic, "", "no topic");
+        let none = Address::parse("zenoh://robot")?;
+        assert_eq!((&*none.topic, none.transform_keys().len()), ("", 0), "no topic");
         Ok(())
     }
 

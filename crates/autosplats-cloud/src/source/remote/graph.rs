@@ -13,7 +13,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::address::Address;
+use super::{address::Address, frames::TRANSFORMS};
 
 /// The type of a PointCloud2 message as ROS writes it.
 pub(super) const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
@@ -112,6 +112,12 @@ impl Graph {
 
     pub(super) fn len(&self) -> usize {
         self.publishers.len()
+    }
+
+    /// How many publish transforms, of whatever robot.
+    pub(super) fn transforms(&self) -> usize {
+        let last = |topic: &Topic| topic.name.rsplit('/').next().is_some_and(|name| TRANSFORMS.contains(&name));
+        self.publishers.values().filter(|topic| last(topic)).count()
     }
 
     /// All topics, those of points first, then by name.

@@ -4,20 +4,23 @@
 //!
 //! Opening and closing wait for the network, so that a thread of its own does both and whoever takes points never waits for it.
 //! It asks again until somebody answers. From then on Zenoh itself asks again when the connection is lost; the
-//! thread only watches who is there, and follows what bridges begin to publish.
+//! thread only watches who is there, follows what bridges begin to publish, and asks for the transforms that were sent before it
+//! listened: whenever others come, and then less and less often, since a publisher may declare itself before it has any.
 
 use std::{
     collections::BTreeMap,
     io,
     net::{TcpStream, ToSocketAddrs as _},
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::Arc,
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use zenoh::{
     Config, Session, Wait as _,
     pubsub::Subscriber,
+    query::{ConsolidationMode, QueryTarget, Reply, ReplyKeyExpr},
     sample::{Sample, SampleKind},
 };
 
@@ -27,6 +30,9 @@ use super::{address::Address, graph::Graph, state::Shared};
 const RETRY: Duration = Duration::from_secs(1);
 /// Between two looks at who is there.
 const LOOK: Duration = Duration::from_millis(100);
+/// For an answer to what was sent before; the first pause until it is asked again, and the longest.
+const HISTORY: Duration = Duration::from_secs(5);
+const ASK_AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(32)];
 /// For an answer to why nobody answers.
 const PROBE: Duration = Duration::from_secs(1);
 /// What nodes of rmw_zenoh connect to, since they do not call out on the network.
@@ -34,7 +40,16 @@ const OWN_ROUTER: &str = "tcp/localhost:7447";
 
 /// Begins to hear what an address means, until it is [stopped](Shared::stop).
 pub(super) fn start(address: Address, shared: Arc<Shared>) -> io::Result<()> {
-    thread::Builder::new().name("zenoh link".into()).spawn(move || run(&address, &shared)).map(drop)
+    let work = move || {
+        // A mistake of ours must not end the connection without a word.
+        if catch_unwind(AssertUnwindSafe(|| run(&address, &shared))).is_err() {
+            let mut state = shared.lock();
+            let why = "the thread of the connection has failed by a mistake of this program, please report it";
+            state.refuse(why.into());
+            (state.connection.connected, state.connection.fault) = (false, Some(why.into()));
+        }
+    };
+    thread::Builder::new().name("zenoh link".into()).spawn(work).map(drop)
 }
 
 fn run(address: &Address, shared: &Arc<Shared>) {
@@ -50,9 +65,15 @@ fn run(address: &Address, shared: &Arc<Shared>) {
     // Before the first message can come.
     look(&session, shared);
     let mut heard = BTreeMap::new();
+    // Kept as long as they are to be heard.
     let mut tokens = Vec::new();
     let keys = if address.topic.is_empty() { Vec::new() } else { address.keys() };
-    let declared = keys.into_iter().try_for_each(|key| hear(&session, key, shared, &mut heard)).and_then(|()| {
+    let points = keys.into_iter().try_for_each(|key| hear(&session, key, shared, &mut heard));
+    let places = address.transform_keys().iter().try_for_each(|key| {
+        tokens.push(hear_transforms(&session, key, shared)?);
+        Ok(())
+    });
+    let declared = points.and(places).and_then(|()| {
         Graph::keys(address).iter().try_for_each(|key| {
             tokens.push(watch(&session, key, shared)?);
             Ok(())
@@ -61,9 +82,11 @@ fn run(address: &Address, shared: &Arc<Shared>) {
     if let Err(error) = declared {
         shared.lock().refuse(format!("nothing can be subscribed to: {error}"));
     }
+    let mut history = History::default();
     while !shared.stopped(LOOK) {
         look(&session, shared);
         let state = shared.lock();
+        let asks = history.is_due((state.connection.times, state.graph.transforms()), state.connection.connected);
         let mut wanted = Vec::new();
         if state.listen && !heard.contains_key("**") {
             wanted.push("**".to_owned());
@@ -72,6 +95,12 @@ fn run(address: &Address, shared: &Arc<Shared>) {
             wanted.extend(state.graph.bridged(address).into_iter().filter(|key| !heard.contains_key(key)));
         }
         drop(state);
+        let asked = if asks { address.history_keys() } else { Vec::new() };
+        for key in asked {
+            if let Err(error) = ask(&session, key, shared) {
+                shared.lock().refuse(format!("transforms cannot be asked for: {error}"));
+            }
+        }
         for key in wanted {
             if let Err(error) = hear(&session, key, shared, &mut heard) {
                 shared.lock().refuse(error.to_string());
@@ -100,6 +129,55 @@ fn hear(session: &Session, key: String, shared: &Arc<Shared>, heard: &mut Heard)
     };
     heard.insert(key.clone(), session.declare_subscriber(key).callback(put).wait()?);
     Ok(())
+}
+
+/// Subscribes to transforms.
+fn hear_transforms(session: &Session, key: &str, shared: &Arc<Shared>) -> zenoh::Result<Subscriber<()>> {
+    let shared = shared.clone();
+    let put = move |sample: Sample| {
+        if sample.kind() == SampleKind::Put {
+            shared.hear(sample.key_expr().as_str(), sample.payload());
+        }
+    };
+    session.declare_subscriber(key.to_owned()).callback(put).wait()
+}
+
+/// When to ask for what was sent before.
+#[derive(Default)]
+struct History {
+    /// How often others came and how many publish transforms, when that was last known.
+    others: (u64, usize),
+    /// When it was asked last, and the pause until it is asked again.
+    asked: Option<(Instant, Duration)>,
+}
+
+impl History {
+    fn is_due(&mut self, others: (u64, usize), connected: bool) -> bool {
+        let [first, longest] = ASK_AGAIN;
+        let new = std::mem::replace(&mut self.others, others) != others;
+        let pause = match self.asked {
+            _ if !connected => return false,
+            None => first,
+            Some(_) if new => first,
+            Some((asked, pause)) if asked.elapsed() >= pause => longest.min(pause * 2),
+            Some(_) => return false,
+        };
+        self.asked = Some((Instant::now(), pause));
+        true
+    }
+}
+
+/// Asks all who keep transforms for them.
+fn ask(session: &Session, key: String, shared: &Arc<Shared>) -> zenoh::Result<()> {
+    let shared = shared.clone();
+    let answered = move |reply: Reply| {
+        if let Ok(sample) = reply.result() {
+            shared.hear(sample.key_expr().as_str(), sample.payload());
+        }
+    };
+    // Of several publishers of one key every answer counts, and each comes under the key itself.
+    let asked = session.get(key).target(QueryTarget::All).consolidation(ConsolidationMode::None);
+    asked.accept_replies(ReplyKeyExpr::Any).timeout(HISTORY).callback(answered).wait()
 }
 
 /// Subscribes to tokens of publishers, those included that are there already.

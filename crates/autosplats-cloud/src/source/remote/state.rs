@@ -9,6 +9,7 @@ use zenoh::{bytes::ZBytes, session::ZenohId};
 
 use super::{
     address::Address,
+    frames::Frames,
     graph::{Graph, Topic, is_name},
 };
 use crate::Statistics;
@@ -17,6 +18,8 @@ use crate::Statistics;
 const MAX_CHANNELS: usize = 64;
 /// Time without a message that is worth telling.
 const SILENCE: Duration = Duration::from_secs(5);
+/// How long the first points wait for transforms, where somebody publishes some: those of a robot come at least every second.
+const SETTLING: Duration = Duration::from_secs(1);
 
 /// State and its lock.
 #[derive(Debug, Default)]
@@ -33,7 +36,10 @@ pub(super) struct State {
     turn: usize,
     pub(super) statistics: Statistics,
     pub(super) graph: Graph,
+    pub(super) frames: Frames,
     pub(super) connection: Connection,
+    /// When the first message came, and the last.
+    first: Option<Instant>,
     heard: Option<Instant>,
     /// Whether to listen to all that is sent.
     pub(super) listen: bool,
@@ -60,6 +66,8 @@ pub(super) struct Message {
 #[derive(Debug, Default)]
 pub(super) struct Connection {
     pub(super) connected: bool,
+    /// Times that others came.
+    pub(super) times: u64,
     /// Who was there last.
     others: Vec<ZenohId>,
     /// Why nobody is.
@@ -71,10 +79,21 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Transforms came.
+    pub(super) fn hear(&self, key: &str, payload: &ZBytes) {
+        if is_name(key) {
+            let topic = Topic::of_key(key);
+            let message = payload.to_bytes();
+            let mut state = self.lock();
+            if let Err(why) = state.frames.hear(&topic, &message, now()) {
+                state.refuse(format!("{}: {why}", topic.name));
+            }
+        }
+    }
+
     /// A message came, which takes the place of the one before that nobody took.
     pub(super) fn put(&self, key: &str, payload: ZBytes) {
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let arrival = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
+        let arrival = now();
         if !is_name(key) {
             return self.lock().refuse("a message under a name that is none".into());
         }
@@ -84,7 +103,8 @@ impl Shared {
         let Some(channel) = known.or_else(|| state.channel(topic)) else { return };
         let replaced = state.channels[channel].newest.replace(Message { payload, arrival });
         state.statistics.dropped += u64::from(replaced.is_some());
-        state.heard = Some(Instant::now());
+        let now = Instant::now();
+        (state.first, state.heard) = (state.first.or(Some(now)), Some(now));
         drop(state);
         // Megabytes are freed here, while nobody waits for the lock.
         drop(replaced);
@@ -116,7 +136,19 @@ impl Shared {
     }
 }
 
+/// Nanoseconds since 1970.
+fn now() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
 impl State {
+    /// Whether the first points still wait for the transforms of their robot.
+    pub(super) fn is_settling(&self) -> bool {
+        let soon = self.first.is_some_and(|first| first.elapsed() < SETTLING);
+        soon && (!self.frames.is_empty() || self.graph.transforms() > 0)
+    }
+
     /// A new channel.
     fn channel(&mut self, topic: Topic) -> Option<usize> {
         if self.channels.len() == MAX_CHANNELS {
@@ -135,10 +167,11 @@ impl State {
 
     /// Who is at the other end now.
     pub(super) fn others(&mut self, others: Vec<ZenohId>) {
-        let Connection { connected, others: before, fault } = &mut self.connection;
+        let Connection { connected, times, others: before, fault } = &mut self.connection;
         let lost = !*connected && !before.is_empty();
         let replaced = !before.is_empty() && !before.iter().any(|other| others.contains(other));
         let was = std::mem::replace(connected, !others.is_empty());
+        *times += u64::from(*connected && (!was || replaced));
         if *connected {
             self.statistics.reconnected += u64::from(lost || replaced);
             *before = others;

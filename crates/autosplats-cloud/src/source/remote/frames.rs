@@ -1,0 +1,144 @@
+//! Where the sensors of robots are, as the robots say, and the frame that their points are brought into.
+//!
+//! # How it works
+//!
+//! Each robot, a ROS domain and a namespace in it, has a tree of frames of its own, of what is published as `tf` and `tf_static`
+//! there. Which frame is the common one is decided once, for the first points that come: who changes it later would
+//! have points that are kept jump. So these wait a moment for transforms, which come in any order, if anybody publishes some.
+
+use std::collections::BTreeMap;
+
+use super::graph::Topic;
+use crate::source::recording::transforms::{Placement, Transforms};
+
+/// What ROS calls topics of transforms: of those that change, and of those that do not.
+pub(super) const TRANSFORMS: [&str; 2] = ["tf", "tf_static"];
+/// Robots whose transforms are known at most.
+const MOST_ROBOTS: usize = 64;
+
+/// The transforms of all robots.
+#[derive(Debug, Default)]
+pub(super) struct Frames {
+    /// The frame that points are to be brought into, if it was named.
+    wanted: Option<String>,
+    /// By domain and namespace; a namespace begins and ends with a slash.
+    robots: BTreeMap<(Option<u32>, String), Transforms>,
+}
+
+impl Frames {
+    pub(super) fn new(wanted: Option<String>) -> Self {
+        Self { wanted, ..Self::default() }
+    }
+
+    /// Whether there are any transforms.
+    pub(super) fn is_empty(&self) -> bool {
+        self.robots.is_empty()
+    }
+
+    /// Takes a message, or says what is wrong with it.
+    pub(super) fn hear(&mut self, topic: &Topic, message: &[u8], arrival: i64) -> Result<(), String> {
+        let Topic { name, domain, .. } = topic;
+        let [moving, fixed] = TRANSFORMS.map(|own| name.strip_suffix(own));
+        let (Some(namespace), fixed) = (moving.or(fixed), fixed.is_some()) else { return Ok(()) };
+        let key = (*domain, namespace.to_owned());
+        if self.robots.len() >= MOST_ROBOTS && !self.robots.contains_key(&key) {
+            return Err(format!("there are transforms of {MOST_ROBOTS} other robots already; name fewer topics"));
+        }
+        self.robots.entry(key).or_default().hear(message, fixed, arrival)
+    }
+
+    /// Where points of a sensor's frame belong that were measured at a time. Nothing if no transforms say anything of them; an
+    /// error if a frame was asked for that nobody knows.
+    pub(super) fn placement(&mut self, topic: &Topic, frame: &str, stamp: i64) -> Result<Option<Placement>, String> {
+        let Self { wanted, robots } = self;
+        // The innermost namespace is its own robot's, if that knows the sensor.
+        let own = robots.iter_mut().filter(|((domain, namespace), transforms)| {
+            *domain == topic.domain && topic.name.starts_with(namespace.as_str()) && transforms.knows(frame)
+        });
+        let Some((_, transforms)) = own.max_by_key(|((_, namespace), _)| namespace.len()) else {
+            return match wanted {
+                Some(wanted) if wanted != frame => Err(format!(
+                    "no transforms of '{frame}' have come, which '{wanted}' would need; its points stay in it"
+                )),
+                _ => Ok(None),
+            };
+        };
+        if transforms.target().is_none() {
+            transforms.choose(&[frame.to_owned()], wanted.clone())?;
+        }
+        Ok(transforms.placement(frame, stamp))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn topic(name: &str, domain: Option<u32>) -> Topic {
+        Topic { name: name.into(), domain, ..Topic::default() }
+    }
+
+    /// A message that says how far to the right of `parent` the frame `child` is.
+    fn message(parent: &str, child: &str, right: f64) -> Vec<u8> {
+        let mut bytes = vec![0, 1, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0];
+        for name in [parent, child] {
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+            bytes.extend((name.len() as u32 + 1).to_le_bytes());
+            bytes.extend([name.as_bytes(), b"\0"].concat());
+        }
+        // Numbers are aligned from behind the first four bytes.
+        bytes.resize((bytes.len() - 4).next_multiple_of(8) + 4, 0);
+        [right, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+        bytes
+    }
+
+    #[test]
+    fn each_robot_has_frames_of_its_own() -> Result<(), String> {
+        let mut frames = Frames::default();
+        for (name, domain, right) in [
+            ("/tf_static", Some(0), 1.0),
+            ("/tf_static", Some(1), 2.0),
+            ("/tf", None, 3.0),
+            ("/robot/tf", Some(0), 4.0),
+            ("/robot/front/tf", Some(0), 5.0),
+        ] {
+            let parent = if name.contains("front") { "elsewhere" } else { "base" };
+            let child = if name.contains("front") { "unknown" } else { "lidar" };
+            frames.hear(&topic(name, domain), &message(parent, child, right), 0)?;
+        }
+        let mut right = |name: &str, domain| {
+            let placement = frames.placement(&topic(name, domain), "lidar", 7_000_000_000)?;
+            let cloud = crate::PointCloud::new(glam::DVec3::ZERO, vec![[0.0; 3]]);
+            Ok::<_, String>(placement.map(|placement| placement.apply(cloud).0.world_position(0).x))
+        };
+        assert_eq!(right("/points", Some(0))?, Some(1.0), "of its domain");
+        assert_eq!(right("/points", Some(1))?, Some(2.0), "of another");
+        assert_eq!(right("/points", None)?, Some(3.0), "behind a bridge");
+        assert_eq!(right("/robot/front/points", Some(0))?, Some(4.0), "the innermost that knows the sensor");
+        assert_eq!(right("/robot_2/points", Some(0))?, Some(1.0), "a namespace ends at a slash");
+        assert_eq!(right("/points", Some(7))?, None, "nobody said anything");
+        Ok(())
+    }
+
+    #[test]
+    fn a_frame_that_was_asked_for_is_waited_for() -> Result<(), String> {
+        let mut frames = Frames::new(Some("map".into()));
+        let points = topic("/points", None);
+        let place = |frames: &mut Frames| frames.placement(&points, "lidar", 0).map(|place| place.is_some());
+        assert!(place(&mut frames).is_err_and(|why| why.contains("'map'")), "nothing is known");
+        frames.hear(&topic("/tf", None), &message("base", "lidar", 1.0), 0)?;
+        let why = place(&mut frames).err().unwrap_or_default();
+        assert_eq!(why, "no frame is called 'map'; there are: base, lidar", "as yet");
+        frames.hear(&topic("/tf", None), &message("map", "base", 1.0), 0)?;
+        assert_eq!(place(&mut frames), Ok(true), "now it is");
+        assert!(frames.hear(&topic("/tf", None), b"nonsense", 0).is_err(), "no message");
+        Ok(())
+    }
+
+    #[test]
+    fn made_up_robots_end_somewhere() {
+        let mut frames = Frames::default();
+        let heard = (0..100).map(|n| frames.hear(&topic(&format!("/{n}/tf"), None), &message("a", "b", 0.0), 0));
+        assert_eq!(heard.filter(Result::is_ok).count(), MOST_ROBOTS, "no more of them");
+    }
+}
