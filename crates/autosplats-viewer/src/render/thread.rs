@@ -257,8 +257,8 @@ impl Studio {
                 let settings = self.settings(&wish, &shown, outbox)?;
                 let size = wish.rendered_size(1.0);
                 let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
-                let image = Box::new(enlarge(frame.image, wish.size));
-                Ok(Outcome::Photographed { image, goal })
+                let (image, range) = (Box::new(enlarge(frame.image, wish.size)), frame.counts.value_range);
+                Ok(Outcome::Photographed { image, range, goal })
             }
         }
     }

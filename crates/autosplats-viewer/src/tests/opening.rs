@@ -1,6 +1,9 @@
 //! From a name to a picture, or to a word about why not.
 
+use std::path::{Path, PathBuf};
+
 use super::*;
+use crate::kept::Kept;
 use crate::storage;
 
 #[test]
@@ -81,19 +84,32 @@ impl eframe::Storage for Memory {
     fn flush(&mut self) {}
 }
 
+/// A recording of which it was told how to play it.
+fn played() -> Input {
+    let mut input = Input::parse("/some/drive.mcap").expect("a recording");
+    (input.play.topics, input.play.fps) = (vec!["/front".into()], Some(5.0));
+    input.play.latest.decay = Some(Duration::from_secs(2));
+    input
+}
+
 #[test]
 fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
     window.harness.state_mut().look.dot_size = 6;
     window.harness.state_mut().look.two_fingers = crate::look::TwoFingers::Pan;
-    window.harness.state_mut().recent = vec!["/some/where.ply".into()];
+    window.harness.state_mut().recent = vec![Kept::of(&played(), crate::loading::Appearance::default())];
     let mut memory = Memory::default();
     storage::save(window.app(), &mut memory);
     let (look, recent) = storage::load(Some(&memory));
     assert_eq!(look, window.app().look, "the look comes back");
-    assert_eq!(recent, window.app().recent, "and the names");
+    assert_eq!(recent, window.app().recent, "and what was opened");
+    let (again, _) = recent[0].clone().open(Path::new("")).expect("a recording");
+    assert_eq!(again.play, played().play, "played as it was");
     let broken = memory.0.keys().map(|key| (key.clone(), "(((".to_owned())).collect();
     assert_eq!(storage::load(Some(&Memory(broken))), (Look::default(), Vec::new()), "what is broken is left behind");
+    let paths: Vec<PathBuf> = vec!["/some/where.ply".into()];
+    eframe::set_value(&mut memory, "recent", &paths);
+    assert_eq!(storage::load(Some(&memory)).1, [Kept::named("/some/where.ply".into())], "an older version's paths");
     assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
     // Values that no renderer takes are left behind, too.
     window.harness.state_mut().look.settings.reconstruction.k = 100_000;
