@@ -134,7 +134,7 @@ impl Reading {
 
 impl Play {
     fn of(input: &Input) -> Self {
-        let PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, .. } = input.play.clone();
+        let PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest } = input.play.clone();
         Self {
             played: input.played,
             fps,
@@ -159,7 +159,7 @@ impl Play {
         let decay = decay.and_then(|decay| Duration::try_from_secs_f64(decay).ok());
         let latest = LatestOptions { decay, accumulate, ..LatestOptions::default() };
         let (frame, sample, scanners) = (fixed_frame, strew, scan);
-        PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, ..PlayOptions::default() }
+        PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest }
     }
 }
 
@@ -191,7 +191,6 @@ mod tests {
             seed: 7,
             watch: true,
             latest,
-            ..PlayOptions::default()
         };
         let world_from_input = DMat4::from_rotation_z(0.5);
         Input { options, play, played: true, world_from_input, ..Input::file("/a/drive.mcap".into()) }

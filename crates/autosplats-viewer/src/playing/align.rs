@@ -27,7 +27,7 @@ pub(super) fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
 }
 
 /// Parts of a list in the order of first stamps that have no time in common.
-fn groups<'a>(mut order: &'a [(usize, [i64; 2])]) -> impl Iterator<Item = &'a [(usize, [i64; 2])]> {
+fn groups(mut order: &[(usize, [i64; 2])]) -> impl Iterator<Item = &[(usize, [i64; 2])]> {
     std::iter::from_fn(move || {
         let mut end = order.first()?.1[1];
         let len = 1 + order[1..]

@@ -50,6 +50,24 @@ fn what_cannot_be_read_says_why_in_place() {
 }
 
 #[test]
+fn the_first_view_is_the_same_whoever_finds_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let path = folder.path().join("slope.xyz");
+    let rows: String = (0..500).map(|i| format!("{} {} {}\n", i % 25, i / 25, i % 7)).collect();
+    std::fs::write(&path, rows).expect("it can be written");
+    let mut window = Window::new(&[&*path.display().to_string()]);
+    window.settle();
+    let camera = window.app().navigation.goal_camera();
+    let (_, glance) = window.app().glance.clone().expect("the thread that read it has looked at it");
+    assert_eq!(glance.camera, Some(camera), "where it says");
+    let app = window.harness.state_mut();
+    app.glance = None;
+    app.navigation.orbit(autosplats::cloud::glam::DVec2::new(0.3, 0.1));
+    app.first_view();
+    assert_eq!(app.navigation.goal_camera(), camera, "as the window finds it by itself");
+}
+
+#[test]
 fn settings_survive_other_versions() {
     let mut look = Look { dots: true, dot_size: 5, ..Look::default() };
     look.settings.reconstruction.k = 33;
