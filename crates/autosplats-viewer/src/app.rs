@@ -12,7 +12,9 @@ use eframe::egui;
 use crate::commands::Tool;
 use crate::document::{History, LayerId, Shown};
 use crate::editing::Counted;
-use crate::loading::{Input, JobId, Loader, Watch};
+use crate::glance::Glance;
+use crate::kept::Kept;
+use crate::loading::{Appearance, Input, JobId, Loader, Watch};
 use crate::look::Look;
 use crate::messages::Messages;
 use crate::navigation::{Flight, Navigation};
@@ -53,7 +55,8 @@ pub(crate) struct App {
     pub(crate) aspect: f64,
     /// Where the picture is in the window.
     pub(crate) view_rect: egui::Rect,
-    pub(crate) recent: Vec<PathBuf>,
+    /// What was opened last, the newest first.
+    pub(crate) recent: Vec<Kept>,
     /// Where the session is kept.
     pub(crate) state: Option<PathBuf>,
     /// Files are read again when they change.
@@ -61,11 +64,13 @@ pub(crate) struct App {
     pub(crate) watches: HashMap<PathBuf, Watch>,
     /// What each layer was read from.
     pub(crate) inputs: HashMap<LayerId, Input>,
-    /// Whether what is being read is to be seen, and in which colour.
-    pub(crate) looks: HashMap<JobId, (bool, Option<[u8; 3]>)>,
+    /// How what is being read is to be seen.
+    pub(crate) appearances: HashMap<JobId, Appearance>,
     /// Files that are read again, and whose points they are.
     pub(crate) reloads: HashMap<JobId, LayerId>,
     pub(crate) guessed_axes: Option<Axes>,
+    /// What the thread that read what is open alone knows of it, at a version of the document.
+    pub(crate) glance: Option<(u64, Glance)>,
     /// Where the program stood by itself, for a picture so much wider than high. As long as nobody has moved, it stands
     /// anew when points arrive and when the picture changes its shape.
     pub(crate) first_camera: Option<(Camera, f64)>,
@@ -79,7 +84,7 @@ pub(crate) struct App {
     /// Whether the first input is not to be fitted into the picture, as a camera was given.
     pub(crate) camera_given: bool,
     /// Inputs that could not be read, which a session keeps.
-    pub(crate) failed: Vec<Input>,
+    pub(crate) failed: Vec<(Input, Appearance)>,
     /// Whether something else than the mouse moves the view.
     stirred: bool,
     /// When something moved last, seconds.
@@ -108,7 +113,7 @@ struct WishKey {
 
 impl App {
     /// An application that begins to read its inputs; `context` is the window's.
-    pub(crate) fn new(options: Options, look: Look, recent: Vec<PathBuf>, context: &egui::Context) -> Self {
+    pub(crate) fn new(options: Options, look: Look, recent: Vec<Kept>, context: &egui::Context) -> Self {
         let mut app = Self {
             history: History::default(),
             loader: Loader::start(context.clone()),
@@ -129,12 +134,13 @@ impl App {
             view_rect: egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(800.0, 600.0)),
             recent,
             state: options.state,
-            looks: HashMap::new(),
+            appearances: HashMap::new(),
             watch: options.watch,
             watches: HashMap::new(),
             inputs: HashMap::new(),
             reloads: HashMap::new(),
             guessed_axes: None,
+            glance: None,
             first_camera: None,
             version: 1,
             counted: Counted::default(),
@@ -225,7 +231,7 @@ impl App {
             Outcome::Selected { shown, hits, mode } => {
                 self.change(|document| document.select(&shown, |i| hits[i], mode));
             }
-            Outcome::Photographed { image, goal } => output::photographed(self, *image, goal),
+            Outcome::Photographed { image, range, goal } => output::photographed(self, *image, range, goal),
         }
     }
 
@@ -238,7 +244,8 @@ impl App {
             settings: self.look.settings.clone(),
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
-            axes: self.up_axis,
+            // What moves has one direction upward, whatever may be guessed of single frames.
+            axes: self.up_axis.or(self.guessed_axes.filter(|_| !self.playing.is_empty())),
             budget_ms: self
                 .both_ms(moving)
                 .map(|both_ms| self.turns.as_ref().map_or(both_ms, |turns| turns.budget_ms(both_ms))),
@@ -256,6 +263,7 @@ impl App {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
         let busy = busy || std::mem::take(&mut self.stirred);
+        self.loader.frame.set(self.frame());
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
         }

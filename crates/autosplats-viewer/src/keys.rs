@@ -120,6 +120,7 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             if app.document().layers.is_empty() {
                 // There is nothing to undo, but what is being read may be given up.
                 app.loader.cancel_all();
+                app.playing.give_up_waiting();
             } else {
                 panels::close_all(app);
             }

@@ -10,6 +10,8 @@ mod document;
 mod editing;
 mod files;
 mod gizmo;
+mod glance;
+mod kept;
 mod keys;
 mod legend;
 mod loading;

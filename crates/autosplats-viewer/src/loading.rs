@@ -10,6 +10,7 @@ use autosplats::cloud::glam::DMat4;
 use autosplats::cloud::{Error, PlayOptions, PointCloud, Progress, ReadOptions, Source};
 use eframe::egui;
 
+use crate::glance::{Frame, Glance, Known};
 use crate::threads::spawn;
 
 /// Most points that are shown before a file is read to its end.
@@ -68,12 +69,26 @@ impl Input {
     }
 }
 
+/// How an input is to be seen once it has points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Appearance {
+    pub(crate) visible: bool,
+    /// One colour for all its points instead of their own.
+    pub(crate) tint: Option<[u8; 3]>,
+}
+
+impl Default for Appearance {
+    fn default() -> Self {
+        Self { visible: true, tint: None }
+    }
+}
+
 /// What happens to a job.
 pub(crate) enum News {
     /// Some of the points, to be shown until all are there.
-    Preview(Box<PointCloud>),
+    Preview(Arc<PointCloud>, Glance),
     /// All points, and what the reader has to say.
-    Read(Box<PointCloud>, Vec<String>),
+    Read(Arc<PointCloud>, Glance, Vec<String>),
     /// Why there are none.
     Failed(String),
     /// Nothing was wanted any more.
@@ -110,6 +125,8 @@ impl Job {
 /// Reads files, one after the other, as each is read by all cores.
 pub(crate) struct Loader {
     context: egui::Context,
+    /// Of the window's picture.
+    pub(crate) frame: Known,
     orders: Sender<Order>,
     receiver: Receiver<(JobId, News)>,
     changes: (Sender<PathBuf>, Receiver<PathBuf>),
@@ -129,9 +146,12 @@ impl Loader {
         let (orders, queue) = channel::<Order>();
         let (sender, receiver) = channel();
         let asked = context.clone();
+        let frame = Known::new(Frame { aspect: 1.5, up: None });
+        let known = frame.clone();
         spawn("read", move || {
             for order in queue {
-                let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| read(&order, &sender, &asked)));
+                let work = std::panic::AssertUnwindSafe(|| read(&order, &known, &sender, &asked));
+                let read = std::panic::catch_unwind(work);
                 // What goes wrong in one file must not keep the next from being read.
                 let news = read.unwrap_or_else(|_| {
                     News::Failed(format!("{}: reading it failed, which is a bug of this program", order.input.name))
@@ -140,7 +160,7 @@ impl Loader {
                 asked.request_repaint();
             }
         });
-        Self { context, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
+        Self { context, frame, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
     }
 
     /// The window's.
@@ -186,7 +206,7 @@ impl Loader {
             }
             // What was finished before the reader heard of it is not wanted either.
             match news {
-                News::Preview(_) if cancelled => {}
+                News::Preview(..) if cancelled => {}
                 News::Read(..) if cancelled => told.push((input, id, News::Cancelled)),
                 news => told.push((input, id, news)),
             }
@@ -233,17 +253,19 @@ pub(crate) struct Watch {
     _alive: Arc<()>,
 }
 
-fn read(order: &Order, sender: &Sender<(JobId, News)>, context: &egui::Context) -> News {
+fn read(order: &Order, frame: &Known, sender: &Sender<(JobId, News)>, context: &egui::Context) -> News {
     if order.state.cancelled.load(Ordering::Relaxed) {
         return News::Cancelled;
     }
-    let follower = Follower { order, sender, context, notes: Mutex::default(), preview: Mutex::default() };
+    let follower = Follower { order, frame, sender, context, notes: Mutex::default(), preview: Mutex::default() };
     let options = ReadOptions { exact: true, ..order.input.options.clone() };
     match order.input.source.read(&options, &follower) {
         Ok(cloud) if cloud.is_empty() => News::Failed(format!("{}: there is no point in it", order.input.name)),
         Ok(cloud) => {
             let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
-            News::Read(Box::new(cloud), notes)
+            let cloud = Arc::new(cloud);
+            let glance = Glance::of(&order.input, &cloud, frame.get());
+            News::Read(cloud, glance, notes)
         }
         Err(Error::Cancelled) => News::Cancelled,
         Err(error) => News::Failed(error.to_string()),
@@ -253,6 +275,7 @@ fn read(order: &Order, sender: &Sender<(JobId, News)>, context: &egui::Context) 
 /// Listens to a reader.
 struct Follower<'a> {
     order: &'a Order,
+    frame: &'a Known,
     sender: &'a Sender<(JobId, News)>,
     context: &'a egui::Context,
     notes: Mutex<Vec<String>>,
@@ -323,7 +346,9 @@ impl Progress for Follower<'_> {
     fn chunk(&self, points: PointCloud) {
         let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cloud) = preview.add(points) {
-            let _ = self.sender.send((self.order.id, News::Preview(Box::new(cloud))));
+            let cloud = Arc::new(cloud);
+            let glance = Glance::of(&self.order.input, &cloud, self.frame.get());
+            let _ = self.sender.send((self.order.id, News::Preview(cloud, glance)));
             self.context.request_repaint();
         }
     }

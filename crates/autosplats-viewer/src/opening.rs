@@ -4,56 +4,81 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use autosplats::cloud::{PointCloud, Source};
-use autosplats::{Camera, Projection, ViewDirection, guess_axes};
+use autosplats::{Camera, Projection, ViewDirection};
 
 use crate::app::App;
 use crate::document::{Layer, LayerId};
-use crate::loading::{Input, JobId, News};
+use crate::glance::{FOV_DEG, Frame, Glance};
+use crate::kept::Kept;
+use crate::loading::{Appearance, Input, JobId, News};
 
-/// Vertical field of view of the first picture, degrees.
-const FOV_DEG: f64 = 40.0;
 /// Files whose names are kept.
 const RECENT: usize = 12;
 
 impl App {
     /// Begins to read something.
     pub(crate) fn open(&mut self, input: Input) {
-        self.open_as(input, true, None);
+        self.open_as(input, Appearance::default());
     }
 
     /// Begins to read something that is shown in a certain way.
-    pub(crate) fn open_as(&mut self, input: Input, visible: bool, tint: Option<[u8; 3]>) {
-        if let Some(path) = input.source.path() {
-            self.recent.retain(|known| known != path);
-            self.recent.insert(0, path.into());
+    pub(crate) fn open_as(&mut self, input: Input, appearance: Appearance) {
+        if !matches!(input.source, Source::Scene(..) | Source::StandardInput) {
+            let kept = Kept::of(&input, Appearance::default());
+            self.recent.retain(|known| known.source != kept.source);
+            self.recent.insert(0, kept);
             self.recent.truncate(RECENT);
-            if self.watch && !self.watches.contains_key(path) {
-                self.watches.insert(path.into(), self.loader.watch(path.into()));
-            }
         }
+        if let Some(path) = input.source.path()
+            && self.watch
+            && !self.watches.contains_key(path)
+        {
+            self.watches.insert(path.into(), self.loader.watch(path.into()));
+        }
+        self.forget_failure_of(&input);
         if input.moves() {
             let context = self.loader.context().clone();
-            self.play(input, visible, tint, &context);
+            self.play(input, appearance, &context);
             return;
         }
         let job = self.loader.read(input);
-        self.looks.insert(job, (visible, tint));
+        self.appearances.insert(job, appearance);
+    }
+
+    /// Opens what was open once, as it was read and played then.
+    pub(crate) fn open_again(&mut self, kept: Kept) {
+        match kept.open(Path::new("")) {
+            Ok((input, appearance)) => self.open_as(input, appearance),
+            Err(error) => self.messages.error(error.to_string()),
+        }
+    }
+
+    /// Keeps the name of what could not be read, for a session.
+    pub(crate) fn fail(&mut self, input: Input, appearance: Appearance) {
+        self.forget_failure_of(&input);
+        self.failed.push((input, appearance));
+    }
+
+    /// What is opened anew may be read this time, and is in a session once.
+    fn forget_failure_of(&mut self, input: &Input) {
+        let name = Self::source_name(input);
+        self.failed.retain(|(failed, _)| Self::source_name(failed) != name);
     }
 
     /// Takes in what has been read, and what has changed.
     pub(crate) fn follow_files(&mut self) {
         for (input, job, news) in self.loader.news() {
             match news {
-                News::Preview(cloud) if !self.reloads.contains_key(&job) => {
-                    self.fill_layer(&input, job, Arc::new(*cloud));
+                News::Preview(cloud, glance) if !self.reloads.contains_key(&job) => {
+                    self.fill_layer(&input, job, &cloud, glance);
                 }
-                News::Preview(_) => {}
-                News::Read(cloud, notes) => {
+                News::Preview(..) => {}
+                News::Read(cloud, glance, notes) => {
                     notes.into_iter().for_each(|note| self.messages.note(format!("{}: {note}", input.name)));
                     match self.reloads.remove(&job) {
-                        Some(id) => self.read_again(&input, id, *cloud),
+                        Some(id) => self.read_again(&input, id, &cloud, glance),
                         None => {
-                            if let Some(id) = self.fill_layer(&input, job, Arc::new(*cloud)) {
+                            if let Some(id) = self.fill_layer(&input, job, &cloud, glance) {
                                 self.loading.remove(&job);
                                 self.settle(|document| document.complete(id));
                             }
@@ -62,8 +87,12 @@ impl App {
                 }
                 News::Failed(why) => {
                     self.messages.error(why);
-                    self.forget_job(job);
-                    self.failed.push(input);
+                    let reloads = self.reloads.contains_key(&job);
+                    let appearance = self.forget_job(job);
+                    // What is read again is still there as it was.
+                    if !reloads {
+                        self.fail(input, appearance);
+                    }
                 }
                 News::Cancelled => {
                     if !self.reloads.contains_key(&job) {
@@ -79,7 +108,7 @@ impl App {
 
     /// Gives the points that have arrived to the layer of a job, which is made with the first of them. Undo takes none of this
     /// back. Says which layer it is, unless the user has removed it meanwhile.
-    fn fill_layer(&mut self, input: &Input, job: JobId, cloud: Arc<PointCloud>) -> Option<LayerId> {
+    fn fill_layer(&mut self, input: &Input, job: JobId, cloud: &Arc<PointCloud>, glance: Glance) -> Option<LayerId> {
         let id = match self.loading.get(&job).copied() {
             Some(id) if self.document().layer(id).is_none() => {
                 self.loader.cancel(job);
@@ -87,16 +116,17 @@ impl App {
                 return None;
             }
             Some(id) => {
-                self.fill(id, &cloud);
-                self.look_anew(id, &cloud, false);
+                self.fill(id, cloud);
+                self.look_anew(id, glance, false);
                 id
             }
             None => {
                 let path = input.source.path().map(Path::to_path_buf);
-                let mut layer = Layer::new(&*input.name, path, Arc::clone(&cloud)).opened_at(input.world_from_input);
+                let mut layer = Layer::new(&*input.name, path, Arc::clone(cloud)).opened_at(input.world_from_input);
                 layer.incomplete = true;
-                (layer.visible, layer.tint) = self.looks.remove(&job).unwrap_or((true, None));
-                let id = self.add_layer(layer, input);
+                Appearance { visible: layer.visible, tint: layer.tint } =
+                    self.appearances.remove(&job).unwrap_or_default();
+                let id = self.add_layer(layer, input, glance);
                 self.loading.insert(job, id);
                 id
             }
@@ -105,9 +135,11 @@ impl App {
     }
 
     /// Puts the first points of an input into the list, and stands where they are seen if they are the first of all.
-    pub(crate) fn add_layer(&mut self, layer: Layer, input: &Input) -> LayerId {
+    pub(crate) fn add_layer(&mut self, layer: Layer, input: &Input, glance: Glance) -> LayerId {
         let first = self.document().layers.is_empty();
-        let (id, cloud) = (layer.id, Arc::clone(&layer.cloud));
+        let id = layer.id;
+        // Those of layers that undo no longer brings back are not asked for any more.
+        self.inputs.retain(|&known, _| self.history.holds(known));
         self.inputs.insert(id, input.clone());
         self.settle(|document| {
             document.add(layer.clone());
@@ -116,15 +148,22 @@ impl App {
             self.first_camera = None;
         }
         let fitted = first && !std::mem::take(&mut self.camera_given);
-        self.look_anew(id, &cloud, fitted);
+        self.look_anew(id, glance, fitted);
         id
     }
 
     /// After the points of a layer have changed: stands where all is seen, if that is asked for or nobody has moved.
-    fn look_anew(&mut self, id: LayerId, cloud: &PointCloud, fitted: bool) {
+    fn look_anew(&mut self, id: LayerId, glance: Glance, fitted: bool) {
         if self.document().layers.first().is_some_and(|layer| layer.id == id) {
-            self.guessed_axes = Some(guess_axes(cloud));
+            self.guessed_axes = Some(glance.axes);
         }
+        let document = self.document();
+        let alone = match document.layers.as_slice() {
+            [only] => only.visible && only.pose == only.opened_at,
+            _ => false,
+        };
+        let whole = !document.clip.as_ref().is_some_and(|clip| clip.enabled);
+        self.glance = Some((self.version, glance)).filter(|_| alone && whole);
         if fitted || self.stands_by_itself() {
             self.first_view();
         } else {
@@ -132,15 +171,19 @@ impl App {
         }
     }
 
-    /// Takes the layer of a job away that will not be read to its end.
-    fn forget_job(&mut self, job: JobId) {
+    /// Takes the layer of a job away that will not be read to its end. Says how it was, or was to be, seen.
+    fn forget_job(&mut self, job: JobId) -> Appearance {
         self.reloads.remove(&job);
-        self.looks.remove(&job);
+        let mut appearance = self.appearances.remove(&job).unwrap_or_default();
         if let Some(id) = self.loading.remove(&job) {
+            if let Some(layer) = self.document().layer(id) {
+                appearance = Appearance { visible: layer.visible, tint: layer.tint };
+            }
             self.settle(|document| {
                 document.remove(id);
             });
         }
+        appearance
     }
 
     /// Gives up a layer that is still being read or played.
@@ -158,21 +201,20 @@ impl App {
     }
 
     /// Shows what a file has now. Edits that were made while it was read are of the points before.
-    fn read_again(&mut self, input: &Input, id: LayerId, cloud: PointCloud) {
+    fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: Glance) {
         if self.history.is_unsaved(id) {
             self.messages.note(format!("{} has changed; what was read is not shown, as it has edits here", input.name));
         } else if self.document().layer(id).is_some() {
-            let cloud = Arc::new(cloud);
-            self.fill(id, &cloud);
+            self.fill(id, cloud);
             self.messages.note(format!("{} was read again", input.name));
-            self.look_anew(id, &cloud, false);
+            self.look_anew(id, glance, false);
         }
     }
 
     /// Reads a file again that has changed.
     fn reload(&mut self, path: &Path) {
-        let layers =
-            self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path) && !layer.incomplete);
+        let whole = |layer: &&Layer| !layer.incomplete || self.playing.shows(layer.id);
+        let layers = self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path)).filter(whole);
         let ids: Vec<_> = layers.map(|layer| layer.id).collect();
         ids.into_iter().for_each(|id| self.reload_layer(id));
     }
@@ -180,12 +222,12 @@ impl App {
     /// Reads the file of an input again; one with edits is only told about, as they are of the points it had.
     pub(crate) fn reload_layer(&mut self, id: LayerId) {
         let Some(input) = self.inputs.get(&id).cloned() else { return };
-        if input.moves() {
-            self.messages.note(format!("{} is played as it was opened; open it anew for what has changed", input.name));
-            return;
-        }
         if self.history.is_unsaved(id) {
             self.messages.note(format!("{} has changed; it was not read again, as it has edits here", input.name));
+            return;
+        }
+        if input.moves() {
+            self.play_anew(id, input);
             return;
         }
         // A file that keeps changing is read once more, not once for each change.
@@ -213,9 +255,19 @@ impl App {
         self.camera_given = true;
     }
 
+    /// What the first picture depends on besides points.
+    pub(crate) fn frame(&self) -> Frame {
+        Frame { aspect: self.aspect, up: self.up_axis }
+    }
+
+    /// What was seen at the first glance, if that is all there is and nothing has been done since.
+    fn glance(&self) -> Option<&Glance> {
+        self.glance.as_ref().filter(|(version, _)| *version == self.version).map(|(_, glance)| glance)
+    }
+
     /// Tells the navigation how large everything is.
     pub(crate) fn measure_scene(&mut self) {
-        let bounds = self.document().shown_bounds();
+        let bounds = self.glance().map_or_else(|| self.document().shown_bounds(), |glance| glance.bounds);
         let up = self.up();
         if let Some([low, high]) = bounds {
             self.navigation.set_scene(low.midpoint(high), 0.5 * low.distance(high), up);
@@ -250,6 +302,15 @@ impl App {
 
     /// Looks at everything from one side.
     pub(crate) fn look_from(&mut self, direction: ViewDirection, at_once: bool) {
+        let known = self.glance().filter(|glance| {
+            let usual = direction == ViewDirection::Auto && !self.navigation.is_orthographic();
+            usual && glance.frame == self.frame()
+        });
+        if let Some(camera) = known.and_then(|glance| glance.camera) {
+            self.measure_scene();
+            self.navigation.go_to(&camera, at_once);
+            return;
+        }
         let cloud = self.document().overview();
         let fov = if direction == ViewDirection::Auto { FOV_DEG } else { self.navigation.fov_deg() };
         let projection = if self.navigation.is_orthographic() {

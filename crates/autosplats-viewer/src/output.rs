@@ -7,7 +7,7 @@ use autosplats::Image;
 use crate::app::App;
 use crate::files;
 use crate::recording::Recording;
-use crate::render::{Task, Wish};
+use crate::render::Task;
 use crate::threads::spawn;
 
 /// What a picture of any size is made for.
@@ -19,13 +19,13 @@ pub(crate) enum Goal {
 }
 
 /// Does with a picture what it was made for.
-pub(crate) fn photographed(app: &mut App, picture: Image, goal: Goal) {
+pub(crate) fn photographed(app: &mut App, picture: Image, range: Option<[f64; 2]>, goal: Goal) {
     match goal {
         Goal::File(path) => save_picture(app, picture, path),
         Goal::Film(number) => {
             // One that was stopped may have left a picture in work.
             if let Some(recording) = app.recording.as_mut().filter(|recording| recording.number == number) {
-                recording.arrived(picture);
+                recording.arrived(picture, range);
             }
         }
     }
@@ -54,10 +54,14 @@ pub(crate) fn record(app: &mut App) {
         }
         return;
     }
-    let (size, number) = (recording.size, recording.number);
-    if let Some(camera) = recording.wanted() {
-        let wish = Wish { camera, ..app.wish(size, false) };
-        app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film(number) });
+    let number = recording.number;
+    match recording.wanted() {
+        Ok(None) => {}
+        Ok(Some(wish)) => app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::Film(number) }),
+        Err(why) => {
+            recording.stop();
+            app.messages.error(why);
+        }
     }
 }
 

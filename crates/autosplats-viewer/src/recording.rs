@@ -2,7 +2,8 @@
 //!
 //! # How it works
 //! The render thread is asked for one picture after the other, so that the window goes on in between; a thread of its own
-//! writes them, as PNG files or to ffmpeg, which makes a film.
+//! writes them, as PNG files or to ffmpeg, which makes a film. Everything is as it was when the film began but for the eye and,
+//! where time runs, the points that a [`Reel`] reads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -12,6 +13,8 @@ use autosplats_film::{Film, Frames, Target};
 use eframe::egui;
 
 use crate::files;
+use crate::playing::Reel;
+use crate::render::Wish;
 use crate::threads::spawn;
 
 /// Pictures that wait to be written.
@@ -24,10 +27,14 @@ static RECORDINGS: AtomicU64 = AtomicU64::new(0);
 pub(crate) struct Recording {
     /// Which one it is: no other has the same number.
     pub(crate) number: u64,
+    /// What the last picture showed, and the next will but for what moves.
+    wish: Wish,
+    /// Of each picture.
     cameras: Vec<Camera>,
+    /// Where time runs.
+    reel: Option<Reel>,
     /// Picture that is asked for next.
     next: usize,
-    pub(crate) size: [u32; 2],
     /// To the thread that writes.
     pictures: Option<SyncSender<Image>>,
     /// One that the writer had no room for yet.
@@ -38,14 +45,17 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    /// Begins to write pictures of `cameras`, so many a second, to `target`.
+    /// Begins to write pictures of what `wish` shows, seen by `cameras`, so many a second, to `target`. With a `reel` time
+    /// runs.
     pub(crate) fn start(
+        wish: Wish,
         cameras: Vec<Camera>,
-        size: [u32; 2],
+        reel: Option<Reel>,
         rate: u32,
         target: Target,
         context: &egui::Context,
     ) -> Self {
+        let size = wish.size;
         let (pictures, queue) = sync_channel::<Image>(QUEUE);
         let (sender, result) = sync_channel(1);
         let context = context.clone();
@@ -61,7 +71,7 @@ impl Recording {
             context.request_repaint();
         });
         let number = RECORDINGS.fetch_add(1, Ordering::Relaxed);
-        Self { number, cameras, next: 0, size, pictures: Some(pictures), waiting: None, asked: false, result }
+        Self { number, wish, cameras, reel, next: 0, pictures: Some(pictures), waiting: None, asked: false, result }
     }
 
     /// Part that is done, 0 to 1.
@@ -69,29 +79,41 @@ impl Recording {
         self.next as f32 / self.cameras.len().max(1) as f32
     }
 
-    /// The camera of the picture to be made now, if it is time.
-    pub(crate) fn wanted(&mut self) -> Option<Camera> {
+    /// The picture to be made now, if it is time.
+    ///
+    /// # Errors
+    /// Why there will be no more pictures.
+    pub(crate) fn wanted(&mut self) -> Result<Option<Wish>, String> {
         if let Some(image) = self.waiting.take() {
             self.hand_over(image);
         }
         if self.asked || self.waiting.is_some() || self.pictures.is_none() {
-            return None;
+            return Ok(None);
         }
-        let camera = self.cameras.get(self.next).copied();
-        match camera {
-            Some(_) => {
-                self.asked = true;
-                self.next += 1;
-            }
+        let Some(&camera) = self.cameras.get(self.next) else {
             // The writer ends when nobody can send any more.
-            None => self.pictures = None,
+            self.stop();
+            return Ok(None);
+        };
+        if let Some(reel) = &self.reel {
+            let Some(changes) = reel.next()? else { return Ok(None) };
+            changes.iter().for_each(|(layer, cloud)| self.wish.document.reload(*layer, cloud));
         }
-        camera
+        self.asked = true;
+        self.next += 1;
+        self.wish.camera = camera;
+        Ok(Some(self.wish.clone()))
     }
 
-    /// Takes in the picture that was wanted.
-    pub(crate) fn arrived(&mut self, image: Image) {
+    /// Takes in the picture that was wanted, and the range of values that its colours are of.
+    pub(crate) fn arrived(&mut self, image: Image, range: Option<[f64; 2]>) {
         self.asked = false;
+        if self.next == 1 {
+            // The same colours mean the same in all pictures.
+            let range = range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high);
+            let known = &mut self.wish.settings.shading.range;
+            *known = known.or(range);
+        }
         self.hand_over(image);
     }
 
@@ -106,7 +128,7 @@ impl Recording {
 
     /// Makes no more pictures.
     pub(crate) fn stop(&mut self) {
-        self.pictures = None;
+        (self.pictures, self.reel) = (None, None);
     }
 
     /// How it ended, once it has: what was written, or why not.
@@ -160,15 +182,24 @@ fn write_film(
 
 #[cfg(test)]
 mod tests {
+    use autosplats::{Backend, Settings};
+
     use super::*;
+    use crate::document::Document;
     use crate::navigation::Navigation;
+
+    fn recording(pictures: usize, target: &Target) -> Recording {
+        let camera = Navigation::new().camera();
+        let (document, settings, backend) = (Document::default(), Settings::default(), Backend::Cpu);
+        let wish = Wish { document, camera, size: [2, 1], settings, dots: None, backend, axes: None, budget_ms: None };
+        Recording::start(wish, vec![camera; pictures], None, 25, target.clone(), &egui::Context::default())
+    }
 
     #[test]
     fn no_two_recordings_are_mistaken_for_each_other() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = Target::new(&folder.path().join("t.png")).expect("pictures");
-        let context = egui::Context::default();
-        let [one, other] = [(); 2].map(|()| Recording::start(Vec::new(), [1, 1], 25, target.clone(), &context).number);
+        let [one, other] = [(); 2].map(|()| recording(0, &target).number);
         assert_ne!(one, other, "each has a number of its own");
     }
 
@@ -176,11 +207,13 @@ mod tests {
     fn pictures_are_written_one_by_one() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = Target::new(&folder.path().join("t.png")).expect("pictures");
-        let context = egui::Context::default();
-        let mut recording = Recording::start(vec![Navigation::new().camera(); 2], [2, 1], 25, target.clone(), &context);
+        let mut recording = recording(2, &target);
+        let mut ranges = Vec::new();
         let result = loop {
-            if recording.wanted().is_some() {
-                recording.arrived(Image { width: 2, height: 1, pixels: vec![[1, 2, 3, 255]; 2], linear: Vec::new() });
+            if let Some(wish) = recording.wanted().expect("nothing moves") {
+                ranges.push(wish.settings.shading.range);
+                let image = Image { width: 2, height: 1, pixels: vec![[1, 2, 3, 255]; 2], linear: Vec::new() };
+                recording.arrived(image, Some([ranges.len() as f64, 5.0]));
             }
             if let Some(result) = recording.ended() {
                 break result;
@@ -188,6 +221,7 @@ mod tests {
             std::thread::yield_now();
         };
         assert!(result.is_ok(), "{result:?}");
+        assert_eq!(ranges, [None, Some([1.0, 5.0])], "colours mean what they mean in the first picture");
         assert_eq!(target.existing(2), Some(folder.path().join("t_00000.png")), "the first is there");
         assert!(folder.path().join("t_00001.png").exists(), "and the second");
     }

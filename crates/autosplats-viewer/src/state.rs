@@ -3,21 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use autosplats::Camera;
-use autosplats::cloud::glam::DMat4;
-use autosplats::cloud::{Axes, DepthCamera, ReadOptions, Source};
+use autosplats::cloud::{Axes, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::app::App;
 use crate::document::ClipBox;
 use crate::files;
-use crate::loading::Input;
+use crate::kept::Kept;
+use crate::loading::Appearance;
 use crate::look::Look;
+use crate::playing::Clock;
 
 /// Everything but the points and what was done to them, which is exported.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct State {
-    inputs: Vec<InputState>,
+    inputs: Vec<Kept>,
     camera: Option<Camera>,
     up: Option<Up>,
     look: Look,
@@ -25,56 +26,9 @@ pub(crate) struct State {
     keys: Vec<Camera>,
     #[serde(skip_serializing_if = "Option::is_none")]
     clip: Option<ClipBox>,
-}
-
-/// An input of the list.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct InputState {
-    /// Path of a file, from the state's own folder if it is no absolute one, or the name of a scene.
-    source: String,
-    #[serde(default = "yes")]
-    visible: bool,
-    #[serde(default)]
-    tint: Option<[u8; 3]>,
-    /// From its own to world coordinates, by columns.
-    #[serde(default)]
-    pose: DMat4,
-    #[serde(default, skip_serializing_if = "Options::is_usual")]
-    options: Options,
-}
-
-/// How an input was read, where that was told.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Options {
+    /// Where what moves stands, and how it goes on.
     #[serde(skip_serializing_if = "Option::is_none")]
-    columns: Option<Vec<String>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    depth_camera: Option<DepthCamera>,
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    keep_no_returns: bool,
-}
-
-impl Options {
-    fn of(input: &Input) -> Self {
-        let ReadOptions { keep_no_returns, columns, depth_camera, .. } = input.options.clone();
-        Self { columns, depth_camera, keep_no_returns }
-    }
-
-    /// Whether nothing was told.
-    fn is_usual(&self) -> bool {
-        *self == Self::default()
-    }
-
-    fn read(self) -> ReadOptions {
-        let Self { columns, depth_camera, keep_no_returns } = self;
-        ReadOptions { columns, depth_camera, keep_no_returns, ..ReadOptions::default() }
-    }
-}
-
-fn yes() -> bool {
-    true
+    clock: Option<Clock>,
 }
 
 /// Which way is up.
@@ -92,28 +46,21 @@ impl State {
     /// What is open in `app`, or was to be.
     pub(crate) fn of(app: &App) -> Self {
         let layers = app.document().layers.iter().filter_map(|layer| {
-            // What came through a pipe cannot be had again.
-            let input = app.inputs.get(&layer.id).filter(|input| !matches!(input.source, Source::StandardInput))?;
-            let (source, options) = (App::source_name(input), Options::of(input));
-            Some(InputState { source, visible: layer.visible, tint: layer.tint, pose: layer.pose, options })
+            let appearance = Appearance { visible: layer.visible, tint: layer.tint };
+            let mut kept = Kept::of(app.inputs.get(&layer.id)?, appearance);
+            kept.pose = layer.pose;
+            Some(kept)
         });
         // What could not be read this time, or is still being read, is no less a part of the session.
         let started = |id| app.loading.contains_key(&id) || app.reloads.contains_key(&id);
-        let waiting = app.loader.jobs().iter().filter(|job| !started(job.id)).map(|job| {
-            let (visible, tint) = app.looks.get(&job.id).copied().unwrap_or((true, None));
-            (&job.input, visible, tint)
-        });
-        let waiting = waiting.chain(app.playing.waiting().map(|input| (input, true, None)));
-        let absent = waiting.chain(app.failed.iter().map(|input| (input, true, None)));
-        let absent = absent.filter(|(input, ..)| !matches!(input.source, Source::StandardInput));
-        let absent = absent.map(|(input, visible, tint)| InputState {
-            source: App::source_name(input),
-            visible,
-            tint,
-            pose: input.world_from_input,
-            options: Options::of(input),
-        });
-        let inputs: Vec<InputState> = layers.chain(absent).collect();
+        let read = app.loader.jobs().iter().filter(|job| !started(job.id));
+        let read = read.map(|job| (&job.input, app.appearances.get(&job.id).copied().unwrap_or_default()));
+        let waiting = app.playing.waiting().map(|waiting| (waiting.input, waiting.appearance));
+        let failed = app.failed.iter().map(|(input, appearance)| (input, *appearance));
+        let absent = read.chain(waiting).chain(failed).map(|(input, appearance)| Kept::of(input, appearance));
+        // What came through a pipe cannot be had again.
+        let again = |kept: &Kept| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
+        let inputs: Vec<Kept> = layers.chain(absent).filter(again).collect();
         let up = app.up_axis.map(|axes| match axes {
             Axes::ZUp => Up::Z,
             Axes::YUp => Up::Y,
@@ -121,6 +68,7 @@ impl State {
         });
         Self {
             camera: (!inputs.is_empty()).then(|| app.navigation.goal_camera()),
+            clock: inputs.iter().any(Kept::moves).then(|| app.playing.clock.clone()),
             inputs,
             up,
             look: app.look.clone(),
@@ -146,6 +94,12 @@ impl State {
         if state.clip.as_ref().is_some_and(|clip| !clip.is_box()) {
             return Err(format!("{}: the clipping box is no box", path.display()));
         }
+        if let Some(problem) = state.inputs.iter().find_map(Kept::problem) {
+            return Err(format!("{}: {problem}", path.display()));
+        }
+        if state.clock.as_ref().is_some_and(|clock| !clock.is_clock()) {
+            return Err(format!("{}: the clock's times or speed are none", path.display()));
+        }
         Ok(state)
     }
 
@@ -163,7 +117,7 @@ impl State {
 
     /// Opens what the state has; paths are from `folder`.
     pub(crate) fn restore(self, app: &mut App, folder: &Path) {
-        let Self { inputs, camera, up, look, keys, clip } = self;
+        let Self { inputs, camera, up, look, keys, clip, clock } = self;
         app.look = look;
         app.keys = keys;
         app.up_axis = up.map(|up| match up {
@@ -174,17 +128,19 @@ impl State {
         if clip.is_some() {
             app.settle(|document| document.clip = clip);
         }
-        for InputState { source, visible, tint, pose, options } in inputs {
-            let address = source.starts_with("scene:") || source.contains("://");
-            let name = if address { source } else { folder.join(source).display().to_string() };
-            match Input::parse(&name) {
-                // Named when the program was started, too.
-                Ok(input)
-                    if app.loader.jobs().iter().any(|job| App::source_name(&job.input) == App::source_name(&input))
-                        || app.playing.has(&App::source_name(&input)) => {}
-                Ok(input) => {
-                    let input = Input { world_from_input: pose, options: options.read(), ..input };
-                    app.open_as(input, visible, tint);
+        if let Some(clock) = clock {
+            app.playing.clock = clock;
+            app.playing.clock.hold();
+        }
+        for kept in inputs {
+            match kept.open(folder) {
+                Ok((input, appearance)) => {
+                    // Named when the program was started, too.
+                    let name = App::source_name(&input);
+                    let named = app.loader.jobs().iter().any(|job| App::source_name(&job.input) == name);
+                    if !named && !app.playing.has(&name) {
+                        app.open_as(input, appearance);
+                    }
                 }
                 Err(error) => app.messages.error(error.to_string()),
             }
@@ -202,28 +158,28 @@ pub(crate) fn folder(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use autosplats::cloud::glam::{DQuat, DVec3};
+    use autosplats::cloud::ReadOptions;
+    use autosplats::cloud::glam::{DMat4, DQuat, DVec3};
 
     use super::*;
+    use crate::Input;
 
     #[test]
     fn states_come_back() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("state.json");
-        let camera = DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: 5000.0 };
-        let columns = Some(vec!["x".into(), "-".into(), "y".into()]);
-        let options = Options { columns, depth_camera: Some(camera), keep_no_returns: true };
-        let pose = DMat4::from_rotation_z(0.5);
-        let input = InputState { source: "a.ply".into(), visible: false, tint: Some([1, 2, 3]), pose, options };
-        let usual = InputState { source: "b.ply".into(), options: Options::default(), ..input.clone() };
+        let inputs = ["a.ply", "b.mcap"].map(|name| Kept::named(name.into())).to_vec();
         let clip = ClipBox { rotation: DQuat::from_rotation_z(0.7), ..ClipBox::new(DVec3::ZERO, DVec3::ONE) };
-        let state = State { inputs: vec![input, usual], up: Some(Up::Y), clip: Some(clip), ..State::default() };
+        let mut clock = Clock::default();
+        (clock.speed, clock.looped) = (0.25, false);
+        let state = State { inputs, up: Some(Up::Y), clip: Some(clip), clock: Some(clock), ..State::default() };
         state.write(&path).expect("written");
         assert_eq!(State::read(&path), Ok(state), "as it was");
         let older = r#"{"inputs": [{"source": "a.ply"}], "camera": null, "up": "z_up", "keys": []}"#;
         std::fs::write(&path, older).expect("written");
-        let read = State::read(&path).expect("a file from before there were boxes and options");
-        assert_eq!((read.clip, &read.inputs[0].options), (None, &Options::default()), "none were told");
+        let read = State::read(&path).expect("a file from before there were boxes, options and clocks");
+        assert_eq!((read.clip, read.clock), (None, None), "none were told");
+        assert_eq!(read.inputs, [Kept::named("a.ply".into())], "nothing but the name");
     }
 
     #[test]
@@ -273,6 +229,10 @@ mod tests {
             "{\"unknown\": 1}",
             "{\"look\": {\"settings\": {\"reconstruction\": {\"k\": 0}}}}",
             "{\"inputs\": [{\"source\": \"a\", \"options\": {\"colums\": []}}]}",
+            "{\"inputs\": [{\"source\": \"a\", \"play\": {\"topic\": []}}]}",
+            "{\"inputs\": [{\"source\": \"a\", \"play\": {\"decay\": -2}}]}",
+            "{\"clock\": {\"speed\": 0}}",
+            "{\"clock\": {\"span\": [3, 2]}}",
             r#"{"clip": {"min": [0,0,0], "max": [-1,1,1], "rotation": [0,0,0,1], "enabled": true}}"#,
         ] {
             std::fs::write(&path, text).expect("written");

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use crate::app::App;
+use crate::kept::Kept;
 use crate::look::Look;
 
 const LOOK: &str = "look";
 const RECENT: &str = "recent";
 
-/// Keeps the look and the names of files.
+/// Keeps the look, and what was opened last with how it is read and played.
 pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
     let mut look = app.look.clone();
     // The range of one file's values is not that of another's.
@@ -18,9 +19,13 @@ pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
 }
 
 /// What was kept, as far as this version understands it.
-pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> (Look, Vec<PathBuf>) {
+pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> (Look, Vec<Kept>) {
     let Some(storage) = storage else { return (Look::default(), Vec::new()) };
     let look: Look = eframe::get_value(storage, LOOK).unwrap_or_default();
     let look = if look.settings.check().is_ok() { look } else { Look::default() };
-    (look, eframe::get_value(storage, RECENT).unwrap_or_default())
+    // Versions before kept the paths of files alone.
+    let paths = || eframe::get_value::<Vec<PathBuf>>(storage, RECENT).unwrap_or_default();
+    let recent = eframe::get_value(storage, RECENT)
+        .unwrap_or_else(|| paths().iter().map(|path| Kept::named(path.display().to_string())).collect());
+    (look, recent)
 }

@@ -36,7 +36,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
             }
         } else {
             painter.rect_filled(rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
-            if app.document().layers.is_empty() && app.loader.jobs().is_empty() {
+            if app.document().layers.is_empty() && app.loader.jobs().is_empty() && app.playing.is_empty() {
                 welcome(app, ui, rect);
             }
         }
@@ -66,17 +66,15 @@ fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
                 ui.add_space(12.0);
                 ui.weak("Opened lately");
             }
-            for path in app.recent.iter().take(8) {
-                let name =
-                    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
-                if ui.link(name).on_hover_text(path.display().to_string()).clicked() {
-                    chosen = Some(Some(path.clone()));
+            for kept in app.recent.iter().take(8) {
+                if ui.link(kept.short_name()).on_hover_text(&kept.source).clicked() {
+                    chosen = Some(Some(kept.clone()));
                 }
             }
         });
     });
     match chosen {
-        Some(Some(path)) => app.open(crate::loading::Input::file(path)),
+        Some(Some(kept)) => app.open_again(kept),
         Some(None) => crate::keys::run(app, &ui.ctx().clone(), crate::commands::Command::Open),
         None => {}
     }

@@ -122,6 +122,12 @@ impl History {
         old.filter(|(place, _)| known.insert(*place)).map(|(_, bytes)| bytes).sum()
     }
 
+    /// Whether a layer is in the document, or would be again by undoing or doing again.
+    pub(crate) fn holds(&self, id: LayerId) -> bool {
+        let steps = self.past.iter().chain(&self.future).map(|step| &step.document);
+        steps.chain([&self.current]).any(|document| document.layer(id).is_some())
+    }
+
     fn forget(&mut self) {
         // The newest step is kept whatever it takes: it has just been done, and may have been a mistake.
         while self.past.len() + self.future.len() > 1

@@ -67,7 +67,7 @@ impl Document {
     }
 
     /// Gives a layer the points that its file has now; what was done to single points is forgotten, as they may be others.
-    pub(super) fn reload(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
+    pub(crate) fn reload(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
         self.change(id, |layer| {
             // On the map as before, if it is in degrees still.
             layer.local = cloud.local_metres(layer.local.as_ref());
@@ -112,8 +112,7 @@ impl Document {
 
     /// The box around most of what is shown, by a part of the points.
     pub(crate) fn shown_bounds(&self) -> Option<[DVec3; 2]> {
-        let cloud = self.overview();
-        super::shown::bounds(cloud.len(), |index| Some(cloud.world_position(index)))
+        bounds_of(&self.overview())
     }
 
     /// Numbers of points of a layer. With a clipping box all selected points are looked at: ask after edits, not in every
@@ -136,6 +135,11 @@ impl Document {
             deleted: all.deleted + own.deleted,
         })
     }
+}
+
+/// The box around an [overview](Document::overview).
+pub(crate) fn bounds_of(overview: &PointCloud) -> Option<[DVec3; 2]> {
+    super::shown::bounds(overview.len(), |index| Some(overview.world_position(index)))
 }
 
 /// Whether a matrix is an affine map that can be undone.

@@ -37,6 +37,7 @@ pub(crate) use self::{
     export::{ExportError, Exported, Replace, What, export},
     history::{History, grouped, label},
     layer::{Counts, Layer, LayerId},
+    layers::bounds_of,
     pick::{PickedPoint, shortest},
     region::Region,
     select::SelectMode,

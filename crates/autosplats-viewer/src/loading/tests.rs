@@ -19,7 +19,7 @@ fn wait<T>(mut ask: impl FnMut() -> Option<T>) -> T {
 }
 
 fn last_news(loader: &mut Loader) -> News {
-    wait(|| loader.news().pop().map(|(_, _, news)| news).filter(|news| !matches!(news, News::Preview(_))))
+    wait(|| loader.news().pop().map(|(_, _, news)| news).filter(|news| !matches!(news, News::Preview(..))))
 }
 
 fn rows(count: usize) -> String {
@@ -33,7 +33,7 @@ fn files_are_read_and_failures_told() {
     std::fs::write(&path, rows(1000)).expect("written");
     let mut loader = Loader::start(egui::Context::default());
     loader.read(Input::file(path));
-    let News::Read(cloud, _) = last_news(&mut loader) else { panic!("it can be read") };
+    let News::Read(cloud, ..) = last_news(&mut loader) else { panic!("it can be read") };
     assert_eq!(cloud.len(), 1000, "all points");
     assert!(loader.jobs().is_empty(), "the job is done");
     loader.read(Input::file(folder.path().join("none.ply")));

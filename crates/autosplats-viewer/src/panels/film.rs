@@ -10,13 +10,19 @@ use super::target_file::{TargetFile, Words};
 use crate::animation::{path, turntable};
 use crate::app::App;
 use crate::output;
+use crate::playing::{Clock, Reel};
 use crate::recording::Recording;
 use crate::threads::spawn;
+
+/// Most pictures of a film.
+const MOST: f64 = 1e6;
 
 /// What is being asked and what is being played.
 pub(crate) struct Film {
     pub(crate) open: bool,
     keyed: bool,
+    time: Time,
+    /// How long it takes, unless what is played says so.
     seconds: f64,
     degrees: f64,
     rate: u32,
@@ -26,14 +32,57 @@ pub(crate) struct Film {
     refused: Option<usize>,
     /// Whether films can be made, once it is known, and once somebody looks.
     ffmpeg: Option<Arc<OnceLock<bool>>>,
-    /// Cameras that are being played, and when that began.
-    played: Option<(Vec<Camera>, f64)>,
+    /// What is being played, and when that began.
+    played: Option<(Vec<Moment>, f64)>,
+}
+
+/// What moves meanwhile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Time {
+    /// It goes on from where it begins to be played, as long as the film lasts.
+    #[default]
+    Runs,
+    /// The same, and the film lasts as long as it does.
+    Once,
+    /// It stands still.
+    Stands,
+}
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug)]
+struct Moment {
+    camera: Camera,
+    /// Place of the clock, where time runs.
+    place: Option<f64>,
 }
 
 impl Film {
-    /// Number of pictures.
-    fn pictures(&self) -> usize {
-        (self.seconds * f64::from(self.rate)).round().max(1.0) as usize
+    /// Seconds that it takes.
+    fn seconds(&self, clock: Option<&Clock>) -> f64 {
+        match clock {
+            Some(clock) if self.time == Time::Once => {
+                let [begin, end] = clock.span();
+                (end - begin) / clock.speed
+            }
+            _ => self.seconds,
+        }
+    }
+
+    /// Number of pictures; `clock` is that of what moves.
+    fn pictures(&self, clock: Option<&Clock>) -> usize {
+        (self.seconds(clock) * f64::from(self.rate)).round().clamp(1.0, MOST) as usize
+    }
+
+    /// Plays no longer.
+    #[cfg(test)]
+    pub(crate) fn stop(&mut self) {
+        self.played = None;
+    }
+
+    /// Half a second, ten small pictures a second, of a camera that stays where it is.
+    #[cfg(test)]
+    pub(crate) fn still_for_tests(&mut self) {
+        (self.seconds, self.rate, self.degrees, self.size) = (0.5, 10, 0.0, [64, 48]);
     }
 
     /// Whether films can be made; nobody has to wait for it, as it is found out beside the window.
@@ -56,6 +105,7 @@ impl Default for Film {
         Self {
             open: false,
             keyed: false,
+            time: Time::default(),
             seconds: 8.0,
             degrees: 360.0,
             rate: 25,
@@ -91,17 +141,27 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             return;
         }
         way(app, ui);
+        time(app, ui);
         ui.separator();
         let ready = has_way(app);
         ui.horizontal(|ui| {
+            let given = clock(app).map(|clock| app.panels.film.seconds(Some(clock)));
             let film = &mut app.panels.film;
-            ui.add(egui::DragValue::new(&mut film.seconds).range(0.1..=600.0).speed(0.1).suffix(" s"));
+            match given.filter(|_| film.time == Time::Once) {
+                Some(mut seconds) => {
+                    let number = egui::DragValue::new(&mut seconds).max_decimals(1).suffix(" s");
+                    ui.add_enabled(false, number).on_disabled_hover_text("As long as what moves is played");
+                }
+                None => {
+                    ui.add(egui::DragValue::new(&mut film.seconds).range(0.1..=600.0).speed(0.1).suffix(" s"));
+                }
+            }
             ui.add(egui::DragValue::new(&mut film.rate).range(1..=120).suffix(" pictures a second"));
             let playing = film.played.is_some();
             let button = ui.add_enabled(ready, egui::Button::new(if playing { "Stop" } else { "Play" }));
             if button.clicked() {
                 let began = context.input(|input| input.time);
-                app.panels.film.played = (!playing).then(|| (cameras(app), began));
+                app.panels.film.played = (!playing).then(|| (moments(app), began));
             }
         });
         ui.separator();
@@ -153,22 +213,72 @@ fn way(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
+/// Whether time runs in the film, where there is something that it runs for.
+fn time(app: &mut App, ui: &mut egui::Ui) {
+    if !app.playing.has_timeline() {
+        return;
+    }
+    ui.separator();
+    let [begin, end] = app.playing.clock.span();
+    let (speed, looped) = (app.playing.clock.speed, app.playing.clock.looped);
+    ui.horizontal(|ui| {
+        ui.label("Time");
+        let time = &mut app.panels.film.time;
+        ui.radio_value(time, Time::Runs, "runs").on_hover_text("What moves goes on as long as the film lasts");
+        ui.radio_value(time, Time::Once, "runs once").on_hover_text("The film lasts as long as what moves is played");
+        ui.radio_value(time, Time::Stands, "stands still").on_hover_text("The film shows what is seen now");
+    });
+    let film = &app.panels.film;
+    let around = if looped { ", over and over" } else { ", and stays there" };
+    let around = if film.time == Time::Runs && film.seconds * speed > end - begin { around } else { "" };
+    let words = match film.time {
+        Time::Stands => format!("{:.2} s in all pictures", app.playing.clock.position()),
+        _ => format!("{begin:.2} to {end:.2} s, {speed:.2} of them a second{around}"),
+    };
+    ui.weak(words).on_hover_text("Begin, end, speed and loop are those of the timeline");
+    if app.playing.is_live() {
+        ui.weak("What is live stands still.");
+    }
+}
+
+/// The clock of what moves in the film, if something does.
+fn clock(app: &App) -> Option<&Clock> {
+    let runs = app.panels.film.time != Time::Stands && app.playing.has_timeline();
+    runs.then_some(&app.playing.clock)
+}
+
 /// Whether the film has cameras.
 fn has_way(app: &App) -> bool {
     !app.document().layers.is_empty() && (!app.panels.film.keyed || !app.keys.is_empty())
 }
 
-/// The cameras of the film, up to tens of thousands.
-fn cameras(app: &App) -> Vec<Camera> {
-    let film = &app.panels.film;
-    let pictures = film.pictures();
-    if app.document().layers.is_empty() {
+/// Why time cannot run now, if it is to.
+fn problem(app: &App) -> Option<String> {
+    let clock = clock(app)?;
+    let pictures = app.panels.film.seconds(Some(clock)) * f64::from(app.panels.film.rate);
+    if pictures > MOST {
+        return Some(format!("These are {pictures:.0} pictures, more than {MOST:.0}; play a part, or faster"));
+    }
+    if let Some(waiting) = app.playing.waiting().next() {
+        return Some(format!("{} has no points yet: {}", waiting.input.name, waiting.why));
+    }
+    let unsaved = app.history.unsaved().find(|&id| app.playing.shows(id)).and_then(|id| app.document().layer(id))?;
+    Some(format!("{} has edits of one moment; export or undo them, or let time stand still", unsaved.name))
+}
+
+/// The cameras of the film and the times that they see, up to a million.
+fn moments(app: &App) -> Vec<Moment> {
+    let (film, clock) = (&app.panels.film, clock(app));
+    let pictures = film.pictures(clock);
+    let cameras = if app.document().layers.is_empty() {
         Vec::new()
     } else if film.keyed {
         path(&app.keys, pictures)
     } else {
         turntable(&app.navigation.goal_camera(), app.up(), film.degrees, pictures)
-    }
+    };
+    let place = |picture: usize| clock.map(|clock| clock.place_after(picture as f64 / f64::from(film.rate)));
+    cameras.into_iter().enumerate().map(|(picture, camera)| Moment { camera, place: place(picture) }).collect()
 }
 
 /// Where it goes, if it is `ready` to go anywhere.
@@ -181,7 +291,9 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
         ui.add(egui::DragValue::new(&mut film.size[1]).range(16..=MAX_SIDE).suffix(" px"));
     });
     let ffmpeg = film.has_ffmpeg(&context);
-    let pictures = film.pictures();
+    let pictures = app.panels.film.pictures(clock(app));
+    let unready = problem(app);
+    let film = &mut app.panels.film;
     if film.refused.take_if(|refused| *refused != pictures).is_some() {
         film.target.forget();
     }
@@ -192,7 +304,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
             Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
         }
         Ok(_) if !ready => Some("There is no way to go yet".into()),
-        Ok(_) => None,
+        Ok(_) => unready,
     };
     let words = Words { title: "Save film", name: "film.mp4", verb: "Write" };
     let Some(write) = film.target.show(ui, &words, &mut app.panels.entered, problem) else { return };
@@ -207,17 +319,26 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     film.target.forget();
     film.played = None;
     let (size, rate) = (film.size, film.rate);
-    app.recording = Some(Recording::start(cameras(app), size, rate, target, &context));
+    let moments = moments(app);
+    let cameras = moments.iter().map(|moment| moment.camera).collect();
+    let places: Vec<f64> = moments.iter().filter_map(|moment| moment.place).collect();
+    let runs = !places.is_empty();
+    let reel = runs.then(|| Reel::start(app.playing.tracks(&places), app.messages.sender(), context.clone()));
+    let wish = app.wish(size, false);
+    app.recording = Some(Recording::start(wish, cameras, reel, rate, target, &context));
 }
 
 /// Goes on with what is being played.
 fn play(app: &mut App, context: &egui::Context) {
-    let Some((cameras, began)) = &app.panels.film.played else { return };
+    let Some((moments, began)) = &app.panels.film.played else { return };
     let picture = (context.input(|input| input.time) - began) * f64::from(app.panels.film.rate);
-    match cameras.get(picture as usize) {
-        Some(camera) => {
-            let camera = *camera;
+    match moments.get(picture as usize) {
+        Some(&Moment { camera, place }) => {
             app.navigation.go_to(&camera, true);
+            if let Some(place) = place {
+                app.playing.clock.playing = false;
+                app.playing.clock.seek(place);
+            }
             app.stir();
             context.request_repaint();
         }

@@ -5,6 +5,7 @@ use eframe::egui;
 
 use crate::app::App;
 use crate::document::{Document, LayerId, grouped, shortest};
+use crate::playing::Waiting;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     let panel = egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0);
@@ -22,11 +23,12 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         ui.separator();
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             loading(app, ui);
+            waiting(app, ui);
             let ids: Vec<LayerId> = app.document().layers.iter().map(|layer| layer.id).collect();
             for id in ids {
                 layer(app, ui, id);
             }
-            if app.document().layers.is_empty() && app.loader.jobs().is_empty() {
+            if app.document().layers.is_empty() && app.loader.jobs().is_empty() && app.playing.is_empty() {
                 ui.weak("Nothing is open.");
             }
         });
@@ -44,6 +46,28 @@ fn loading(app: &App, ui: &mut egui::Ui) {
             let bar = egui::ProgressBar::new(job.fraction()).desired_width(ui.available_width());
             ui.add(bar.text(&*job.input.name));
         });
+    }
+}
+
+/// What is played but has no points yet, and why.
+fn waiting(app: &mut App, ui: &mut egui::Ui) {
+    let mut given_up = None;
+    for Waiting { number, input, why, read, .. } in app.playing.waiting() {
+        ui.horizontal(|ui| {
+            if ui.small_button("×").on_hover_text("Do not open it").clicked() {
+                given_up = Some(number);
+            }
+            ui.add(egui::Label::new(&*input.name).truncate()).on_hover_text(App::source_name(input));
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.add_space(22.0);
+            ui.spinner();
+            ui.small(if read > 0.0 { format!("{why}, {:.0} %", 100.0 * read) } else { why });
+        });
+        ui.add_space(4.0);
+    }
+    if let Some(number) = given_up {
+        app.playing.give_up(number);
     }
 }
 
@@ -73,10 +97,11 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
             let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
             let file = path.map_or_else(String::new, |path| format!("\n{}", path.display()));
             let edits = if unsaved { "\nIts edits are not saved" } else { "" };
+            let begins = app.playing.alignment(id).map_or_else(String::new, |words| format!("\nIt begins {words}"));
             if label.double_clicked() {
                 super::layer::rename(app, id);
             }
-            label.on_hover_text(format!("{name}{file}{edits}")).context_menu(|ui| menu(app, ui, id));
+            label.on_hover_text(format!("{name}{file}{edits}{begins}")).context_menu(|ui| menu(app, ui, id));
         });
         ui.horizontal_wrapped(|ui| {
             ui.add_space(22.0);
@@ -129,6 +154,7 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
 /// Takes everything off the list.
 pub(crate) fn close_all(app: &mut App) {
     app.loader.cancel_all();
+    app.playing.give_up_waiting();
     let ids = app.document().layers.iter().map(|layer| layer.id).collect();
     remove(app, ids);
 }
@@ -212,6 +238,9 @@ pub(super) fn inspected(app: &mut App, context: &egui::Context) {
                     ui.end_row();
                 };
                 row("Input", &point.name);
+                if let Some(words) = app.playing.alignment(point.layer) {
+                    row("Begins", &words);
+                }
                 row("Index", &point.point.to_string());
                 for (axis, value) in ["x", "y", "z"].into_iter().zip(&point.file_text) {
                     row(axis, value);

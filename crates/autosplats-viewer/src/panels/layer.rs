@@ -1,5 +1,6 @@
 //! What can be done with an input besides looking at it: its name, its place in the list and in the world.
 
+use autosplats::cloud::Source;
 use eframe::egui;
 
 use crate::app::App;
@@ -46,6 +47,8 @@ pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     let layers = &app.document().layers;
     let (count, place) = (layers.len(), layers.iter().position(|layer| layer.id == id).unwrap_or(0));
     let path = layers.get(place).and_then(|layer| layer.path.clone());
+    let source = app.inputs.get(&id).map(|input| &input.source);
+    let again = source.is_some_and(|source| !matches!(source, Source::Scene(..) | Source::StandardInput));
     if ui.button("Rename…").clicked() {
         rename(app, id);
         ui.close();
@@ -63,11 +66,11 @@ pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
         }
     }
     let unsaved = app.history.is_unsaved(id);
-    let reload = ui.add_enabled(path.is_some() && !unsaved, egui::Button::new("Reload"));
-    let reload = reload.on_hover_text("Read its file again").on_disabled_hover_text(if unsaved {
+    let reload = ui.add_enabled(again && !unsaved, egui::Button::new("Reload"));
+    let reload = reload.on_hover_text("Read it again, from where it was read").on_disabled_hover_text(if unsaved {
         "It has edits that are not saved, which would be of other points"
     } else {
-        "It was not read from a file"
+        "It was made, or came through a pipe"
     });
     if reload.clicked() {
         app.reload_layer(id);

@@ -6,7 +6,6 @@ use eframe::egui;
 use super::command_button;
 use crate::app::App;
 use crate::commands::{Command, Tool};
-use crate::loading::Input;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     let shown = egui::Panel::top("menu").show(ui, |ui| {
@@ -27,10 +26,9 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     let recent = app.recent.clone();
     ui.add_enabled_ui(!recent.is_empty(), |ui| {
         ui.menu_button("Open lately", |ui| {
-            for path in recent {
-                let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-                if ui.button(file).on_hover_text(path.display().to_string()).clicked() {
-                    app.open(Input::file(path));
+            for kept in recent {
+                if ui.button(kept.short_name()).on_hover_text(&kept.source).clicked() {
+                    app.open_again(kept);
                     ui.close();
                 }
             }
@@ -43,7 +41,8 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::Film, any);
     command_button(app, ui, Command::SaveState, any);
     ui.separator();
-    command_button(app, ui, Command::CloseAll, any);
+    let open = any || !app.loader.jobs().is_empty() || !app.playing.is_empty();
+    command_button(app, ui, Command::CloseAll, open);
     command_button(app, ui, Command::Quit, true);
 }
 

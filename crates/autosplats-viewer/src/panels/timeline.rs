@@ -4,9 +4,7 @@ use eframe::egui;
 
 use crate::app::App;
 use crate::commands::Command;
-
-/// Slowest and fastest, seconds played in a second.
-const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+use crate::playing::SPEEDS;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     if app.playing.is_empty() {

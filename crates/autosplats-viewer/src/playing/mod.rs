@@ -1,6 +1,9 @@
 //! Inputs that move: each is read by a thread of its own, for the time that one clock of all says.
 
+mod align;
 mod clock;
+mod follow;
+mod reel;
 #[cfg(test)]
 mod tests;
 mod thread;
@@ -8,14 +11,14 @@ mod thread;
 use std::sync::Arc;
 use std::time::Duration;
 
-use autosplats::cloud::{PointCloud, Statistics, Timeline};
-use eframe::egui;
+use autosplats::cloud::{Source, Statistics, Timeline};
 
-pub(crate) use self::clock::Clock;
+pub(crate) use self::clock::{Clock, SPEEDS};
+pub(crate) use self::reel::{Reel, Track};
 use self::thread::StreamThread;
 use crate::app::App;
-use crate::document::{Layer, LayerId};
-use crate::loading::Input;
+use crate::document::LayerId;
+use crate::loading::{Appearance, Input};
 
 /// Milliseconds that a picture of something that moves may take at most, and of what is live, whenever the next one comes.
 const LIVE_MS: f64 = 100.0;
@@ -25,6 +28,8 @@ const LIVE_MS: f64 = 100.0;
 pub(crate) struct Playing {
     pub(crate) clock: Clock,
     streams: Vec<Moving>,
+    /// What was removed, and would come back by undo.
+    removed: Vec<Removed>,
     /// When the clock was advanced last, seconds of the window.
     time: Option<f64>,
     /// The time of points with edits that are not saved.
@@ -37,8 +42,53 @@ struct Moving {
     thread: StreamThread,
     /// Where its points are shown, once there are some.
     layer: Option<LayerId>,
-    visible: bool,
-    tint: Option<[u8; 3]>,
+    /// The frame that the layer shows.
+    frame: Option<usize>,
+    /// When it begins on the clock, if its stamps say that; with the clock otherwise.
+    begins: Option<Duration>,
+    appearance: Appearance,
+}
+
+/// An input that moved.
+struct Removed {
+    input: Input,
+    layer: LayerId,
+    frame: Option<usize>,
+    /// Seconds of the clock at which it was removed.
+    position: f64,
+}
+
+/// An input that has no points yet.
+pub(crate) struct Waiting<'a> {
+    /// Among all that moves.
+    pub(crate) number: usize,
+    pub(crate) input: &'a Input,
+    pub(crate) appearance: Appearance,
+    /// What it waits for.
+    pub(crate) why: String,
+    /// Part of that which is done, 0 to 1, as far as it is known.
+    pub(crate) read: f32,
+}
+
+impl Moving {
+    /// When its frames happen, if it has a timeline and that is known.
+    fn timeline(&self) -> Option<Arc<Timeline>> {
+        self.thread.timeline().flatten()
+    }
+
+    /// The frame of a timeline of its own that is shown at a place of the clock.
+    fn frame_at(&self, timeline: &Timeline, position: Duration) -> usize {
+        timeline.frame_at(position.saturating_sub(self.begins.unwrap_or_default()))
+    }
+
+    /// What it waits for, if it has no points yet.
+    fn why(&self) -> String {
+        match self.thread.timeline() {
+            None => "being opened".into(),
+            Some(Some(_)) => "waits for its first points".into(),
+            Some(None) => self.thread.statistics().waiting.unwrap_or_else(|| "waits for points".into()),
+        }
+    }
 }
 
 impl Playing {
@@ -54,19 +104,40 @@ impl Playing {
         self.streams.len() < before
     }
 
+    /// Gives up an input that [has no points yet](Self::waiting), by its number.
+    pub(crate) fn give_up(&mut self, number: usize) {
+        if self.streams.get(number).is_some_and(|moving| moving.layer.is_none()) {
+            self.streams.remove(number);
+        }
+    }
+
+    /// Gives up all that has no points yet.
+    pub(crate) fn give_up_waiting(&mut self) {
+        self.streams.retain(|moving| moving.layer.is_some());
+    }
+
     /// Whether something of this name is played.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.streams.iter().any(|moving| App::source_name(&moving.input) == name)
     }
 
-    /// What is open but has no points yet.
-    pub(crate) fn waiting(&self) -> impl Iterator<Item = &Input> {
-        self.streams.iter().filter(|moving| moving.layer.is_none()).map(|moving| &moving.input)
+    /// Whether a layer is of something that is played.
+    pub(crate) fn shows(&self, id: LayerId) -> bool {
+        self.streams.iter().any(|moving| moving.layer == Some(id))
     }
 
-    /// The timelines of what has one.
-    fn timelines(&self) -> impl Iterator<Item = Arc<Timeline>> + '_ {
-        self.streams.iter().filter_map(|moving| moving.thread.timeline().flatten())
+    /// What is open but has no points yet.
+    pub(crate) fn waiting(&self) -> impl Iterator<Item = Waiting<'_>> {
+        let waiting = self.streams.iter().enumerate().filter(|(_, moving)| moving.layer.is_none());
+        waiting.map(|(number, moving)| {
+            let Moving { input, appearance, thread, .. } = moving;
+            Waiting { number, input, appearance: *appearance, why: moving.why(), read: thread.read() }
+        })
+    }
+
+    /// The timelines of what has one, and when they begin on the clock.
+    fn timelines(&self) -> impl Iterator<Item = (Arc<Timeline>, Duration)> + '_ {
+        self.streams.iter().filter_map(|moving| Some((moving.timeline()?, moving.begins.unwrap_or_default())))
     }
 
     /// Whether there is a time to go to.
@@ -81,14 +152,13 @@ impl Playing {
 
     /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second.
     pub(crate) fn frame_ms(&self) -> Option<f64> {
-        if !self.clock.playing || self.is_empty() {
-            return None;
-        }
+        let runs = self.clock.runs();
         let each = self
             .timelines()
-            .filter(|timeline| timeline.len() > 1)
-            .map(|timeline| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
-        each.chain(self.is_live().then_some(LIVE_MS)).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
+            .filter(|(timeline, _)| runs && timeline.len() > 1)
+            .map(|(timeline, _)| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
+        let live = (self.clock.playing && self.is_live()).then_some(LIVE_MS);
+        each.chain(live).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
     }
 
     /// What became of all updates.
@@ -108,22 +178,34 @@ impl Playing {
     /// The frame that is shown, of so many, where one input alone has a timeline.
     pub(crate) fn frame(&self) -> Option<(usize, usize)> {
         let mut timelines = self.timelines();
-        let only = timelines.next().filter(|_| timelines.next().is_none())?;
+        let (only, _) = timelines.next().filter(|_| timelines.next().is_none())?;
         Some((only.frame_at(self.position()), only.len()))
+    }
+
+    /// When the input of a layer begins, where several have timelines, in words.
+    pub(crate) fn alignment(&self, id: LayerId) -> Option<String> {
+        let moving = self.streams.iter().find(|moving| moving.layer == Some(id) && moving.timeline().is_some())?;
+        (self.timelines().count() > 1).then(|| match moving.begins {
+            Some(begins) => format!("by the clock of its stamps, {:.3} s after the first", begins.as_secs_f64()),
+            None => "at once with the others, whatever their stamps say".into(),
+        })
     }
 
     /// Goes to the next frame of any input, or to the one before.
     pub(crate) fn step(&mut self, forward: bool) {
         self.clock.playing = false;
         let position = self.position();
-        // Times since the first frame: the one that is shown now, and those to choose from.
+        // Nanoseconds of the clock: of what is shown now, and those to choose from.
         let mut now = 0;
-        let mut times: Vec<i64> = Vec::new();
-        for timeline in self.timelines() {
+        let mut times: Vec<u64> = Vec::new();
+        for (timeline, begins) in self.timelines() {
             let first = timeline.stamps().first().copied().unwrap_or_default();
-            let since = |stamp: &i64| stamp.saturating_sub(first);
-            now = now.max(timeline.stamps().get(timeline.frame_at(position)).map_or(0, since));
-            times.extend(timeline.stamps().iter().map(since));
+            let begins_ns = u64::try_from(begins.as_nanos()).unwrap_or(u64::MAX);
+            let time = |stamp: &i64| begins_ns.saturating_add(stamp.abs_diff(first));
+            if position >= begins {
+                now = now.max(timeline.stamps().get(timeline.frame_at(position - begins)).map_or(0, time));
+            }
+            times.extend(timeline.stamps().iter().map(time));
         }
         let next = if forward {
             times.into_iter().filter(|&time| time > now).min()
@@ -136,110 +218,46 @@ impl Playing {
         }
     }
 
+    /// The frames that are seen at each of some places of the clock, of all that has a timeline and points.
+    pub(crate) fn tracks(&self, places: &[f64]) -> Vec<Track> {
+        let shown = self.streams.iter().filter_map(|moving| Some((moving, moving.layer?, moving.timeline()?)));
+        let track = |(moving, layer, timeline): (&Moving, LayerId, Arc<Timeline>)| {
+            let frame = |&place: &f64| moving.frame_at(&timeline, duration(place));
+            Track { layer, input: moving.input.clone(), frames: places.iter().map(frame).collect() }
+        };
+        shown.map(track).collect()
+    }
+
+    /// Finds out when each begins, by what is open now. What is shown stays as it is unless the clock is held.
+    fn align(&mut self) {
+        let spans: Vec<_> = self
+            .streams
+            .iter()
+            .map(|moving| match moving.input.source {
+                // Stamps of what is no recording count from its own beginning.
+                Source::Recording(_) => moving.timeline().and_then(|timeline| align::span(&timeline)),
+                _ => None,
+            })
+            .collect();
+        let mut shift = None;
+        for (moving, begins) in self.streams.iter_mut().zip(align::beginnings(&spans)) {
+            let [before, after] = [moving.begins, begins].map(|begins| begins.unwrap_or_default().as_secs_f64());
+            if moving.layer.is_some() {
+                shift.get_or_insert(after - before);
+            }
+            moving.begins = begins;
+        }
+        if let Some(shift) = shift.filter(|shift| *shift != 0.0 && !self.clock.is_held()) {
+            self.clock.shift(shift);
+        }
+    }
+
     fn position(&self) -> Duration {
-        Duration::from_secs_f64(self.clock.position())
+        duration(self.clock.position())
     }
 }
 
-impl App {
-    /// Begins to play something.
-    pub(crate) fn play(&mut self, input: Input, visible: bool, tint: Option<[u8; 3]>, context: &egui::Context) {
-        let thread = StreamThread::start(input.clone(), context.clone());
-        self.playing.streams.push(Moving { input, thread, layer: None, visible, tint });
-    }
-
-    /// Begins or stops to play.
-    pub(crate) fn toggle_playing(&mut self) {
-        self.playing.clock.toggle();
-    }
-
-    /// Lets the time pass, asks for what is to be seen by then and takes in what has come.
-    pub(crate) fn follow_streams(&mut self, context: &egui::Context) {
-        if self.playing.is_empty() {
-            return;
-        }
-        let now = context.input(|input| input.time);
-        let passed = self.playing.time.replace(now).map_or(0.0, |before| now - before);
-        self.keep_edits();
-        let playing = &mut self.playing;
-        let length = playing.timelines().map(|timeline| timeline.duration()).max().unwrap_or_default();
-        playing.clock.set_length(length);
-        playing.clock.advance(passed.min(0.5));
-        let position = playing.position();
-        for moving in &playing.streams {
-            moving.thread.pause(!playing.clock.playing);
-            if let Some(Some(timeline)) = moving.thread.timeline() {
-                moving.thread.want(timeline.frame_at(position));
-            }
-        }
-        let news: Vec<_> = playing.streams.iter().map(|moving| moving.thread.news()).collect();
-        let mut ended = Vec::new();
-        for (number, news) in news.into_iter().enumerate() {
-            let name = self.playing.streams[number].input.name.clone();
-            news.notes.into_iter().for_each(|note| self.messages.note(format!("{name}: {note}")));
-            if let Some(ending) = news.ending {
-                match ending {
-                    Ok(()) => self.messages.note(format!("{name} has ended")),
-                    Err(failure) => self.messages.error(failure),
-                }
-                ended.push(number);
-            }
-            if let Some(cloud) = news.cloud {
-                self.show_frame(number, &cloud);
-            }
-        }
-        for number in ended.into_iter().rev() {
-            let moving = self.playing.streams.remove(number);
-            match moving.layer {
-                // What came last stays, as any points do.
-                Some(id) => self.settle(|document| document.complete(id)),
-                None => self.failed.push(moving.input),
-            }
-        }
-        let open: Vec<LayerId> = self.document().layers.iter().map(|layer| layer.id).collect();
-        self.playing.streams.retain(|moving| moving.layer.is_none_or(|id| open.contains(&id)));
-        if self.playing.clock.playing && self.playing.timelines().any(|timeline| timeline.len() > 1) {
-            context.request_repaint();
-        }
-    }
-
-    /// Points that stand still can be edited; what moves on would lose that, and stays at the time of the edits.
-    fn keep_edits(&mut self) {
-        let layers: Vec<LayerId> = self.playing.streams.iter().filter_map(|moving| moving.layer).collect();
-        let unsaved = layers.iter().find(|id| self.history.is_unsaved(**id)).copied();
-        let position = self.playing.clock.position();
-        let edited_at = unsaved.map(|_| self.playing.edited_at.unwrap_or(position));
-        self.playing.edited_at = edited_at;
-        let moves = self.playing.clock.playing || edited_at.is_some_and(|at| at != position);
-        if let (Some(id), Some(at)) = (unsaved.filter(|_| moves), edited_at) {
-            self.playing.clock.playing = false;
-            self.playing.clock.seek(at);
-            let name = self.document().layer(id).map(|layer| layer.name.clone()).unwrap_or_default();
-            self.messages.note(format!("{name} has edits that are not saved; export or undo them to play on"));
-        }
-        let still = !self.playing.clock.playing;
-        let changed = |id: &LayerId| self.document().layer(*id).is_some_and(|layer| layer.incomplete == still);
-        if layers.iter().any(changed) {
-            self.settle(|document| layers.iter().for_each(|&id| document.set_incomplete(id, !still)));
-        }
-    }
-
-    /// Shows the points of a stream.
-    fn show_frame(&mut self, number: usize, cloud: &Arc<PointCloud>) {
-        let moving = &self.playing.streams[number];
-        match moving.layer {
-            Some(id) => self.fill(id, cloud),
-            None if cloud.is_empty() => {}
-            None => {
-                let Moving { input, visible, tint, .. } = moving;
-                let (input, visible, tint) = (input.clone(), *visible, *tint);
-                let path = input.source.path().map(std::path::Path::to_path_buf);
-                let mut layer = Layer::new(&*input.name, path, Arc::clone(cloud)).opened_at(input.world_from_input);
-                layer.incomplete = self.playing.clock.playing;
-                (layer.visible, layer.tint) = (visible, tint);
-                let id = self.add_layer(layer, &input);
-                self.playing.streams[number].layer = Some(id);
-            }
-        }
-    }
+/// A time of a clock.
+fn duration(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }

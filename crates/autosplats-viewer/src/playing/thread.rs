@@ -6,6 +6,7 @@ use std::time::Duration;
 use autosplats::cloud::{Error, PointCloud, Progress, ReadOptions, Statistics, Timeline};
 use eframe::egui;
 
+use crate::glance::{Glance, Known};
 use crate::loading::Input;
 
 /// How long a live stream may keep silent before it is asked whether it is still wanted.
@@ -17,8 +18,10 @@ const MOST_NOTES: usize = 20;
 /// What has come since it was asked last.
 #[derive(Default)]
 pub(crate) struct News {
-    /// The newest points; older ones that nobody took are gone.
-    pub(crate) cloud: Option<Arc<PointCloud>>,
+    /// The newest points, and the frame that they are if there is a timeline; older ones that nobody took are gone.
+    pub(crate) cloud: Option<(Option<usize>, Arc<PointCloud>)>,
+    /// What is known of the first points at a glance.
+    pub(crate) glance: Option<Glance>,
     /// What is to be told.
     pub(crate) notes: Vec<String>,
     /// That there will be no more, and what went wrong if something did.
@@ -32,12 +35,16 @@ struct Post {
     /// Once it is open: when its frames happen, or `None` if it is live.
     timeline: Option<Option<Arc<Timeline>>>,
     statistics: Statistics,
-    wanted: usize,
+    /// Part of what has to be read first, 0 to 1.
+    read: f32,
+    /// Whether there have been points.
+    begun: bool,
+    /// Frame that the window wants, once it knows the timeline.
+    wanted: Option<usize>,
     paused: bool,
     closed: bool,
 }
 
-#[derive(Default)]
 struct Shared {
     post: Mutex<Post>,
     changed: Condvar,
@@ -55,12 +62,22 @@ pub(crate) struct StreamThread {
 }
 
 impl StreamThread {
-    /// Begins to open an input and reads its first frame; `context` is asked to draw again with each piece of news.
-    pub(crate) fn start(input: Input, context: egui::Context) -> Self {
-        let shared = Arc::new(Shared::default());
+    /// Begins to open an input; `context` is asked to draw again with each piece of news.
+    pub(crate) fn start(input: Input, view: Known, context: egui::Context) -> Self {
+        Self::begin(input, None, view, Post::default(), context)
+    }
+
+    /// The same where its points are shown already, as those of `frame` if it has a timeline: they stay until other ones are
+    /// wanted.
+    pub(crate) fn go_on(input: Input, frame: Option<usize>, view: Known, context: egui::Context) -> Self {
+        Self::begin(input, frame, view, Post { begun: true, ..Post::default() }, context)
+    }
+
+    fn begin(input: Input, shown: Option<usize>, view: Known, post: Post, context: egui::Context) -> Self {
+        let shared = Arc::new(Shared { post: Mutex::new(post), changed: Condvar::new() });
         let theirs = Arc::clone(&shared);
         crate::threads::spawn("play", move || {
-            let work = std::panic::AssertUnwindSafe(|| run(&input, &theirs, &context));
+            let work = std::panic::AssertUnwindSafe(|| run(&input, shown, &view, &theirs, &context));
             let ending = match std::panic::catch_unwind(work) {
                 Ok(Ok(())) => Ok(()),
                 Ok(Err(Error::Cancelled)) => return,
@@ -76,14 +93,14 @@ impl StreamThread {
     /// Asks for a frame of the timeline.
     pub(crate) fn want(&self, frame: usize) {
         let mut post = self.shared.lock();
-        if post.wanted != frame {
-            post.wanted = frame;
+        if post.wanted != Some(frame) {
+            post.wanted = Some(frame);
             drop(post);
             self.shared.changed.notify_one();
         }
     }
 
-    /// Whether live points that come are passed over for now.
+    /// Whether live points that come are passed over for now, but for the first.
     pub(crate) fn pause(&self, paused: bool) {
         self.shared.lock().paused = paused;
     }
@@ -91,6 +108,11 @@ impl StreamThread {
     /// Once it is open: when its frames happen, or `None` if it is live.
     pub(crate) fn timeline(&self) -> Option<Option<Arc<Timeline>>> {
         self.shared.lock().timeline.clone()
+    }
+
+    /// Part of what has to be read before there are points, 0 to 1, as far as that is known.
+    pub(crate) fn read(&self) -> f32 {
+        self.shared.lock().read
     }
 
     /// What became of the updates so far.
@@ -112,17 +134,32 @@ impl Drop for StreamThread {
 }
 
 /// Listens to a reader.
-struct Follower<'a>(&'a Shared);
+struct Follower<'a> {
+    shared: &'a Shared,
+    context: &'a egui::Context,
+}
 
 impl Progress for Follower<'_> {
-    fn report(&self, _fraction: f32) {}
+    fn report(&self, fraction: f32) {
+        let mut post = self.shared.lock();
+        // Later frames come soon enough.
+        if post.begun {
+            return;
+        }
+        let before = std::mem::replace(&mut post.read, fraction.clamp(0.0, 1.0));
+        drop(post);
+        // A bar a hundred pixels long moves a hundred times.
+        if (100.0 * before) as u32 != (100.0 * fraction) as u32 {
+            self.context.request_repaint();
+        }
+    }
 
     fn cancelled(&self) -> bool {
-        self.0.lock().closed
+        self.shared.lock().closed
     }
 
     fn note(&self, note: &str) {
-        let notes = &mut self.0.lock().news.notes;
+        let notes = &mut self.shared.lock().news.notes;
         // A window that is not drawn takes none of them.
         if notes.len() < MOST_NOTES && notes.iter().all(|known| known != note) {
             notes.push(note.into());
@@ -130,42 +167,58 @@ impl Progress for Follower<'_> {
     }
 }
 
-fn run(input: &Input, shared: &Shared, context: &egui::Context) -> Result<(), Error> {
-    let follower = Follower(shared);
+fn run(
+    input: &Input,
+    mut shown: Option<usize>,
+    view: &Known,
+    shared: &Shared,
+    context: &egui::Context,
+) -> Result<(), Error> {
+    let follower = Follower { shared, context };
     let options = ReadOptions { exact: true, ..input.options.clone() };
     let mut player = input.source.play(&input.play, &options, &follower)?;
     let timeline = player.stream().timeline().cloned().map(Arc::new);
-    shared.lock().timeline = Some(timeline.clone());
-    let mut shown = None;
-    let mut any = false;
+    {
+        let mut post = shared.lock();
+        post.timeline = Some(timeline.clone());
+        post.read = 0.0;
+    }
+    // Which frame is wanted is known by the timeline.
+    context.request_repaint();
     loop {
         let wanted = {
             let mut post = shared.lock();
-            while !post.closed && timeline.is_some() && shown == Some(post.wanted) {
+            while !post.closed && timeline.is_some() && (post.wanted.is_none() || post.wanted == shown) {
                 post = shared.changed.wait(post).unwrap_or_else(PoisonError::into_inner);
             }
             if post.closed {
                 return Ok(());
             }
-            post.wanted
+            post.wanted.filter(|_| timeline.is_some())
         };
-        let cloud = if timeline.is_some() {
-            shown = Some(wanted);
-            Some(player.frame(wanted, &follower)?)
-        } else {
-            match player.next(PATIENCE, &follower) {
-                Err(Error::NoFrames { .. }) if any => return Ok(()),
-                next => next?,
+        let cloud = match wanted {
+            Some(frame) => {
+                shown = wanted;
+                Some(player.frame(frame, &follower)?)
             }
+            None => match player.next(PATIENCE, &follower) {
+                Err(Error::NoFrames { .. }) if shared.lock().begun => return Ok(()),
+                next => next?,
+            },
         };
+        let first = cloud.as_ref().filter(|cloud| !cloud.is_empty() && !shared.lock().begun);
+        let glance = first.map(|cloud| Glance::of(input, cloud, view.get()));
         let mut post = shared.lock();
-        let news = cloud.filter(|_| timeline.is_some() || !post.paused);
+        let news = cloud.filter(|_| wanted.is_some() || !post.paused || !post.begun);
         let statistics = player.stream().statistics();
         let changed = news.is_some() || statistics != post.statistics;
         post.statistics = statistics;
-        if news.is_some() {
-            any = true;
-            post.news.cloud = news;
+        if let Some(cloud) = news {
+            post.begun |= !cloud.is_empty();
+            if glance.is_some() {
+                post.news.glance = glance;
+            }
+            post.news.cloud = Some((wanted, cloud));
         }
         drop(post);
         if changed {

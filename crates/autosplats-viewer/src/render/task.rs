@@ -70,8 +70,8 @@ pub(crate) enum Outcome {
     Picked { purpose: Purpose, point: Option<Seen> },
     /// Which of the points shown are in the region.
     Selected { shown: Arc<Shown>, hits: Vec<bool>, mode: SelectMode },
-    /// A picture of the size that was asked for.
-    Photographed { image: Box<Image>, goal: Goal },
+    /// A picture of the size that was asked for, and the range of values that its colours are of.
+    Photographed { image: Box<Image>, range: Option<[f64; 2]>, goal: Goal },
 }
 
 /// A point that is seen at a pixel.

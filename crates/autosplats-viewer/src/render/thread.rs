@@ -124,6 +124,13 @@ impl Studio {
         Ok(renderer)
     }
 
+    /// There is nothing to be drawn: gives back what a renderer keeps, which is as large as the largest picture and cloud that it
+    /// has seen. One on a GPU takes long to be made ready again, and stays.
+    fn let_go(&mut self) {
+        self.renderer.take_if(|(_, renderer)| renderer.adapter().is_none());
+        self.sparse = None;
+    }
+
     /// What is asked of the renderer for a task.
     fn settings(&mut self, wish: &Wish, shown: &Shown, outbox: &Outbox) -> Result<Settings, Error> {
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
@@ -135,6 +142,7 @@ impl Studio {
         let started = Instant::now();
         let shown = self.shown(wish)?;
         if shown.cloud.len() < 2 {
+            self.let_go();
             return Ok(Answer::Empty);
         }
         let pixels = wish.size[0] as usize * wish.size[1] as usize;
@@ -257,8 +265,8 @@ impl Studio {
                 let settings = self.settings(&wish, &shown, outbox)?;
                 let size = wish.rendered_size(1.0);
                 let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
-                let image = Box::new(enlarge(frame.image, wish.size));
-                Ok(Outcome::Photographed { image, goal })
+                let (image, range) = (Box::new(enlarge(frame.image, wish.size)), frame.counts.value_range);
+                Ok(Outcome::Photographed { image, range, goal })
             }
         }
     }

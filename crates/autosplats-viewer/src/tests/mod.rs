@@ -4,6 +4,7 @@ mod access;
 mod dialogs;
 mod edits;
 mod mouse;
+mod moving;
 mod opening;
 mod shortcuts;
 mod soak;
@@ -184,6 +185,21 @@ impl Window {
         let rect = self.picture();
         rect.min + rect.size() * egui::vec2(x, y)
     }
+}
+
+/// The folder of files that tests share.
+pub(crate) fn data() -> Option<std::path::PathBuf> {
+    let beside = || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, std::path::PathBuf::from);
+    if folder.join("README.md").exists() {
+        return Some(folder);
+    }
+    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
+    // Past the test harness, which would swallow what a passing test prints.
+    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
+    use std::io::Write as _;
+    std::io::stderr().write_all(message.as_bytes()).expect("somewhere to say it");
+    None
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! From a name to a picture, or to a word about why not.
 
+use std::path::{Path, PathBuf};
+
 use super::*;
+use crate::kept::Kept;
 use crate::storage;
 
 #[test]
@@ -47,6 +50,24 @@ fn what_cannot_be_read_says_why_in_place() {
 }
 
 #[test]
+fn the_first_view_is_the_same_whoever_finds_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let path = folder.path().join("slope.xyz");
+    let rows: String = (0..500).map(|i| format!("{} {} {}\n", i % 25, i / 25, i % 7)).collect();
+    std::fs::write(&path, rows).expect("it can be written");
+    let mut window = Window::new(&[&*path.display().to_string()]);
+    window.settle();
+    let camera = window.app().navigation.goal_camera();
+    let (_, glance) = window.app().glance.clone().expect("the thread that read it has looked at it");
+    assert_eq!(glance.camera, Some(camera), "where it says");
+    let app = window.harness.state_mut();
+    app.glance = None;
+    app.navigation.orbit(autosplats::cloud::glam::DVec2::new(0.3, 0.1));
+    app.first_view();
+    assert_eq!(app.navigation.goal_camera(), camera, "as the window finds it by itself");
+}
+
+#[test]
 fn settings_survive_other_versions() {
     let mut look = Look { dots: true, dot_size: 5, ..Look::default() };
     look.settings.reconstruction.k = 33;
@@ -81,19 +102,32 @@ impl eframe::Storage for Memory {
     fn flush(&mut self) {}
 }
 
+/// A recording of which it was told how to play it.
+fn played() -> Input {
+    let mut input = Input::parse("/some/drive.mcap").expect("a recording");
+    (input.play.topics, input.play.fps) = (vec!["/front".into()], Some(5.0));
+    input.play.latest.decay = Some(Duration::from_secs(2));
+    input
+}
+
 #[test]
 fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
     window.harness.state_mut().look.dot_size = 6;
     window.harness.state_mut().look.two_fingers = crate::look::TwoFingers::Pan;
-    window.harness.state_mut().recent = vec!["/some/where.ply".into()];
+    window.harness.state_mut().recent = vec![Kept::of(&played(), crate::loading::Appearance::default())];
     let mut memory = Memory::default();
     storage::save(window.app(), &mut memory);
     let (look, recent) = storage::load(Some(&memory));
     assert_eq!(look, window.app().look, "the look comes back");
-    assert_eq!(recent, window.app().recent, "and the names");
+    assert_eq!(recent, window.app().recent, "and what was opened");
+    let (again, _) = recent[0].clone().open(Path::new("")).expect("a recording");
+    assert_eq!(again.play, played().play, "played as it was");
     let broken = memory.0.keys().map(|key| (key.clone(), "(((".to_owned())).collect();
     assert_eq!(storage::load(Some(&Memory(broken))), (Look::default(), Vec::new()), "what is broken is left behind");
+    let paths: Vec<PathBuf> = vec!["/some/where.ply".into()];
+    eframe::set_value(&mut memory, "recent", &paths);
+    assert_eq!(storage::load(Some(&memory)).1, [Kept::named("/some/where.ply".into())], "an older version's paths");
     assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
     // Values that no renderer takes are left behind, too.
     window.harness.state_mut().look.settings.reconstruction.k = 100_000;

@@ -110,12 +110,18 @@ fn anything(window: &mut Window, chance: &mut Chance) {
     window.steps(1 + chance.below(3));
 }
 
-/// Closes everything and forgets what could be undone, which is kept on purpose; gives the megabytes that are left.
+/// Brings the program to where it was in the beginning: everything is closed, what could be undone, which is kept on purpose, is
+/// forgotten, and the window has its first size. Gives the megabytes that are left.
 fn rest(window: &mut Window) -> f64 {
+    window.harness.set_size(SMALL);
+    // What the window asked of the system is kept by the test, not by the program.
+    (window.commands, window.outputs) = (Vec::new(), Vec::new());
     let app = window.harness.state_mut();
     app.loader.cancel_all();
     app.history = crate::document::History::default();
     app.version += 1;
+    // Cameras that are being played may be tens of thousands.
+    app.panels.film.stop();
     window.until("everything is closed", |window| {
         let app = window.app();
         app.loader.jobs().is_empty() && app.document().layers.is_empty() && app.shot.is_none()

@@ -3,29 +3,13 @@
 //! They lie beside the repository, in `../shared/data`, or where `AUTOSPLATS_DATA` says. Without them these tests say that
 //! they check nothing, and where `CI` is set they fail.
 
-use std::{
-    io::Write as _,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::Path, sync::Arc};
 
 use autosplats::cloud::{PointCloud, ReadOptions, read_with};
 
 use super::super::{Document, Layer, Replace, What, export, pick::file_text};
 use super::{edit, every};
-
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, PathBuf::from);
-    if folder.join("README.md").exists() {
-        return Some(folder);
-    }
-    assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    // Past the test harness, which would swallow what a passing test prints.
-    let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
-    std::io::stderr().write_all(message.as_bytes()).expect("somewhere to say it");
-    None
-}
+use crate::tests::data;
 
 fn exact(path: &Path) -> PointCloud {
     let options = ReadOptions { exact: true, ..ReadOptions::default() };

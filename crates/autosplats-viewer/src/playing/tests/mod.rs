@@ -1,3 +1,7 @@
+mod again;
+mod films;
+mod sessions;
+
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -35,7 +39,11 @@ fn left(app: &App) -> Option<f64> {
 }
 
 fn app(name: &str, context: &egui::Context) -> App {
-    let input = Input::parse(name).expect("a folder");
+    app_of(Input::parse(name).expect("a folder"), context)
+}
+
+/// The application with the first frame of an input.
+fn app_of(input: Input, context: &egui::Context) -> App {
     let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), context);
     // The context's clock stands still, and so does what is played.
@@ -70,11 +78,7 @@ fn edits_are_not_played_over() {
     assert!(incomplete(&app), "what moves is not edited");
     app.toggle_playing();
     until(&mut app, &context, "a pause", |app| !incomplete(app));
-    app.edit_points("Delete", |document| {
-        let shown = document.shown();
-        document.select(&shown, |index| index < 7, crate::document::SelectMode::Replace);
-        document.delete_selected()
-    });
+    delete(&mut app);
     app.toggle_playing();
     app.follow_streams(&context);
     assert!(!app.playing.clock.playing, "it waits");
@@ -82,6 +86,15 @@ fn edits_are_not_played_over() {
     app.toggle_playing();
     app.follow_streams(&context);
     assert!(app.playing.clock.playing, "nothing would be lost any more");
+}
+
+/// Deletes a few points.
+fn delete(app: &mut App) {
+    app.edit_points("Delete", |document| {
+        let shown = document.shown();
+        document.select(&shown, |index| index < 7, crate::document::SelectMode::Replace);
+        document.delete_selected()
+    });
 }
 
 #[test]
@@ -103,4 +116,27 @@ fn what_cannot_be_played_is_told() {
     until(&mut app, &context, "the failure", |app| app.playing.is_empty());
     assert_eq!(app.failed.len(), 1, "a session keeps its name");
     assert!(app.document().layers.is_empty(), "and nothing is shown");
+}
+
+#[test]
+fn what_waits_for_its_first_points_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let context = egui::Context::default();
+    let mut input = Input::parse(&folder.path().display().to_string()).expect("a folder");
+    input.play.watch = true;
+    let options = Options { inputs: vec![input.clone()], backend: Some(Backend::Cpu), ..Options::default() };
+    let mut app = App::new(options, Look::default(), Vec::new(), &context);
+    let why = |app: &App| app.playing.waiting().next().map(|waiting| waiting.why);
+    until(&mut app, &context, "a word", |app| why(app).is_some_and(|why| why.contains("points")));
+    // What was paused before there was anything to see shows what comes first.
+    app.toggle_playing();
+    std::fs::write(folder.path().join("frame_0.xyz"), "0 0 0\n1 0 0\n0 1 0\n").expect("a frame");
+    until(&mut app, &context, "the first points", |app| left(app) == Some(0.0));
+    assert_eq!(why(&app), None, "it waits no longer");
+    app.open(input);
+    assert!(why(&app).is_some(), "another one does");
+    let context = egui::Context::default();
+    crate::keys::run(&mut app, &context, crate::commands::Command::CloseAll);
+    app.follow_streams(&context);
+    assert!(app.playing.is_empty() && app.failed.is_empty(), "closed as all is");
 }

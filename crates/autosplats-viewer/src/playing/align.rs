@@ -1,0 +1,88 @@
+//! Where the timelines of several inputs begin on the one clock of all.
+//!
+//! Recordings that were made at the same time, as several robots or several drives make them, belong together as their stamps say.
+//! Stamps of others say nothing of each other, and all begin at once.
+
+use std::time::Duration;
+
+use autosplats::cloud::Timeline;
+
+/// When each of some inputs begins: so long after the first one that was recorded at the same time as it, or `None` where
+/// there is no such one and it begins with the clock. `spans` are the first and last stamps of recordings, nanoseconds, and
+/// `None` of what has no stamps or none that count.
+pub(super) fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
+    let mut order: Vec<(usize, [i64; 2])> =
+        spans.iter().enumerate().filter_map(|(number, span)| Some((number, (*span)?))).collect();
+    order.sort_by_key(|&(number, [first, _])| (first, number));
+    let mut beginnings = vec![None; spans.len()];
+    // Each overlaps one before it, but for the first of a group.
+    for group in groups(&order) {
+        if let [(_, [begin, _]), _, ..] = *group {
+            for &(number, [first, _]) in group {
+                beginnings[number] = Some(Duration::from_nanos(first.abs_diff(begin)));
+            }
+        }
+    }
+    beginnings
+}
+
+/// Parts of a list in the order of first stamps that have no time in common.
+fn groups(mut order: &[(usize, [i64; 2])]) -> impl Iterator<Item = &[(usize, [i64; 2])]> {
+    std::iter::from_fn(move || {
+        let mut end = order.first()?.1[1];
+        let len = 1 + order[1..]
+            .iter()
+            .take_while(|(_, [first, last])| {
+                let together = *first <= end;
+                end = end.max(*last);
+                together
+            })
+            .count();
+        let (group, rest) = order.split_at(len);
+        order = rest;
+        Some(group)
+    })
+}
+
+/// The first and the last stamp.
+pub(super) fn span(timeline: &Timeline) -> Option<[i64; 2]> {
+    Some([*timeline.stamps().first()?, *timeline.stamps().last()?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seconds(beginnings: Vec<Option<Duration>>) -> Vec<Option<f64>> {
+        beginnings.into_iter().map(|beginning| beginning.map(|beginning| beginning.as_secs_f64())).collect()
+    }
+
+    #[test]
+    fn what_was_recorded_at_once_is_shown_at_once() {
+        let at = |first: i64, last: i64| Some([first * 1_000_000_000, last * 1_000_000_000]);
+        let spans = [at(105, 120), None, at(100, 110), at(500, 510), at(118, 130)];
+        // The last overlaps the first only, which overlaps the third.
+        assert_eq!(seconds(beginnings(&spans)), [Some(5.0), None, Some(0.0), None, Some(18.0)]);
+        assert_eq!(
+            seconds(beginnings(&[at(0, 9), at(10, 20)])),
+            [None, None],
+            "one after the other: at their beginnings"
+        );
+        assert_eq!(
+            seconds(beginnings(&[at(0, 10), at(10, 20)])),
+            [Some(0.0), Some(10.0)],
+            "a moment in common is enough"
+        );
+        assert_eq!(seconds(beginnings(&[at(0, 30), at(1, 2), at(20, 40)])), [0.0, 1.0, 20.0].map(Some), "one within");
+        assert_eq!(beginnings(&[]), []);
+    }
+
+    #[test]
+    fn stamps_may_be_anything() {
+        let all = Some([i64::MIN, i64::MAX]);
+        let late = Some([i64::MAX, i64::MAX]);
+        assert_eq!(beginnings(&[late, all]), [Some(Duration::from_nanos(u64::MAX)), Some(Duration::ZERO)]);
+        assert_eq!(span(&Timeline::default()), None, "no frame");
+        assert_eq!(span(&Timeline::new(vec![3, 1])), Some([1, 3]));
+    }
+}

@@ -1,0 +1,188 @@
+//! What the window does with all that moves, each time that it is drawn.
+
+use std::sync::Arc;
+
+use autosplats::cloud::{PointCloud, Source};
+use eframe::egui;
+
+use super::thread::StreamThread;
+use super::{Moving, Removed};
+use crate::app::App;
+use crate::document::{Layer, LayerId};
+use crate::glance::Glance;
+use crate::loading::{Appearance, Input};
+
+impl App {
+    /// Begins to play something.
+    pub(crate) fn play(&mut self, input: Input, appearance: Appearance, context: &egui::Context) {
+        let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), context.clone());
+        self.playing.streams.push(Moving { input, thread, layer: None, frame: None, begins: None, appearance });
+    }
+
+    /// Opens the source of a layer anew and plays it from where the clock stands.
+    pub(crate) fn play_anew(&mut self, id: LayerId, input: Input) {
+        if matches!(input.source, Source::StandardInput) {
+            self.messages.note(format!("{}: what came through a pipe cannot be read again", input.name));
+            return;
+        }
+        self.messages.note(format!("{} is opened anew", input.name));
+        let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), self.loader.context().clone());
+        match self.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
+            Some(moving) => (moving.thread, moving.frame) = (thread, None),
+            None => {
+                let appearance = Appearance::default();
+                let moving = Moving { input, thread, layer: Some(id), frame: None, begins: None, appearance };
+                self.playing.streams.push(moving);
+            }
+        }
+        self.playing.clock.hold();
+    }
+
+    /// Begins or stops to play.
+    pub(crate) fn toggle_playing(&mut self) {
+        self.playing.clock.toggle();
+    }
+
+    /// Lets the time pass, asks for what is to be seen by then and takes in what has come.
+    pub(crate) fn follow_streams(&mut self, context: &egui::Context) {
+        self.follow_layers(context);
+        if self.playing.is_empty() {
+            return;
+        }
+        let now = context.input(|input| input.time);
+        let passed = self.playing.time.replace(now).map_or(0.0, |before| now - before);
+        self.keep_edits();
+        let playing = &mut self.playing;
+        let open = playing.streams.iter().all(|moving| moving.thread.timeline().is_some());
+        if open || !playing.clock.is_held() {
+            playing.align();
+        }
+        let ends = playing.timelines().map(|(timeline, begins)| begins.saturating_add(timeline.duration()));
+        let length = ends.max().unwrap_or_default();
+        playing.clock.set_length(length, open);
+        let live = playing.is_live();
+        playing.clock.advance(passed.min(0.5), live);
+        let position = playing.position();
+        for moving in &playing.streams {
+            moving.thread.pause(!playing.clock.playing);
+            if let Some(timeline) = moving.timeline() {
+                moving.thread.want(moving.frame_at(&timeline, position));
+            }
+        }
+        self.take_news();
+        if self.playing.clock.runs() && self.playing.timelines().any(|(timeline, _)| timeline.len() > 1) {
+            context.request_repaint();
+        }
+    }
+
+    /// Plays no longer what was removed, and again what undo has brought back: at the time of the clock, unless its points have
+    /// edits that are of another.
+    fn follow_layers(&mut self, context: &egui::Context) {
+        let open: Vec<LayerId> = self.document().layers.iter().map(|layer| layer.id).collect();
+        let position = self.playing.clock.position();
+        let mut index = 0;
+        while let Some(moving) = self.playing.streams.get(index) {
+            match moving.layer.filter(|id| !open.contains(id)) {
+                None => index += 1,
+                Some(layer) => {
+                    let Moving { input, frame, .. } = self.playing.streams.remove(index);
+                    self.playing.removed.push(Removed { input, layer, frame, position });
+                }
+            }
+        }
+        if self.playing.removed.is_empty() {
+            return;
+        }
+        let removed = std::mem::take(&mut self.playing.removed);
+        let (back, gone): (Vec<_>, Vec<_>) = removed.into_iter().partition(|removed| open.contains(&removed.layer));
+        self.playing.removed = gone;
+        self.playing.removed.retain(|removed| self.history.holds(removed.layer));
+        for Removed { input, layer, frame, position } in back {
+            // A pipe does not wait for anybody.
+            if matches!(input.source, Source::StandardInput) {
+                self.messages.note(format!("{} was closed; its last points are shown", input.name));
+                continue;
+            }
+            if self.history.is_unsaved(layer) {
+                self.playing.edited_at.get_or_insert(position);
+            }
+            let thread = StreamThread::go_on(input.clone(), frame, self.loader.frame.clone(), context.clone());
+            let appearance = Appearance::default();
+            self.playing.streams.push(Moving { input, thread, layer: Some(layer), frame, begins: None, appearance });
+            self.playing.clock.hold();
+        }
+    }
+
+    /// Takes in what has come.
+    fn take_news(&mut self) {
+        let news: Vec<_> = self.playing.streams.iter().map(|moving| moving.thread.news()).collect();
+        let mut ended = Vec::new();
+        for (number, news) in news.into_iter().enumerate() {
+            let name = self.playing.streams[number].input.name.clone();
+            news.notes.into_iter().for_each(|note| self.messages.note(format!("{name}: {note}")));
+            if let Some(ending) = news.ending {
+                match ending {
+                    Ok(()) => self.messages.note(format!("{name} has ended")),
+                    Err(failure) => self.messages.error(failure),
+                }
+                ended.push(number);
+            }
+            if let Some((frame, cloud)) = news.cloud {
+                self.show_frame(number, frame, &cloud, news.glance);
+            }
+        }
+        for number in ended.into_iter().rev() {
+            let moving = self.playing.streams.remove(number);
+            match moving.layer {
+                // What came last stays, as any points do.
+                Some(id) => self.settle(|document| document.complete(id)),
+                None => self.fail(moving.input, moving.appearance),
+            }
+        }
+    }
+
+    /// Points that stand still can be edited; what moves on would lose that, and stays at the time of the edits.
+    fn keep_edits(&mut self) {
+        let layers: Vec<LayerId> = self.playing.streams.iter().filter_map(|moving| moving.layer).collect();
+        let unsaved = layers.iter().find(|id| self.history.is_unsaved(**id)).copied();
+        let position = self.playing.clock.position();
+        let edited_at = unsaved.map(|_| self.playing.edited_at.unwrap_or(position));
+        self.playing.edited_at = edited_at;
+        let moves = self.playing.clock.playing || edited_at.is_some_and(|at| at != position);
+        if let (Some(id), Some(at)) = (unsaved.filter(|_| moves), edited_at) {
+            self.playing.clock.playing = false;
+            self.playing.clock.seek(at);
+            let name = self.document().layer(id).map(|layer| layer.name.clone()).unwrap_or_default();
+            self.messages.note(format!("{name} has edits that are not saved; export or undo them to play on"));
+        }
+        let still = !self.playing.clock.playing;
+        let changed = |id: &LayerId| self.document().layer(*id).is_some_and(|layer| layer.incomplete == still);
+        if layers.iter().any(changed) {
+            self.settle(|document| layers.iter().for_each(|&id| document.set_incomplete(id, !still)));
+        }
+    }
+
+    /// Shows the points of a stream.
+    fn show_frame(&mut self, number: usize, frame: Option<usize>, cloud: &Arc<PointCloud>, glance: Option<Glance>) {
+        let moving = &self.playing.streams[number];
+        match moving.layer {
+            // What was asked for before the points were edited.
+            Some(id) if self.history.is_unsaved(id) => return,
+            Some(id) => self.fill(id, cloud),
+            None if cloud.is_empty() => return,
+            None => {
+                let known = || Glance::of(&moving.input, cloud, self.frame());
+                let glance = glance.unwrap_or_else(known);
+                let Moving { input, appearance, .. } = moving;
+                let (input, appearance) = (input.clone(), *appearance);
+                let path = input.source.path().map(std::path::Path::to_path_buf);
+                let mut layer = Layer::new(&*input.name, path, Arc::clone(cloud)).opened_at(input.world_from_input);
+                layer.incomplete = self.playing.clock.playing;
+                Appearance { visible: layer.visible, tint: layer.tint } = appearance;
+                let id = self.add_layer(layer, &input, glance);
+                self.playing.streams[number].layer = Some(id);
+            }
+        }
+        self.playing.streams[number].frame = frame;
+    }
+}

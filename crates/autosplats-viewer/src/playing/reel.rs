@@ -1,0 +1,125 @@
+//! What a film shows of what moves.
+//!
+//! A thread opens everything once more, so that the same film is the same pictures whatever the window plays meanwhile, and reads
+//! ahead the frames of the next picture.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+
+use autosplats::cloud::{Error, Player, PointCloud, Progress, ReadOptions};
+use eframe::egui;
+
+use crate::document::LayerId;
+use crate::loading::Input;
+use crate::messages::Mail;
+
+/// Pictures whose points are read before they are asked for, beside the one in work.
+const AHEAD: usize = 1;
+
+/// An input of a film, and the frame of its timeline that each picture shows.
+pub(crate) struct Track {
+    pub(crate) layer: LayerId,
+    pub(crate) input: Input,
+    pub(crate) frames: Vec<usize>,
+}
+
+/// Layers that change from one picture to the next, and their points.
+pub(crate) type Changes = Vec<(LayerId, Arc<PointCloud>)>;
+
+/// Reads the points of a film, picture by picture.
+pub(crate) struct Reel {
+    changes: Receiver<Result<Changes, String>>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Reel {
+    /// Begins to read; what is worth knowing is told by `mail`, and `context` asked to draw when there is something for a picture.
+    pub(crate) fn start(tracks: Vec<Track>, mail: Mail, context: egui::Context) -> Self {
+        let (sender, changes) = sync_channel(AHEAD);
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let theirs = Arc::clone(&cancelled);
+        crate::threads::spawn("reel", move || {
+            let send = |changes| {
+                let wanted = sender.send(changes).is_ok();
+                context.request_repaint();
+                wanted
+            };
+            let work = std::panic::AssertUnwindSafe(|| read(&tracks, &mail, &theirs, &|changes| send(Ok(changes))));
+            let ended = std::panic::catch_unwind(work);
+            match ended {
+                Ok(Ok(()) | Err(Error::Cancelled)) => {}
+                Ok(Err(error)) => {
+                    send(Err(error.to_string()));
+                }
+                Err(_) => {
+                    send(Err("reading the film's points failed, which is a bug of this program".into()));
+                }
+            }
+        });
+        Self { changes, cancelled }
+    }
+
+    /// What the next picture has other than the one before; `None` while that is being read.
+    ///
+    /// # Errors
+    /// Why there will be none.
+    pub(crate) fn next(&self) -> Result<Option<Changes>, String> {
+        match self.changes.try_recv() {
+            Ok(changes) => changes.map(Some),
+            Err(TryRecvError::Empty) => Ok(None),
+            // It has told all it had to tell.
+            Err(TryRecvError::Disconnected) => Err("the film has no more pictures".into()),
+        }
+    }
+}
+
+impl Drop for Reel {
+    fn drop(&mut self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Listens to the reading of an input.
+struct Follower<'a> {
+    input: &'a Input,
+    mail: &'a Mail,
+    cancelled: &'a AtomicBool,
+}
+
+impl Progress for Follower<'_> {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn note(&self, note: &str) {
+        self.mail.send(Ok(format!("{}: {note}", self.input.name)));
+    }
+}
+
+/// Reads all frames in order and hands them to `send`, which says whether more are wanted.
+fn read(tracks: &[Track], mail: &Mail, cancelled: &AtomicBool, send: &dyn Fn(Changes) -> bool) -> Result<(), Error> {
+    let followers: Vec<_> = tracks.iter().map(|track| Follower { input: &track.input, mail, cancelled }).collect();
+    let open = |follower: &Follower<'_>| {
+        let Input { source, play, options, .. } = follower.input;
+        source.play(play, &ReadOptions { exact: true, ..options.clone() }, follower)
+    };
+    let mut players = followers.iter().map(open).collect::<Result<Vec<Player>, Error>>()?;
+    let pictures = tracks.iter().map(|track| track.frames.len()).max().unwrap_or_default();
+    for picture in 0..pictures {
+        let mut changes = Changes::new();
+        for ((track, player), follower) in tracks.iter().zip(&mut players).zip(&followers) {
+            let frame = track.frames.get(picture).copied();
+            let before = picture.checked_sub(1).and_then(|before| track.frames.get(before).copied());
+            if let Some(frame) = frame.filter(|_| frame != before) {
+                changes.push((track.layer, player.frame(frame, follower)?));
+            }
+        }
+        if !send(changes) {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
