@@ -8,6 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub(crate) mod las;
 pub(crate) mod recording;
 pub(crate) mod ros;
 #[cfg(feature = "zenoh")]
