@@ -121,7 +121,7 @@ fn ctrl_c_ends_it_and_leaves_whole_files() {
     let (code, _, stderr) = end(child);
     assert_eq!(code, Some(0), "what was asked for is done: {stderr}");
     assert_eq!(folder.list(), ["f_0.png"], "and no part of another");
-    assert!(stderr.contains("1 pictures;"), "{stderr}");
+    assert!(stderr.contains("1 picture;"), "{stderr}");
 
     let child = start(&folder, &["-", "-o", "g_%d.png"]);
     std::thread::sleep(Duration::from_millis(500));

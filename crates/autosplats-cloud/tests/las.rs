@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use autosplats_cloud::{Crs, FieldValues, PointCloud, ReadOptions, Unit, describe, glam::DVec3, read_bytes};
 use common::{
-    las::{NONE, Notes, about, extra, file, load, values, written},
-    las_bytes, shared_data,
+    las_bytes,
+    las_files::{NONE, Notes, about, extra, file, load, values, written},
+    shared_data,
 };
 
 #[test]

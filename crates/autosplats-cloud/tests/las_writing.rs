@@ -12,9 +12,9 @@ use autosplats_cloud::{
     read_bytes, write,
 };
 use common::{
-    Random,
-    las::{EXACT, about, load, values, written},
-    las_bytes, positions, rich_cloud,
+    Random, las_bytes,
+    las_files::{EXACT, about, load, values, written},
+    positions, rich_cloud,
 };
 
 #[test]

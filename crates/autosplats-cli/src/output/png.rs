@@ -16,7 +16,6 @@ pub(crate) fn write_png(image: &Image, alpha: bool, writer: &mut impl Write) -> 
     let written = if alpha {
         encoder.write_image(pixels.as_flattened(), *width, *height, ExtendedColorType::Rgba8)
     } else {
-        // Colours collected one by one took three times as long as all the rest.
         let mut bytes = vec![[0; 3]; pixels.len()];
         for (rgb, [red, green, blue, _]) in bytes.iter_mut().zip(pixels) {
             *rgb = [*red, *green, *blue];

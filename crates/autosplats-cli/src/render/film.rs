@@ -194,9 +194,10 @@ impl Tally {
             Target::Frames(names) => names.pattern(),
         };
         eprintln!(
-            "{}: {} pictures{more}; {:.1} s, of which {:.1} s rendering on {}",
+            "{}: {} picture{}{more}; {:.1} s, of which {:.1} s rendering on {}",
             place.display(),
             self.written,
+            if self.written == 1 { "" } else { "s" },
             begun.elapsed().as_secs_f64(),
             self.milliseconds * 1e-3,
             device.describe()

@@ -49,6 +49,7 @@ pub(super) struct FrameReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) pictures: Option<usize>,
     pub(super) counts: Counts,
+    /// Of what is live, waiting for it as well.
     pub(super) read_ms: f64,
     pub(super) timings_ms: Timings,
 }

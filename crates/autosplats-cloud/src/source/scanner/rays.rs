@@ -193,8 +193,9 @@ mod tests {
                 }
             }
             let len = window.map_or(0, |window| window.len());
-            let pole = (centre.y / centre.length()).abs() > 0.5;
-            assert!(pole || len <= 2 * met + 150, "{len} rays where {met} meet {radius} about {centre}, {view:?}");
+            // Windows of what is near a pole, or as large as all that is seen, may have many more.
+            let small = radius < 0.3 * centre.length() && (centre.y / centre.length()).abs() < 0.5 && view[0] > 1.0;
+            assert!(!small || len <= 2 * met + 100, "{len} rays where {met} meet {radius} about {centre}, {view:?}");
         }
     }
 
