@@ -2,6 +2,8 @@
 
 mod common;
 
+#[cfg(unix)]
+use common::KEEP;
 use common::{Folder, Outcome};
 use serde_json::Value;
 
@@ -142,20 +144,11 @@ fn a_picture_that_cannot_be_written_is_not_told_of() {
     assert_eq!(pictures(&folder), ["f_0.png", "f_1.png", "f_2.png"], "and nothing after it");
 }
 
-/// Keeps what it is told and the bytes that it is given.
-#[cfg(unix)]
-const KEEP: &str = "echo \"$@\" > words; for last; do :; done; cat > \"$last\"";
-
-/// Renders with a shell script in the place of ffmpeg.
+/// Renders a film with a shell script in the place of ffmpeg.
 #[cfg(unix)]
 fn film(folder: &Folder, script: &str, arguments: &[&str]) -> Outcome {
-    use std::os::unix::fs::PermissionsExt as _;
-    std::fs::create_dir_all(folder.path("bin")).expect("a folder");
-    folder.write("bin/ffmpeg", &format!("#!/bin/sh\n[ \"$1\" = -version ] && exit\n{script}\n"));
-    std::fs::set_permissions(folder.path("bin/ffmpeg"), std::fs::Permissions::from_mode(0o755)).expect("a program");
-    let programs = format!("{}:{}", folder.path("bin").display(), std::env::var("PATH").expect("a path"));
     let mut command = folder.command(&[&["render"][..], arguments, &["--size", "40x30", "-o", "f.mp4"]].concat());
-    let out = command.env("PATH", programs).output().expect("it runs");
+    let out = command.env("PATH", folder.with_ffmpeg(script)).output().expect("it runs");
     let words = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     Outcome { code: out.status.code(), stdout: words(out.stdout), stderr: words(out.stderr) }
 }

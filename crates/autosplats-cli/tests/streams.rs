@@ -130,6 +130,33 @@ fn ctrl_c_ends_it_and_leaves_whole_files() {
     assert_eq!(code, Some(130), "nothing was made: {stderr}");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_film_of_what_is_live_takes_as_long_as_it_took() {
+    let folder = Folder::new();
+    let path = folder.with_ffmpeg(common::KEEP);
+    let mut command = folder.command(&["render", "-", "-o", "f.mp4", "--fps", "20", "--size", "40x30", "--json"]);
+    command.env("PATH", path).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    let mut pipe = input(&mut child);
+    let begun = Instant::now();
+    for (height, milliseconds) in [(0, 2000), (9, 600)] {
+        pipe.write_all(sheet(height).as_bytes()).expect("it reads");
+        std::thread::sleep(Duration::from_millis(milliseconds));
+    }
+    assert!(!folder.path("f.mp4").exists(), "it is not there before it is whole");
+    press_ctrl_c(&child);
+    let (code, stdout, stderr) = end(child);
+    let took = begun.elapsed().as_secs_f64();
+    assert_eq!(code, Some(0), "that ends a film as well: {stderr}");
+    let lines: Vec<Value> = stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let shown: Vec<u64> = lines.iter().filter_map(|line| line["pictures"].as_u64()).collect();
+    let all: u64 = shown.iter().sum();
+    assert_eq!(folder.read("f.mp4").len() as u64, all * 40 * 30 * 4, "as many as are told of");
+    // 2.6 s are 52 pictures, fewer by as much as the first one was late on a busy machine.
+    assert!(shown.len() == 2 && all >= 20 && all as f64 <= 20.0 * took + 2.0, "{shown:?} in {took} s");
+}
+
 #[test]
 fn a_folder_that_is_watched_has_a_picture_of_each_new_file() {
     let folder = Folder::new();
