@@ -14,7 +14,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let ConvertArgs { paths, input, force, thinning, run } = args;
     start_threads(run)?;
     let (inputs, output) = Inputs::with_output(paths, input)?;
-    check_cloud_target(&output, *force, inputs.files())?;
+    check_cloud_target(&output, *force, &inputs.files([]))?;
     let mut cloud = match thinning.sample {
         Some(count) => inputs.sample(count, thinning.seed, run.quiet)?,
         None => inputs.read(run.quiet)?,

@@ -9,7 +9,7 @@ use autosplats_cloud::Scene;
 use crate::args::DemoArgs;
 use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
-use crate::output::{check_target, print_line, write_file, write_png};
+use crate::output::{ReadFiles, check_target, print_line, write_file, write_png};
 use crate::progress::Bar;
 use crate::render::{render_failure, scene_camera};
 use crate::threads::start_threads;
@@ -26,7 +26,7 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
     let mut renderer = Renderer::new();
     for (name, about) in Scene::names() {
         let path = out.join(name).with_extension("png");
-        check_target(&path, [])?;
+        check_target(&path, &ReadFiles::default())?;
         let input = format!("scene:{name}");
         let inputs = Inputs::scene(name)?;
         let Some(scene) = inputs.only_scene() else { continue };

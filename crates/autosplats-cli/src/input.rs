@@ -7,13 +7,14 @@ use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
 use autosplats_cloud::{
-    Error, LatestOptions, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, check_memory,
+    Error, LatestOptions, Live, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, check_memory,
     read_mesh, sample_surface,
 };
 use rayon::prelude::*;
 
 use crate::args::{InputArgs, PlayingArgs, ReadingArgs};
 use crate::exit::{Exit, Failure, suggest};
+use crate::output::{ReadFiles, folder_of};
 use crate::progress::{Bar, Part};
 
 /// What begins the name of a generated scene.
@@ -68,6 +69,17 @@ struct Input {
     name: String,
     source: Source,
     world_from_input: DMat4,
+    /// Where that is read from.
+    pose: Option<PathBuf>,
+}
+
+/// An input that is played.
+pub(crate) struct Playing {
+    pub(crate) name: String,
+    pub(crate) player: Player,
+    /// Whether its points change by themselves.
+    pub(crate) moves: bool,
+    pub(crate) world_from_input: DMat4,
 }
 
 impl Inputs {
@@ -99,6 +111,7 @@ impl Inputs {
                     ))
                 })?;
             input.world_from_input = read_pose(Path::new(&matrix))?;
+            input.pose = Some(matrix.into());
         }
         Ok(Self { list, options: reading.options(), play: playing.options() })
     }
@@ -137,7 +150,7 @@ impl Inputs {
             }
             _ => false,
         };
-        let input = |Input { name, source, world_from_input }| {
+        let input = |Input { name, source, world_from_input, .. }| {
             let played = made || play.fps.is_some() && looked_at(&source);
             let (options, play) = (options.clone(), play.clone());
             let name = source.short_name().unwrap_or(name);
@@ -151,9 +164,10 @@ impl Inputs {
         &self.list[0].source
     }
 
-    /// The files among the inputs.
-    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
-        self.list.iter().filter_map(|input| input.source.path())
+    /// The files that are read, those of sequences and of poses among them, and `others`.
+    pub(crate) fn files<'a>(&'a self, others: impl IntoIterator<Item = &'a Path>) -> ReadFiles {
+        let own = self.list.iter().flat_map(|input| input.source.files().into_iter().chain(input.pose.clone()));
+        ReadFiles::new(own.chain(others.into_iter().map(Path::to_owned)))
     }
 
     /// The names as typed, for a message.
@@ -187,21 +201,65 @@ impl Inputs {
         })
     }
 
-    /// Makes the inputs ready to be played, with their poses.
-    pub(crate) fn play(&self, quiet: bool) -> Result<Vec<(Player, DMat4)>, Failure> {
+    /// Makes the inputs ready to be played, with their poses; files and folders as they change if they are `watched`.
+    pub(crate) fn play(&self, watched: bool, quiet: bool) -> Result<Vec<Playing>, Failure> {
         let open = |input: &Input| {
             let bar = Bar::on_file("opening", Path::new(&input.name), quiet);
-            let player = input.source.play(&self.play, &self.options, &bar).map_err(|error| match error {
-                Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
-                error => read_failure(error),
-            })?;
-            if player.stream().timeline().is_none() {
-                let why = "is live, so that it has no frames to be counted; leave out --frames and the number in the output's name";
-                return Err(Failure::usage(format!("{} {why}", input.name)));
-            }
-            Ok((player, input.world_from_input))
+            let player = match &input.source {
+                Source::File(path) if watched => self.watch(path, &input.name),
+                Source::Sequence(folder) if watched => self.watch(Path::new(folder), &input.name),
+                source => source.play(&self.play, &self.options, &bar).map_err(|error| match error {
+                    Error::NoSurface => Failure::new(Exit::Input, format!("{}: {error}", input.name)),
+                    error => read_failure(error),
+                }),
+            }?;
+            let Input { name, source, world_from_input, .. } = input;
+            Ok(Playing { name: name.clone(), player, moves: source.moves(), world_from_input: *world_from_input })
         };
         self.list.iter().map(open).collect()
+    }
+
+    /// Refuses to watch what cannot be watched, and pictures that would be taken for new files of a watched folder.
+    pub(crate) fn check_watched(&self, picture: Option<&Path>) -> Result<(), Failure> {
+        let watched: Vec<PathBuf> = self
+            .list
+            .iter()
+            .filter_map(|input| match &input.source {
+                Source::File(path) => Some(path.clone()),
+                Source::Sequence(name) => Some(name.into()),
+                _ => None,
+            })
+            .collect();
+        if watched.is_empty() {
+            return Err(Failure::usage(format!(
+                "--watch: {} is no file and no folder that could change",
+                self.names()
+            )));
+        }
+        if let Some(pattern) = watched.iter().find(|path| !path.exists()) {
+            return Err(Failure::usage(format!(
+                "--watch: {} is a pattern; name a file or a folder",
+                pattern.display()
+            )));
+        }
+        let true_name = |path: &Path| path.canonicalize().ok();
+        if let Some(picture) = picture
+            && let folder = true_name(folder_of(picture))
+            && let Some(folder) = watched.iter().find(|path| path.is_dir() && true_name(path) == folder)
+        {
+            let why = "pictures in the folder that is watched would be taken for depth images; name another one";
+            return Err(Failure::usage(format!("{}: {why} than {}", picture.display(), folder.display())));
+        }
+        Ok(())
+    }
+
+    /// Plays a file or a folder as it changes.
+    fn watch(&self, path: &Path, name: &str) -> Result<Player, Failure> {
+        if self.play.sample.is_some() || self.play.scanners.is_some() {
+            return Err(Failure::usage(format!("--watch: {name} is shown as it is; leave out --strew and --scan")));
+        }
+        let stream = Live::watch(path, &self.options).map_err(read_failure)?;
+        Ok(Player::new(Box::new(stream), self.play.latest.clone()))
     }
 
     /// Reads meshes and strews `count` points over the surface of each, into one cloud.
@@ -283,7 +341,7 @@ impl Input {
                 return Err(Failure::new(Exit::Input, format!("{name}: a folder; name the files in it")));
             }
         }
-        Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY })
+        Ok(Self { name: name.into(), source, world_from_input: DMat4::IDENTITY, pose: None })
     }
 
     /// What reading it is called.

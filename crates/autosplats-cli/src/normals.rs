@@ -29,7 +29,7 @@ pub(crate) fn run(args: &NormalsArgs) -> Result<(), Failure> {
             output.display()
         )));
     }
-    check_cloud_target(&output, *force, inputs.files())?;
+    check_cloud_target(&output, *force, &inputs.files([]))?;
     let cloud = inputs.read(run.quiet)?;
     check_memory(&format!("the normals of {} points", cloud.len()), cloud.len() as u64 * BYTES_PER_POINT)
         .map_err(read_failure)?;

@@ -8,7 +8,7 @@ use clap_mangen::Man;
 
 use crate::args::{CommandLine, CompletionsArgs, ManArgs};
 use crate::exit::{Exit, Failure};
-use crate::output::{check_target, print_bytes, print_line, write_file};
+use crate::output::{ReadFiles, check_target, print_bytes, print_line, write_file};
 
 /// Prints the script of a shell.
 pub(crate) fn completions(args: &CompletionsArgs) -> Result<(), Failure> {
@@ -35,7 +35,7 @@ pub(crate) fn manual(args: &ManArgs) -> Result<(), Failure> {
                 format!("{}: is already there; --force replaces it", path.display()),
             ));
         }
-        check_target(path, [])?;
+        check_target(path, &ReadFiles::default())?;
     }
     for (path, (_, page)) in paths.iter().zip(&pages) {
         let page = render(page)?;

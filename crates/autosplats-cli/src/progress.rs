@@ -17,6 +17,9 @@ const PATIENCE: Duration = Duration::from_millis(500);
 const REDRAW: Duration = Duration::from_millis(100);
 const STEPS: u64 = 1000;
 
+/// Notes on one input that plays; streams of garbage have no end.
+const MOST_NOTES: u64 = 50;
+
 /// One task on the screen. It vanishes when dropped.
 pub(crate) struct Bar {
     bar: ProgressBar,
@@ -104,6 +107,41 @@ impl Progress for Bar {
 
     fn note(&self, note: &str) {
         self.tell(&self.subject, note);
+    }
+}
+
+/// Passes on what parts of a task have to say of an input: how far each is counts for nothing in all of them.
+pub(crate) struct Notes<'a> {
+    bar: &'a Bar,
+    subject: String,
+    told: AtomicU64,
+}
+
+impl<'a> Notes<'a> {
+    /// Those on `input`, of which the first are told.
+    pub(crate) fn new(bar: &'a Bar, input: &str) -> Self {
+        Self { bar, subject: input.into(), told: AtomicU64::new(0) }
+    }
+
+    /// Tells something.
+    pub(crate) fn tell(&self, note: &str) {
+        match self.told.fetch_add(1, Ordering::Relaxed) {
+            told if told < MOST_NOTES => self.bar.tell(&self.subject, note),
+            MOST_NOTES => self.bar.tell(&self.subject, "what more there is of this kind is not told"),
+            _ => {}
+        }
+    }
+}
+
+impl Progress for Notes<'_> {
+    fn report(&self, _fraction: f32) {}
+
+    fn cancelled(&self) -> bool {
+        interrupt::requested()
+    }
+
+    fn note(&self, note: &str) {
+        self.tell(note);
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod common;
 
+#[cfg(unix)]
+use common::KEEP;
 use common::{Folder, Outcome};
 use serde_json::Value;
 
@@ -109,4 +111,119 @@ fn a_film_needs_ffmpeg_and_says_so() {
     let words = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(words.contains("ffmpeg") && words.contains("f_%05d.png"), "what to do: {words}");
     assert!(!folder.path("f.mp4").exists(), "and nothing is left");
+}
+
+#[test]
+fn no_picture_takes_the_place_of_an_input() {
+    let folder = folder();
+    // The third of them is a frame.
+    std::fs::copy(folder.path("sweep/scan_2.xyz"), folder.path("kept.xyz")).expect("a copy");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(folder.path("sweep/scan_2.xyz"), folder.path("f_2.png")).expect("a link");
+        folder.fail(&["render", "sweep", "-o", "f_%d.png"], 2, &["f_2.png", "overwrite an input"]);
+        folder.fail(&["render", "sweep/*.xyz", "-o", "f_%d.png"], 2, &["f_2.png", "overwrite an input"]);
+        render(&folder, &["--frames", "0..1", "-o", "f_%d.png"]);
+        assert_eq!(folder.read("sweep/scan_2.xyz"), folder.read("kept.xyz"), "as it was");
+    }
+    folder.fail(&["render", "sweep", "-o", "c_%d.png", "--save-camera", "c_3.png"], 2, &["c_3.png", "two outputs"]);
+    folder.write("pose_1.png", "1 0 0 0  0 1 0 0  0 0 1 0");
+    let posed = ["render", "sweep", "--pose", "sweep=pose_1.png", "-o", "pose_%d.png"];
+    folder.fail(&posed, 2, &["pose_1.png", "overwrite an input"]);
+    folder.fail(&["convert", "sweep", "sweep/scan_3.xyz", "--force"], 2, &["scan_3.xyz", "overwrite an input"]);
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_not_told_of() {
+    let folder = folder();
+    // A folder that is in the way of the third.
+    std::fs::create_dir(folder.path("f_2.png")).expect("a folder");
+    let out = folder.run(&["render", "sweep", "--size", "120x90", "--quiet", "--json", "-o", "f_%d.png"]);
+    assert_eq!(out.code, Some(4), "{}", out.stderr);
+    assert_eq!(out.stdout.lines().count(), 2, "only of those that are in place: {}", out.stdout);
+    assert_eq!(pictures(&folder), ["f_0.png", "f_1.png", "f_2.png"], "and nothing after it");
+}
+
+/// Renders a film with a shell script in the place of ffmpeg.
+#[cfg(unix)]
+fn film(folder: &Folder, script: &str, arguments: &[&str]) -> Outcome {
+    let mut command = folder.command(&[&["render"][..], arguments, &["--size", "40x30", "-o", "f.mp4"]].concat());
+    let out = command.env("PATH", folder.with_ffmpeg(script)).output().expect("it runs");
+    let words = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    Outcome { code: out.status.code(), stdout: words(out.stdout), stderr: words(out.stderr) }
+}
+
+#[cfg(unix)]
+fn film_pictures(folder: &Folder) -> Vec<Vec<u8>> {
+    folder.read("f.mp4").chunks(4 * 40 * 30).map(<[u8]>::to_vec).collect()
+}
+
+/// A recording of a sheet that climbs, at these milliseconds: MCAP without chunks, in messages of ROS 1.
+fn recording(times: &[u64]) -> Vec<u8> {
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
+    let record = |kind: u8, parts: &[&[u8]]| {
+        let body = parts.concat();
+        [&[kind][..], &(body.len() as u64).to_le_bytes(), &body].concat()
+    };
+    let number = |value: u32| value.to_le_bytes();
+    let one = 1_u16.to_le_bytes();
+    let magic = b"\x89MCAP0\r\n";
+    let mut file = [&magic[..], &record(1, &[&text(""), &text("test")])].concat();
+    file.extend(record(3, &[&one, &text("sensor_msgs/msg/PointCloud2"), &text("ros1msg"), &text("")]));
+    file.extend(record(4, &[&one, &one, &text("/points"), &text("ros1"), &[0; 4]]));
+    for (frame, time) in times.iter().enumerate() {
+        let place = |point: usize| [(point % 30) as f32, (point / 30) as f32, (frame * 4) as f32];
+        let data: Vec<u8> = (0..900).flat_map(|point| place(point).map(f32::to_le_bytes).concat()).collect();
+        let stamp = [number((time / 1000) as u32), number((time % 1000) as u32 * 1_000_000)].concat();
+        let mut message = [&number(0)[..], &stamp, &text("lidar"), &number(1), &number(900), &number(3)].concat();
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            message.extend([&text(name)[..], &number(4 * axis as u32), &[7], &number(1)].concat());
+        }
+        message.extend([&[0][..], &number(12), &number(12 * 900), &number(data.len() as u32), &data, &[1]].concat());
+        let stamp = (time * 1_000_000).to_le_bytes();
+        file.extend(record(5, &[&one, &[0; 4], &stamp, &stamp, &message]));
+    }
+    file.extend(record(15, &[&[0; 4]]));
+    file.extend(record(2, &[&[0; 20]]));
+    file.extend_from_slice(magic);
+    file
+}
+
+#[cfg(unix)]
+#[test]
+fn a_film_shows_each_frame_for_as_long_as_it_lasts() {
+    let folder = folder();
+    let out = film(&folder, KEEP, &["sweep", "--fps", "12.5", "--json"]);
+    assert_eq!(out.code, Some(0), "{}", out.stderr);
+    assert_eq!(film_pictures(&folder).len(), 4, "even frames have a picture each");
+    assert!(folder.read("words").starts_with(b"-loglevel error -y"), "by ffmpeg");
+    assert!(String::from_utf8_lossy(&folder.read("words")).contains("-r 12.5 "), "at their rate");
+    assert!(out.stderr.contains("4 pictures"), "{}", out.stderr);
+    let lines: Vec<Value> = out.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    assert!(lines.len() == 4 && lines.iter().all(|line| line["pictures"] == 1 && line["path"].is_null()), "{lines:?}");
+
+    std::fs::write(folder.path("drive.mcap"), recording(&[0, 100, 500, 520])).expect("a recording");
+    let out = film(&folder, KEEP, &["drive.mcap", "--fps", "10", "--json"]);
+    assert_eq!(out.code, Some(0), "{}", out.stderr);
+    let lines: Vec<Value> = out.stdout.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let shown: Vec<_> = lines.iter().map(|line| (line["frame"].as_u64(), line["pictures"].as_u64())).collect();
+    // Pictures are those of 0, 0.1, 0.2 s and so on; the last frame is shown for the mean of the steps.
+    assert_eq!(shown, [(Some(0), Some(1)), (Some(1), Some(4)), (Some(2), Some(1)), (Some(3), Some(1))]);
+    let pictures = film_pictures(&folder);
+    assert_eq!(pictures.len(), 7, "0.69 s");
+    assert!(pictures[1..5].iter().all(|picture| *picture == pictures[1]), "it stands still");
+    assert!(pictures[0] != pictures[1] && pictures[5] != pictures[4], "and moves on");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_film_that_fails_is_not_told_of() {
+    let folder = folder();
+    film(&folder, KEEP, &["sweep", "--quiet"]);
+    let whole = folder.read("f.mp4");
+    let out = film(&folder, "cat > /dev/null; echo full >&2; exit 1", &["sweep", "--json", "--frames", "0..1"]);
+    assert_eq!(out.code, Some(4), "{}", out.stderr);
+    assert_eq!(out.stderr.trim(), "error: ffmpeg: full", "why");
+    assert!(out.stdout.is_empty(), "no line of a film that is not there");
+    assert_eq!(folder.read("f.mp4"), whole, "what was there stays");
 }

@@ -26,6 +26,7 @@ mod memory;
 mod merge;
 mod moved;
 mod progress;
+mod random;
 mod read;
 mod retain;
 mod sample;

@@ -69,6 +69,35 @@ fn points_without_noise_are_the_first_that_rays_meet() {
 }
 
 #[test]
+fn no_ray_that_meets_a_scene_is_left_out() {
+    for name in ["scene:figure", "scene:herd", "scene:cathedral"] {
+        let (scene, count) = Scene::parse(name).unwrap();
+        let animation = Animation::scene(&scene, count, 10.0).unwrap();
+        let mut scanners = animation.scanners(2, &()).unwrap();
+        // One stands in the middle of it all and looks around.
+        let all_around = DMat4::from_translation(DVec3::new(0.1, 0.2, 1.7));
+        scanners.push(Scanner { world_from_sensor: all_around, fov_degrees: [360.0, 170.0], ..Scanner::default() });
+        for scanner in &mut scanners {
+            *scanner = Scanner { columns: 80, rows: 60, noise: 0.0, ..scanner.clone() };
+        }
+        let seen = frame(&animation.scanned(scanners.clone(), 1).unwrap(), 0);
+        for (index, (scanner, seen)) in scanners.iter().zip(&seen).enumerate() {
+            let pose = scanner.world_from_sensor;
+            let angle = |axis: usize, ray: u32, rays: u32| {
+                (scanner.fov_degrees[axis] * ((f64::from(ray) + 0.5) / f64::from(rays) - 0.5)).to_radians().sin_cos()
+            };
+            let met = (0..60).flat_map(|row| (0..80).map(move |column| (row, column))).filter(|&(row, column)| {
+                let ((sin, cos), (down, level)) = (angle(0, column, 80), angle(1, row, 60));
+                let direction = pose.transform_vector3(DVec3::new(sin * level, down, cos * level));
+                scene.trace(pose.w_axis.truncate(), direction).is_some()
+            });
+            assert_eq!(seen.len(), met.count(), "{name}, scanner {index}");
+            assert!(seen.len() > 50, "{name}, scanner {index}: {} points", seen.len());
+        }
+    }
+}
+
+#[test]
 fn a_mesh_hides_what_is_behind_it() {
     let Some(data) = shared_data() else { return };
     let folder = data.join("animation/horse_gallop");

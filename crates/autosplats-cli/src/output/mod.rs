@@ -3,6 +3,7 @@
 mod exr;
 mod png;
 
+use std::collections::HashSet;
 use std::fs::{File, metadata};
 use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write, stdout};
 use std::path::{Path, PathBuf};
@@ -16,8 +17,27 @@ use crate::exit::{Exit, Failure};
 use crate::interrupt;
 use crate::progress::Bar;
 
+/// Files that are read, none of which an output may replace.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ReadFiles(HashSet<PathBuf>);
+
+impl ReadFiles {
+    /// Those of the files that are there.
+    pub(crate) fn new(files: impl IntoIterator<Item = impl AsRef<Path>>) -> Self {
+        Self(files.into_iter().filter_map(|file| file.as_ref().canonicalize().ok()).collect())
+    }
+
+    /// Refuses an output that would overwrite one.
+    pub(crate) fn check(&self, output: &Path) -> Result<(), Failure> {
+        if output.canonicalize().is_ok_and(|target| self.0.contains(&target)) {
+            return Err(Failure::usage(format!("{}: this output would overwrite an input", output.display())));
+        }
+        Ok(())
+    }
+}
+
 /// Refuses a path that cannot be written, or that would overwrite an input.
-pub(crate) fn check_target<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Failure> {
+pub(crate) fn check_target(path: &Path, inputs: &ReadFiles) -> Result<(), Failure> {
     let folder = folder_of(path);
     let shown = path.display();
     if path.is_dir() || path.file_name().is_none() {
@@ -26,11 +46,7 @@ pub(crate) fn check_target<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a
     if !folder.is_dir() {
         return Err(Failure::new(Exit::Output, format!("{shown}: there is no folder {}", folder.display())));
     }
-    if let Ok(target) = path.canonicalize()
-        && inputs.into_iter().any(|input| input.canonicalize().is_ok_and(|input| input == target))
-    {
-        return Err(Failure::usage(format!("{shown}: this output would overwrite an input")));
-    }
+    inputs.check(path)?;
     // The only way to know whether a file can be made is to make one.
     let _writing = interrupt::writing();
     temporary_in(folder)
@@ -85,11 +101,7 @@ pub(crate) fn write_cloud(cloud: &PointCloud, path: &Path, quiet: bool) -> Resul
 
 /// Refuses a cloud's output whose format is not known, that exists and is not to be replaced, or that is no place to
 /// write.
-pub(crate) fn check_cloud_target<'a>(
-    path: &Path,
-    force: bool,
-    inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), Failure> {
+pub(crate) fn check_cloud_target(path: &Path, force: bool, inputs: &ReadFiles) -> Result<(), Failure> {
     check_writable(path).map_err(Failure::usage)?;
     check_target(path, inputs)?;
     if !force && path.exists() {
@@ -143,7 +155,8 @@ fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new(Exit::Output, format!("{}: cannot write it: {reason}", path.display()))
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// The folder that a file is in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

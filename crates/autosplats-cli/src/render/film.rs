@@ -1,40 +1,32 @@
 //! A picture for each frame of what moves, as numbered files or as a film.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Instant;
 
-use autosplats::{Camera, ColorMode, Counts, Image, Renderer, Timings};
-use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Axes, LocalMetres, Player, PointCloud, Progress};
-use autosplats_film::{Error, Film, Frames, Target, has_ffmpeg, has_number};
-use serde::Serialize;
+use autosplats::{Frame, Renderer};
+use autosplats_cloud::Progress as _;
+use autosplats_film::{Target, has_ffmpeg, has_number};
 
 use super::job::Job;
-use super::{camera, render_failure, shrink};
+use super::moving::Moving;
+use super::pictures::{FrameReport, Shot, Style, Writer};
+use super::{camera, live, schedule, shrink};
 use crate::device::Device;
-use crate::exit::{Exit, Failure};
-use crate::input::read_failure;
+use crate::exit::Failure;
 use crate::interrupt;
-use crate::output::{print_line, write_file, write_png};
-use crate::progress::Bar;
+use crate::output::check_target;
+use crate::progress::{Bar, Notes};
 use crate::values::FrameRange;
-
-/// Frames that the camera is placed by.
-const PLACED_BY: usize = 5;
-/// Pictures that wait to be written.
-const QUEUE: usize = 2;
-/// Pictures a second of a film of what has no rate.
-const USUAL_RATE: f64 = 30.0;
 
 /// Frames to render, and where to.
 #[derive(Debug)]
 pub(super) struct FilmJob {
-    target: Target,
-    frames: FrameRange,
-    resume: bool,
-    fps: Option<f64>,
+    pub(super) target: Target,
+    pub(super) frames: FrameRange,
+    pub(super) resume: bool,
+    pub(super) fps: Option<f64>,
+    /// Whether files are read again when they change.
+    pub(super) watch: bool,
 }
 
 impl FilmJob {
@@ -44,13 +36,14 @@ impl FilmJob {
         frames: Option<FrameRange>,
         resume: bool,
         fps: Option<f64>,
+        watch: bool,
     ) -> Result<Option<Self>, Failure> {
         let many = |path: &PathBuf| {
             let name = path.to_string_lossy();
             let film = Target::new(path).is_ok_and(|target| matches!(target, Target::Film(_)));
             film || has_number(&name) && Target::new(path).is_ok()
         };
-        if frames.is_none() && !resume && !outputs.iter().any(many) {
+        if frames.is_none() && !resume && !watch && !outputs.iter().any(many) {
             return Ok(None);
         }
         let [output] = outputs else {
@@ -70,36 +63,43 @@ impl FilmJob {
             }
         }
         let all = FrameRange { first: 0, last: None };
-        Ok(Some(Self { target, frames: frames.unwrap_or(all), resume, fps }))
+        Ok(Some(Self { target, frames: frames.unwrap_or(all), resume, fps, watch }))
     }
 
     /// A file that is going to be written.
-    pub(super) fn first_file(&self) -> Option<PathBuf> {
+    pub(super) fn first_file(&self) -> PathBuf {
+        self.file(self.frames.first).unwrap_or_else(|| match &self.target {
+            Target::Film(path) => path.clone(),
+            Target::Frames(names) => names.file(0),
+        })
+    }
+
+    /// The file of a picture; a film's pictures have none.
+    pub(super) fn file(&self, frame: usize) -> Option<PathBuf> {
         match &self.target {
-            Target::Film(path) => Some(path.clone()),
-            Target::Frames(frames) => Some(frames.file(self.frames.first)),
+            Target::Film(_) => None,
+            Target::Frames(names) => Some(names.file(frame)),
         }
+    }
+
+    /// How pictures of a job are written.
+    pub(super) fn style(&self, job: &Job, rate: f64) -> Style {
+        let (target, size, alpha, json) = (self.target.clone(), job.size, job.transparent(), job.json);
+        Style { target, size, rate, alpha, json, inputs: job.read_files.clone() }
     }
 }
 
-/// One line of `--json`.
-#[derive(Serialize)]
-struct FrameReport {
-    frame: usize,
-    /// Since the first frame.
-    seconds: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    path: Option<PathBuf>,
-    counts: Counts,
-    read_ms: f64,
-    timings_ms: Timings,
-}
-
 /// Renders the frames that are asked for.
-pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Result<(), Failure> {
-    let Some(film) = job.film.take() else { return Ok(()) };
-    let mut scene = Moving::new(job)?;
-    let frames = film.frames.first..film.frames.last.map_or(scene.times.len(), |last| last + 1);
+pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device: &Device) -> Result<(), Failure> {
+    if film.watch {
+        job.inputs.check_watched(film.file(0).as_deref())?;
+    }
+    let playing = job.inputs.play(film.watch, job.quiet)?;
+    if playing.iter().any(|input| input.player.stream().timeline().is_none()) {
+        return live::run(job, film, playing, renderer, device);
+    }
+    let mut scene = Moving::new(playing, job.inputs.names());
+    let frames = film.frames.first..film.frames.last.map_or(scene.times.len(), |last| last.saturating_add(1));
     if frames.end > scene.times.len() || frames.is_empty() {
         let there = scene.times.len();
         return Err(Failure::usage(format!(
@@ -109,273 +109,98 @@ pub(super) fn run(job: &mut Job, renderer: &mut Renderer, device: &Device) -> Re
             there.saturating_sub(1)
         )));
     }
+    for file in frames.clone().filter_map(|frame| film.file(frame)) {
+        job.read_files.check(&file)?;
+        if job.save_camera.as_ref() == Some(&file) {
+            return Err(Failure::usage(format!("{}: two outputs have this name", file.display())));
+        }
+    }
+    let times = &scene.times[frames.clone()];
+    let rate = film.fps.unwrap_or_else(|| schedule::rate(times));
+    let shown: Vec<(usize, Option<usize>)> = match &film.target {
+        Target::Frames(_) => frames.clone().map(|frame| (frame, None)).collect(),
+        Target::Film(_) => {
+            let shown = schedule::resample(times, rate, &job.inputs.names())?;
+            shown.into_iter().map(|(frame, pictures)| (frames.start + frame, Some(pictures))).collect()
+        }
+    };
 
-    let (camera, axes) = scene.place(job, &frames)?;
+    let camera = scene.settle(job, renderer, &frames)?;
     if let Some(path) = &job.save_camera {
+        check_target(path, &job.read_files)?;
         camera::save(path, &camera)?;
     }
-    scene.settle_range(job, renderer, &camera, axes, frames.start)?;
-    let rate = film.fps.unwrap_or_else(|| scene.rate());
-    let bar = Bar::on_input(&format!("rendering {} frames", frames.len()), &scene.names, job.quiet);
+    let bar = Bar::new(&format!("rendering {} frames", shown.len()), job.quiet);
+    let notes = Notes::new(&bar, &job.inputs.names());
     let begun = Instant::now();
-    let (mut written, mut kept, mut milliseconds) = (0, 0, 0.0);
-    let (sender, queue) = sync_channel(QUEUE);
-    let (size, alpha) = (job.size, job.transparent());
-    let target = film.target.clone();
-    std::thread::scope(|scope| {
-        let count = frames.len();
-        let writer = scope.spawn(move || write(&queue, &target, count, size, rate, alpha));
-        let rendered = (|sender: SyncSender<(usize, Image)>| {
-            for frame in frames.clone() {
-                if interrupt::requested() {
-                    return Err(Failure::interrupted());
-                }
-                let path = match &film.target {
-                    Target::Frames(names) => Some(names.file(frame)),
-                    Target::Film(_) => None,
-                };
-                if film.resume && path.as_ref().is_some_and(|path| path.exists()) {
-                    kept += 1;
-                    continue;
-                }
-                let started = Instant::now();
-                let cloud = scene.frame(frame, axes, &Notes(&bar))?;
-                let read_ms = super::milliseconds_since(started);
-                let shot = scene.draw(job, renderer, &cloud, &camera)?;
-                milliseconds += shot.timings.frame;
-                let report = FrameReport {
-                    frame,
-                    seconds: scene.times[frame] as f64 * 1e-9,
-                    path,
-                    counts: shot.counts,
-                    read_ms,
-                    timings_ms: shot.timings,
-                };
-                if sender.send((frame, shot.image)).is_err() {
-                    // The writer has given up and says why.
-                    return Ok(());
-                }
-                if job.json {
-                    let line = serde_json::to_string(&report);
-                    print_line(&line.map_err(|error| Failure::new(Exit::Output, format!("--json: {error}")))?)?;
-                }
-                written += 1;
-                bar.report((frame + 1 - frames.start) as f32 / frames.len() as f32);
+    let mut tally = Tally::default();
+    let writer = Writer::start(film.style(job, rate));
+    let mut render_all = || {
+        for (number, &(frame, pictures)) in shown.iter().enumerate() {
+            if interrupt::requested() {
+                return Err(Failure::interrupted());
             }
-            Ok(())
-        })(sender);
-        let ended = writer.join().unwrap_or_else(|_| Err(Failure::new(Exit::Output, "writing the pictures failed")));
-        rendered.and(ended)
-    })?;
+            let path = film.file(frame);
+            if film.resume && path.as_ref().is_some_and(|path| path.exists()) {
+                tally.kept += 1;
+                continue;
+            }
+            let started = Instant::now();
+            let cloud = scene.frame(frame, &notes)?;
+            let read_ms = super::milliseconds_since(started);
+            let rendered = job.render(renderer, &cloud, &camera)?;
+            tally.milliseconds += rendered.timings.frame;
+            let (counts, timings_ms) = (rendered.counts, rendered.timings);
+            let seconds = scene.times[frame] as f64 * 1e-9;
+            let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
+            if !writer.put(Shot { image: picture(job, &rendered, &writer), report }) {
+                // The writer has given up and says why.
+                return Ok(());
+            }
+            tally.written += pictures.unwrap_or(1);
+            bar.report((number + 1) as f32 / shown.len() as f32);
+        }
+        Ok(())
+    };
+    let rendered = render_all();
+    let written = writer.finish(rendered.is_ok());
+    rendered.and(written)?;
     drop(bar);
     if !job.quiet {
-        let place = match &film.target {
-            Target::Film(path) => path.clone(),
-            Target::Frames(names) => names.pattern(),
-        };
-        let kept = if kept > 0 { format!(", {kept} were there") } else { String::new() };
-        eprintln!(
-            "{}: {written} pictures{kept}; {:.1} s, of which {:.1} s rendering on {}",
-            place.display(),
-            begun.elapsed().as_secs_f64(),
-            milliseconds * 1e-3,
-            device.describe()
-        );
+        let kept = if tally.kept > 0 { format!(", {} were there", tally.kept) } else { String::new() };
+        tally.summarize(film, &kept, begun, device);
     }
     Ok(())
 }
 
-/// Tells what frames have to say; how far each is counts for nothing in all of them.
-struct Notes<'a>(&'a Bar);
-
-impl Progress for Notes<'_> {
-    fn report(&self, _fraction: f32) {}
-
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
-
-    fn note(&self, note: &str) {
-        self.0.note(note);
-    }
+/// The picture that is written of what was rendered.
+pub(super) fn picture(job: &Job, frame: &Frame<'_>, writer: &Writer) -> autosplats::Image {
+    if job.supersample > 1 { shrink(frame.image, job.supersample) } else { writer.copy(frame.image) }
 }
 
-/// A picture and what is known of it.
-struct Shot {
-    image: Image,
-    counts: Counts,
-    timings: Timings,
+/// What became of the frames.
+#[derive(Default)]
+pub(super) struct Tally {
+    pub(super) written: usize,
+    pub(super) kept: usize,
+    pub(super) milliseconds: f64,
 }
 
-/// The inputs as they are at each frame.
-struct Moving {
-    players: Vec<(Player, DMat4)>,
-    /// Nanoseconds since the first of each input at which something changes.
-    times: Vec<i64>,
-    /// The map of what is in degrees, once there are points.
-    metres: Option<LocalMetres>,
-    /// Names of the inputs, for messages.
-    names: String,
-}
-
-impl Moving {
-    fn new(job: &Job) -> Result<Self, Failure> {
-        let players = job.inputs.play(job.quiet)?;
-        let since_first = |player: &Player| {
-            let stamps = player.stream().timeline().map_or(&[][..], |timeline| timeline.stamps());
-            let first = stamps.first().copied().unwrap_or_default();
-            stamps.iter().map(|stamp| stamp.saturating_sub(first)).collect::<Vec<_>>()
+impl Tally {
+    /// One line on standard error.
+    pub(super) fn summarize(&self, film: &FilmJob, more: &str, begun: Instant, device: &Device) {
+        let place = match &film.target {
+            Target::Film(path) => path.clone(),
+            Target::Frames(names) => names.pattern(),
         };
-        let times = match players.as_slice() {
-            [(only, _)] => since_first(only),
-            several => {
-                let mut times: Vec<i64> = several.iter().flat_map(|(player, _)| since_first(player)).collect();
-                times.sort_unstable();
-                times.dedup();
-                times
-            }
-        };
-        Ok(Self { players, times, metres: None, names: job.inputs.names() })
+        eprintln!(
+            "{}: {} picture{}{more}; {:.1} s, of which {:.1} s rendering on {}",
+            place.display(),
+            self.written,
+            if self.written == 1 { "" } else { "s" },
+            begun.elapsed().as_secs_f64(),
+            self.milliseconds * 1e-3,
+            device.describe()
+        );
     }
-
-    /// Frames a second, in the mean.
-    fn rate(&self) -> f64 {
-        match (self.times.first(), self.times.last()) {
-            (Some(first), Some(last)) if last > first => {
-                ((self.times.len() - 1) as f64 * 1e9 / (last - first) as f64).clamp(1.0, 240.0)
-            }
-            _ => USUAL_RATE,
-        }
-    }
-
-    /// The points at a frame.
-    fn points(&mut self, frame: usize, progress: &dyn Progress) -> Result<PointCloud, Failure> {
-        let time = self.times[frame];
-        let single = self.players.len() == 1;
-        let mut parts: Vec<(Arc<PointCloud>, DMat4)> = Vec::new();
-        for (player, pose) in &mut self.players {
-            let at = |timeline: &autosplats_cloud::Timeline| {
-                timeline.frame_at(std::time::Duration::from_nanos(u64::try_from(time).unwrap_or_default()))
-            };
-            // Frames of one input may be of the same time.
-            let own = if single { frame } else { player.stream().timeline().map_or(0, at) };
-            parts.push((player.frame(own, progress).map_err(read_failure)?, *pose));
-        }
-        let mut cloud = match parts.pop() {
-            Some((only, pose)) if parts.is_empty() && pose == DMat4::IDENTITY => Arc::unwrap_or_clone(only),
-            Some(last) => {
-                parts.push(last);
-                let parts: Vec<_> = parts.iter().map(|(cloud, pose)| (&**cloud, *pose)).collect();
-                PointCloud::merged(&parts)
-            }
-            None => PointCloud::default(),
-        };
-        if self.metres.is_none() && !cloud.is_empty() {
-            self.metres = cloud.local_metres(None);
-        }
-        if let Some(metres) = &self.metres {
-            cloud.to_metres_on(metres);
-        }
-        Ok(cloud)
-    }
-
-    /// The points at a frame, with what is known to be up.
-    fn frame(&mut self, frame: usize, axes: Axes, progress: &dyn Progress) -> Result<PointCloud, Failure> {
-        Ok(self.points(frame, progress)?.with_axes(axes))
-    }
-
-    /// Places the camera so that it sees what there is from the first frame to the last, and settles what follows from the
-    /// points.
-    fn place(&mut self, job: &mut Job, frames: &std::ops::Range<usize>) -> Result<(Camera, Axes), Failure> {
-        let bar = Bar::on_input("placing the camera", &self.names, job.quiet);
-        let last = frames.len() - 1;
-        let count = frames.len().min(PLACED_BY);
-        let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
-        looks.dedup();
-        let mut clouds = Vec::new();
-        for (number, frame) in looks.iter().enumerate() {
-            clouds.push(self.points(*frame, &bar)?);
-            bar.report((number + 1) as f32 / looks.len() as f32);
-        }
-        let parts: Vec<_> = clouds.iter().map(|cloud| (cloud, DMat4::IDENTITY)).collect();
-        let all = PointCloud::merged(&parts);
-        if all.len() < 2 {
-            return Err(Failure::new(Exit::Input, format!("{}: there are no points in these frames", self.names)));
-        }
-        job.check_color(&all)?;
-        job.camera.place(&all, job.inputs.only_scene(), job.size)
-    }
-
-    /// Takes the range of a colour map from the first frame, so that colours mean the same in all.
-    fn settle_range(
-        &mut self,
-        job: &mut Job,
-        renderer: &mut Renderer,
-        camera: &Camera,
-        axes: Axes,
-        first: usize,
-    ) -> Result<(), Failure> {
-        let plain = matches!(job.settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
-        if job.settings.shading.range.is_none() && !plain {
-            let cloud = self.frame(first, axes, &())?;
-            let range = self.draw(job, renderer, &cloud, camera)?.counts.value_range;
-            job.settings.shading.range = range.map(|ends| ends.map(|end| end as f32));
-        }
-        Ok(())
-    }
-
-    /// Renders a frame.
-    fn draw(&self, job: &Job, renderer: &mut Renderer, cloud: &PointCloud, camera: &Camera) -> Result<Shot, Failure> {
-        let mut settings = job.settings.clone();
-        if cloud.is_empty() {
-            // No points have no colours either, and show the background.
-            settings.shading.color = ColorMode::Plain;
-        }
-        settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
-        let frame = renderer.render(cloud, camera, job.rendered_size(), &settings).map_err(render_failure)?;
-        let image = if job.supersample > 1 {
-            shrink(frame.image, job.supersample)
-        } else {
-            let Image { width, height, ref pixels, .. } = *frame.image;
-            Image { width, height, pixels: pixels.clone(), linear: Vec::new() }
-        };
-        Ok(Shot { image, counts: frame.counts, timings: frame.timings })
-    }
-}
-
-/// Writes pictures as they come, until there are no more.
-fn write(
-    queue: &Receiver<(usize, Image)>,
-    target: &Target,
-    count: usize,
-    size: [u32; 2],
-    rate: f64,
-    alpha: bool,
-) -> Result<(), Failure> {
-    match target {
-        Target::Frames(names) => queue.iter().try_for_each(|(frame, image)| write_frame(names, frame, &image, alpha)),
-        Target::Film(path) => {
-            // What is there of the film is gone before Ctrl-C ends the program.
-            let _writing = interrupt::writing();
-            let mut film = Film::begin(path, size, rate).map_err(film_failure)?;
-            let mut added = 0;
-            for (_, image) in queue {
-                film.add(&image).map_err(film_failure)?;
-                added += 1;
-            }
-            if interrupt::requested() {
-                return Err(Failure::interrupted());
-            }
-            // Whoever sent too few says why.
-            if added == count { film.finish().map_err(film_failure) } else { Ok(()) }
-        }
-    }
-}
-
-fn write_frame(names: &Frames, frame: usize, image: &Image, alpha: bool) -> Result<(), Failure> {
-    write_file(&names.file(frame), |writer| write_png(image, alpha, writer)).map(|_| ())
-}
-
-fn film_failure(error: Error) -> Failure {
-    if interrupt::requested() { Failure::interrupted() } else { Failure::new(Exit::Output, error) }
 }

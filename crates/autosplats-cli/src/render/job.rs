@@ -3,7 +3,9 @@
 use std::collections::HashSet;
 use std::path::PathBuf;
 
-use autosplats::{Backend, Background, ColorMap, ColorMode, MAX_SIDE, Reconstruction, Settings, Shading};
+use autosplats::{
+    Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer, Settings, Shading,
+};
 use autosplats_cloud::{PointCloud, check_memory};
 
 use super::camera::CameraJob;
@@ -14,7 +16,7 @@ use crate::choices::Map;
 use crate::exit::{Exit, Failure, suggest};
 use crate::first_radius::FirstRadius;
 use crate::input::{Inputs, read_failure};
-use crate::output::{Format, Picture, check_target};
+use crate::output::{Format, Picture, ReadFiles, check_target};
 use crate::threads::start_threads;
 use crate::values::COLOR_MODES;
 
@@ -26,9 +28,9 @@ const BYTES_PER_PIXEL: u64 = 100;
 pub(super) struct Job {
     pub(super) inputs: Inputs,
     pub(super) pictures: Vec<Picture>,
-    /// In place of them, a picture for each frame.
-    pub(super) film: Option<FilmJob>,
     pub(super) save_camera: Option<PathBuf>,
+    /// None of which is overwritten.
+    pub(super) read_files: ReadFiles,
     /// Of the pictures that are written.
     pub(super) size: [u32; 2],
     /// How many times as wide and high they are rendered.
@@ -42,13 +44,27 @@ pub(super) struct Job {
 }
 
 impl Job {
-    /// Checks the flags, the inputs' existence and the outputs' places.
-    pub(super) fn new(args: RenderArgs) -> Result<Self, Failure> {
-        let RenderArgs { inputs, input, outputs, size, supersample, frames, resume, camera, surface, look, run, json } =
-            args;
+    /// Checks the flags, the inputs' existence and the outputs' places. Where frames are asked for, they are in place of the
+    /// pictures.
+    pub(super) fn new(args: RenderArgs) -> Result<(Self, Option<FilmJob>), Failure> {
+        let RenderArgs {
+            inputs,
+            input,
+            outputs,
+            size,
+            supersample,
+            frames,
+            resume,
+            watch,
+            camera,
+            surface,
+            look,
+            run,
+            json,
+        } = args;
         start_threads(&run)?;
         let fps = input.playing.fps;
-        let film = FilmJob::new(&outputs, frames, resume, fps)?;
+        let film = FilmJob::new(&outputs, frames, resume, fps, watch)?;
         let pictures = match &film {
             Some(_) => Vec::new(),
             None => outputs.into_iter().map(Picture::new).collect::<Result<Vec<_>, _>>()?,
@@ -65,14 +81,15 @@ impl Job {
         let save_camera = camera.save_camera.clone();
         let inputs = Inputs::new(&inputs, &input)?;
         let camera = CameraJob::new(&camera)?;
-        let named = film.as_ref().and_then(FilmJob::first_file);
+        let read_files = inputs.files(camera.file());
+        let named = film.as_ref().map(FilmJob::first_file);
         let targets = pictures.iter().map(|picture| &picture.path).chain(&named).chain(&save_camera);
         let mut seen = HashSet::new();
         for target in targets {
             if !seen.insert(target) {
                 return Err(Failure::usage(format!("{}: two outputs have this name", target.display())));
             }
-            check_target(target, inputs.files().chain(camera.file()))?;
+            check_target(target, &read_files)?;
         }
         let [width, height] = size.map(|side| u64::from(side) * u64::from(supersample));
         if width.max(height) > u64::from(MAX_SIDE) {
@@ -84,11 +101,11 @@ impl Job {
             .map_err(read_failure)?;
         let SurfaceArgs { backend, first_radius, .. } = surface;
         let (backend, quiet) = (backend.into(), run.quiet);
-        Ok(Self {
+        let job = Self {
             inputs,
             pictures,
-            film,
             save_camera,
+            read_files,
             size,
             supersample,
             camera,
@@ -97,12 +114,41 @@ impl Job {
             first_radius,
             json,
             quiet,
-        })
+        };
+        Ok((job, film))
     }
 
     /// Pixels of the picture that is rendered.
     pub(super) fn rendered_size(&self) -> [u32; 2] {
         self.size.map(|side| side * self.supersample)
+    }
+
+    /// Tries out what the kd-tree search is to begin with, if that is what was asked for.
+    pub(super) fn settle_first_radius(
+        &mut self,
+        renderer: &mut Renderer,
+        cloud: &PointCloud,
+        camera: &Camera,
+    ) -> Result<(), Failure> {
+        let size = self.rendered_size();
+        self.settings = self.first_radius.settle(renderer, cloud, camera, size, &self.settings, self.quiet)?;
+        Ok(())
+    }
+
+    /// Renders points, of which there may be few or none.
+    pub(super) fn render<'a>(
+        &self,
+        renderer: &'a mut Renderer,
+        cloud: &PointCloud,
+        camera: &Camera,
+    ) -> Result<Frame<'a>, Failure> {
+        let mut settings = self.settings.clone();
+        if cloud.is_empty() {
+            // No points have no colours either, and show the background.
+            settings.shading.color = ColorMode::Plain;
+        }
+        settings.reconstruction.k = settings.reconstruction.k.min(cloud.len().saturating_sub(1).max(1) as u32);
+        renderer.render(cloud, camera, self.rendered_size(), &settings).map_err(render_failure)
     }
 
     /// Whether the picture has nothing behind the surface.
@@ -156,6 +202,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         ellipses: surface.ellipses,
         grid_culling: !surface.no_grid_culling,
         depth_refinement: !surface.no_depth_refinement,
+        frames_averaged: surface.frames_averaged,
         ..Reconstruction::default()
     };
     let shading = Shading {

@@ -3,7 +3,11 @@
 mod camera;
 mod film;
 mod job;
+mod live;
+mod moving;
+mod pictures;
 mod report;
+mod schedule;
 mod shrink;
 
 use std::time::Instant;
@@ -23,13 +27,13 @@ use crate::progress::Bar;
 
 /// Renders one picture to one file or several, or a picture for each frame of what moves.
 pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
-    let mut job = Job::new(args)?;
+    let (mut job, film) = Job::new(args)?;
     // A device that is not there says so before anything is read.
     let mut renderer = Renderer::with_backend(job.backend).map_err(render_failure)?;
     renderer.check(&job.settings).map_err(render_failure)?;
     let device = Device::of(&renderer);
-    if job.film.is_some() {
-        return film::run(&mut job, &mut renderer, &device);
+    if let Some(film) = film {
+        return film::run(&mut job, &film, &mut renderer, &device);
     }
 
     let started = Instant::now();
@@ -42,10 +46,9 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
-    job.settings =
-        job.first_radius.settle(&mut renderer, &cloud, &camera, job.rendered_size(), &job.settings, job.quiet)?;
+    job.settle_first_radius(&mut renderer, &cloud, &camera)?;
     let bar = Bar::spinner("rendering", job.quiet);
-    let frame = renderer.render(&cloud, &camera, job.rendered_size(), &job.settings).map_err(render_failure)?;
+    let frame = job.render(&mut renderer, &cloud, &camera)?;
     drop(bar);
     check_visible(&frame, &job.inputs)?;
     if !job.quiet {

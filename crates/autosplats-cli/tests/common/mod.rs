@@ -7,6 +7,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+/// In the place of ffmpeg: keeps what it is told and the bytes that it is given.
+#[cfg(unix)]
+pub(crate) const KEEP: &str = "echo \"$@\" > words; for last; do :; done; cat > \"$last\"";
+
 /// Points on the unit sphere, evenly.
 pub(crate) const SPHERE_POINTS: usize = 6000;
 
@@ -64,6 +68,16 @@ impl Folder {
         // No test opens a window by mistake.
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
         command
+    }
+
+    /// Puts a shell script into the place of ffmpeg; returns the `PATH` by which it is found.
+    #[cfg(unix)]
+    pub(crate) fn with_ffmpeg(&self, script: &str) -> String {
+        use std::os::unix::fs::PermissionsExt as _;
+        fs::create_dir_all(self.path("bin")).expect("a folder");
+        self.write("bin/ffmpeg", &format!("#!/bin/sh\n[ \"$1\" = -version ] && exit\n{script}\n"));
+        fs::set_permissions(self.path("bin/ffmpeg"), fs::Permissions::from_mode(0o755)).expect("a program");
+        format!("{}:{}", self.path("bin").display(), std::env::var("PATH").expect("a path"))
     }
 
     pub(crate) fn run(&self, arguments: &[&str]) -> Outcome {

@@ -14,14 +14,12 @@
 
 mod strewn;
 
-use std::f64::consts::TAU;
-
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::strewn::Place;
 pub(crate) use self::strewn::Strewn;
-use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress};
+use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress, random::Random};
 
 /// Points made between two looks at the caller's wish to stop.
 const BLOCK: usize = 1 << 18;
@@ -353,43 +351,6 @@ impl<'a> Surface<'a> {
 /// Halvings of a triangle until its pieces are much smaller than a patch.
 fn depth(area: f64, patch: f64) -> i32 {
     (FINER + (area / patch).log2().ceil().clamp(0.0, 40.0) as i32).min(46)
-}
-
-/// Splitmix: random numbers of one point, whoever asks.
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64, point: u64) -> Self {
-        let mut random = Self(seed ^ point.wrapping_mul(0xD134_2543_DE82_EF95));
-        random.bits();
-        random
-    }
-
-    pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in 0..1.
-    pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
-    }
-
-    /// Of the normal distribution, by Box and Muller.
-    pub(crate) fn normal(&mut self) -> f64 {
-        let (length, turn) = (1.0 - self.unit(), self.unit());
-        (-2.0 * length.ln()).sqrt() * (TAU * turn).cos()
-    }
-
-    /// Of length one.
-    pub(crate) fn direction(&mut self) -> DVec3 {
-        let (height, turn) = (2.0 * self.unit() - 1.0, TAU * self.unit());
-        let width = (1.0 - height * height).sqrt();
-        DVec3::new(width * turn.cos(), width * turn.sin(), height)
-    }
 }
 
 /// Steps per axis of the Hilbert curve, as a power of two.

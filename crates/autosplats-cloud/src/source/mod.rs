@@ -21,7 +21,7 @@ use std::{
 };
 
 use self::{
-    animation::Animation,
+    animation::{Animation, candidates},
     latest::LatestOptions,
     live::{Live, LiveOptions},
     player::Player,
@@ -112,6 +112,18 @@ impl Source {
         match self {
             Self::File(path) | Self::Recording(path) => Some(path),
             Self::Scene(..) | Self::Sequence(_) | Self::StandardInput | Self::Remote(_) => None,
+        }
+    }
+
+    /// All files that it is read from, as far as they are there now and known: of a sequence those that its name stands for, of a
+    /// recording's folder all that are in it.
+    pub fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Self::File(path) => vec![path.clone()],
+            Self::Recording(path) if path.is_dir() => candidates(&path.to_string_lossy()).unwrap_or_default(),
+            Self::Recording(path) => vec![path.clone()],
+            Self::Sequence(name) => candidates(name).unwrap_or_default(),
+            Self::Scene(..) | Self::StandardInput | Self::Remote(_) => Vec::new(),
         }
     }
 
@@ -241,6 +253,9 @@ mod tests {
         assert_eq!(short("a/f_*.ply").as_deref(), Some("f_*.ply"));
         assert_eq!(short("zenoh://robot/points").as_deref(), Some("points"));
         assert_eq!(short("-"), None, "a pipe is called as it is");
+        std::fs::write(path("f_1.ply"), "").expect("a file");
+        let files = |name: &str| kind(name).files().len();
+        assert_eq!([files(&path("")), files(&path("f_*.ply")), files("a.ply"), files("-")], [2, 1, 1, 0]);
         assert!(matches!(kind("scene:statue:1K"), Source::Scene(_, 1000)), "a scene");
         std::fs::write(path("metadata.yaml"), "rosbag2_bagfile_information:").expect("a file");
         assert!(matches!(kind(&path("")), Source::Recording(_)), "a folder of ROS 2");

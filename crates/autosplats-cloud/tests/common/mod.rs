@@ -8,6 +8,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub(crate) mod las_files;
 pub(crate) mod recording;
 pub(crate) mod ros;
 #[cfg(feature = "zenoh")]

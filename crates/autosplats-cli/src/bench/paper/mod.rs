@@ -28,7 +28,7 @@ use self::report::Report;
 use self::scenes::{NAMES, PaperScene};
 use crate::bench::args::PaperArgs;
 use crate::exit::{Exit, Failure, suggest};
-use crate::output::{check_target, print_line, write_file};
+use crate::output::{ReadFiles, check_target, print_line, write_file};
 use crate::progress::Bar;
 use crate::threads::start_threads;
 
@@ -165,7 +165,7 @@ pub(crate) fn run(args: &PaperArgs) -> Result<(), Failure> {
         Failure::new(Exit::Output, format!("{}: cannot make the folder: {error}", pictures.display()))
     })?;
     let page = out.join(format!("RESULTS{suffix}.md"));
-    check_target(&page, [])?;
+    check_target(&page, &ReadFiles::default())?;
 
     let mut journal = Journal::open(&pictures.join("measurements.json"), *fresh)?;
     let mut renderers = Renderers::new();

@@ -17,7 +17,7 @@ use std::{path::Path, sync::Arc};
 use glam::DVec3;
 
 pub use self::playback::Playback;
-pub(crate) use self::sequence::{is_named_as_cloud, natural};
+pub(crate) use self::sequence::{candidates, is_named_as_cloud, natural};
 use super::scanner::{Scanned, Scanner};
 use crate::{Axes, Contents, Error, PointCloud, Progress, ReadOptions, Scene, Timeline};
 

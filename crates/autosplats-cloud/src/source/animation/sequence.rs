@@ -75,7 +75,7 @@ impl Frames for Sequence {
 }
 
 /// The files that a name stands for, in natural order.
-fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
     let path = Path::new(name);
     let mut files = if path.is_dir() {
         let io = |source| Error::Io { path: path.into(), source };

@@ -2,22 +2,31 @@
 //!
 //! # How it works
 //!
-//! In each frame rays go out from every scanner, the same angle apart in azimuth and in elevation, and end at the first surface
-//! they meet ([`Target`]): what is hidden from a scanner is missing. Ranges get noise, some rays return nothing, and points
+//! In each frame rays go out from every scanner, the same angle apart in azimuth and in elevation ([`Rays`]), and end at the
+//! first surface they meet ([`Target`]): what is hidden from a scanner is missing. Most rays meet nothing, so what there is is
+//! looked for along the rays, and not the other way round: triangles, and the parts of a scene, ask for those that may meet
+//! them. Ranges get noise, some rays return nothing, and points
 //! are put where the scanner believes to stand, which may be a little off. All of it depends on the seed, the frame, the
 //! scanner and the ray alone, so threads change nothing.
 
+mod rays;
 mod target;
-mod tree;
+mod triangles;
 
-use std::{f64::consts::TAU, sync::Arc};
+use std::{
+    f64::consts::TAU,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
 
 use glam::{DMat4, DQuat, DVec3};
 use rayon::prelude::*;
 
-use self::target::Target;
+use self::{rays::Rays, target::Target};
 use super::animation::{Frames, Surface};
-use crate::{Error, PointCloud, Progress, Scan, Timeline, memory::check_memory, progress::tick, sample::Random};
+use crate::{Error, PointCloud, Progress, Scan, Timeline, memory::check_memory, progress::tick, random::Random};
 
 /// Rays of a scanner, at most.
 const MAX_RAYS: u64 = 1 << 28;
@@ -116,15 +125,6 @@ impl Scanner {
         let turn = DMat4::from_axis_angle(axis, self.misturned_degrees.to_radians());
         DMat4::from_translation(offset) * self.world_from_sensor * turn
     }
-
-    /// Direction of a ray in its own frame.
-    fn direction(&self, column: u32, row: u32) -> DVec3 {
-        let part = |index: u32, count: u32| (f64::from(index) + 0.5) / f64::from(count) - 0.5;
-        let azimuth = (self.fov_degrees[0] * part(column, self.columns)).to_radians();
-        let elevation = (self.fov_degrees[1] * part(row, self.rows)).to_radians();
-        let ((sin, cos), (down, level)) = (azimuth.sin_cos(), elevation.sin_cos());
-        DVec3::new(sin * level, down, cos * level)
-    }
 }
 
 /// The pose of a sensor at `eye` that looks at `centre`.
@@ -166,19 +166,21 @@ impl Scanned {
         let scanner = &self.scanners[index];
         // A pose is wrong in the same way in all frames.
         let believed = scanner.believed(&mut self.random(index, usize::MAX, 0));
-        let pose = scanner.world_from_sensor;
-        let eye = pose.w_axis.truncate();
+        let rays = Rays::new(scanner);
+        let sight = target.seen_along(&rays);
         let origin = target.origin();
         let row = |row: u32| {
             if progress.cancelled() {
                 return Vec::new();
             }
-            let mut waiting = Vec::new();
             let seen = |column: u32| {
-                let direction = scanner.direction(column, row);
-                let hit = target.trace(eye, pose.transform_vector3(direction), &mut waiting)?;
-                let ray = u64::from(row) * u64::from(scanner.columns) + u64::from(column);
-                let mut random = self.random(index, frame, ray);
+                let ray = row as usize * scanner.columns as usize + column as usize;
+                if !sight.may_meet(ray) {
+                    return None;
+                }
+                let direction = rays.direction(column, row);
+                let hit = sight.hit(&rays, ray, direction)?;
+                let mut random = self.random(index, frame, ray as u64);
                 if random.unit() < scanner.dropouts {
                     return None;
                 }
@@ -189,7 +191,9 @@ impl Scanned {
             (0..scanner.columns).filter_map(seen).collect()
         };
         let rows: Vec<Vec<Seen>> = (0..scanner.rows).into_par_iter().map(row).collect();
-        tick(progress, (index + 1) as f32 / self.scanners.len() as f32)?;
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
         let positions: Vec<[f32; 3]> = rows.iter().flatten().map(|(position, _)| *position).collect();
         let name = Some(format!("scanner {}", index + 1));
         let scan = Scan { name, world_from_sensor: believed, points: 0..positions.len() };
@@ -213,7 +217,14 @@ impl Frames for Scanned {
 
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
         let target = Target::new(self.frames.surface(frame, progress)?)?;
-        (0..self.scanners.len()).map(|index| Ok(Arc::new(self.scan(index, frame, &target, progress)?))).collect()
+        let count = self.scanners.len();
+        let done = AtomicUsize::new(0);
+        let scan = |index| {
+            let cloud = self.scan(index, frame, &target, progress)?;
+            tick(progress, (done.fetch_add(1, Ordering::Relaxed) + 1) as f32 / count as f32)?;
+            Ok(Arc::new(cloud))
+        };
+        (0..count).into_par_iter().map(scan).collect()
     }
 
     fn surface(&self, frame: usize, progress: &dyn Progress) -> Result<Surface, Error> {

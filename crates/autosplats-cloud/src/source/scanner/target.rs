@@ -4,13 +4,22 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::tree::{Tree, Waiting};
+use super::{
+    rays::{Rays, Window},
+    triangles::{Nearest, Triangles},
+};
 use crate::{Axes, Contents, Crs, Error, Scene, source::animation::Surface};
+
+/// Rays of a window for which a part of a scene is not cut any more.
+const SMALL: u64 = 25;
+
+/// By how much more than it has to be of a ray is looked at.
+const SLACK: f32 = 1e-6;
 
 /// A surface that can be hit.
 pub(super) enum Target {
     Scene(Scene),
-    Mesh(Arc<Contents>, Tree),
+    Mesh(Arc<Contents>, Triangles),
 }
 
 /// Where a ray ends.
@@ -19,13 +28,23 @@ pub(super) struct Hit {
     pub(super) color: Option<[u8; 3]>,
 }
 
+/// A target as it is seen along all rays of a scanner.
+pub(super) enum Sight<'a> {
+    /// From where to where each ray may meet something, if that is known; nowhere if the end comes first.
+    Scene(&'a Scene, Option<Vec<[f32; 2]>>),
+    Mesh(&'a Contents, &'a Triangles, Vec<Nearest>),
+}
+
 impl Target {
     pub(super) fn new(surface: Surface) -> Result<Self, Error> {
         Ok(match surface {
-            Surface::Scene(scene) => Self::Scene(scene),
+            Surface::Scene(scene) => {
+                scene.prepare();
+                Self::Scene(scene)
+            }
             Surface::Mesh(mesh) => {
-                let tree = Tree::new(&mesh)?;
-                Self::Mesh(mesh, tree)
+                let triangles = Triangles::new(&mesh)?;
+                Self::Mesh(mesh, triangles)
             }
         })
     }
@@ -59,23 +78,65 @@ impl Target {
         }
     }
 
-    /// First place where a ray of length one from a place in world coordinates meets the surface.
-    pub(super) fn trace(&self, eye: DVec3, direction: DVec3, waiting: &mut Waiting) -> Option<Hit> {
+    /// Looks along all rays.
+    pub(super) fn seen_along(&self, rays: &Rays) -> Sight<'_> {
         match self {
-            Self::Scene(scene) => {
-                let hit = scene.trace(eye, direction)?;
-                let color = hit.rgb.map(|channel| (channel * 255.0 + 0.5).clamp(0.0, 255.0) as u8);
-                Some(Hit { distance: hit.distance, color: Some(color) })
+            Self::Scene(scene) => Sight::Scene(scene, spans(scene, rays)),
+            Self::Mesh(mesh, triangles) => Sight::Mesh(mesh, triangles, triangles.nearest(rays, mesh.cloud.origin())),
+        }
+    }
+}
+
+/// From where to where each ray may meet the scene: most of them nowhere.
+fn spans(scene: &Scene, rays: &Rays) -> Option<Vec<[f32; 2]>> {
+    let cube_radius = rays.cube_radius();
+    let mut parts: Vec<(Window, [f32; 2])> = Vec::new();
+    let known = scene.cubes(&mut |middle, half, whole| {
+        let Some(window) = rays.window(rays.in_sensor(middle - rays.eye), half * cube_radius) else { return false };
+        if !whole && window.len() > SMALL {
+            return true;
+        }
+        let (distance, radius) = (middle.distance(rays.eye), half * 3.0_f64.sqrt());
+        let (near, far) = ((distance - radius) as f32, (distance + radius) as f32);
+        parts.push((window, [near - SLACK * far, far + SLACK * far]));
+        false
+    });
+    known.then(|| {
+        rays.put_all(&parts, [f32::INFINITY, f32::NEG_INFINITY], |[near, far], part, _, _| {
+            (*near, *far) = (near.min(part[0]), far.max(part[1]));
+        })
+    })
+}
+
+impl Sight<'_> {
+    /// Whether a ray, counted row by row, may meet anything.
+    pub(super) fn may_meet(&self, ray: usize) -> bool {
+        match self {
+            Self::Scene(_, spans) => spans.as_ref().is_none_or(|spans| spans[ray][0] <= spans[ray][1]),
+            Self::Mesh(_, _, nearest) => nearest[ray].distance < f64::INFINITY,
+        }
+    }
+
+    /// Where a ray ends that may meet something, if it does; `direction` is its own, in the scanner's frame.
+    pub(super) fn hit(&self, rays: &Rays, ray: usize, direction: DVec3) -> Option<Hit> {
+        match self {
+            Self::Scene(scene, spans) => {
+                let [near, far] = spans.as_ref().map_or([0.0, f32::INFINITY], |spans| spans[ray]);
+                let within = f64::from(near)..f64::from(far);
+                let (distance, rgb) = scene.trace_within(rays.eye, rays.in_world(direction), within)?;
+                let color = rgb.map(|channel| (channel * 255.0 + 0.5).clamp(0.0, 255.0) as u8);
+                Some(Hit { distance, color: Some(color) })
             }
-            Self::Mesh(mesh, tree) => {
-                let crossing = tree.trace(eye - mesh.cloud.origin(), direction, waiting)?;
-                let [second, third] = crossing.weights;
+            Self::Mesh(mesh, triangles, nearest) => {
+                let nearest = nearest[ray];
                 let mixed = |colors: &[[u8; 3]]| {
-                    let [a, b, c] = crossing.corners.map(|corner| colors[corner as usize].map(f64::from));
+                    let eye = rays.eye - mesh.cloud.origin();
+                    let (corners, [second, third]) = triangles.place(nearest, eye, rays.in_world(direction));
+                    let [a, b, c] = corners.map(|corner| colors[corner as usize].map(f64::from));
                     let mix = |i: usize| a[i] * (1.0 - second - third) + b[i] * second + c[i] * third;
                     [0, 1, 2].map(|i| (mix(i) + 0.5).clamp(0.0, 255.0) as u8)
                 };
-                Some(Hit { distance: crossing.distance, color: mesh.cloud.colors().map(mixed) })
+                Some(Hit { distance: nearest.distance, color: mesh.cloud.colors().map(mixed) })
             }
         }
     }

@@ -18,7 +18,6 @@ mod name;
 mod octree;
 mod paint;
 mod pedestal;
-mod random;
 mod sample;
 mod scan;
 mod shape;
@@ -178,8 +177,26 @@ impl Scene {
     /// First place where a ray meets the surface, from outside or from within a solid.
     pub fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let tree = &self.model().tree;
-        let crossing = tree.trace(origin, direction)?;
+        let crossing = tree.trace(origin, direction, 0.0..f64::INFINITY)?;
         Some(Hit { distance: crossing.distance, normal: tree.normal(&crossing), rgb: tree.rgb(&crossing) })
+    }
+
+    /// The same from some distance to another, in which all lies that the ray meets; distance and colour alone.
+    pub(crate) fn trace_within(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+        within: std::ops::Range<f64>,
+    ) -> Option<(f64, [f32; 3])> {
+        let tree = &self.model().tree;
+        let crossing = tree.trace(origin, direction, within)?;
+        Some((crossing.distance, tree.rgb(&crossing)))
+    }
+
+    /// Cubes that together hold all the surface, from large to small: `visit` gets the middle, half a side, and whether there are
+    /// no smaller ones within, and says whether to go on with these. Returns whether there are such cubes.
+    pub(crate) fn cubes(&self, visit: &mut dyn FnMut(DVec3, f64, bool) -> bool) -> bool {
+        self.model().tree.cubes(visit)
     }
 
     /// Signed distance bound: zero on the surface, negative inside, never farther than the surface is.

@@ -6,6 +6,8 @@
 //! list is short or the cell is small. In such a cell a ray advances by the distance bound until the sign changes, and
 //! the root is then polished by regula falsi.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -209,11 +211,13 @@ impl Octree {
         self.fold.apply(p).0
     }
 
-    /// Every place where the bound changes sign on the way from `from` to `to` metres along the ray, nearest first, as
-    /// long as `more` asks for more.
+    /// Every place where the bound changes sign within `to` metres along the ray, nearest first, as long as `more` asks for
+    /// more; at its begin the bound is `start`. Returns the last such place and true, or a bound with the sign that there is at
+    /// the end.
     fn crossings(
         &self,
         leaf: Leaf,
+        start: f64,
         origin: DVec3,
         direction: DVec3,
         to: f64,
@@ -222,8 +226,9 @@ impl Octree {
         let list = self.list(&leaf);
         // Steps never get smaller than this, so that grazing rays get on. All that is missed are chords shorter than it.
         let least = 5e-3 * leaf.size;
-        let (mut t, mut f) = (0.0, self.body.distance(origin, list));
-        while t < to {
+        let (mut t, mut f) = (0.0, start);
+        // What is further away than the way that is left is not on it.
+        while f.abs() < to - t {
             let next = (t + f.abs() + least).min(to);
             let g = self.body.distance(origin + direction * next, list);
             if (g < 0.0) != (f < 0.0) {
@@ -251,20 +256,41 @@ impl Octree {
     /// and leaves it after `to` metres.
     pub(super) fn crossings_in(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, to: f64, hit: &mut dyn FnMut(f64)) {
         // Most cells' lines meet nothing, which their middle tells at once.
-        if self.body.distance(origin + direction * (0.5 * to), self.list(leaf)).abs() > 0.5 * to {
+        let list = self.list(leaf);
+        if self.body.distance(origin + direction * (0.5 * to), list).abs() > 0.5 * to {
             return;
         }
-        self.crossings(*leaf, origin, direction, to, &mut |t| {
+        self.crossings(*leaf, self.body.distance(origin, list), origin, direction, to, &mut |t| {
             hit(t);
             true
         });
     }
 
-    /// First place where the ray crosses the surface, from either side.
-    pub(super) fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Crossing> {
+    /// Cubes around the surface, from large to small; see [`Scene::cubes`](super::Scene::cubes). Folded space has none.
+    pub(super) fn cubes(&self, visit: &mut dyn FnMut(DVec3, f64, bool) -> bool) -> bool {
+        let mut stack = vec![(0_usize, self.min, 0.5 * self.size)];
+        while let Some((cell, min, half)) = stack.pop().filter(|_| self.fold == Fold::None) {
+            match self.cells[cell] {
+                Cell::Empty(_) => {}
+                Cell::Surface { .. } => {
+                    visit(min + DVec3::splat(half), half, true);
+                }
+                Cell::Branch(children) => {
+                    if visit(min + DVec3::splat(half), half, false) {
+                        stack.extend((0..8).map(|i| (children as usize + i, min + half * corner(i), 0.5 * half)));
+                    }
+                }
+            }
+        }
+        self.fold == Fold::None
+    }
+
+    /// First place where the ray crosses the surface, from either side; all that it meets lies `within` some distances.
+    pub(super) fn trace(&self, origin: DVec3, direction: DVec3, within: Range<f64>) -> Option<Crossing> {
         let direction = direction.try_normalize()?;
         let (low, high) = self.fold.bounds(self.min, self.size);
-        let (mut t, end) = clip(low, high, origin, direction)?;
+        let (start, end) = clip(low, high, origin, direction)?;
+        let (mut t, end) = (start.max(within.start), end.min(within.end));
         let inverse = direction.recip();
         let nudge = 1e-10 * self.size;
         let mut least_step = nudge;
@@ -287,15 +313,18 @@ impl Octree {
                         first,
                         len,
                     };
-                    let inside = self.body.distance(p, self.list(&leaf)) < 0.0;
+                    let start = self.body.distance(p, self.list(&leaf));
+                    let inside = start < 0.0;
                     if was_inside.is_some_and(|was: bool| was != inside) {
                         return Some(crossing(0.0));
                     }
-                    let (value, found) = self.crossings(leaf, p, along, to, &mut |_| false);
+                    let (value, found) = self.crossings(leaf, start, p, along, to, &mut |_| false);
                     if found {
                         return Some(crossing(value));
                     }
                     was_inside = Some(value < 0.0);
+                    // As far as the surface is away, there are no cells to be looked into.
+                    to = to.max(start.abs());
                 }
                 Cell::Empty(distance) => {
                     was_inside = Some(distance < 0.0);

@@ -2,8 +2,6 @@
 
 use glam::DVec3;
 
-use super::random::lattice;
-
 /// What a part is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Paint {
@@ -98,4 +96,13 @@ fn clouds(p: DVec3, grain: f64) -> f32 {
     let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
     let edge = |j: i64, k: i64| lerp(lattice(x, y + j, z + k), lattice(x + 1, y + j, z + k), t.x);
     lerp(lerp(edge(0, 0), edge(1, 0), t.y), lerp(edge(0, 1), edge(1, 1), t.y), t.z)
+}
+
+/// A fixed number in 0..1 for a lattice point.
+pub(super) fn lattice(x: i64, y: i64, z: i64) -> f32 {
+    let mut h = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
+        ^ (z as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
+    h = (h ^ (h >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (h >> 40) as f32 / (1 << 24) as f32
 }

@@ -14,7 +14,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::octree::{Leaf, Octree};
-use super::random::Random;
+use crate::random::Random;
 
 /// Points per random stream.
 const BLOCK: usize = 16384;
@@ -119,7 +119,7 @@ pub(super) fn strew(
         (count as f64 * share).round() as usize
     };
     by_blocks(positions, colors, progress, |first, points, colors| {
-        let mut random = Random::new(first as u64);
+        let mut random = Random::of_scene(first as u64);
         let end = first + points.len();
         let mut slots = points.iter_mut().zip(colors);
         let mut before = 0;

@@ -9,9 +9,8 @@ use super::fold::Fold;
 use super::head::{Looks, head};
 use super::limb::{Hand, foot, hand, reach};
 use super::octree::Octree;
-use super::paint::Paint;
+use super::paint::{Paint, lattice};
 use super::pedestal::pedestal;
-use super::random::lattice;
 use super::shape::{Placement, Shape, Similarity};
 use super::{Model, Points};
 

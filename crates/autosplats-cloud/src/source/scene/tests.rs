@@ -8,11 +8,10 @@ use super::body::{Body, Op};
 use super::fold::Fold;
 use super::octree::Octree;
 use super::paint::Paint;
-use super::random::Random;
 use super::sample;
 use super::shape::{Placement, Shape};
 use super::{Points, Scene};
-use crate::{Axes, Error, PointCloud};
+use crate::{Axes, Error, PointCloud, random::Random};
 
 /// Larger than any scene.
 const FAR: f64 = 100.0;
@@ -47,7 +46,7 @@ fn sphere(random: &mut Random) -> DVec3 {
 
 /// Rays that mostly hit something.
 fn rays(scene: &Scene, count: usize) -> Vec<(DVec3, DVec3)> {
-    let mut random = Random::new(7);
+    let mut random = Random::of_scene(7);
     let targets = sample(scene, count);
     (0..count)
         .map(|i| {

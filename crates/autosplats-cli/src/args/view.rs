@@ -1,0 +1,48 @@
+//! `view`: the window.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{InputArgs, RunArgs};
+use crate::choices::Backend;
+use crate::exit::EXIT_CODES;
+
+const VIEW_EXAMPLES: &str = "\
+Examples:
+  autosplats scan.laz
+  autosplats view a.e57 b.e57 --pose b.e57=b.txt
+  autosplats view result.ply --watch
+  autosplats scene:statue:1M
+  autosplats drive.mcap --decay 1s
+  autosplats 'scans/frame_*.ply' --fps 25
+  producer | autosplats view -
+  autosplats --state survey.json survey.laz
+
+In the window H shows what keys and mouse do.";
+
+#[derive(Args, Debug)]
+#[command(after_help = VIEW_EXAMPLES, after_long_help = format!("{VIEW_EXAMPLES}\n\n{EXIT_CODES}"))]
+pub(crate) struct ViewArgs {
+    #[arg(
+        value_name = "INPUT",
+        help = "\
+A point cloud, mesh or depth image (.ply .las .laz .e57 .pcd .ptx .pts .xyz .csv .obj .stl .glb .bin .png …), or a \
+generated scene as scene:NAME[:COUNT]. What moves is a folder or a quoted pattern of files, a recording (.mcap .bag), or - for PLY \
+and PCD files from standard input. None opens an empty window to drop files on."
+    )]
+    pub(crate) inputs: Vec<String>,
+    #[command(flatten)]
+    pub(crate) input: InputArgs,
+    /// File that keeps the session, what is open and how it is seen: had again if it is there, written at the end
+    #[arg(long, value_name = "FILE")]
+    pub(crate) state: Option<PathBuf>,
+    /// Read files again when they change
+    #[arg(long)]
+    pub(crate) watch: bool,
+    /// What renders; the picture is the same [default: as last time, at first auto]
+    #[arg(long, value_enum)]
+    pub(crate) backend: Option<Backend>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}

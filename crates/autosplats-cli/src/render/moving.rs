@@ -1,0 +1,160 @@
+//! The inputs as they are at each frame.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
+
+use autosplats::{Camera, ColorMode, Renderer};
+use autosplats_cloud::glam::DMat4;
+use autosplats_cloud::{Axes, LocalMetres, Player, PointCloud, Progress, Timeline};
+
+use super::job::Job;
+use crate::exit::{Exit, Failure};
+use crate::input::{Playing, read_failure};
+use crate::progress::Bar;
+
+/// Frames that the camera is placed by.
+const PLACED_BY: usize = 5;
+
+/// Inputs with timelines.
+pub(super) struct Moving {
+    players: Vec<(Player, DMat4)>,
+    /// Nanoseconds since the first of each input at which something changes.
+    pub(super) times: Vec<i64>,
+    place: Place,
+    /// Names of the inputs, for messages.
+    names: String,
+}
+
+impl Moving {
+    pub(super) fn new(playing: Vec<Playing>, names: String) -> Self {
+        let players: Vec<_> = playing.into_iter().map(|input| (input.player, input.world_from_input)).collect();
+        let since_first = |(player, _): &(Player, DMat4)| {
+            let stamps = player.stream().timeline().map_or(&[][..], Timeline::stamps);
+            let first = stamps.first().copied().unwrap_or_default();
+            stamps.iter().map(|stamp| stamp.saturating_sub(first)).collect::<Vec<_>>()
+        };
+        let times = match players.as_slice() {
+            [only] => since_first(only),
+            several => {
+                let mut times: Vec<i64> = several.iter().flat_map(since_first).collect();
+                times.sort_unstable();
+                times.dedup();
+                times
+            }
+        };
+        Self { players, times, place: Place::default(), names }
+    }
+
+    /// The points at a frame.
+    pub(super) fn points(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
+        let time = self.times[frame];
+        let single = self.players.len() == 1;
+        let mut parts: Vec<(Arc<PointCloud>, DMat4)> = Vec::new();
+        for (player, pose) in &mut self.players {
+            let at =
+                |timeline: &Timeline| timeline.frame_at(Duration::from_nanos(u64::try_from(time).unwrap_or_default()));
+            // Frames of one input may be of the same time.
+            let own = if single { frame } else { player.stream().timeline().map_or(0, at) };
+            parts.push((player.frame(own, progress).map_err(read_failure)?, *pose));
+        }
+        Ok(self.place.merge(parts))
+    }
+
+    /// Places the camera so that it sees what there is from the first frame to the last, and settles for all of them what
+    /// follows from the points.
+    pub(super) fn settle(
+        &mut self,
+        job: &mut Job,
+        renderer: &mut Renderer,
+        frames: &Range<usize>,
+    ) -> Result<Camera, Failure> {
+        let bar = Bar::on_input("placing the camera", &self.names, job.quiet);
+        let last = frames.len() - 1;
+        let count = frames.len().min(PLACED_BY);
+        let mut looks: Vec<usize> = (0..count).map(|look| frames.start + last * look / (count - 1).max(1)).collect();
+        looks.dedup();
+        let mut clouds = Vec::new();
+        for (number, frame) in looks.iter().enumerate() {
+            clouds.push(self.points(*frame, &bar)?);
+            bar.report((number + 1) as f32 / looks.len() as f32);
+        }
+        drop(bar);
+        let parts: Vec<_> = clouds.iter().map(|cloud| (&**cloud, DMat4::IDENTITY)).collect();
+        let all = PointCloud::merged(&parts);
+        if all.len() < 2 {
+            return Err(Failure::new(Exit::Input, format!("{}: there are no points in these frames", self.names)));
+        }
+        let first = clouds.into_iter().find(|cloud| cloud.len() > 1).unwrap_or_else(|| Arc::new(all.clone()));
+        self.place.settle(job, renderer, &all, first)
+    }
+
+    /// The points at a frame, as they are rendered.
+    pub(super) fn frame(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
+        let cloud = self.points(frame, progress)?;
+        Ok(self.place.upright(cloud))
+    }
+}
+
+/// What is known of the place that points are in, once there are some, and is the same in all pictures.
+#[derive(Default)]
+pub(super) struct Place {
+    /// The map of what is in degrees.
+    metres: Option<LocalMetres>,
+    axes: Option<Axes>,
+}
+
+impl Place {
+    /// Puts inputs with their poses together.
+    pub(super) fn merge(&mut self, mut parts: Vec<(Arc<PointCloud>, DMat4)>) -> Arc<PointCloud> {
+        let mut cloud = match parts.pop() {
+            Some((only, pose)) if parts.is_empty() && pose == DMat4::IDENTITY => only,
+            Some(last) => {
+                parts.push(last);
+                let parts: Vec<_> = parts.iter().map(|(cloud, pose)| (&**cloud, *pose)).collect();
+                Arc::new(PointCloud::merged(&parts))
+            }
+            None => Arc::default(),
+        };
+        if self.metres.is_none() && !cloud.is_empty() {
+            self.metres = cloud.local_metres(None);
+        }
+        if let Some(metres) = &self.metres {
+            Arc::make_mut(&mut cloud).to_metres_on(metres);
+        }
+        cloud
+    }
+
+    /// Places the camera before `all` points, and settles by the `first` ones what is to be the same in all pictures: the range
+    /// of a colour map, so that colours mean the same, and the first radius of the kd-tree.
+    pub(super) fn settle(
+        &mut self,
+        job: &mut Job,
+        renderer: &mut Renderer,
+        all: &PointCloud,
+        first: Arc<PointCloud>,
+    ) -> Result<Camera, Failure> {
+        job.check_color(all)?;
+        let (camera, axes) = job.camera.place(all, job.inputs.only_scene(), job.size)?;
+        self.axes = Some(axes);
+        let first = self.upright(first);
+        job.settle_first_radius(renderer, &first, &camera)?;
+        let plain = matches!(job.settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
+        if job.settings.shading.range.is_none() && !plain {
+            let range = job.render(renderer, &first, &camera)?.counts.value_range;
+            job.settings.shading.range = range.map(|ends| ends.map(|end| end as f32));
+        }
+        Ok(camera)
+    }
+
+    /// The points with what is known to be up.
+    pub(super) fn upright(&self, mut cloud: Arc<PointCloud>) -> Arc<PointCloud> {
+        if let Some(axes) = self.axes
+            && cloud.axes() != Some(axes)
+        {
+            // Others have it as well: this is a copy.
+            cloud = Arc::new(Arc::unwrap_or_clone(cloud).with_axes(axes));
+        }
+        cloud
+    }
+}
