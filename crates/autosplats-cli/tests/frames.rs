@@ -55,6 +55,8 @@ fn what_is_there_is_not_made_again() {
     assert_eq!(pictures(&folder).len(), 4, "the others are made");
     assert_eq!(folder.read("f_1.png"), b"kept", "this one was there");
     folder.fail(&["render", "sweep", "--resume", "-o", "f.mp4"], 2, &["--resume", "f_%05d.png"]);
+    let averaged = ["render", "sweep", "--resume", "--frames-averaged", "4", "-o", "f_%d.png"];
+    folder.fail(&averaged, 2, &["--resume", "depends on those before"]);
 }
 
 #[test]

@@ -75,6 +75,11 @@ impl Job {
                 "--supersample: .exr layers are not averaged; write them in a run of their own",
             ));
         }
+        if resume && surface.frames_averaged > 1 {
+            return Err(Failure::usage(
+                "--resume: with --frames-averaged a frame depends on those before; render all of them anew",
+            ));
+        }
         let settings = settings(&surface, look, needs_layers);
         settings.check().map_err(render_failure)?;
 

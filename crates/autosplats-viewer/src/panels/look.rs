@@ -156,6 +156,8 @@ fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
         .on_hover_text("More neighbours where points scatter; rows and strays are told apart");
     ui.add(Slider::new(&mut reconstruction.k, 1..=64).text("k")).on_hover_text("Neighbours that a splat is made from");
     ui.add(Slider::new(&mut reconstruction.splat_scale, 0.1..=4.0).logarithmic(true).text("splat size"));
+    ui.add(Slider::new(&mut reconstruction.frames_averaged, 1..=32).text("frames averaged"))
+        .on_hover_text("Steadies live points that are noisy anew in each frame; what moves slowly lags behind");
     let mut two = reconstruction.points_per_pixel == 2;
     if ui.checkbox(&mut two, "Two points a pixel").on_hover_text("Truer outlines and thin parts").changed() {
         reconstruction.points_per_pixel = if two { 2 } else { 1 };
