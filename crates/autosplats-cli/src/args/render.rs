@@ -61,7 +61,7 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) run: RunArgs,
     /// Print counts, device, camera, outputs and milliseconds per stage as one JSON object on standard output; of frames, one
-    /// a line for each
+    /// a line for each as soon as it is in place
     #[arg(long, help_heading = "Running")]
     pub(crate) json: bool,
 }

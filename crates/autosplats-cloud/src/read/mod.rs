@@ -36,6 +36,7 @@ mod xyz;
 
 use std::{fs::File, io::Read as _, ops::Deref, path::Path};
 
+pub(crate) use self::depth_image::color::beside as colors_beside;
 pub(crate) use self::framing::{Found, Framing};
 pub(crate) use self::{
     columns::numbered,

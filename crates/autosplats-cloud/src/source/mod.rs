@@ -28,7 +28,7 @@ use self::{
     recording::{Recording, RecordingOptions, is_recording},
     stream::Stream,
 };
-use crate::{Error, PointCloud, Progress, ReadOptions, Scene, read_mesh, read_with};
+use crate::{Error, PointCloud, Progress, ReadOptions, Scene, read::colors_beside, read_mesh, read_with};
 
 /// What begins the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
@@ -115,16 +115,19 @@ impl Source {
         }
     }
 
-    /// All files that it is read from, as far as they are there now and known: of a sequence those that its name stands for, of a
-    /// recording's folder all that are in it.
+    /// All files that it is read from, as far as they are there now: of a sequence those that its name stands for, of a
+    /// recording's folder all that are in it; and the pictures that give depth images their colours.
     pub fn files(&self) -> Vec<PathBuf> {
-        match self {
+        let mut files = match self {
             Self::File(path) => vec![path.clone()],
             Self::Recording(path) if path.is_dir() => candidates(&path.to_string_lossy()).unwrap_or_default(),
             Self::Recording(path) => vec![path.clone()],
             Self::Sequence(name) => candidates(name).unwrap_or_default(),
             Self::Scene(..) | Self::StandardInput | Self::Remote(_) => Vec::new(),
-        }
+        };
+        let colors: Vec<PathBuf> = files.iter().filter_map(|file| colors_beside(file)).collect();
+        files.extend(colors);
+        files
     }
 
     /// The last part of its path, pattern or address; none of what has no such thing.
@@ -256,6 +259,10 @@ mod tests {
         std::fs::write(path("f_1.ply"), "").expect("a file");
         let files = |name: &str| kind(name).files().len();
         assert_eq!([files(&path("")), files(&path("f_*.ply")), files("a.ply"), files("-")], [2, 1, 1, 0]);
+        for name in ["depth_1.pgm", "color_1.png"] {
+            std::fs::write(path(name), "").expect("a file");
+        }
+        assert_eq!(kind(&path("depth_*.pgm")).files().last(), Some(&path("color_1.png").into()), "the colours as well");
         assert!(matches!(kind("scene:statue:1K"), Source::Scene(_, 1000)), "a scene");
         std::fs::write(path("metadata.yaml"), "rosbag2_bagfile_information:").expect("a file");
         assert!(matches!(kind(&path("")), Source::Recording(_)), "a folder of ROS 2");

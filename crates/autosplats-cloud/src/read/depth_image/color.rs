@@ -18,7 +18,7 @@ const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "ppm"];
 const MAX_BYTES: u64 = 1 << 28;
 
 /// The picture that goes with a depth image, by its name: `depth_1.pgm` and `color_1.png`, `depth/1.png` and `rgb/1.jpg`.
-pub(super) fn beside(path: &Path) -> Option<PathBuf> {
+pub(crate) fn beside(path: &Path) -> Option<PathBuf> {
     let stem = path.file_stem()?.to_str()?;
     let folder = path.parent()?;
     for word in WORDS {

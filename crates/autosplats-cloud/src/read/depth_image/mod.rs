@@ -7,7 +7,7 @@
 //! points.
 
 mod camera;
-mod color;
+pub(crate) mod color;
 mod pgm;
 
 use std::io::Cursor;
