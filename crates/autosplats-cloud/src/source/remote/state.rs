@@ -145,11 +145,11 @@ fn now() -> i64 {
 }
 
 impl State {
-    /// Whether the first points still wait for the transforms of their robot.
+    /// Whether the first points have not come, or still wait for the transforms of their robot.
     pub(super) fn is_settling(&self) -> bool {
         let known = !self.frames.is_empty() || self.graph.transforms() > 0;
         let patience = if known { SETTLING } else { SIGNS };
-        self.first.is_some_and(|first| first.elapsed() < patience)
+        self.first.is_none_or(|first| first.elapsed() < patience)
     }
 
     /// A new channel.
