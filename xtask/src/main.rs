@@ -14,6 +14,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 const USAGE: &str = "\
 usage: cargo xtask test               format, lints, build, tests, documentation, the rules between crates and stages,
                                   Zenoh and programs of others, and a minute of broken files
+       cargo xtask peers              of the tests those of Zenoh and with programs of others, for which it gets a Python
        cargo xtask fuzz [OPTIONS]     broken files for every reader, as long as wanted; --help tells the options
        cargo xtask quality [OPTIONS]  docs/QUALITY.md, from pictures held against the exact surface, in some ten minutes;
                                   --quick and --only NAME take some of them, --out DIR writes elsewhere
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
     let typed: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match typed.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["test"] => root().and_then(test),
+        ["peers"] => root().and_then(peers::alone),
         ["fuzz", options @ ..] => root().and_then(|root| fuzz(root, options)),
         ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::run(root, false)),
@@ -79,9 +81,7 @@ fn test(root: &Path) -> Result<()> {
     let python = RefCell::new(Err(String::new()));
     step("programs of others", &|| {
         *python.borrow_mut() = peers::find_python(root)?;
-        if let Err(why) = &*python.borrow() {
-            eprintln!("LEFT OUT: the tests with recordings and messages of other programs: {why}");
-        }
+        python.borrow().as_ref().err().into_iter().for_each(left_out);
         Ok(())
     })?;
     step("stages import in one direction", &|| layers::check(&root.join("crates/autosplats/src")))?;
@@ -102,7 +102,7 @@ fn test(root: &Path) -> Result<()> {
     step("build", &|| tests(&["--no-run"]))?;
     step("tests", &|| tests(&[]))?;
     if let Ok(python) = &*python.borrow() {
-        step("tests with programs of others", &|| peers::test(root, python))?;
+        step("tests with programs of others", &|| peers::test(root, python, &["--ignored"]))?;
     }
     step("broken files", &|| fuzz(root, &["--seconds", FUZZ_SECONDS]))?;
     step("documentation", &|| {
@@ -111,10 +111,13 @@ fn test(root: &Path) -> Result<()> {
         run(command.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
     println!("\nall passed in {:.0} s", start.elapsed().as_secs_f64());
-    if let Err(why) = &*python.borrow() {
-        eprintln!("LEFT OUT: the tests with recordings and messages of other programs: {why}");
-    }
+    python.borrow().as_ref().err().into_iter().for_each(left_out);
     Ok(())
+}
+
+/// Says that something was not tested, where nobody overlooks it.
+fn left_out(why: &String) {
+    eprintln!("LEFT OUT: the tests with recordings and messages of other programs: {why}");
 }
 
 /// The real scans that some tests read lie beside the repository, as they may not be redistributed. CI has them.

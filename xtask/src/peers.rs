@@ -76,10 +76,38 @@ fn quiet(command: &mut Command) -> Result<(), String> {
     Err(last.map_or_else(|| output.status.to_string(), str::to_owned))
 }
 
-/// The tests with recordings and messages of these programs. They are built already, with the others.
-pub(crate) fn test(root: &Path, python: &Path) -> Result<()> {
+/// The tests that hear and read these programs; by `which` all of them, or those alone that need a Python.
+pub(crate) fn test(root: &Path, python: &Path, which: &[&str]) -> Result<()> {
     let mut command = cargo_command(root);
-    command.args(["test", "--locked", "--workspace"]).args(FEATURES).args(["--test", "remote", "--test", "interop"]);
-    command.args(["--", "--ignored", "--skip", NEEDS_MULTICAST]);
+    command
+        .args(["test", "--locked", "--workspace"])
+        .args(FEATURES)
+        .args(["--test", "remote", "--test", "interop", "--"]);
+    command.args(which).args(["--skip", NEEDS_MULTICAST]);
     run(command.env("AUTOSPLATS_PYTHON", python))
+}
+
+/// These tests without all others.
+pub(crate) fn alone(root: &Path) -> Result<()> {
+    let python = find_python(root)?.map_err(anyhow::Error::msg)?;
+    test(root, &python, &["--include-ignored"])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_program_says_last_is_why_it_failed() {
+        let shell = |script| quiet(Command::new("sh").args(["-c", script]));
+        assert_eq!(shell("echo all is well"), Ok(()), "nothing to tell");
+        assert_eq!(
+            shell("echo first; echo '  the reason  ' >&2; echo >&2; exit 3"),
+            Err("the reason".into()),
+            "in a line"
+        );
+        assert!(shell("exit 3").is_err_and(|why| why.contains('3')), "at least its status");
+        let absent = quiet(&mut Command::new("no-such-program"));
+        assert!(absent.is_err_and(|why| why.starts_with("no-such-program cannot be started")), "nor does it exist");
+    }
 }

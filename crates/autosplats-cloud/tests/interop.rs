@@ -1,6 +1,6 @@
 //! Recordings that programs of others write, read here: `interop/recordings.py` makes them and says what is in them.
 //!
-//! Ignored unless asked for, as it needs Python with what `interop/requirements.txt` lists:
+//! Ignored unless asked for, as it needs Python with what `interop/requirements.txt` lists. `cargo xtask peers` gets one, or:
 //! `AUTOSPLATS_PYTHON=python3 cargo test -p autosplats-cloud --test interop -- --ignored`.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]

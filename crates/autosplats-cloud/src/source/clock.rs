@@ -41,11 +41,11 @@ impl Clock {
             }
             return Order::Onward;
         };
-        let count = match self.row {
-            Some((last, count)) if stamp > last => count + 1,
+        let (count, first) = match self.row {
+            Some((last, count)) if stamp > last => (count + 1, false),
             // The same one sent again.
-            Some((last, count)) if stamp == last => count,
-            _ => 1,
+            Some((last, count)) if stamp == last => (count, false),
+            _ => (1, true),
         };
         let far = Duration::from_nanos(newest.saturating_sub(stamp).unsigned_abs()) > jump;
         if far || count >= ROW {
@@ -53,7 +53,7 @@ impl Clock {
             return Order::Restarted { first: far };
         }
         self.row = Some((stamp, count));
-        Order::Behind { first: count == 1 }
+        Order::Behind { first }
     }
 }
 

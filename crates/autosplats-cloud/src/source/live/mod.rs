@@ -70,7 +70,11 @@ impl Live {
         let filled = Arc::clone(&mailbox);
         let path = PathBuf::from(name);
         let work = move || {
-            if let Err(error) = guarded(&path, || Ok(work(&filled))) {
+            let done = guarded(&path, || {
+                work(&filled);
+                Ok(())
+            });
+            if let Err(error) = done {
                 filled.refuse(error);
             }
             filled.end();

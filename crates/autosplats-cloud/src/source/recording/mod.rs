@@ -14,6 +14,7 @@ mod index;
 mod mcap;
 mod play;
 mod summary;
+#[cfg_attr(not(feature = "zenoh"), allow(dead_code, reason = "transforms are heard as they are sent over Zenoh alone"))]
 pub(super) mod transforms;
 
 use std::{collections::HashMap, path::Path};

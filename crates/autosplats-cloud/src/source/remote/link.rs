@@ -67,18 +67,19 @@ fn run(address: &Address, shared: &Arc<Shared>) {
     let mut heard = BTreeMap::new();
     // Kept as long as they are to be heard.
     let mut tokens = Vec::new();
-    let keys = if address.topic.is_empty() { Vec::new() } else { address.keys() };
-    let points = keys.into_iter().try_for_each(|key| hear(&session, key, shared, &mut heard));
-    let places = address.transform_keys().iter().try_for_each(|key| {
-        tokens.push(hear_transforms(&session, key, shared)?);
+    // Points last, so that whatever else there is to be known of them comes no later.
+    let declared = Graph::keys(address).iter().try_for_each(|key| {
+        tokens.push(watch(&session, key, shared)?);
         Ok(())
     });
-    let declared = points.and(places).and_then(|()| {
-        Graph::keys(address).iter().try_for_each(|key| {
-            tokens.push(watch(&session, key, shared)?);
+    let declared = declared.and_then(|()| {
+        address.transform_keys().iter().try_for_each(|key| {
+            tokens.push(hear_transforms(&session, key, shared)?);
             Ok(())
         })
     });
+    let keys = if address.topic.is_empty() { Vec::new() } else { address.keys() };
+    let declared = declared.and_then(|()| keys.into_iter().try_for_each(|key| hear(&session, key, shared, &mut heard)));
     if let Err(error) = declared {
         shared.lock().refuse(format!("nothing can be subscribed to: {error}"));
     }

@@ -46,7 +46,7 @@ const SETTLE: Duration = Duration::from_millis(10);
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RemoteOptions {
     /// The coordinate frame that all points are brought into; the topmost that is known of the first sensor, a second after its
-    /// first points, if there is none.
+    /// first points, if there is none. So long these wait for transforms, or 0.3 s if nobody publishes any.
     pub frame: Option<String>,
     /// How points are read.
     pub read: ReadOptions,

@@ -18,7 +18,9 @@ use crate::Statistics;
 const MAX_CHANNELS: usize = 64;
 /// Time without a message that is worth telling.
 const SILENCE: Duration = Duration::from_secs(5);
-/// How long the first points wait for transforms, where somebody publishes some: those of a robot come at least every second.
+/// How long the first points wait for a sign that somebody publishes transforms, and if so for these: those of a robot come at
+/// least every second.
+const SIGNS: Duration = Duration::from_millis(300);
 const SETTLING: Duration = Duration::from_secs(1);
 
 /// State and its lock.
@@ -143,10 +145,11 @@ fn now() -> i64 {
 }
 
 impl State {
-    /// Whether the first points still wait for the transforms of their robot.
+    /// Whether the first points have not come, or still wait for the transforms of their robot.
     pub(super) fn is_settling(&self) -> bool {
-        let soon = self.first.is_some_and(|first| first.elapsed() < SETTLING);
-        soon && (!self.frames.is_empty() || self.graph.transforms() > 0)
+        let known = !self.frames.is_empty() || self.graph.transforms() > 0;
+        let patience = if known { SETTLING } else { SIGNS };
+        self.first.is_none_or(|first| first.elapsed() < patience)
     }
 
     /// A new channel.
