@@ -38,6 +38,10 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
             painter.rect_filled(rect, 0.0, Color32::from_rgb(0x2b, 0x30, 0x37));
             if app.document().layers.is_empty() && app.loader.jobs().is_empty() && app.playing.is_empty() {
                 welcome(app, ui, rect);
+            } else if let Some(waiting) = app.playing.waiting().next() {
+                let text = format!("{}: {}", waiting.input.name, waiting.why);
+                let (font, color) = (egui::FontId::proportional(15.0), Color32::from_gray(190));
+                painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, color);
             }
         }
         tools::show(app, ui, rect, size);

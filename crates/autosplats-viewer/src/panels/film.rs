@@ -233,7 +233,7 @@ fn time(app: &mut App, ui: &mut egui::Ui) {
     let around = if film.time == Time::Runs && film.seconds * speed > end - begin { around } else { "" };
     let words = match film.time {
         Time::Stands => format!("{:.2} s in all pictures", app.playing.clock.position()),
-        _ => format!("{begin:.2} to {end:.2} s, {speed:.2} of them a second{around}"),
+        _ => format!("{begin:.2} to {end:.2} s at {speed:.2}×{around}"),
     };
     ui.weak(words).on_hover_text("Begin, end, speed and loop are those of the timeline");
     if app.playing.is_live() {

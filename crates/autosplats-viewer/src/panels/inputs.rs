@@ -61,7 +61,7 @@ fn waiting(app: &mut App, ui: &mut egui::Ui) {
         });
         ui.horizontal_wrapped(|ui| {
             ui.add_space(22.0);
-            ui.spinner();
+            // Nothing that turns: it would draw the window all the while.
             ui.small(if read > 0.0 { format!("{why}, {:.0} %", 100.0 * read) } else { why });
         });
         ui.add_space(4.0);

@@ -81,6 +81,8 @@ pub(crate) enum Answer {
 struct Post {
     wish: Option<Wish>,
     tasks: VecDeque<Task>,
+    /// Whether the thread has something in work.
+    working: bool,
     closed: bool,
 }
 
@@ -130,6 +132,13 @@ impl RenderThread {
     pub(crate) fn task(&self, task: Task) {
         self.shared.lock().tasks.push_back(task);
         self.shared.news.notify_one();
+    }
+
+    /// Whether everything asked for has been done, whose answers may still be on their way.
+    #[cfg(test)]
+    pub(crate) fn is_idle(&self) -> bool {
+        let post = self.shared.lock();
+        post.wish.is_none() && post.tasks.is_empty() && !post.working
     }
 
     /// The next that comes, if it comes in time.

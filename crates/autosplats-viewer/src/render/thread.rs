@@ -27,6 +27,7 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
                 if post.closed {
                     return;
                 }
+                post.working = !post.tasks.is_empty() || post.wish.is_some();
                 if let Some(task) = post.tasks.pop_front() {
                     break (Some(task), None);
                 }

@@ -124,9 +124,9 @@ fn rest(window: &mut Window) -> f64 {
     app.panels.film.stop();
     window.until("everything is closed", |window| {
         let app = window.app();
-        app.loader.jobs().is_empty() && app.document().layers.is_empty() && app.shot.is_none()
+        app.loader.jobs().is_empty() && app.document().layers.is_empty() && app.render.is_idle()
     });
-    // What the threads still have in work is let go of, too.
+    // What has been done meanwhile is taken in, and what threads that write have in work is let go of.
     for _ in 0..10 {
         std::thread::sleep(Duration::from_millis(5));
         window.step();
@@ -137,8 +137,8 @@ fn rest(window: &mut Window) -> f64 {
 /// Does anything for so long; what is left when everything is closed may grow by so many megabytes.
 ///
 /// While things are open memory goes up and down by hundreds of megabytes, in which a leak would not be seen. So everything is
-/// closed every now and then, and what is still allocated counts. Buffers and caches are as large as they get after a third of
-/// the time; what is more in the last third than in the middle one, each at its least, is lost.
+/// closed every now and then, as in the beginning, and what is still allocated counts. Caches are as large as they get after a
+/// third of the time; what is more in the last third than in the middle one, each at its least, is lost.
 fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     let mut window = Window::with_statue();
     let mut chance = Chance(seed);
