@@ -61,6 +61,8 @@ pub fn paper() -> Reconstruction {
         ellipses: false,
         grid_culling: true,
         depth_refinement: true,
+        coherent: false,
+        frames_averaged: 1,
     }
 }
 

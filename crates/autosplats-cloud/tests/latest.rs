@@ -148,6 +148,18 @@ fn messages_that_are_late_or_sent_twice_set_no_clock_back() {
 }
 
 #[test]
+fn no_single_stamp_takes_away_what_is_accumulated() {
+    let mut latest = one(LatestOptions { accumulate: true, ..LatestOptions::default() });
+    for time in [100_000, 100_100, 900_000, 100_200, 100_300, 5, 900_100] {
+        assert_eq!(latest.put(0, update(0, time, 1)), Arrival::Shown, "at {time}");
+    }
+    assert_eq!(latest.cloud().len(), 7, "all, however far apart");
+    let again = [0, 100, 200, 300].map(|time| latest.put(0, update(0, time, 10)));
+    assert_eq!(again, [Arrival::Shown, Arrival::Shown, Arrival::Shown, Arrival::Restarted], "four in a row begin anew");
+    assert_eq!(latest.cloud().len(), 40, "and what came since then is kept");
+}
+
+#[test]
 fn a_stream_that_is_played_again_shows_its_first_frame_once_it_is_there() {
     let mut latest = one(LatestOptions::default());
     latest.put(0, update(0, 900, 9));

@@ -285,6 +285,10 @@ impl App {
         let mut look = self.look.clone();
         // It lies over the picture here, where it stays as large when pictures become coarse.
         look.settings.shading.legend = false;
+        if self.playing.frame_ms().is_none() {
+            // At rest it is of its points alone, not of a coarser picture before it.
+            look.settings.reconstruction.frames_averaged = 1;
+        }
         let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
         let hurried = self.both_ms(moving).is_some();
         let key = WishKey { version, camera, size, look, axes, hurried };

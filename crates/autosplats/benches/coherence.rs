@@ -1,14 +1,15 @@
-//! What temporal coherence saves: `cargo bench -p autosplats --bench coherence [-- quick] [gpu]`.
+//! What temporal coherence saves: `cargo bench -p autosplats --bench coherence [-- quick] [gpu] [SCENE]`.
 //!
 //! Cameras that orbit and walk, and points that are new in each frame, rendered by two renderers in turns: one starts its
-//! searches from the last frame's k-radii, the other from densities. Their pictures have to be equal. `gpu` is for the search
-//! engines on a device; `quick` only shows that the benchmark runs. Times are medians.
+//! searches from the last frame's k-radii, the other from densities. Their pictures have to be equal. `gpu` is for a device;
+//! `quick` only shows that the benchmark runs. Times are medians.
 
+#[allow(dead_code, reason = "others use the rest")]
 mod common;
 
 use autosplats::cloud::glam::{DQuat, DVec3};
 use autosplats::cloud::{PointCloud, Scene};
-use autosplats::{Backend, Camera, Reconstruction, Renderer, SearchEngine, Settings, Timings};
+use autosplats::{Backend, Camera, Reconstruction, Renderer, Settings, Timings};
 
 use common::{SIZE, args, machine, median, scene, short};
 
@@ -49,26 +50,19 @@ impl Motion {
 struct Measured {
     search: f64,
     frame: f64,
-    /// Mean number, of an engine that iterates.
-    iterations: f64,
 }
 
-fn measured(frames: &[(Timings, usize)]) -> Measured {
-    let middle = |of: fn(&Timings) -> f64| median(frames.iter().map(|(timings, _)| of(timings)));
-    let iterations = frames.iter().map(|&(_, iterations)| iterations as f64).sum::<f64>() / frames.len() as f64;
-    Measured { search: middle(|t| t.search), frame: middle(|t| t.frame), iterations }
+fn measured(frames: &[Timings]) -> Measured {
+    let middle = |of: fn(&Timings) -> f64| median(frames.iter().map(of));
+    Measured { search: middle(|t| t.search), frame: middle(|t| t.frame) }
 }
 
 fn main() {
     let has = |name: &str| args().iter().any(|arg| arg == name);
     let (quick, gpu) = (has("quick"), has("gpu"));
     let backend = if gpu { Backend::Gpu } else { Backend::Cpu };
-    let paper = Reconstruction { engine: SearchEngine::SplatCommunication, ..Reconstruction::paper() };
-    let ways: &[(&str, Reconstruction)] = &[
-        ("screen grid", Reconstruction::default()),
-        ("screen grid, k = 17", Reconstruction { k: 17, ..Reconstruction::default() }),
-        ("splat communication", paper),
-    ];
+    let ways: &[(&str, Reconstruction)] =
+        &[("10", Reconstruction::default()), ("17", Reconstruction { k: 17, ..Reconstruction::default() })];
     let cases = [
         ("statue", 1_000_000, Motion::Still),
         ("statue", 1_000_000, Motion::Orbit(1.0)),
@@ -78,10 +72,8 @@ fn main() {
         ("figure", 200_000, Motion::Animation),
     ];
     println!("{}\n", machine());
-    println!(
-        "| scene | points | motion | engine | search ms without | with | ratio | frame ms without | with | iterations |"
-    );
-    println!("|---|--:|---|---|--:|--:|--:|--:|--:|--:|");
+    println!("| scene | points | motion | k | search ms without | with | ratio | frame ms without | with |");
+    println!("|---|--:|---|--:|--:|--:|--:|--:|--:|");
     let named: Vec<_> = args().into_iter().filter(|arg| cases.iter().any(|(name, ..)| name == arg)).collect();
     for (name, points, motion) in cases {
         if !named.is_empty() && !named.iter().any(|wanted| wanted == name) {
@@ -91,14 +83,10 @@ fn main() {
         let (cloud, camera) = scene(name, points);
         let frames = if quick { 3 } else { FRAMES };
         let clouds = clouds(name, points, motion, frames, cloud);
-        for (engine, reconstruction) in ways.iter().filter(|(_, way)| gpu || way.engine == SearchEngine::ScreenGrid) {
+        for (k, reconstruction) in ways {
             let [without, with] = compare(backend, reconstruction, &clouds, &|frame| motion.camera(&camera, frame));
-            let iterations = match reconstruction.engine {
-                SearchEngine::SplatCommunication => format!("{:.1} and {:.1}", without.iterations, with.iterations),
-                _ => String::new(),
-            };
             println!(
-                "| {name} | {} | {motion:?} | {engine} | {:.1} | {:.1} | {:.2} | {:.1} | {:.1} | {iterations} |",
+                "| {name} | {} | {motion:?} | {k} | {:.1} | {:.1} | {:.2} | {:.1} | {:.1} |",
                 short(points),
                 without.search,
                 with.search,
@@ -134,16 +122,13 @@ fn compare(
         let [without, with] = renderers.each_mut().map(|(renderer, settings, times)| {
             let frame = renderer.render(cloud, &camera(at), SIZE, settings).expect("valid settings");
             let (timings, pixels) = (frame.timings, frame.image.pixels.clone());
-            let iterations = renderer.convergence().expect("a device").len().saturating_sub(1);
             // The first frame makes the buffers.
             if at > 0 {
-                times.push((timings, iterations));
+                times.push(timings);
             }
             pixels
         });
-        if reconstruction.engine == SearchEngine::ScreenGrid {
-            assert!(without == with, "the past changed frame {at}");
-        }
+        assert!(without == with, "the past changed frame {at}");
     }
     renderers.map(|(_, _, times)| measured(&times))
 }

@@ -92,7 +92,8 @@ pub(super) fn run(
     if let (Some(shot), Some((_, first))) = (shown.take(), &first_frame) {
         hand_over(shot, Some(first.elapsed().as_secs_f64()), rate, &mut tally, &writer);
     }
-    let written = writer.finish(tally.written > 0 && rendered.is_ok());
+    // What cannot be shown of what comes later takes nothing from what was.
+    let written = writer.finish(tally.written > 0);
     rendered.and(written)?;
     let Statistics { dropped, refused, waiting, .. } = streams.statistics();
     drop(streams);

@@ -141,8 +141,12 @@ impl Place {
         job.settle_first_radius(renderer, &first, &camera)?;
         let plain = matches!(job.settings.shading.color, ColorMode::Plain | ColorMode::Rgb | ColorMode::Normal);
         if job.settings.shading.range.is_none() && !plain {
+            // No frame is to be averaged with this one.
+            let averaged = std::mem::replace(&mut job.settings.reconstruction.frames_averaged, 1);
             let range = job.render(renderer, &first, &camera)?.counts.value_range;
-            job.settings.shading.range = range.map(|ends| ends.map(|end| end as f32));
+            job.settings.reconstruction.frames_averaged = averaged;
+            let ends = range.map(|ends| ends.map(|end| end as f32));
+            job.settings.shading.range = ends.filter(|[low, high]| low < high);
         }
         Ok(camera)
     }

@@ -138,7 +138,9 @@ fn write_film(
             for _ in 0..report.pictures.unwrap_or(1) {
                 film.add(&image).map_err(film_failure)?;
             }
-            reports.push(report);
+            if style.json {
+                reports.push(report);
+            }
             let _ = written.send(image);
         }
         if interrupt::requested() {
@@ -151,7 +153,7 @@ fn write_film(
         film.finish().map_err(film_failure)?;
     }
     // Only now is there something to tell of.
-    if style.json { reports.iter().try_for_each(tell) } else { Ok(()) }
+    reports.iter().try_for_each(tell)
 }
 
 fn tell(report: &FrameReport) -> Result<(), Failure> {

@@ -39,6 +39,7 @@ pub enum Arrival {
     Shown,
     /// It is shown, and what was known of its sensor before its clock went back is forgotten: it went back by more than a second
     /// and more than is kept, or this is the fourth in a row that is older than the newest and newer than the one before it.
+    /// Where everything is kept it takes both.
     Restarted,
     /// Older than what had come before, and than all that is kept.
     Late,
@@ -140,13 +141,20 @@ impl Latest {
         if sensor.restarts {
             *sensor = Sensor::default();
         }
+        let accumulate = self.options.accumulate;
         let keeps = self.options.decay.unwrap_or_default();
+        let jump = keeps.max(JUMP);
+        let behind = |sensor: &Sensor| {
+            let newest = sensor.kept.back().map_or(i64::MIN, |kept| kept.stamp);
+            Duration::from_nanos(newest.saturating_sub(stamp).max(0).unsigned_abs())
+        };
         let mut restarted = false;
-        match sensor.clock.hear(stamp, keeps.max(JUMP)) {
+        // Where everything is kept no single stamp may take it all away.
+        match sensor.clock.hear(stamp, if accumulate { Duration::MAX } else { jump }) {
             Order::Onward => {}
             Order::Behind { first } => sensor.since = if first { self.arrivals } else { sensor.since },
-            // Where everything is kept, late points are shown as any, so that none need to go for them.
-            Order::Restarted { first } if first || !self.options.accumulate => {
+            // There late points are shown as any, so that none need to go for them.
+            Order::Restarted { first } if !accumulate || behind(sensor) > jump => {
                 let since = if first { self.arrivals } else { sensor.since };
                 sensor.kept.retain(|kept| kept.arrival >= since);
                 self.statistics.restarted += 1;
@@ -154,14 +162,12 @@ impl Latest {
             }
             Order::Restarted { .. } => {}
         }
-        let newest = sensor.kept.back().map_or(i64::MIN, |kept| kept.stamp);
-        let behind = Duration::from_nanos(newest.saturating_sub(stamp).max(0).unsigned_abs());
         let at = sensor.kept.partition_point(|kept| kept.stamp < stamp);
         if sensor.kept.get(at).is_some_and(|kept| kept.stamp == stamp) {
             self.statistics.duplicates += 1;
             return Arrival::Duplicate;
         }
-        if behind > keeps && !self.options.accumulate {
+        if !accumulate && behind(sensor) > keeps {
             self.statistics.late += 1;
             return Arrival::Late;
         }

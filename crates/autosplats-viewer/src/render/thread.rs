@@ -135,7 +135,10 @@ impl Studio {
     /// What is asked of the renderer for a task.
     fn settings(&mut self, wish: &Wish, shown: &Shown, outbox: &Outbox) -> Result<Settings, Error> {
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
-        Ok(settings(wish, &shown.cloud, gpu).0)
+        let mut settings = settings(wish, &shown.cloud, gpu).0;
+        // What is done once does not follow any other picture.
+        settings.reconstruction.frames_averaged = 1;
+        Ok(settings)
     }
 
     /// Makes a picture, unless `go_on` says that another one is more urgent.

@@ -40,6 +40,8 @@ pub(super) struct CpuRenderer {
     linear: [f32; 256],
     /// Of the last frame.
     seen: Option<Seen>,
+    /// Of the last frame that was averaged, if its layers are still there.
+    averaged: Option<Seen>,
 }
 
 impl Default for CpuRenderer {
@@ -59,6 +61,7 @@ impl Default for CpuRenderer {
             image: Image::default(),
             linear: linear_steps(),
             seen: None,
+            averaged: None,
         }
     }
 }
@@ -97,7 +100,7 @@ impl CpuRenderer {
         }
         let wanted = Wanted::new(cloud, settings)?;
         // From here on nothing fails, but it may be given up; then there are no surfels.
-        let before = self.seen.take();
+        self.seen = None;
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
@@ -120,6 +123,7 @@ impl CpuRenderer {
             splatter,
             image,
             seen: last_seen,
+            averaged,
             ..
         } = self;
         let mut clock = Clock::start(go_on);
@@ -153,7 +157,8 @@ impl CpuRenderer {
         splatter.begin(&view);
         let nothing = DepthNoise::default();
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
-        let before = before.map(|before| Reprojection::new(&now, &before));
+        let smooths = settings_splat.smoothing() > 0.0 && given.is_none();
+        let before = averaged.filter(|_| smooths).map(|before| Reprojection::new(&now, &before));
         let reconstruct = Reconstruct { screen, view: &view, settings, past, before, sensors, depth_noise, given };
         let mut search_counts =
             reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock)?;
@@ -174,6 +179,7 @@ impl CpuRenderer {
             splatter.refine(surfels, &view);
             splatter.refine(surfels, &view);
         }
+        *averaged = None;
         splatter.attributes(surfels, &view, &attributes);
         let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
         clock.lap(|timings| &mut timings.splat)?;
@@ -182,6 +188,7 @@ impl CpuRenderer {
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_seen = Some(now);
+        *averaged = smooths.then_some(now);
         past.end();
 
         let dropped = screen.dropped;
@@ -211,7 +218,7 @@ struct Reconstruct<'a> {
     view: &'a View,
     settings: &'a Settings,
     past: &'a Past,
-    /// The last frame, if it was drawn to its end.
+    /// The last frame, if surfels are to be drawn towards it.
     before: Option<Reprojection>,
     sensors: &'a Sensors,
     depth_noise: &'a DepthNoise,
@@ -272,9 +279,7 @@ impl Reconstruct<'_> {
         sensors.orient(&mut surfels[first..], view);
         clock.lap(|timings| &mut timings.fit)?;
 
-        if let Some(before) = before
-            && settings.smoothing() > 0.0
-        {
+        if let Some(before) = before {
             splatter.smooth(&mut surfels[first..], &before, settings.smoothing(), view);
         }
         splatter.add(surfels, first, view);

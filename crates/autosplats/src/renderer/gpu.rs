@@ -300,6 +300,7 @@ impl GpuRenderer {
         *times = recorder.finish();
         // What was not submitted left the surfels as they were.
         *last_view = Some(*view);
+        prepared.seen = Some(Seen { view: *view, origin: cloud.origin() });
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
@@ -368,6 +369,7 @@ impl GpuRenderer {
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
         recorder.finish();
         *last_view = Some(*view);
+        prepared.seen = Some(now);
         gpu.check_lost()
     }
 
@@ -493,7 +495,7 @@ impl Prepared {
             ..FrameUniform::new(&now.view, reconstruction.k)
         };
         // Steps that are made anew leave nothing to look back at, and those of another k are.
-        let past = self.seen.replace(now).filter(|_| self.shape.coherent || self.shape.smooth);
+        let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
         let told = past.map_or(told, |past| told.after(&Reprojection::new(&now, &past)));
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
         self.picture.write(gpu, shading, &settings.shading);

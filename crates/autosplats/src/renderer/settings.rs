@@ -51,12 +51,13 @@ pub struct Reconstruction {
     /// Redraw the depth map twice without the splats of hidden points [Paper, §7].
     pub depth_refinement: bool,
     /// Temporal coherence: start the search of each point from the k-radius that the last frame of the same [`Renderer`] found
-    /// where the point was then. It saves time and changes no picture; [`SearchEngine::KdTree`] goes without.
+    /// where the point was then. It saves time and changes no picture. Of [`SearchEngine::ScreenGrid`]; the paper's and its rival
+    /// take each frame by itself.
     ///
     /// [`Renderer`]: crate::Renderer
     pub coherent: bool,
     /// Temporal smoothing, for live points that are noisy anew in each frame: surfaces are averaged over about so many frames
-    /// of the same [`Renderer`], 1 to 32. 1, the default, takes each frame by itself. What moves lags behind, unless it moves by
+    /// of the same [`Renderer`], 1 to 32, that follow each other with such a setting. 1, the default, takes each frame by itself. What moves lags behind, unless it moves by
     /// more than half its k-radius a frame; a frame then depends on those before.
     ///
     /// [`Renderer`]: crate::Renderer
@@ -100,7 +101,7 @@ impl Reconstruction {
 
     /// Whether the search of a frame starts from what the last one found.
     pub(super) fn remembers(&self) -> bool {
-        self.coherent && !matches!(self.engine, SearchEngine::KdTree { .. })
+        self.coherent && self.engine == SearchEngine::ScreenGrid
     }
 
     /// Whether halves of pixels keep a point each.

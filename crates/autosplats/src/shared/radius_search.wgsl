@@ -2,21 +2,14 @@
 
 // Between which distances the k-th neighbour is being looked for: a and b of the paper.
 struct Search {
-    // While the radius expands, the distance to the furthest neighbour, below 0; see first_sample. Before the first step, and
-    // while it is being tried, a radius that is likely by the last frame; 0 before it if there is none.
+    // While the radius expands, the distance to the furthest neighbour, below 0; see first_sample.
     low: f32,
     // Below 0 before the first step; 0 if the point is not a query and only answers. Once the search has ended, the radius
     // of the neighbourhood.
     high: f32,
-    // Neighbours up to `low`; LIKELY if a likely radius is being tried; or, below 0, how the search ended.
+    // Neighbours up to `low`; or, below 0, how the search ended.
     count: f32,
 }
-
-// No number of neighbours. Whoever asks so wants to be told of all up to `high`.
-const LIKELY = 0.5;
-// Where the radii to be tried lie, about the likely one. A little above it is where it is found again, if the neighbours are the
-// same: distances differ by the rounding of another view's coordinates.
-const TRIED = vec4f(0.95, 1.001, 1.06, 1.2);
 
 const FOUND = -1.0;
 // No neighbour is near enough.
@@ -54,7 +47,7 @@ fn has_neighbors(search: Search) -> bool {
 // Whether a point at this distance is among those that the search is to be told of: the delta region; all of the
 // neighbourhood once it has ended.
 fn is_within(search: Search, distance: f32) -> bool {
-    return distance <= search.high && (distance > abs(search.low) || search.count <= LIKELY);
+    return distance <= search.high && (distance > abs(search.low) || search.count <= 0.0);
 }
 
 // How much a radius with so many neighbours expands at most: α of [Paper, §5.2].
@@ -73,9 +66,6 @@ fn first_sample(search: Search) -> f32 {
 
 // The m = 4 radii at which neighbours are counted. Fused, so that every pass gets the same bits.
 fn sample_radii(search: Search) -> vec4f {
-    if search.count == LIKELY {
-        return vec4f(min((search.low * TRIED).xyz, vec3f(search.high)), search.high);
-    }
     let low = first_sample(search);
     let radii = fma(vec4f(search.high - low), vec4f(0.25, 0.5, 0.75, 1.0), vec4f(low));
     return vec4f(radii.xyz, search.high);
@@ -101,9 +91,6 @@ struct Known {
 
 fn recall(radii: vec4f, counters: vec4f) -> Known {
     let asked = Search(radii.x, radii.y, radii.z);
-    if asked.count == LIKELY {
-        return Known(asked, radii.w, counters);
-    }
     return Known(asked, max(abs(radii.x), radii.w), max(asked.count, 0.0) + counters);
 }
 
@@ -114,25 +101,12 @@ fn advance(known: Known, initial_radius: f32, others: f32) -> Search {
         return asked;
     }
     if asked.high < 0.0 {
-        return first_step(asked.low, initial_radius);
+        return Search(0.0, initial_radius, 0.0);
     }
     if known.counts.w < f32(frame.k) {
         return expand(known, initial_radius, others);
     }
     return bracket(known);
-}
-
-// A likely radius is tried, but nothing beyond the radius up to which no rule can have ended the neighbourhood: the rules are
-// looked at from there on.
-fn first_step(likely: f32, initial_radius: f32) -> Search {
-    if likely == 0.0 {
-        return Search(0.0, initial_radius, 0.0);
-    }
-    let unruled = min(frame.gap_growth, frame.outlier_growth) * initial_radius;
-    if likely * TRIED.y < unruled {
-        return Search(likely, min(likely * TRIED.w, unruled), LIKELY);
-    }
-    return Search(0.0, unruled, 0.0);
 }
 
 fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
@@ -162,9 +136,6 @@ fn bracket(known: Known) -> Search {
     let counts = known.counts;
     // The last sample below k neighbours and the first with them.
     var low = vec2f(first_sample(known.asked), known.asked.count);
-    if known.asked.count == LIKELY {
-        low = vec2f(0.0);
-    }
     var high = vec2f(radii.x, counts.x);
     for (var sample = 1u; sample < 4u; sample++) {
         if high.y < k {

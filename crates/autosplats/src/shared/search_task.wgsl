@@ -1,4 +1,4 @@
-// What all queries of a search's workgroup need to know. Imports: counters. The including pass binds `counters` as atomics.
+// What all queries of a search's workgroup need to know. Imports: counters, window, window_points. The including pass binds `counters` as atomics.
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
@@ -39,4 +39,10 @@ fn task_load() {
     task.strip_px = atomicLoad(&counters[STRIP_PX]);
     task.cell_px = atomicLoad(&counters[CELL_PX]);
     task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+}
+
+// Whether the bound on searches is beyond this radius: it is one of radii BOUND_STEP apart.
+fn is_unbounded(center: vec3f, radius: f32) -> bool {
+    let beyond = window_of_sphere(center, 1.01 * BOUND_STEP * radius);
+    return window_len(beyond, task.strip_px, MAX_CANDIDATES) <= MAX_CANDIDATES;
 }

@@ -318,7 +318,6 @@ fn the_same_frame_twice_is_the_same_to_the_byte() {
 /// A renderer that has seen other views, sizes and points before makes the same picture, to the byte.
 #[test]
 fn the_frames_before_leave_no_trace() {
-    let settings = Settings { all_layers: true, ..Settings::default() };
     let (cloud, camera) = scene("herd", 100_000);
     let (other, _) = scene("statue", 50_000);
     let step = |part: f64| Camera { eye: camera.eye + part * (camera.look_at - camera.eye), ..camera };
@@ -331,7 +330,10 @@ fn the_frames_before_leave_no_trace() {
         (&cloud, step(0.31), [SIZE[0] / 2, SIZE[1]]),
         (&cloud, step(0.31), SIZE),
     ];
-    for mut renderer in [Some(Renderer::new()), gpu()].into_iter().flatten() {
+    let renderers = [10, 17].into_iter().flat_map(|k| [(Some(Renderer::new()), k), (gpu(), k)]);
+    for (mut renderer, k) in renderers.filter_map(|(renderer, k)| Some((renderer?, k))) {
+        let reconstruction = Reconstruction { k, ..Reconstruction::default() };
+        let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
         for (at, (cloud, camera, size)) in frames.iter().enumerate() {
             let picture = |renderer: &mut Renderer, settings: &Settings| {
                 let frame = renderer.render(cloud, camera, *size, settings).expect("a picture");
@@ -341,7 +343,7 @@ fn the_frames_before_leave_no_trace() {
             let after = picture(&mut renderer, &settings);
             let backend = if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu };
             let mut fresh = Renderer::with_backend(backend).expect("a device");
-            assert!(picture(&mut fresh, &settings) == after, "{backend:?}, frame {at}");
+            assert!(picture(&mut fresh, &settings) == after, "{backend:?}, k = {k}, frame {at}");
             let reconstruction = Reconstruction { coherent: false, ..settings.reconstruction.clone() };
             let alone = Settings { reconstruction, ..settings.clone() };
             assert!(picture(&mut fresh, &alone) == after, "{backend:?}, frame {at}, each by itself");

@@ -44,7 +44,13 @@ impl Frames {
         if self.robots.len() >= MOST_ROBOTS && !self.robots.contains_key(&key) {
             return Err(format!("there are transforms of {MOST_ROBOTS} other robots already; name fewer topics"));
         }
-        self.robots.entry(key).or_default().hear(message, fixed, arrival)
+        let known = self.robots.contains_key(&key);
+        let heard = self.robots.entry(key.clone()).or_default().hear(message, fixed, arrival);
+        if heard.is_err() && !known {
+            // What says nothing makes no robot.
+            self.robots.remove(&key);
+        }
+        heard
     }
 
     /// Where points of a sensor's frame belong that were measured at a time. Nothing if no transforms say anything of them; an

@@ -1,6 +1,5 @@
 //! The k-radii of the last frame on the GPU.
 
-use super::{LIKELY, SLACK};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{ScreenBuffers, Work};
@@ -9,11 +8,6 @@ use crate::project::gpu::{ScreenBuffers, Work};
 pub(crate) const PASSES: &[PassSource] = &[CLEAR_PAST, KEEP_PAST];
 const CLEAR_PAST: PassSource = PassSource::new("search/past/clear_past", include_str!("clear_past.wgsl"));
 const KEEP_PAST: PassSource = PassSource::new("search/past/keep_past", include_str!("keep_past.wgsl"));
-
-/// The overrides of passes that read `shared/past.wgsl`.
-pub(crate) const CONSTANTS: [(&str, f64); 2] = [("LEAST_LIKELY", LIKELY[0] as f64), ("MOST_LIKELY", LIKELY[1] as f64)];
-/// And of those that take a slack.
-pub(crate) const SLACK_CONSTANT: (&str, f64) = ("SLACK", SLACK as f64);
 
 /// Room for the k-radii of pictures of `size`; for none if it is `None`.
 ///

@@ -71,6 +71,30 @@ fn the_past_changes_nothing() {
     }
 }
 
+/// Sparse points beside a crowd may meet the bound on search work, whatever radius their search started from.
+#[test]
+fn the_past_changes_nothing_at_the_bound() {
+    let mut random = Random::new(6);
+    let mut positions = test_clouds::plane(400);
+    positions.extend(test_clouds::clumps(30_000));
+    positions.extend(test_clouds::outliers(2000));
+    let mut bounded = 0;
+    for camera in cameras() {
+        for k in [10, 64] {
+            let (screen, view) = projected(&positions, &camera, [400, 300], &ProjectRules::usual(k));
+            assert!(screen.points.len() > 4096, "more than are read: {}", screen.points.len());
+            let rules = SearchRules { k, outlier_expansions: None, gap_factor: None };
+            let without = search(&screen, &view, &rules, &Past::default());
+            bounded += without.1.bounded;
+            for radii in [found(&screen, &view, k), garbage(&screen, &view, k, &mut random)] {
+                let with = search(&screen, &view, &rules, &past(&view, k, &radii));
+                assert!(with == without, "k = {k}, {:?}", camera.projection);
+            }
+        }
+    }
+    assert!(bounded > 0, "some meet the bound");
+}
+
 /// The radius of a point is known again after a step aside, unless it was not in the picture.
 #[test]
 fn radii_are_found_again_from_elsewhere() {

@@ -125,7 +125,7 @@ fn search_block<S: Simd>(
         let (window, group) = block.next_window(task);
         let everything = window.is_all();
         let crowded = window.candidates(&screen.cells) > CROWDED;
-        let bound: [f32; LANES] = std::array::from_fn(|lane| match crowded & group[lane] {
+        let mut bound: [f32; LANES] = std::array::from_fn(|lane| match crowded & group[lane] {
             true => block.bound_radius(lane, task),
             false => f32::INFINITY,
         });
@@ -137,10 +137,15 @@ fn search_block<S: Simd>(
         let mut done = [false; LANES];
         if enough {
             kth_smallest(simd, &scratch.squared, rules.k, &group, &mut block.threshold);
-            let inside = block.spheres_inside(&window, view);
+            let spheres = block.spheres(view);
             for lane in 0..LANES {
                 // Points so far away that their squared distance overflows are nobody's neighbours.
-                exact[lane] = group[lane] & (inside[lane] | everything) & block.threshold.0[lane].is_finite();
+                let inside = window.contains(&spheres[lane]) | everything;
+                exact[lane] = group[lane] & inside & block.threshold.0[lane].is_finite();
+                // Where few points were read as well, if there are many a little further out: then it does not matter what was.
+                if exact[lane] & !crowded && !spheres[lane].is_small() && block.meets_bound(lane, task) {
+                    bound[lane] = block.bound_radius(lane, task);
+                }
                 exact[lane] &= block.threshold.0[lane].sqrt() <= bound[lane];
             }
             done = unruled(simd, &scratch.squared, &block, rules, &exact);
@@ -160,6 +165,7 @@ fn search_block<S: Simd>(
             let known = known.min(bound[lane]);
             let upper = if enough { kth_radius } else { f32::INFINITY };
             sort_lane(&scratch.squared, lane, known, &mut scratch.sorted);
+            let crowded = crowded | bound[lane].is_finite();
             let verdict =
                 judge(task, &block, lane, &scratch.sorted, Known { radius: known, exact: exact[lane], upper, crowded });
             if let Verdict::Grow(radius) = verdict {
@@ -346,6 +352,15 @@ impl Block {
         full.map(|lane| out.k_radius.0[lane] / self.likely.0[lane]).reduce(f32::max)
     }
 
+    /// Whether the bound on search work may be nearer than the threshold of a lane.
+    #[inline(never)]
+    fn meets_bound(&self, lane: usize, task: &Task) -> bool {
+        let Task { screen, view, .. } = *task;
+        let beyond = 1.01 * BOUND_STEP * self.threshold.0[lane].sqrt();
+        let window = Window::of_sphere(self.center(lane), beyond, view);
+        screen.points.len() > MAX_CANDIDATES && window.candidates(&screen.cells) > MAX_CANDIDATES
+    }
+
     /// How far the search of a point goes at most.
     #[cold]
     fn bound_radius(&self, lane: usize, task: &Task) -> f32 {
@@ -394,15 +409,10 @@ impl Block {
         (union, self.pending)
     }
 
-    /// For each lane, whether the sphere up to its threshold projects into the window.
+    /// Where the spheres up to the thresholds can be seen.
     #[inline(always)]
-    fn spheres_inside(&self, window: &Window, view: &View) -> [bool; LANES] {
-        let mut inside = [false; LANES];
-        for lane in 0..LANES {
-            let sphere = Window::of_sphere(self.center(lane), self.threshold.0[lane].sqrt(), view);
-            inside[lane] = window.contains(&sphere);
-        }
-        inside
+    fn spheres(&self, view: &View) -> [Window; LANES] {
+        std::array::from_fn(|lane| Window::of_sphere(self.center(lane), self.threshold.0[lane].sqrt(), view))
     }
 }
 

@@ -43,11 +43,11 @@ struct RoundPasses {
 
 impl RoundPasses {
     fn new(gpu: &Gpu, k: u32, four: bool, round: Round) -> Result<Self, Error> {
-        let [least, most] = past::gpu::CONSTANTS;
+        let [least, most] = past::LIKELY;
         let common = [
-            least,
-            most,
-            past::gpu::SLACK_CONSTANT,
+            ("LEAST_LIKELY", least.into()),
+            ("MOST_LIKELY", most.into()),
+            ("SLACK", past::SLACK.into()),
             ("ROUND", f64::from(round as u32)),
             ("K", k.into()),
             ("FIRST_REACH", FIRST_REACH.into()),

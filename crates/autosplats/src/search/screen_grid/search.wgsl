@@ -139,7 +139,8 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
         let is_all = window_contains(window, picture());
-        let is_crowded = len > CROWDED;
+        // Where there are few points as well, if a little further out there are many: then it does not matter what was read.
+        let is_crowded = len > CROWDED || (kth_squared < MOST && !is_unbounded(center, kth_radius));
         if is_crowded && farthest == 0.0 {
             farthest = bound_radius(center, initial_radius);
         }
@@ -223,9 +224,10 @@ fn moments(center: vec3f, squared: f32) -> Neighborhood {
             let away = points[at].position_view - center;
             if squared_length(away) <= squared {
                 sums.count += 1.0;
+                // Fused, so that both forms of the search get the same bits.
                 sums.offset += away;
-                sums.second_x += away.x * away;
-                sums.second_yz += vec3f(away.y * away.y, away.y * away.z, away.z * away.z);
+                sums.second_x = fma(vec3f(away.x), away, sums.second_x);
+                sums.second_yz = fma(away.yyz, away.yzz, sums.second_yz);
             }
         }
     }

@@ -202,12 +202,6 @@ fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
     return Listed(sign * kth, furthest);
 }
 
-// Whether the bound on searches is beyond this radius: it is one of radii BOUND_STEP apart.
-fn is_unbounded(center: vec3f, radius: f32) -> bool {
-    let beyond = window_of_sphere(center, 1.01 * BOUND_STEP * radius);
-    return window_len(beyond, task.strip_px, MAX_CANDIDATES) <= MAX_CANDIDATES;
-}
-
 // Squared distances to the k-th neighbours; MOST for those that are left.
 fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
     var found = vec4f(MOST);
@@ -247,10 +241,8 @@ fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
             // From the furthest within reach of the first radius on the next gap would begin.
             let is_bridged = is_gap_first & (furthest > initial_radius) & (kth <= frame.gap_growth * furthest);
             var is_settled = is_listed & ((kth <= unruled) | is_bridged);
-            if len > CROWDED {
-                for (var lane = 0u; lane < 4u; lane++) {
-                    is_settled[lane] = is_settled[lane] && is_unbounded(center(four, lane), kth[lane]);
-                }
+            for (var lane = 0u; lane < 4u; lane++) {
+                is_settled[lane] = is_settled[lane] && is_unbounded(center(four, lane), kth[lane]);
             }
             found = select(found, listed.kth, is_settled);
         }
@@ -296,12 +288,12 @@ fn sum_moments(four: Four, found: vec4f, first: u32) {
             x += dx;
             y += dy;
             z += dz;
-            xx += dx * dx;
-            xy += dx * dy;
-            xz += dx * dz;
-            yy += dy * dy;
-            yz += dy * dz;
-            zz += dz * dz;
+            xx = fma(dx, dx, xx);
+            xy = fma(dx, dy, xy);
+            xz = fma(dx, dz, xz);
+            yy = fma(dy, dy, yy);
+            yz = fma(dy, dz, yz);
+            zz = fma(dz, dz, zz);
         }
     }
     for (var lane = 0u; lane < 4u; lane++) {

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::camera::View;
 use crate::project::ScreenCells;
-use crate::search::MARGIN_PX;
+use crate::search::{MARGIN_PX, MAX_CANDIDATES};
 
 /// A rectangle of pixels and a range of depths, all sides included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +48,13 @@ impl Window {
             near: z - radius,
             far: z + radius,
         }
+    }
+
+    /// Whether a sphere [`BOUND_STEP`](crate::search::BOUND_STEP) times as large, with two points in each pixel, is far from the bound on search work.
+    #[inline(always)]
+    pub(super) fn is_small(&self) -> bool {
+        let side = |low: f32, high: f32| 1.5 * (high - low + 1.0) + 4.0;
+        2.0 * side(self.x0, self.x1) * side(self.y0, self.y1) <= MAX_CANDIDATES as f32
     }
 
     pub(super) fn union(self, other: Self) -> Self {

@@ -8,7 +8,6 @@ use crate::gpu::{DepthMask, Draw, Gpu, Groups, Load, Pass, PassSource, RasterPas
 use crate::project::gpu::Round;
 use crate::search::MARGIN_PX;
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers};
-use crate::search::past;
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[BEGIN, COUNT, DECIDE, KEEP_MEAN, KEEP_COVARIANCE];
@@ -97,7 +96,6 @@ impl CommunicationPasses {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         check(gpu)?;
         let margin = ("MARGIN_PX", f64::from(MARGIN_PX));
-        let [least, most] = past::gpu::CONSTANTS;
         let raster = |source: &PassSource, constants: &[(&str, f64)], targets: &[Target]| {
             RasterPass::new(gpu, source, constants, targets, DepthMask::Greater)
         };
@@ -106,7 +104,7 @@ impl CommunicationPasses {
             let round = ("ROUND", f64::from(round as u32));
             Ok::<_, Error>(RoundPasses {
                 begin: Pass::new(gpu, &BEGIN, &[round])?,
-                ask: raster(&ASK, &[margin, round, least, most], &[Target::Replace])?,
+                ask: raster(&ASK, &[margin, round], &[Target::Replace])?,
                 count: Pass::new(gpu, &COUNT, &[round])?,
                 decide: Pass::new(gpu, &DECIDE, &[round, ("UNCONVERGED", UNCONVERGED)])?,
                 keep_mean: Pass::new(gpu, &KEEP_MEAN, &[round])?,
@@ -249,8 +247,7 @@ impl Bound<'_> {
 
     fn ask(&self, round: Round) -> Step {
         let screen = self.buffers.screen;
-        let SearchBuffers { frame, past, .. } = self.buffers;
-        let resources = buffers([frame, &screen.points, &screen.queries, &screen.counters, &screen.density, past]);
+        let resources = buffers([self.buffers.frame, &screen.points, &screen.queries, &screen.counters]);
         let pass = &self.passes.rounds[round as usize].ask;
         let Textures { radii, depth, .. } = self.textures;
         let colors = vec![(radii.clone(), Load::Cleared([0.0; 4]))];

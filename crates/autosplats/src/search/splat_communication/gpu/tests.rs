@@ -11,10 +11,10 @@ use crate::project::gpu::{COUNTERS, Counter};
 use crate::project::{ProjectRules, ScreenPoints};
 use crate::search::SearchRules;
 use crate::search::gpu::convergence;
-use crate::search::past;
+use crate::search::past::gpu::past_buffer;
 use crate::search::screen_grid::gpu::neighborhood_buffer;
-use crate::search::screen_grid::gpu::tests::{Moments, cameras, frame_buffer_after, on_host, projected};
-use crate::test_clouds::{self, Random};
+use crate::search::screen_grid::gpu::tests::{Moments, cameras, frame_buffer, on_host, projected};
+use crate::test_clouds;
 
 const SIZE: [u32; 2] = [121, 90];
 
@@ -39,12 +39,12 @@ fn on_device(
     screen: &ScreenPoints,
     view: &View,
     rules: &SearchRules,
-    radii: Option<&[f32]>,
 ) -> Found {
     let buffers = upload_screen(gpu, screen, view);
     let neighborhoods = neighborhood_buffer(gpu, buffers.capacity).expect("room");
-    let (frame, past) = frame_buffer_after(gpu, view, rules, radii);
+    let frame = frame_buffer(gpu, view, rules);
     let cloud = DeviceCloud::default();
+    let past = past_buffer(gpu, None).expect("room");
     let searched =
         SearchBuffers { frame: &frame, cloud: &cloud, screen: &buffers, neighborhoods: &neighborhoods, past: &past };
     let steps = passes.steps(gpu, searched).expect("steps");
@@ -91,7 +91,7 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
                     let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda };
                     let case = format!("{name}, {:?}, {rules:?}", camera.projection);
                     let (host, [clamped, _]) = on_host(&screen, &view, &rules);
-                    let found = on_device(&gpu, &passes, &screen, &view, &rules, None);
+                    let found = on_device(&gpu, &passes, &screen, &view, &rules);
                     let different = different(&found.neighborhoods, &host, &case);
                     assert!(different <= allowed(&screen), "{case}: {different} of {} differ", host.len());
                     assert!(
@@ -122,7 +122,7 @@ fn short_steps_and_far_outliers() {
             let rules = SearchRules { k: 10, outlier_expansions: e0, gap_factor: Some(lambda) };
             let case = format!("{name}, {rules:?}");
             let host = on_host(&screen, &view, &rules).0;
-            let found = on_device(&gpu, &passes, &screen, &view, &rules, None);
+            let found = on_device(&gpu, &passes, &screen, &view, &rules);
             let different = different(&found.neighborhoods, &host, &case);
             let allowed = found.bounded + allowed(&screen);
             assert!(different <= allowed, "{case}: {different} differ, {} unfinished", found.bounded);
@@ -140,7 +140,7 @@ fn pictures_of_any_shape() {
         for camera in cameras() {
             let (screen, view) = screen(&test_clouds::sphere(2000), &camera, size, 10);
             let host = on_host(&screen, &view, &rules(10)).0;
-            let found = on_device(&gpu, &passes, &screen, &view, &rules(10), None);
+            let found = on_device(&gpu, &passes, &screen, &view, &rules(10));
             let different = different(&found.neighborhoods, &host, "sphere");
             assert!(different <= allowed(&screen), "{size:?}: {different} of {} differ", host.len());
         }
@@ -154,7 +154,7 @@ fn the_search_converges_as_in_the_paper() {
     let passes = CommunicationPasses::new(&gpu).expect("passes");
     for (name, positions) in [("sphere", test_clouds::sphere(9000)), ("edge", test_clouds::edge(6000))] {
         let (screen, view) = screen(&positions, &cameras()[0], [240, 180], 10);
-        let Found { curve, .. } = on_device(&gpu, &passes, &screen, &view, &rules(10), None);
+        let Found { curve, .. } = on_device(&gpu, &passes, &screen, &view, &rules(10));
         let queries = screen.points.len() as f64;
         let left: Vec<_> = curve.iter().map(|&left| f64::from(left) / queries).collect();
         assert_eq!(left[0], 1.0, "{name}: every point is searched for");
@@ -163,34 +163,6 @@ fn the_search_converges_as_in_the_paper() {
         assert!(left[left.len() - 1] <= UNCONVERGED, "{name}: t_conv is reached: {left:?}");
         assert!(left.get(7).is_none_or(|&left| left <= 0.02), "{name}: after seven iterations: {left:?}");
     }
-}
-
-/// From the right radii the search has nothing left to do but to count; from wrong ones it finds the right ones.
-#[test]
-fn the_past_saves_iterations_and_changes_nothing() {
-    let Some(gpu) = test_gpu() else { return };
-    let passes = CommunicationPasses::new(&gpu).expect("passes");
-    let mut random = Random::new(4);
-    for (name, positions) in test_clouds::all(4000) {
-        let (screen, view) = screen(&positions, &cameras()[0], SIZE, 10);
-        let host = on_host(&screen, &view, &rules(10)).0;
-        let wrong = past::tests::garbage(&screen, &view, 10, &mut random);
-        let right = past::tests::found(&screen, &view, 10);
-        let [without, wrong, right] = [None, Some(&wrong[..]), Some(&right)]
-            .map(|radii| on_device(&gpu, &passes, &screen, &view, &rules(10), radii));
-        for found in [&wrong, &right] {
-            let different = different(&found.neighborhoods, &host, name);
-            assert!(different <= allowed(&screen), "{name}: {different} of {} differ", host.len());
-            assert!(found.bounded <= allowed(&screen), "{name}: {} ended unfinished", found.bounded);
-        }
-        let left = |found: &Found, iterations: usize| found.curve.get(iterations).copied().unwrap_or_default();
-        let saved = left(&right, 2) <= left(&without, 2) && right.curve.len() <= without.curve.len();
-        assert!(saved, "{name}: {:?}, without a past {:?}", right.curve, without.curve);
-    }
-    let (screen, view) = screen(&test_clouds::sphere(9000), &cameras()[0], [240, 180], 10);
-    let right = past::tests::found(&screen, &view, 10);
-    let curve = on_device(&gpu, &passes, &screen, &view, &rules(10), Some(&right)).curve;
-    assert!(curve[1] * 2 <= curve[0], "half of them are found at once: {curve:?}");
 }
 
 /// Among equal distances no bracket finds its way: all points at the k-th distance belong.
@@ -208,7 +180,7 @@ fn ties_belong() {
     for k in [1, 3, 4, 5, 10, 16] {
         let (screen, view) = screen(&lattice, &camera, [64, 64], k);
         let host = on_host(&screen, &view, &rules(k)).0;
-        let found = on_device(&gpu, &passes, &screen, &view, &rules(k), None);
+        let found = on_device(&gpu, &passes, &screen, &view, &rules(k));
         assert_eq!(different(&found.neighborhoods, &host, "lattice"), 0, "k = {k}: {:?}", found.curve);
         assert_eq!(found.curve.last(), Some(&0), "k = {k}: all converge: {:?}", found.curve);
     }
@@ -233,7 +205,7 @@ fn coincident_points() {
         for k in [1, 10] {
             let (screen, view) = screen(&positions, &camera, SIZE, k);
             let host = on_host(&screen, &view, &rules(k)).0;
-            let found = on_device(&gpu, &passes, &screen, &view, &rules(k), None);
+            let found = on_device(&gpu, &passes, &screen, &view, &rules(k));
             let different = different(&found.neighborhoods, &host, "crowd");
             assert!(different <= allowed(&screen), "k = {k}: {different} of {} differ, {:?}", host.len(), found.curve);
         }
@@ -251,7 +223,7 @@ fn huge_coordinates_reach_no_sum() {
         positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
         let (screen, view) = screen(&positions, &cameras()[1], [90, 70], 10);
         let host = on_host(&screen, &view, &rules(10)).0;
-        let found = on_device(&gpu, &passes, &screen, &view, &rules(10), None);
+        let found = on_device(&gpu, &passes, &screen, &view, &rules(10));
         let different = different(&found.neighborhoods, &host, "huge");
         assert!(different <= allowed(&screen), "{near} + {huge}: {different} of {} differ", host.len());
     }
@@ -262,7 +234,7 @@ fn the_same_again() {
     let Some(gpu) = test_gpu() else { return };
     let passes = CommunicationPasses::new(&gpu).expect("passes");
     let (screen, view) = screen(&test_clouds::edge(4000), &cameras()[0], SIZE, 17);
-    let [first, second] = [(); 2].map(|()| on_device(&gpu, &passes, &screen, &view, &rules(17), None));
+    let [first, second] = [(); 2].map(|()| on_device(&gpu, &passes, &screen, &view, &rules(17)));
     assert_eq!(first.neighborhoods, second.neighborhoods, "to the last bit");
     assert_eq!(first.curve, second.curve, "and the way there");
 }
