@@ -1,7 +1,6 @@
 //! Temporal smoothing: noise of live points is averaged over frames, what moves is not held back.
 
 #[path = "../src/test_clouds.rs"]
-#[allow(dead_code, reason = "other tests use the rest")]
 mod test_clouds;
 
 use autosplats::cloud::PointCloud;
