@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use autosplats_cloud::glam::{DMat4, DQuat, DVec3, DVec4};
 use autosplats_cloud::{
-    Error, LatestOptions, Live, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, check_memory,
-    read_mesh, sample_surface,
+    Error, LatestOptions, Live, PlayOptions, Player, PointCloud, Progress, ReadOptions, Scene, Source, beginnings,
+    check_memory, read_mesh, sample_surface,
 };
 use rayon::prelude::*;
 
@@ -79,6 +79,8 @@ pub(crate) struct Playing {
     pub(crate) player: Player,
     /// Whether its points change by themselves.
     pub(crate) moves: bool,
+    /// So long after the first of those recorded at the same time, if there are others.
+    pub(crate) begins: Option<Duration>,
     pub(crate) world_from_input: DMat4,
 }
 
@@ -214,9 +216,16 @@ impl Inputs {
                 }),
             }?;
             let Input { name, source, world_from_input, .. } = input;
-            Ok(Playing { name: name.clone(), player, moves: source.moves(), world_from_input: *world_from_input })
+            let (name, moves, world_from_input) = (name.clone(), source.moves(), *world_from_input);
+            Ok(Playing { name, player, moves, begins: None, world_from_input })
         };
-        self.list.iter().map(open).collect()
+        let mut playing = self.list.iter().map(open).collect::<Result<Vec<_>, Failure>>()?;
+        let span = |(input, playing): (&Input, &Playing)| input.source.clock_span(playing.player.stream().timeline()?);
+        let spans: Vec<_> = self.list.iter().zip(&playing).map(span).collect();
+        for (playing, begins) in playing.iter_mut().zip(beginnings(&spans)) {
+            playing.begins = begins;
+        }
+        Ok(playing)
     }
 
     /// Refuses to watch what cannot be watched, and pictures that would be taken for new files of a watched folder.

@@ -191,6 +191,27 @@ fn recording(times: &[u64]) -> Vec<u8> {
     file
 }
 
+#[test]
+fn recordings_made_at_once_are_shown_at_once() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("one.mcap"), recording(&[1000, 1100, 1500])).expect("a recording");
+    std::fs::write(folder.path("other.mcap"), recording(&[1200, 1400])).expect("a recording");
+    std::fs::write(folder.path("later.mcap"), recording(&[9000, 9300])).expect("a recording");
+    let seconds = |others: &[&str]| {
+        let arguments = [&["render", "one.mcap"], others, &["--size", "80x60", "--json", "-o", "f_%d.png"]].concat();
+        let out = folder.succeed(&arguments);
+        let seconds =
+            out.stdout.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON")["seconds"].clone());
+        (seconds.map(|seconds| seconds.as_f64().expect("a number")).collect::<Vec<_>>(), out.stderr)
+    };
+    let (aligned, said) = seconds(&["other.mcap"]);
+    assert_eq!(aligned, [0.0, 0.1, 0.2, 0.4, 0.5], "by their stamps");
+    assert!(said.contains("other.mcap: begins 0.200 s after the first recording"), "which is said: {said}");
+    let (begun_at_once, said) = seconds(&["later.mcap"]);
+    assert_eq!(begun_at_once, [0.0, 0.1, 0.3, 0.5], "stamps that have no time in common say nothing of each other");
+    assert!(!said.contains("begins"), "{said}");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_film_shows_each_frame_for_as_long_as_it_lasts() {

@@ -51,6 +51,7 @@ pub use sample::sample_surface;
 pub use source::remote;
 pub use source::{
     PlayOptions, Source,
+    align::beginnings,
     animation::{Animation, Playback},
     latest::{Arrival, Latest, LatestOptions, LatestStatistics},
     live::{Live, LiveOptions},

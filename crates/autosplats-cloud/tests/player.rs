@@ -53,12 +53,64 @@ fn a_frame_is_the_same_however_it_is_come_to() {
     ] {
         let mut through = player(folder.path(), options.clone());
         let played: Vec<_> = (0..9).map(|frame| frames(&through.frame(frame, &()).expect("a frame"))).collect();
-        for frame in [8, 3, 4, 5, 0, 7, 7, 2] {
+        for frame in [8, 3, 4, 5, 0, 7, 7, 2, 4] {
             let again = frames(&through.frame(frame, &()).expect("a frame"));
             assert_eq!(again, played[frame], "frame {frame} sought, {options:?}");
             let alone = player(folder.path(), options.clone()).frame(frame, &()).expect("a frame");
             assert_eq!(frames(&alone), played[frame], "frame {frame} alone, {options:?}");
         }
+    }
+}
+
+/// Frames of two channels by turns, some of which cannot be read. The point of a frame is at its number.
+struct Turns {
+    timeline: Timeline,
+    broken: Vec<usize>,
+    position: usize,
+}
+
+impl Stream for Turns {
+    fn timeline(&self) -> Option<&Timeline> {
+        Some(&self.timeline)
+    }
+
+    fn seen_at(&self, frame: usize) -> Vec<usize> {
+        (frame.saturating_sub(1)..=frame).collect()
+    }
+
+    fn seek(&mut self, frame: usize) {
+        self.position = frame;
+    }
+
+    fn next(&mut self, _: Duration, _: &dyn Progress) -> Result<Next, Error> {
+        let frame = self.position;
+        self.position += 1;
+        if self.broken.contains(&frame) {
+            return Err(Error::NoFrames { name: frame.to_string(), why: "it is broken".into() });
+        }
+        let cloud = Arc::new(PointCloud::new(DVec3::ZERO, vec![[frame as f32, 0.0, 0.0]]));
+        Ok(Next::Update(Update { channel: frame % 2, stamp: self.timeline.stamps()[frame], cloud }))
+    }
+
+    fn statistics(&self) -> Statistics {
+        Statistics::default()
+    }
+}
+
+#[test]
+fn what_is_broken_of_one_channel_takes_nothing_from_the_other() {
+    let player = || {
+        let timeline = Timeline::new((0..12).collect());
+        Player::new(Box::new(Turns { timeline, broken: vec![4, 6, 7], position: 0 }), LatestOptions::default())
+    };
+    let mut through = player();
+    let played: Vec<_> = (0..12).map(|frame| frames(&through.frame(frame, &()).expect("a frame"))).collect();
+    assert_eq!(played[6..9], [[2, 5], [2, 5], [5, 8]], "the newest of each that can be read");
+    for frame in [7, 6, 1, 7, 8, 2, 8] {
+        let again = frames(&through.frame(frame, &()).expect("a frame"));
+        assert_eq!(again, played[frame], "frame {frame} sought");
+        let alone = frames(&player().frame(frame, &()).expect("a frame"));
+        assert_eq!(alone, played[frame], "frame {frame} alone");
     }
 }
 

@@ -13,6 +13,7 @@ use super::pictures::{FrameReport, Shot, Style, Writer};
 use super::{camera, live, schedule, shrink};
 use crate::device::Device;
 use crate::exit::Failure;
+use crate::input::Playing;
 use crate::interrupt;
 use crate::output::check_target;
 use crate::progress::{Bar, Notes};
@@ -98,6 +99,16 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
     if playing.iter().any(|input| input.player.stream().timeline().is_none()) {
         return live::run(job, film, playing, renderer, device);
     }
+    if !job.quiet {
+        for Playing { name, begins, .. } in &playing {
+            if let Some(begins) = begins.filter(|begins| !begins.is_zero()) {
+                eprintln!(
+                    "note: {name}: begins {:.3} s after the first recording, by its stamps",
+                    begins.as_secs_f64()
+                );
+            }
+        }
+    }
     let mut scene = Moving::new(playing, job.inputs.names());
     let frames = film.frames.first..film.frames.last.map_or(scene.times.len(), |last| last.saturating_add(1));
     if frames.end > scene.times.len() || frames.is_empty() {
@@ -151,7 +162,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
             let rendered = job.render(renderer, &cloud, &camera)?;
             tally.milliseconds += rendered.timings.frame;
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
-            let seconds = scene.times[frame] as f64 * 1e-9;
+            let seconds = scene.times[frame] as f64 / 1e9;
             let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
             if !writer.put(Shot { image: picture(job, &rendered, &writer), report }) {
                 // The writer has given up and says why.

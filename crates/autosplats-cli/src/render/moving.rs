@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use autosplats::{Camera, ColorMode, Renderer};
 use autosplats_cloud::glam::DMat4;
-use autosplats_cloud::{Axes, LocalMetres, Player, PointCloud, Progress, Timeline};
+use autosplats_cloud::{Axes, LocalMetres, PointCloud, Progress, Timeline};
 
 use super::job::Job;
 use crate::exit::{Exit, Failure};
@@ -18,8 +18,8 @@ const PLACED_BY: usize = 5;
 
 /// Inputs with timelines.
 pub(super) struct Moving {
-    players: Vec<(Player, DMat4)>,
-    /// Nanoseconds since the first of each input at which something changes.
+    playing: Vec<Playing>,
+    /// Nanoseconds since all begin at which something changes.
     pub(super) times: Vec<i64>,
     place: Place,
     /// Names of the inputs, for messages.
@@ -28,35 +28,34 @@ pub(super) struct Moving {
 
 impl Moving {
     pub(super) fn new(playing: Vec<Playing>, names: String) -> Self {
-        let players: Vec<_> = playing.into_iter().map(|input| (input.player, input.world_from_input)).collect();
-        let since_first = |(player, _): &(Player, DMat4)| {
-            let stamps = player.stream().timeline().map_or(&[][..], Timeline::stamps);
+        let times_of = |input: &Playing| {
+            let stamps = input.player.stream().timeline().map_or(&[][..], Timeline::stamps);
             let first = stamps.first().copied().unwrap_or_default();
-            stamps.iter().map(|stamp| stamp.saturating_sub(first)).collect::<Vec<_>>()
+            let begins = i64::try_from(input.begins.unwrap_or_default().as_nanos()).unwrap_or(i64::MAX);
+            stamps.iter().map(|stamp| stamp.saturating_sub(first).saturating_add(begins)).collect::<Vec<_>>()
         };
-        let times = match players.as_slice() {
-            [only] => since_first(only),
+        let times = match playing.as_slice() {
+            [only] => times_of(only),
             several => {
-                let mut times: Vec<i64> = several.iter().flat_map(since_first).collect();
+                let mut times: Vec<i64> = several.iter().flat_map(times_of).collect();
                 times.sort_unstable();
                 times.dedup();
                 times
             }
         };
-        Self { players, times, place: Place::default(), names }
+        Self { playing, times, place: Place::default(), names }
     }
 
     /// The points at a frame.
     pub(super) fn points(&mut self, frame: usize, progress: &dyn Progress) -> Result<Arc<PointCloud>, Failure> {
-        let time = self.times[frame];
-        let single = self.players.len() == 1;
+        let time = Duration::from_nanos(u64::try_from(self.times[frame]).unwrap_or_default());
+        let single = self.playing.len() == 1;
         let mut parts: Vec<(Arc<PointCloud>, DMat4)> = Vec::new();
-        for (player, pose) in &mut self.players {
-            let at =
-                |timeline: &Timeline| timeline.frame_at(Duration::from_nanos(u64::try_from(time).unwrap_or_default()));
+        for Playing { player, begins, world_from_input, .. } in &mut self.playing {
+            let at = |timeline: &Timeline| timeline.frame_at(time.saturating_sub(begins.unwrap_or_default()));
             // Frames of one input may be of the same time.
             let own = if single { frame } else { player.stream().timeline().map_or(0, at) };
-            parts.push((player.frame(own, progress).map_err(read_failure)?, *pose));
+            parts.push((player.frame(own, progress).map_err(read_failure)?, *world_from_input));
         }
         Ok(self.place.merge(parts))
     }

@@ -1,5 +1,6 @@
 //! Where clouds come from.
 
+pub(crate) mod align;
 pub(crate) mod animation;
 mod clock;
 pub(crate) mod latest;
@@ -26,7 +27,7 @@ use self::{
     live::{Live, LiveOptions},
     player::Player,
     recording::{Recording, RecordingOptions, is_recording},
-    stream::Stream,
+    stream::{Stream, Timeline},
 };
 use crate::{Error, PointCloud, Progress, ReadOptions, Scene, read::colors_beside, read_mesh, read_with};
 
@@ -151,6 +152,12 @@ impl Source {
     /// Whether its points change by themselves. Files and scenes can be [played](Self::play) as well.
     pub fn moves(&self) -> bool {
         matches!(self, Self::Sequence(_) | Self::Recording(_) | Self::StandardInput | Self::Remote(_))
+    }
+
+    /// The [span](Timeline::span) of its timeline by a clock that others may share, as [`beginnings`](crate::beginnings) takes it.
+    /// Recordings have such a clock; the stamps of all others count from their own beginning.
+    pub fn clock_span(&self, timeline: &Timeline) -> Option<[i64; 2]> {
+        matches!(self, Self::Recording(_)).then(|| timeline.span()).flatten()
     }
 
     /// Reads or generates the cloud; of what moves, the first.

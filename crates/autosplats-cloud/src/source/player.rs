@@ -13,7 +13,7 @@ use crate::{Error, Next, PointCloud, Progress, Stream, Update};
 /// How long a wait may last before somebody may cancel it.
 const STEP: Duration = Duration::from_millis(100);
 
-/// Frames before one that cannot be read among which one is looked for that can.
+/// Frames of the same channel before one that cannot be read among which one is looked for that can.
 const STEPS_BACK: usize = 16;
 
 /// Plays a stream: makes the cloud that is to be seen at a frame of its timeline, or now.
@@ -62,18 +62,25 @@ impl Player {
             self.latest.forget(0);
             (self.last, after) = (None, None);
         }
-        let fresh = after.is_none();
         for needed in self.needed(frame).into_iter().filter(|&needed| after.is_none_or(|after| needed > after)) {
-            // Whoever comes here without what was before sees that instead of a frame that cannot be read, as all others do.
-            let least = if fresh { needed.saturating_sub(STEPS_BACK) } else { needed };
-            for other in (least..=needed).rev() {
-                if self.put(other, progress)? {
+            // Instead of a frame that cannot be read whoever comes here sees what was before it, as all do who played on.
+            let mut next = Some(needed);
+            for _ in 0..=STEPS_BACK {
+                let Some(tried) = next.filter(|&next| after.is_none_or(|after| next > after)) else { break };
+                if self.put(tried, progress)? {
                     break;
                 }
+                next = self.before(tried);
             }
         }
         self.last = Some(frame);
         Ok(self.latest.cloud())
+    }
+
+    /// The frame that was seen until this one took its place: of the same channel.
+    fn before(&self, frame: usize) -> Option<usize> {
+        let seen = self.stream.seen_at(frame);
+        self.stream.seen_at(frame.checked_sub(1)?).into_iter().find(|before| !seen.contains(before))
     }
 
     /// Reads a frame; says whether that was possible.

@@ -124,10 +124,16 @@ impl Timeline {
         &self.stamps
     }
 
+    /// The first and the last stamp, in nanoseconds; `None` if there is no frame. What they count from, and whether others
+    /// count from the same, [the source](crate::Source::clock_span) knows.
+    pub fn span(&self) -> Option<[i64; 2]> {
+        Some([*self.stamps.first()?, *self.stamps.last()?])
+    }
+
     /// From the first frame to the last one's end, which lasts as long as the others do on average; zero if there is none.
     pub fn duration(&self) -> Duration {
-        let (Some(first), Some(last)) = (self.stamps.first(), self.stamps.last()) else { return Duration::ZERO };
-        let span = last.abs_diff(*first);
+        let Some([first, last]) = self.span() else { return Duration::ZERO };
+        let span = last.abs_diff(first);
         let frames = self.stamps.len() as u64;
         Duration::from_nanos(if frames > 1 { span.saturating_add(span / (frames - 1)) } else { span })
     }
@@ -151,6 +157,11 @@ mod tests {
         assert_eq!([0, 99, 100, 250, 300, 9000].map(at), [0, 0, 1, 2, 3, 3], "a frame is shown until the next");
         assert_eq!(timeline.duration(), Duration::from_millis(400), "the last frame lasts as well");
         assert_eq!(Timeline::new(vec![30, 10, 20]).stamps(), [10, 20, 30], "brought into order");
+        assert_eq!(
+            (Timeline::new(vec![3, 1]).span(), Timeline::default().span()),
+            (Some([1, 3]), None),
+            "first and last"
+        );
         assert_eq!(Timeline::default().frame_at(Duration::MAX), 0, "no frame at all");
         let far = Timeline::new(vec![i64::MIN, i64::MAX]);
         assert_eq!(far.frame_at(Duration::MAX), 1, "a clock that jumped over all there is");

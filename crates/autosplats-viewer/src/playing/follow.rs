@@ -152,6 +152,7 @@ impl App {
         if let (Some(id), Some(at)) = (unsaved.filter(|_| moves), edited_at) {
             self.playing.clock.playing = false;
             self.playing.clock.seek(at);
+            self.playing.edited_at = Some(self.playing.clock.position());
             let name = self.document().layer(id).map(|layer| layer.name.clone()).unwrap_or_default();
             self.messages.note(format!("{name} has edits that are not saved; export or undo them to play on"));
         }

@@ -1,6 +1,5 @@
 //! Inputs that move: each is read by a thread of its own, for the time that one clock of all says.
 
-mod align;
 mod clock;
 mod follow;
 mod reel;
@@ -11,7 +10,7 @@ mod thread;
 use std::sync::Arc;
 use std::time::Duration;
 
-use autosplats::cloud::{Source, Statistics, Timeline};
+use autosplats::cloud::{Statistics, Timeline, beginnings};
 
 pub(crate) use self::clock::{Clock, SPEEDS};
 pub(crate) use self::reel::{Reel, Track};
@@ -228,27 +227,23 @@ impl Playing {
         shown.map(track).collect()
     }
 
-    /// Finds out when each begins, by what is open now. What is shown stays as it is unless the clock is held.
+    /// Finds out when each begins, by what is open now. What is shown stays as it is unless the clock is held; of several that
+    /// move against each other, what the first one shows.
     fn align(&mut self) {
-        let spans: Vec<_> = self
-            .streams
-            .iter()
-            .map(|moving| match moving.input.source {
-                // Stamps of what is no recording count from its own beginning.
-                Source::Recording(_) => moving.timeline().and_then(|timeline| align::span(&timeline)),
-                _ => None,
-            })
-            .collect();
+        let span = |moving: &Moving| moving.input.source.clock_span(&*moving.timeline()?);
+        let spans: Vec<_> = self.streams.iter().map(span).collect();
         let mut shift = None;
-        for (moving, begins) in self.streams.iter_mut().zip(align::beginnings(&spans)) {
+        for ((moving, begins), span) in self.streams.iter_mut().zip(beginnings(&spans)).zip(spans) {
             let [before, after] = [moving.begins, begins].map(|begins| begins.unwrap_or_default().as_secs_f64());
-            if moving.layer.is_some() {
+            if moving.layer.is_some() && span.is_some() {
                 shift.get_or_insert(after - before);
             }
             moving.begins = begins;
         }
         if let Some(shift) = shift.filter(|shift| *shift != 0.0 && !self.clock.is_held()) {
             self.clock.shift(shift);
+            let times = self.removed.iter_mut().map(|removed| &mut removed.position).chain(&mut self.edited_at);
+            times.for_each(|time| *time = (*time + shift).max(0.0));
         }
     }
 

@@ -30,18 +30,14 @@ pub(crate) struct FrameUniform {
     pub(crate) first_radius: f32,
     /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     pub(crate) longest: f32,
-    pub(crate) past_near: f32,
+    /// By which share of the way surfels are drawn towards the last frame's surface.
+    pub(crate) smoothing: f32,
     pub(crate) past_perspective: u32,
     /// Columns, each padded to four numbers.
     pub(crate) past_rotation: [[f32; 4]; 3],
     pub(crate) past_shift: [f32; 3],
     /// 0 if nothing is known of the last frame.
     pub(crate) past_focal_px: f32,
-    /// By which share of the way surfels are drawn towards the last frame's surface.
-    pub(crate) smoothing: f32,
-    pub(crate) unused_0: u32,
-    pub(crate) unused_1: u32,
-    pub(crate) unused_2: u32,
 }
 
 impl FrameUniform {
@@ -64,15 +60,11 @@ impl FrameUniform {
             gap_growth: f32::INFINITY,
             first_radius: 1.0,
             longest: 1.0,
-            past_near: 0.0,
+            smoothing: 0.0,
             past_perspective: 0,
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],
             past_focal_px: 0.0,
-            smoothing: 0.0,
-            unused_0: 0,
-            unused_1: 0,
-            unused_2: 0,
         }
     }
 
@@ -80,7 +72,6 @@ impl FrameUniform {
     pub(crate) fn after(self, past: &Reprojection) -> Self {
         let Reprojection { rotation, shift, view } = past;
         Self {
-            past_near: view.near,
             past_perspective: view.perspective.into(),
             past_rotation: columns(*rotation),
             past_shift: shift.to_array(),

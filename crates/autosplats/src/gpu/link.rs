@@ -37,6 +37,7 @@ const SHARED: &[(&str, &str)] = &[
     ("answer", include_str!("../shared/answer.wgsl")),
     ("nearest", include_str!("../shared/nearest.wgsl")),
     ("search_task", include_str!("../shared/search_task.wgsl")),
+    ("reproject", include_str!("../shared/reproject.wgsl")),
     ("past", include_str!("../shared/past.wgsl")),
     ("layers", include_str!("../shared/layers.wgsl")),
     ("range_keys", include_str!("../shared/range_keys.wgsl")),

@@ -39,7 +39,7 @@ pub(super) struct CpuRenderer {
     image: Image,
     linear: [f32; 256],
     /// Of the last frame.
-    seen: Option<Seen>,
+    view: Option<View>,
     /// Of the last frame that was averaged, if its layers are still there.
     averaged: Option<Seen>,
 }
@@ -60,7 +60,7 @@ impl Default for CpuRenderer {
             splatter: Splatter::default(),
             image: Image::default(),
             linear: linear_steps(),
-            seen: None,
+            view: None,
             averaged: None,
         }
     }
@@ -80,7 +80,7 @@ pub(super) fn check_engine(engine: SearchEngine) -> Result<(), Error> {
 impl CpuRenderer {
     /// See [`Renderer::surfels`](super::Renderer::surfels).
     pub(super) fn surfels(&self) -> Vec<PointSurfel> {
-        self.seen.map_or_else(Vec::new, |Seen { view, .. }| point_surfels(&self.surfels, &view))
+        self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
     }
 
     /// See [`Renderer::render_while`](super::Renderer::render_while); `given` planes are drawn instead of what a search would
@@ -100,7 +100,7 @@ impl CpuRenderer {
         }
         let wanted = Wanted::new(cloud, settings)?;
         // From here on nothing fails, but it may be given up; then there are no surfels.
-        self.seen = None;
+        self.view = None;
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
             color: colors.as_deref().map(|srgb| PointColors { srgb, linear: &self.linear }),
@@ -122,7 +122,7 @@ impl CpuRenderer {
             recovered,
             splatter,
             image,
-            seen: last_seen,
+            view: last_view,
             averaged,
             ..
         } = self;
@@ -187,7 +187,7 @@ impl CpuRenderer {
         let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
-        *last_seen = Some(now);
+        *last_view = Some(view);
         *averaged = smooths.then_some(now);
         past.end();
 

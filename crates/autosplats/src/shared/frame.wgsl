@@ -27,18 +27,14 @@ struct Frame {
     first_radius: f32,
     // Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     longest: f32,
+    // By which share of the way surfels are drawn towards the last frame's surface.
+    smoothing: f32,
     // Of the last frame, which had the same size: how its camera saw, and how its view space comes from this one. The focal
     // length is 0 if nothing is known of it.
-    past_near: f32,
     past_perspective: u32,
     past_rotation: mat3x3f,
     past_shift: vec3f,
     past_focal_px: f32,
-    // By which share of the way surfels are drawn towards the last frame's surface.
-    smoothing: f32,
-    unused_0: u32,
-    unused_1: u32,
-    unused_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

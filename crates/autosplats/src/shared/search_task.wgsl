@@ -1,4 +1,5 @@
-// What all queries of a search's workgroup need to know. Imports: counters, window, window_points. The including pass binds `counters` as atomics.
+// What all queries of a search's workgroup need to know. Imports: counters, window, window_points. The including pass binds
+// `counters` as atomics.
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;

@@ -6,6 +6,7 @@
 #import groups
 #import counters
 #import surfel
+#import reproject
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> surface: array<vec4f>;
@@ -21,26 +22,18 @@ fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let first = select(0u, counters[ACTIVE], ROUND == 1u);
     let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
     let index = group_index(workgroup) * 64u + local;
-    if index >= len || frame.past_focal_px == 0.0 {
+    if index >= len || !has_past() {
         return;
     }
     let place = first + index;
     let surfel = surfels[place];
-    let is_perspective = frame.past_perspective == 1u;
-    let position = frame.past_rotation * surfel.center + frame.past_shift;
-    let scale = select(frame.past_focal_px, frame.past_focal_px / position.z, is_perspective);
-    let at = position.xy * scale + 0.5 * vec2f(frame.size);
-    if !(position.z > frame.past_near && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size))) {
+    let position = past_position(surfel.center);
+    let pixel = past_pixel(position);
+    if pixel == NO_PIXEL || !is_finite(surface[pixel].w) {
         return;
     }
-    let pixel = vec2u(at);
-    let seen = surface[pixel.y * frame.size.x + pixel.x];
-    if !is_finite(seen.w) {
-        return;
-    }
-    let unit = select(1.0 / frame.past_focal_px, seen.w / frame.past_focal_px, is_perspective);
-    let spot = vec3f((vec2f(pixel) + 0.5 - 0.5 * vec2f(frame.size)) * unit, seen.w);
-    let distance = dot(seen.xyz, position - spot);
+    let seen = surface[pixel];
+    let distance = dot(seen.xyz, position - past_unproject(pixel, seen.w));
     let turned = transpose(frame.past_rotation) * seen.xyz;
     let facing = dot(turned, surfel.normal);
     if !(abs(distance) <= NEAR * surfel.k_radius && abs(facing) >= ALIKE && surfel.radius > 0.0) {

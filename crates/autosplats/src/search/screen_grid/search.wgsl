@@ -16,6 +16,7 @@
 #import window_points
 #import nearest
 #import search_task
+#import reproject
 #import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;

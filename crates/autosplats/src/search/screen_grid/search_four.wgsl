@@ -19,6 +19,7 @@
 #import window
 #import window_points
 #import search_task
+#import reproject
 #import past
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;

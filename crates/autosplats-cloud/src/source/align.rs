@@ -5,12 +5,10 @@
 
 use std::time::Duration;
 
-use autosplats::cloud::Timeline;
-
 /// When each of some inputs begins: so long after the first one that was recorded at the same time as it, or `None` where
-/// there is no such one and it begins with the clock. `spans` are the first and last stamps of recordings, nanoseconds, and
-/// `None` of what has no stamps or none that count.
-pub(super) fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
+/// there is no such one and it begins with the clock. `spans` are [those of their clocks](crate::Source::clock_span):
+/// nanoseconds of the first and last stamp, and `None` of what has no stamps or none that others share.
+pub fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
     let mut order: Vec<(usize, [i64; 2])> =
         spans.iter().enumerate().filter_map(|(number, span)| Some((number, (*span)?))).collect();
     order.sort_by_key(|&(number, [first, _])| (first, number));
@@ -42,11 +40,6 @@ fn groups(mut order: &[(usize, [i64; 2])]) -> impl Iterator<Item = &[(usize, [i6
         order = rest;
         Some(group)
     })
-}
-
-/// The first and the last stamp.
-pub(super) fn span(timeline: &Timeline) -> Option<[i64; 2]> {
-    Some([*timeline.stamps().first()?, *timeline.stamps().last()?])
 }
 
 #[cfg(test)]
@@ -82,7 +75,5 @@ mod tests {
         let all = Some([i64::MIN, i64::MAX]);
         let late = Some([i64::MAX, i64::MAX]);
         assert_eq!(beginnings(&[late, all]), [Some(Duration::from_nanos(u64::MAX)), Some(Duration::ZERO)]);
-        assert_eq!(span(&Timeline::default()), None, "no frame");
-        assert_eq!(span(&Timeline::new(vec![3, 1])), Some([1, 3]));
     }
 }
