@@ -25,9 +25,13 @@ use autosplats::{
 };
 
 const POINTS: usize = 100_000;
+/// Of the first pictures; those that follow are as large as they can be.
 const SIZE: [u32; 2] = [960, 540];
+const FIRST: usize = 100;
 /// Milliseconds from message to message.
 const PERIOD: f64 = 50.0;
+/// Share of it that a picture may take, as in the window.
+const SHARE: f64 = 0.6;
 /// Megabytes that memory may grow by from the end of the first minute to the end.
 const GROWTH: f64 = 20.0;
 
@@ -71,7 +75,8 @@ fn ten_minutes_of_live_points_become_pictures() {
     let mut latest = Latest::new(LatestOptions::default());
     latest.add(DMat4::IDENTITY);
     let mut renderer = Renderer::new();
-    let (mut camera, settings) = (None, Settings::default());
+    let (mut camera, mut size, settings) = (None, SIZE, Settings::default());
+    let mut pictures = 0;
     let (mut since_sent, mut since_taken, mut memory) = (Vec::new(), Vec::new(), Vec::new());
     let begun = Instant::now();
     loop {
@@ -86,12 +91,26 @@ fn ten_minutes_of_live_points_become_pictures() {
         latest.put(0, update);
         let cloud = latest.cloud();
         assert_eq!(cloud.len(), POINTS, "whole");
+        if since_taken.len() == FIRST {
+            // Those of the first second are of a program that has just begun.
+            let [median, ..] = percentiles(&since_taken[FIRST / 5..]);
+            println!(
+                "{} x {}: {}, from taking {median:.1}",
+                size[0],
+                size[1],
+                shown(percentiles(&since_sent[FIRST / 5..]))
+            );
+            let scale = (SHARE * PERIOD / median).sqrt().min(1.0);
+            size = SIZE.map(|side| (f64::from(side) * scale) as u32);
+            since_sent.clear();
+        }
         let fitted = || {
             let (aspect, projection) = (f64::from(SIZE[0]) / f64::from(SIZE[1]), Projection::PerspectiveFovDeg(40.0));
             Camera::fit(&cloud, guess_axes(&cloud), ViewDirection::Iso, aspect, projection).unwrap()
         };
         let camera = camera.get_or_insert_with(fitted);
-        let frame = renderer.render(&cloud, camera, SIZE, &settings).unwrap();
+        let frame = renderer.render(&cloud, camera, size, &settings).unwrap();
+        pictures += 1;
         since_sent.push((now() - stamp) as f64 / 1e6);
         since_taken.push(taken.elapsed().as_secs_f64() * 1e3);
         let background = frame.image.pixels[0];
@@ -107,12 +126,13 @@ fn ten_minutes_of_live_points_become_pictures() {
     assert!(sender.wait().unwrap().success(), "the script ends in order");
     memory.push(resident());
     println!(
-        "{sent} sent in {seconds} s, {} taken, {} dropped, {} pictures; from sending to the picture: {}; from taking: {}; MB by minute: {memory:.0?}",
+        "{sent} sent in {seconds} s, {} taken, {} dropped, {pictures} pictures; of {} x {} from sending to the picture: {}; from taking: {}; MB by minute: {memory:.0?}",
         told.taken,
         told.dropped,
-        since_sent.len(),
+        size[0],
+        size[1],
         shown(percentiles(&since_sent)),
-        shown(percentiles(&since_taken)),
+        shown(percentiles(&since_taken[FIRST..])),
     );
     assert_eq!(told.taken + told.dropped, sent, "none is lost unless it is counted: {told:?}");
     assert_eq!((kept.shown, kept.late + kept.duplicates), (told.taken, 0), "each that was taken is shown: {kept:?}");

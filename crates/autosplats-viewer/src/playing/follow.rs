@@ -16,7 +16,7 @@ impl App {
     /// Begins to play something.
     pub(crate) fn play(&mut self, input: Input, appearance: Appearance, context: &egui::Context) {
         let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), context.clone());
-        self.playing.streams.push(Moving { input, thread, layer: None, frame: None, begins: None, appearance });
+        self.playing.streams.push(Moving::new(input, thread, appearance));
     }
 
     /// Opens the source of a layer anew and plays it from where the clock stands.
@@ -30,9 +30,8 @@ impl App {
         match self.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
             Some(moving) => (moving.thread, moving.frame) = (thread, None),
             None => {
-                let appearance = Appearance::default();
-                let moving = Moving { input, thread, layer: Some(id), frame: None, begins: None, appearance };
-                self.playing.streams.push(moving);
+                let moving = Moving::new(input, thread, Appearance::default());
+                self.playing.streams.push(Moving { layer: Some(id), ..moving });
             }
         }
         self.playing.clock.hold();
@@ -53,6 +52,7 @@ impl App {
         let passed = self.playing.time.replace(now).map_or(0.0, |before| now - before);
         self.keep_edits();
         let playing = &mut self.playing;
+        playing.count_updates(now);
         let open = playing.streams.iter().all(|moving| moving.thread.timeline().is_some());
         if open || !playing.clock.is_held() {
             playing.align();
@@ -107,8 +107,8 @@ impl App {
                 self.playing.edited_at.get_or_insert(position);
             }
             let thread = StreamThread::go_on(input.clone(), frame, self.loader.frame.clone(), context.clone());
-            let appearance = Appearance::default();
-            self.playing.streams.push(Moving { input, thread, layer: Some(layer), frame, begins: None, appearance });
+            let moving = Moving::new(input, thread, Appearance::default());
+            self.playing.streams.push(Moving { layer: Some(layer), frame, ..moving });
             self.playing.clock.hold();
         }
     }

@@ -19,8 +19,14 @@ use crate::app::App;
 use crate::document::LayerId;
 use crate::loading::{Appearance, Input};
 
-/// Milliseconds that a picture of something that moves may take at most, and of what is live, whenever the next one comes.
+/// Milliseconds that a picture of something that moves may take at most, and of what is live before it is known how often that
+/// comes.
 const LIVE_MS: f64 = 100.0;
+/// Share of the time from update to update that a picture of what is live may take: half a picture is waited for first, and both
+/// are to be over when the next update comes.
+const LIVE_SHARE: f64 = 0.6;
+/// Seconds over which live updates are counted.
+const COUNTED: f64 = 1.0;
 
 /// All that moves.
 #[derive(Default)]
@@ -46,6 +52,33 @@ struct Moving {
     /// When it begins on the clock, if its stamps say that; with the clock otherwise.
     begins: Option<Duration>,
     appearance: Appearance,
+    heard: Heard,
+}
+
+/// How often something live comes.
+#[derive(Default)]
+struct Heard {
+    /// Seconds of the window and the number of updates by then, when counting began.
+    since: Option<(f64, u64)>,
+    /// Milliseconds from update to update, once that is known.
+    period_ms: Option<f64>,
+}
+
+impl Heard {
+    /// So many updates have come by now.
+    fn count(&mut self, now: f64, updates: u64) {
+        let (since, before) = *self.since.get_or_insert((now, updates));
+        if now - since >= COUNTED {
+            let came = updates.saturating_sub(before);
+            self.period_ms = (came > 0).then(|| 1e3 * (now - since) / came as f64);
+            self.since = Some((now, updates));
+        }
+    }
+
+    /// Milliseconds that a picture may take to be there before the next update.
+    fn live_ms(&self) -> f64 {
+        self.period_ms.map_or(LIVE_MS, |period_ms| (LIVE_SHARE * period_ms).min(LIVE_MS))
+    }
 }
 
 /// An input that moved.
@@ -70,6 +103,11 @@ pub(crate) struct Waiting<'a> {
 }
 
 impl Moving {
+    /// Something that has no points yet.
+    fn new(input: Input, thread: StreamThread, appearance: Appearance) -> Self {
+        Self { input, thread, layer: None, frame: None, begins: None, appearance, heard: Heard::default() }
+    }
+
     /// When its frames happen, if it has a timeline and that is known.
     fn timeline(&self) -> Option<Arc<Timeline>> {
         self.thread.timeline().flatten()
@@ -149,14 +187,16 @@ impl Playing {
         self.streams.iter().any(|moving| matches!(moving.thread.timeline(), Some(None)))
     }
 
-    /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second.
+    /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second. Of what is live,
+    /// what a picture may take to be there before the next update.
     pub(crate) fn frame_ms(&self) -> Option<f64> {
         let runs = self.clock.runs();
         let each = self
             .timelines()
             .filter(|(timeline, _)| runs && timeline.len() > 1)
             .map(|(timeline, _)| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
-        let live = (self.clock.playing && self.is_live()).then_some(LIVE_MS);
+        let is_live = |moving: &&Moving| self.clock.playing && matches!(moving.thread.timeline(), Some(None));
+        let live = self.streams.iter().filter(is_live).map(|moving| moving.heard.live_ms());
         each.chain(live).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
     }
 
@@ -225,6 +265,14 @@ impl Playing {
             Track { layer, input: moving.input.clone(), frames: places.iter().map(frame).collect() }
         };
         shown.map(track).collect()
+    }
+
+    /// Listens how often live updates come, at a second of the window.
+    fn count_updates(&mut self, now: f64) {
+        for moving in &mut self.streams {
+            let Statistics { taken, dropped, .. } = moving.thread.statistics();
+            moving.heard.count(now, taken + dropped);
+        }
     }
 
     /// Finds out when each begins, by what is open now. What is shown stays as it is unless the clock is held; of several that

@@ -39,7 +39,7 @@ override DOT_PX: f32;
 struct Surface {
     // From the surfel to the surface.
     offset: vec3f,
-    // Sum of weights; 0 if there is none.
+    // Sum of weights; 0 if there is none, below 0 if there are some of which none agrees.
     weight: f32,
     // Of either sign.
     normal: vec3f,
@@ -57,6 +57,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
     let low = vec2u(max(floor(at), vec2f(0.0)));
     let high = min(vec2u(max(at + 1.0, vec2f(0.0))), vec2u(level.columns, level.rows) - 1u);
     let per_farthest = 1.0 / (FARTHEST * noise);
+    var disagrees = false;
     for (var row = low.y; row <= high.y; row++) {
         for (var column = low.x; column <= high.x; column++) {
             let cell = row * level.columns + column;
@@ -78,6 +79,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
                 // The smallest of a sheet's balls was held against nothing.
                 let agrees = dot(across, across) <= AGREE * AGREE * (sheet.error * sheet.error + first.w * first.w);
                 if first.w >= 0.0 && !(agrees && sheet.scatter <= SCATTER * noise) {
+                    disagrees = true;
                     continue;
                 }
                 // To the eighth: about as likely as noise puts a point there.
@@ -96,6 +98,8 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
         sum.offset *= per_total;
         sum.normal = normalize(sum.normal);
         sum.curvature *= per_total;
+    } else if disagrees {
+        sum.weight = -1.0;
     }
     return sum;
 }
@@ -216,7 +220,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
         let first = vec4f(surfel.normal, select(-1.0, noise / surfel.k_radius, is_reliable));
         surface = blend(surfel.center, first, noise);
-        if !(surface.weight > 0.0) {
+        if surface.weight == 0.0 {
             let cell_px = atomicLoad(&counters[CELL_PX]);
             let radius = base_radius(surfel, cell_px, atomicLoad(&counters[CELL_COLUMNS]));
             let quadric = choose(surfel.center, radius, first, noise, enough);

@@ -9,7 +9,7 @@ use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
 use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
 use super::rows::{is_row, turn};
-use super::sheets::{Sheets, Surface};
+use super::sheets::{Blend, Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -208,13 +208,19 @@ fn adapt_all_with<'a, S: Simd>(
         };
         let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
         let first = is_reliable.then(|| (surfel.normal.into(), noise / surfel.k_radius));
-        let alone = || {
+        let mut alone = || {
             let radius = first_radius(surfel, density, view, k);
             let quadric = choose(simd, surfel.center, radius, first, (noise, enough), (cells, view), gathered)?;
             let Quadric { normal, height, axis, curvature, .. } = quadric;
             Some(Surface { offset: axis * height, normal, curvature })
         };
-        match sheets.blend(surfel.center, first, noise, cells, view).or_else(alone) {
+        let surface = match sheets.blend(surfel.center, first, noise, cells, view) {
+            Blend::Surface(surface) => Some(surface),
+            // So would nine of ten quadrics of its own, each at the cost of a sheet.
+            Blend::Disagrees => None,
+            Blend::Nothing => alone(),
+        };
+        match surface {
             Some(surface) => {
                 if known.is_some() {
                     surfel.radius *= (widest(surfel, task) / surfel.k_radius).min(1.0);

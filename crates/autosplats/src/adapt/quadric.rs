@@ -186,20 +186,20 @@ impl Gathered {
     /// The plane through the clusters.
     #[inline(always)]
     pub(super) fn plane<S: Simd>(&self, simd: S) -> Plane {
-        let mut total = [0.0; 10];
+        let mut lanes = [Lanes::default(); 10];
         for vector in 0..LANES / S::F32_LANES {
             let mut sums = [F32s::splat(simd, 0.0); 10];
-            for lanes in &self.lanes {
-                let [x, y, z, w] = load(simd, lanes, vector);
+            for clusters in &self.lanes {
+                let [x, y, z, w] = load(simd, clusters, vector);
                 let (wx, wy, wz) = (w * x, w * y, w * z);
                 let terms = [w, wx, wy, wz, wx * x, wx * y, wx * z, wy * y, wy * z, wz * z];
                 for term in 0..10 {
                     sums[term] += terms[term];
                 }
             }
-            add_lanes(&sums, vector, &mut total);
+            store(&sums, vector, &mut lanes);
         }
-        let [w, x, y, z, xx, xy, xz, yy, yz, zz] = total;
+        let [w, x, y, z, xx, xy, xz, yy, yz, zz] = add_lanes(&mut lanes);
         let share = 1.0 / w;
         let [x, y, z] = [x * share, y * share, z * share];
         let second = [xx * share - x * x, xy * share - x * y, xz * share - x * z, yy * share - y * y];
@@ -223,11 +223,11 @@ impl Gathered {
         let (ux, uy, uz) = (splat(u.x), splat(u.y), splat(u.z));
         let (vx, vy, vz) = (splat(v.x), splat(v.y), splat(v.z));
         let (ax, ay, az) = (splat(axis.x), splat(axis.y), splat(axis.z));
-        let mut total = [0.0; 22];
+        let mut lanes = [Lanes::default(); 22];
         for vector in 0..LANES / S::F32_LANES {
             let mut sums = [splat(0.0); 22];
-            for lanes in &self.lanes {
-                let [px, py, pz, w] = load(simd, lanes, vector);
+            for clusters in &self.lanes {
+                let [px, py, pz, w] = load(simd, clusters, vector);
                 let x = ux * px + uy * py + uz * pz;
                 let y = vx * px + vy * py + vz * pz;
                 let h = ax * px + ay * py + az * pz;
@@ -243,10 +243,10 @@ impl Gathered {
                     sums[term] += terms[term];
                 }
             }
-            add_lanes(&sums, vector, &mut total);
+            store(&sums, vector, &mut lanes);
         }
         #[rustfmt::skip]
-        let [w, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy, h, hx, hy, hxx, hxy, hyy, hh] = total;
+        let [w, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy, h, hx, hy, hxx, hxy, hyy, hh] = add_lanes(&mut lanes);
         let ridge = RIDGE * w;
         // Slopes last, so that what is left of their rows when the others are eliminated is their own.
         let mut rows = [
@@ -307,14 +307,25 @@ fn load<S: Simd>(simd: S, lanes: &[Lanes; 4], vector: usize) -> [F32s<S>; 4] {
     ]
 }
 
-/// Adds the lanes of some sums up, those of the `vector`-th part, one after the other: the same bits for any width.
+/// Adds the `vector`-th part of the lanes of some sums to all of them.
 #[inline(always)]
-fn add_lanes<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, total: &mut [f32; N]) {
-    let mut lanes = Lanes::default();
+fn store<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, lanes: &mut [Lanes; N]) {
     for index in 0..N {
-        sums[index].store(&mut lanes.0, vector);
-        for lane in vector * S::F32_LANES..(vector + 1) * S::F32_LANES {
-            total[index] += lanes.0[lane];
+        sums[index].store(&mut lanes[index].0, vector);
+    }
+}
+
+/// Adds the lanes of some sums up, half to half: the same bits for any width of vectors, and few additions that wait for each
+/// other.
+#[inline(always)]
+fn add_lanes<const N: usize>(lanes: &mut [Lanes; N]) -> [f32; N] {
+    for half in [8, 4, 2, 1] {
+        for Lanes(lanes) in &mut *lanes {
+            let (low, high) = lanes.split_at_mut(half);
+            for lane in 0..half {
+                low[lane] += high[lane];
+            }
         }
     }
+    std::array::from_fn(|index| lanes[index].0[0])
 }

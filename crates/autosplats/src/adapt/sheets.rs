@@ -92,6 +92,16 @@ pub(super) struct Surface {
     pub(super) curvature: f32,
 }
 
+/// What the sheets around a surfel say.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Blend {
+    Surface(Surface),
+    /// There are some, but none agrees with the surfel's first normal: it is at an edge, or of detail finer than sheets.
+    Disagrees,
+    /// There are none.
+    Nothing,
+}
+
 /// Noise at a place in view space, of a cloud's point with a k-radius, world units.
 type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> f32 + Sync + 'a;
 
@@ -165,7 +175,7 @@ impl Sheets {
     }
 
     /// The surface beside `center`, from the sheets of the four cells around it that agree with the `first` normal, where
-    /// its standard error is known. `None` if there are none.
+    /// its standard error is known.
     #[inline(always)]
     pub(super) fn blend(
         &self,
@@ -174,8 +184,8 @@ impl Sheets {
         noise: f32,
         cells: &Cells,
         view: &View,
-    ) -> Option<Surface> {
-        let level = cells.levels.get(self.level)?;
+    ) -> Blend {
+        let Some(level) = cells.levels.get(self.level) else { return Blend::Nothing };
         let per_side = 1.0 / level.side_px as f32;
         let [x, y] = view.to_pixel(center.into()).map(|at| at * per_side - 0.5);
         // Casts from float saturate at 0.
@@ -186,6 +196,7 @@ impl Sheets {
         let per_farthest = 1.0 / (FARTHEST * noise);
         let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
         let mut total = 0.0;
+        let mut disagrees = false;
         for row in y0..=y1 {
             for column in x0..=x1 {
                 let cell = row * level.columns + column;
@@ -208,6 +219,7 @@ impl Sheets {
                         // The smallest of a sheet's balls was held against nothing.
                         let agrees = across <= AGREE * AGREE * (sheet.error * sheet.error + error * error);
                         if !(agrees & (sheet.scatter <= SCATTER * noise)) {
+                            disagrees = true;
                             continue;
                         }
                     }
@@ -224,10 +236,10 @@ impl Sheets {
             }
         }
         if !(total > 0.0) {
-            return None;
+            return if disagrees { Blend::Disagrees } else { Blend::Nothing };
         }
         let per_total = 1.0 / total;
-        Some(Surface {
+        Blend::Surface(Surface {
             offset: sum.offset * per_total,
             normal: sum.normal.normalize(),
             curvature: sum.curvature * per_total,

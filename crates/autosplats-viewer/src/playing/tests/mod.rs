@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use autosplats::Backend;
 use eframe::egui;
 
+use super::{Heard, LIVE_MS, LIVE_SHARE};
 use crate::app::App;
 use crate::look::Look;
 use crate::{Input, Options};
@@ -20,6 +21,20 @@ fn sequence(folder: &Path, frames: usize) -> String {
         std::fs::write(folder.join(format!("frame_{frame}.xyz")), rows).expect("a frame");
     }
     folder.display().to_string()
+}
+
+#[test]
+fn pictures_of_what_is_live_are_there_before_the_next_update() {
+    let mut heard = Heard::default();
+    assert_eq!(heard.live_ms(), LIVE_MS, "before anything is known");
+    for (tick, now) in (0_u32..60).map(|tick| (u64::from(tick), f64::from(tick) * 0.05)) {
+        heard.count(now, tick);
+    }
+    assert!((heard.live_ms() - LIVE_SHARE * 50.0).abs() < 2.0, "twenty a second: {} ms", heard.live_ms());
+    heard.count(10.0, 60);
+    assert_eq!(heard.live_ms(), LIVE_MS, "seldom is no reason to be slow");
+    heard.count(12.0, 60);
+    assert_eq!(heard.live_ms(), LIVE_MS, "nor is a pause");
 }
 
 /// Lets the application take in what its threads have, until something is so.
