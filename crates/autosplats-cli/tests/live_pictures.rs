@@ -25,9 +25,10 @@ use autosplats::{
 };
 
 const POINTS: usize = 100_000;
-/// Of the first pictures; those that follow are as large as they can be.
+/// Of the first hundred pictures; those that follow get smaller, in a few steps of as many.
 const SIZE: [u32; 2] = [960, 540];
 const FIRST: usize = 100;
+const STEPS: usize = 3;
 /// Milliseconds from message to message.
 const PERIOD: f64 = 50.0;
 /// Share of it that a picture may take, as in the window.
@@ -76,7 +77,7 @@ fn ten_minutes_of_live_points_become_pictures() {
     latest.add(DMat4::IDENTITY);
     let mut renderer = Renderer::new();
     let (mut camera, mut size, settings) = (None, SIZE, Settings::default());
-    let mut pictures = 0;
+    let (mut pictures, mut steps) = (0, 0);
     let (mut since_sent, mut since_taken, mut memory) = (Vec::new(), Vec::new(), Vec::new());
     let begun = Instant::now();
     loop {
@@ -91,18 +92,19 @@ fn ten_minutes_of_live_points_become_pictures() {
         latest.put(0, update);
         let cloud = latest.cloud();
         assert_eq!(cloud.len(), POINTS, "whole");
-        if since_taken.len() == FIRST {
+        if since_taken.len() == FIRST && steps < STEPS {
             // Those of the first second are of a program that has just begun.
             let [median, ..] = percentiles(&since_taken[FIRST / 5..]);
             println!(
-                "{} x {}: {}, from taking {median:.1}",
+                "{} x {}: {}; from taking {median:.1}",
                 size[0],
                 size[1],
                 shown(percentiles(&since_sent[FIRST / 5..]))
             );
             let scale = (SHARE * PERIOD / median).sqrt().min(1.0);
-            size = SIZE.map(|side| (f64::from(side) * scale) as u32);
-            since_sent.clear();
+            size = size.map(|side| (f64::from(side) * scale) as u32);
+            (since_sent, since_taken) = (Vec::new(), Vec::new());
+            steps += 1;
         }
         let fitted = || {
             let (aspect, projection) = (f64::from(SIZE[0]) / f64::from(SIZE[1]), Projection::PerspectiveFovDeg(40.0));
@@ -132,7 +134,7 @@ fn ten_minutes_of_live_points_become_pictures() {
         size[0],
         size[1],
         shown(percentiles(&since_sent)),
-        shown(percentiles(&since_taken[FIRST..])),
+        shown(percentiles(&since_taken)),
     );
     assert_eq!(told.taken + told.dropped, sent, "none is lost unless it is counted: {told:?}");
     assert_eq!((kept.shown, kept.late + kept.duplicates), (told.taken, 0), "each that was taken is shown: {kept:?}");

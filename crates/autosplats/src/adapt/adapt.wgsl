@@ -137,8 +137,7 @@ fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
         offset = offset_along(known, surface.normal, offset);
     }
     let center = surfel.center + offset;
-    let to_eye = select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u);
-    let normal = select(surface.normal, -surface.normal, dot(surface.normal, to_eye) < 0.0);
+    let normal = turned_to_eye(surface.normal, center);
     surfels[place].normal = normal;
     var shadow = vec4f(any_orthonormal(normal), 1.0);
     if known.noise > 0.0 {

@@ -348,8 +348,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
 fn place(surfel: &mut Surfel, surface: &Surface, known: Option<&Known>, view: &View) {
     let &Surface { offset, normal, curvature } = surface;
     let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(normal, offset));
-    let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
-    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+    let normal = view.turned_to_eye(normal, center);
     let circle = (normal.any_orthonormal_vector(), 1.0);
     let (major_axis, major_ratio) =
         known.and_then(|known| known.shadow(surfel.normal.into(), normal)).unwrap_or(circle);

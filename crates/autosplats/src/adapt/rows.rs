@@ -73,8 +73,7 @@ pub(super) fn turn<S: Simd>(
         surfel.major_ratio = 1.0 / THIN_ROW;
         return false;
     };
-    let to_eye = if view.perspective { -Vec3::from(surfel.center) } else { Vec3::NEG_Z };
-    let normal = if plane.axis.dot(to_eye) < 0.0 { -plane.axis } else { plane.axis };
+    let normal = view.turned_to_eye(plane.axis, surfel.center.into());
     surfel.normal = normal.to_array();
     // Not zero: the row is nearly in the plane.
     surfel.major_axis = normal.cross(row).normalize().to_array();

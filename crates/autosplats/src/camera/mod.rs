@@ -126,6 +126,18 @@ impl View {
         if self.perspective { depth / self.focal_px } else { 1.0 / self.focal_px }
     }
 
+    /// From a view-space position towards the eye; not of unit length.
+    #[inline(always)]
+    pub(crate) fn to_eye(&self, position: Vec3) -> Vec3 {
+        if self.perspective { -position } else { Vec3::NEG_Z }
+    }
+
+    /// A normal of a surface at a view-space position, on the side of the eye.
+    #[inline(always)]
+    pub(crate) fn turned_to_eye(&self, normal: Vec3, position: Vec3) -> Vec3 {
+        if normal.dot(self.to_eye(position)) < 0.0 { -normal } else { normal }
+    }
+
     /// The view-space position that projects to `pixel` at `depth`.
     #[inline(always)]
     pub(crate) fn unproject(&self, pixel: [f32; 2], depth: f32) -> Vec3 {

@@ -175,8 +175,7 @@ impl Fitted {
         rules: &FitRules,
     ) -> Surfel {
         let [count, k_radius] = [block.count.0[lane], block.k_radius.0[lane]];
-        let to_eye = if view.perspective { center.map(|c| -c) } else { [0.0, 0.0, -1.0] };
-        let plane = self.plane(lane, to_eye);
+        let plane = self.plane(lane, view.to_eye(center.into()).to_array());
         let offset = of_lane(&block.offset, lane).map(|sum| sum / count);
         let apart = offset.iter().map(|c| c * c).sum::<f32>() > (LOPSIDED * k_radius) * (LOPSIDED * k_radius);
         let outlier = apart & (count >= LOPSIDED_COUNT) & !rules.keep_outliers;

@@ -71,8 +71,8 @@ fn axes(sums: Neighborhood) -> Eigen {
 }
 
 // The unit normal of a neighbourhood that is no plane: as much towards the eye as its line allows.
-fn facing(to_eye: vec3f, line: vec3f, has_line: bool) -> vec3f {
-    let toward = normalized_or(to_eye, vec3f(0.0, 0.0, -1.0));
+fn facing(eye: vec3f, line: vec3f, has_line: bool) -> vec3f {
+    let toward = normalized_or(eye, vec3f(0.0, 0.0, -1.0));
     let across = toward - line * product(line, toward);
     let length_squared = product(across, across);
     // Of a line towards the eye nothing but rounding is left across it.
@@ -83,7 +83,7 @@ fn facing(to_eye: vec3f, line: vec3f, has_line: bool) -> vec3f {
 
 // The plane through a neighbourhood [Paper, Eq. 1 to 3], seen from the eye. A neighbourhood that is a line or one place has
 // many; the one most square to the line of sight is taken.
-fn plane(sums: Neighborhood, to_eye: vec3f) -> Plane {
+fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     let found = axes(sums);
     let middle = found.values.y;
     let largest = found.values.z;
@@ -91,7 +91,7 @@ fn plane(sums: Neighborhood, to_eye: vec3f) -> Plane {
     var major_axis = found.largest;
     var major_ratio = largest / middle;
     if !(middle > LINE * largest) {
-        normal = facing(to_eye, major_axis, largest > 0.0);
+        normal = facing(eye, major_axis, largest > 0.0);
         // Any tangent does for a circle.
         major_axis = select(any_orthonormal(normal), major_axis, largest > 0.0);
         major_ratio = select(1.0, MOST, largest > 0.0);
@@ -99,7 +99,7 @@ fn plane(sums: Neighborhood, to_eye: vec3f) -> Plane {
     let least = max(found.values.x, 0.0);
     let sum = least + middle + largest;
     let curvature = select(0.0, least / sum, sum > 0.0);
-    return Plane(select(normal, -normal, product(normal, to_eye) < 0.0), major_axis, major_ratio, curvature);
+    return Plane(select(normal, -normal, product(normal, eye) < 0.0), major_axis, major_ratio, curvature);
 }
 
 // Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6]; one cut short counts as k neighbours.
@@ -110,7 +110,7 @@ fn splat_radius(k_radius: f32, count: f32) -> f32 {
 fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     let point = points[query];
     let center = point.position_view;
-    let face = plane(sums, select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u));
+    let face = plane(sums, to_eye(center));
 
     var radius = 0.0;
     if sums.count > 0.0 {

@@ -31,8 +31,7 @@ pub(crate) fn place(
         let point = &screen.points[query as usize];
         let source = screen.source[query as usize];
         let normal = view.view_from_world * Vec3::from(planes.normals[source as usize]);
-        let to_eye = if view.perspective { -Vec3::from(point.position_view) } else { Vec3::NEG_Z };
-        let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+        let normal = view.turned_to_eye(normal, point.position_view.into());
         // Splat set-up would draw a radius of NaN as wide as splats may be.
         let is_drawn = normal.is_finite() && planes.radius[source as usize].is_finite();
         let radius = if is_drawn { planes.radius[source as usize].max(0.0) } else { 0.0 };

@@ -1,33 +1,33 @@
 //! The frame on the GPU: the steps of all stages, made when buffers change and replayed for each picture.
 
-use std::mem::{Discriminant, discriminant};
+mod prepared;
+#[cfg(test)]
+mod tests;
+
 use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
 
+use self::prepared::{OnDevice, Passes, Prepared, Shape};
 use super::attributes::{ColorSource, Wanted};
 use super::surfels::point_surfels;
 use super::upward::Upward;
-use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check, check_count};
+use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
 use crate::Error;
 use crate::adapt::DepthNoise;
-use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
-use crate::camera::{Camera, Reprojection, Seen, View};
+use crate::adapt::gpu::DepthNoiseBuffer;
+use crate::camera::{Camera, Seen, View};
 use crate::fit::Surfel;
-use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::Sensors;
-use crate::fit::orient::gpu::{OrientPasses, sensor_buffer, write_sensors};
-use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, Step, stage_ms};
-use crate::project::gpu::{Counter, ProjectPasses, Round, ScreenBuffers};
+use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
+use crate::gpu::{AdapterSummary, Clock, FrameUniform, Gpu, PassTime, Readback, Recorder, stage_ms};
+use crate::project::gpu::{Counter, ScreenBuffers};
 use crate::project::{DeviceCloud, PointValues, Uploader};
-use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, check_engine, compile, convergence};
-use crate::search::past::gpu::{PastPasses, past_buffer};
-use crate::search::screen_grid::gpu::neighborhood_buffer;
-use crate::search::{SearchEngine, SearchRules};
-use crate::shade::gpu::{ReadPicture, ShadeBuffers, ShadePasses, ShadeUniform, check_texture, finds_range, finish};
-use crate::shade::{ColorMode, Image, Scene, linear_steps};
-use crate::splat::gpu::{SplatBuffers, SplatPasses};
-use crate::splat::{Channels, GBuffer, LayerBuffers};
+use crate::search::SearchEngine;
+use crate::search::gpu::{check_engine, convergence};
+use crate::shade::gpu::{ReadPicture, ShadeUniform, check_texture, finish};
+use crate::shade::{Image, Scene};
+use crate::splat::{GBuffer, LayerBuffers};
 
 /// Renders on a device.
 #[derive(Debug)]
@@ -61,59 +61,6 @@ struct Resident {
     values: Option<(u64, Option<ColorSource>, Option<String>)>,
 }
 
-/// Which engine, whatever its parameters, and k: what search passes are compiled for.
-type SearchKind = (Discriminant<SearchEngine>, u32);
-
-/// Compiled passes: those of the last engine, k and channels are kept.
-#[derive(Debug)]
-struct Passes {
-    project: ProjectPasses,
-    search: Option<(SearchKind, Box<dyn EnginePasses>)>,
-    past: PastPasses,
-    fit: FitPasses,
-    /// Once there was a cloud with sensors.
-    orient: Option<OrientPasses>,
-    /// Compiled when first asked for.
-    adapt: Option<AdaptPasses>,
-    splat: Option<(Channels, SplatPasses)>,
-    shade: ShadePasses,
-}
-
-/// What a frame's buffers and steps were made for.
-#[derive(Clone, Debug, PartialEq)]
-struct Shape {
-    size: [u32; 2],
-    halves: bool,
-    search: SearchKind,
-    coherent: bool,
-    smooth: bool,
-    adaptive: bool,
-    depth_refinement: bool,
-    channels: Channels,
-    /// Runs of points by their sensors.
-    sensors: Option<usize>,
-    tone_backs: bool,
-    find_range: bool,
-    keep_linear: bool,
-    color: ColorMode,
-}
-
-/// A frame ready to be replayed.
-#[derive(Debug)]
-struct Prepared {
-    shape: Shape,
-    /// How the last frame was seen, if there was one.
-    seen: Option<Seen>,
-    screen: ScreenBuffers,
-    /// [`Surfel`] per query.
-    surfels: wgpu::Buffer,
-    layers: LayerBuffers,
-    picture: ShadeBuffers,
-    /// Of an engine that iterates.
-    convergence: Option<wgpu::Buffer>,
-    steps: Vec<Step>,
-}
-
 impl GpuRenderer {
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
@@ -126,16 +73,7 @@ impl GpuRenderer {
             depth_noise: DepthNoiseBuffer::new(&gpu)?,
             resident: Resident::default(),
             frame: gpu.uniform::<FrameUniform>("frame")?,
-            passes: Passes {
-                project: ProjectPasses::new(&gpu, gpu.int64_atomics())?,
-                search: None,
-                past: PastPasses::new(&gpu)?,
-                fit: FitPasses::new(&gpu)?,
-                orient: None,
-                adapt: None,
-                splat: None,
-                shade: ShadePasses::new(&gpu)?,
-            },
+            passes: Passes::new(&gpu)?,
             prepared: None,
             upward: Upward::default(),
             view: None,
@@ -378,127 +316,16 @@ impl GpuRenderer {
         // A screen point has nothing larger than its surfel.
         let halves = settings.reconstruction.halves()
             && ScreenBuffers::has_room_for_halves::<Surfel>(&self.gpu, size, self.cloud.capacity());
-        let shape = Shape {
-            size,
-            halves,
-            search: (discriminant(&settings.reconstruction.engine), settings.reconstruction.k),
-            coherent: settings.reconstruction.remembers(),
-            smooth: settings.reconstruction.smoothing() > 0.0,
-            adaptive: settings.reconstruction.adaptive,
-            depth_refinement: settings.reconstruction.depth_refinement,
-            channels: Channels {
-                color: wanted.colors.is_some(),
-                scalar: wanted.scalar.is_some(),
-                measures: wanted.measures,
-                backs: wanted.backs,
-            },
-            sensors: self.sensors.as_ref().map(|(_, len)| *len),
-            tone_backs: wanted.backs && settings.shading.tones_backs(),
-            find_range: finds_range(&settings.shading),
-            keep_linear: settings.all_layers,
-            color: settings.shading.color.clone(),
-        };
-        if self.prepared.as_ref().is_some_and(|prepared| prepared.shape == shape) {
-            return Ok(());
+        let sensors = self.sensors.as_ref().map(|(_, len)| *len);
+        let shape = Shape::new(size, halves, sensors, wanted, settings);
+        if self.prepared.as_ref().is_none_or(|prepared| !prepared.is_for(&shape)) {
+            // The old buffers go before the new ones come.
+            self.prepared = None;
+            let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
+            let resident = OnDevice { cloud, sensors: sensors.as_ref().map(|(buffer, _)| buffer), depth_noise, frame };
+            self.prepared = Some(Prepared::new(gpu, shape, passes, resident, settings)?);
         }
-        // The old buffers go before the new ones come.
-        self.prepared = None;
-        let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
-        let Passes { project, search, past, fit, orient, adapt, splat, shade } = passes;
-        if sensors.is_some() && orient.is_none() {
-            *orient = Some(OrientPasses::new(gpu)?);
-        }
-        if search.as_ref().is_none_or(|(of, _)| *of != shape.search) {
-            let Reconstruction { engine, k, .. } = settings.reconstruction;
-            *search = Some((shape.search, compile(gpu, engine, k)?));
-        }
-        if shape.adaptive && adapt.is_none() {
-            *adapt = Some(AdaptPasses::new(gpu)?);
-        }
-        let adapt = adapt.as_ref().filter(|_| shape.adaptive);
-        if splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
-            *splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
-        }
-        let (Some((_, search)), Some((_, splat))) = (search, splat) else { return Ok(()) };
-        let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
-        let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
-        let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
-        let surfels = surfel_buffer(gpu, screen.capacity)?;
-        let adapt = match adapt {
-            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
-            None => None,
-        };
-        let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
-        let layers = LayerBuffers::new(gpu, size, shape.channels)?;
-        let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
-        let (steps, convergence) = gpu.checked(|| {
-            let mut steps = project.steps(gpu, frame, cloud, &screen);
-            if let Some((passes, buffers)) = &adapt {
-                steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
-            }
-            let buffers =
-                SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods, past: &past_radii };
-            let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
-            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
-                if round == Round::Recovered {
-                    steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
-                }
-                steps.extend(search);
-                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
-                if let Some((passes, buffers)) = &adapt {
-                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
-                }
-                if let (Some(orient), Some((sensors, _))) = (&*orient, &*sensors) {
-                    steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
-                }
-                if shape.smooth {
-                    steps.push(splat.step_over_time(gpu, frame, &screen, &surfels, &layers, round));
-                }
-                steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
-            }
-            if shape.coherent {
-                steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
-            }
-            let refine = shape.depth_refinement;
-            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
-            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
-            Ok::<_, Error>((steps, convergence))
-        })??;
-        self.prepared = Some(Prepared { shape, seen: None, screen, surfels, layers, picture, convergence, steps });
         Ok(())
-    }
-}
-
-impl Prepared {
-    /// Tells the passes what the next frame is to be.
-    fn tell(&mut self, gpu: &Gpu, frame: &wgpu::Buffer, now: Seen, settings: &Settings, shading: &ShadeUniform) {
-        let Settings { reconstruction, .. } = settings;
-        let rules = SearchRules {
-            k: reconstruction.k,
-            outlier_expansions: reconstruction.outlier_expansions,
-            gap_factor: reconstruction.gap_factor,
-        };
-        let told = FrameUniform {
-            halves: self.shape.halves.into(),
-            grid_culling: reconstruction.grid_culling.into(),
-            adaptive: reconstruction.adaptive.into(),
-            longest: reconstruction.longest(),
-            keep_outliers: reconstruction.outlier_expansions.is_none().into(),
-            splat_scale: reconstruction.splat_scale,
-            smoothing: reconstruction.smoothing(),
-            outlier_growth: rules.outlier_radius(1.0),
-            gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
-            first_radius: match reconstruction.engine {
-                SearchEngine::KdTree { first_radius } => first_radius,
-                _ => 0.0,
-            },
-            ..FrameUniform::new(&now.view, reconstruction.k)
-        };
-        // Steps that are made anew leave nothing to look back at, and those of another k are.
-        let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
-        let told = past.map_or(told, |past| told.after(&Reprojection::new(&now, &past)));
-        gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
-        self.picture.write(gpu, shading, &settings.shading);
     }
 }
 
@@ -523,6 +350,3 @@ fn counts(cloud: &PointCloud, counters: &[u32]) -> Counts {
         value_range: None,
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -53,6 +53,16 @@ fn is_finite(value: f32) -> bool {
     return (bitcast<u32>(value) & 0x7f800000u) != 0x7f800000u;
 }
 
+// From a view-space position towards the eye; not of unit length.
+fn to_eye(position: vec3f) -> vec3f {
+    return select(vec3f(0.0, 0.0, -1.0), -position, frame.perspective == 1u);
+}
+
+// A normal of a surface at a view-space position, on the side of the eye.
+fn turned_to_eye(normal: vec3f, position: vec3f) -> vec3f {
+    return select(normal, -normal, dot(normal, to_eye(position)) < 0.0);
+}
+
 fn to_view(position: vec3f) -> vec3f {
     let p = position - frame.eye_local;
     let m = frame.view_from_world;

@@ -127,8 +127,7 @@ fn turned(surfel: Surfel, found: Area) -> Surfel {
         return out;
     }
     let plane = found.plane;
-    let to_eye = select(vec3f(0.0, 0.0, -1.0), -surfel.center, frame.perspective == 1u);
-    out.normal = select(plane.axis, -plane.axis, dot(plane.axis, to_eye) < 0.0);
+    out.normal = turned_to_eye(plane.axis, surfel.center);
     out.major_axis = normalize(cross(out.normal, surfel.major_axis));
     out.curvature = curvature_of(plane);
     // Rows are as far apart as the density says of points k-radius / (k/2) apart; the splat radius is 2/√k k-radii.

@@ -56,10 +56,8 @@ fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<S
 fn draw_towards(surfel: &mut Surfel, surface: &Surface, share: f32, view: &View) {
     let &Surface { normal: then, distance } = surface;
     let center = Vec3::from(surfel.center) - share * distance * then;
-    let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
     let now = Vec3::from(surfel.normal);
-    let normal = (now + share * (then - now)).normalize();
-    let normal = if normal.dot(to_eye) < 0.0 { -normal } else { normal };
+    let normal = view.turned_to_eye((now + share * (then - now)).normalize(), center);
     let major_axis = Vec3::from(surfel.major_axis);
     surfel.normal = normal.to_array();
     surfel.major_axis = (major_axis - normal * normal.dot(major_axis)).normalize().to_array();

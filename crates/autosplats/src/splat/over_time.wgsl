@@ -41,9 +41,7 @@ fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     }
     let before = turned * sign(facing);
     let center = surfel.center - frame.smoothing * distance * turned;
-    let to_eye = select(vec3f(0.0, 0.0, -1.0), -center, frame.perspective == 1u);
-    var normal = normalize(surfel.normal + frame.smoothing * (before - surfel.normal));
-    normal = select(normal, -normal, dot(normal, to_eye) < 0.0);
+    let normal = turned_to_eye(normalize(surfel.normal + frame.smoothing * (before - surfel.normal)), center);
     surfels[place].normal = normal;
     surfels[place].major_axis = normalize(surfel.major_axis - normal * dot(normal, surfel.major_axis));
     let middle = to_pixel(center);

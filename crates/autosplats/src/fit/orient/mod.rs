@@ -121,7 +121,7 @@ impl Sensors {
 /// Whether the sensor, in view space, was surely on the other side of a surfel than the eye.
 fn shows_back(surfel: &Surfel, sensor: Vec3, view: &View) -> bool {
     let [center, normal] = [surfel.center, surfel.normal].map(Vec3::from);
-    let to_eye = if view.perspective { -center } else { Vec3::NEG_Z };
+    let to_eye = view.to_eye(center);
     let to_sensor = sensor - center;
     // How thick the neighbourhood is for its width: about the tangent of the angle that its normal may be off by.
     let rough = (2.0 * surfel.curvature).sqrt();

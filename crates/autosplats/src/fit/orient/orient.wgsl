@@ -41,12 +41,12 @@ fn sensor_of(point: u32) -> vec3f {
 }
 
 fn shows_back(surfel: Surfel, sensor: vec3f) -> bool {
-    let to_eye = select(vec3f(0.0, 0.0, -1.0), -surfel.center, frame.perspective == 1u);
+    let eye = to_eye(surfel.center);
     let to_sensor = to_view(sensor) - surfel.center;
     // How thick the neighbourhood is for its width: about the tangent of the angle that its normal may be off by.
     let rough = sqrt(2.0 * surfel.curvature);
     return dot(surfel.normal, to_sensor) < -max(rough, SURE) * length(to_sensor)
-        && dot(surfel.normal, to_eye) > max(rough, SEEN) * length(to_eye);
+        && dot(surfel.normal, eye) > max(rough, SEEN) * length(eye);
 }
 
 @compute @workgroup_size(64)

@@ -1,0 +1,255 @@
+//! What a frame needs on a device beside points: compiled passes, buffers and steps.
+
+use std::mem::{Discriminant, discriminant};
+
+use crate::Error;
+use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
+use crate::camera::{Reprojection, Seen};
+use crate::fit::gpu::{FitPasses, surfel_buffer};
+use crate::fit::orient::gpu::OrientPasses;
+use crate::gpu::{FrameUniform, Gpu, Step};
+use crate::project::DeviceCloud;
+use crate::project::gpu::{ProjectPasses, Round, ScreenBuffers};
+use crate::renderer::attributes::Wanted;
+use crate::renderer::{Reconstruction, Settings};
+use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, compile};
+use crate::search::past::gpu::{PastPasses, past_buffer};
+use crate::search::screen_grid::gpu::neighborhood_buffer;
+use crate::search::{SearchEngine, SearchRules};
+use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
+use crate::shade::{ColorMode, linear_steps};
+use crate::splat::gpu::{SplatBuffers, SplatPasses};
+use crate::splat::{Channels, LayerBuffers};
+
+/// Which engine, whatever its parameters, and k: what search passes are compiled for.
+type SearchKind = (Discriminant<SearchEngine>, u32);
+
+/// Compiled passes: those of the last engine, k and channels are kept.
+#[derive(Debug)]
+pub(super) struct Passes {
+    project: ProjectPasses,
+    search: Option<(SearchKind, Box<dyn EnginePasses>)>,
+    past: PastPasses,
+    fit: FitPasses,
+    /// Once there was a cloud with sensors.
+    orient: Option<OrientPasses>,
+    /// Compiled when first asked for.
+    adapt: Option<AdaptPasses>,
+    splat: Option<(Channels, SplatPasses)>,
+    shade: ShadePasses,
+}
+
+impl Passes {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        Ok(Self {
+            project: ProjectPasses::new(gpu, gpu.int64_atomics())?,
+            search: None,
+            past: PastPasses::new(gpu)?,
+            fit: FitPasses::new(gpu)?,
+            orient: None,
+            adapt: None,
+            splat: None,
+            shade: ShadePasses::new(gpu)?,
+        })
+    }
+
+    /// Compiles what frames of a shape need and earlier ones did not.
+    fn compile(&mut self, gpu: &Gpu, shape: &Shape, settings: &Settings) -> Result<(), Error> {
+        if shape.sensors.is_some() && self.orient.is_none() {
+            self.orient = Some(OrientPasses::new(gpu)?);
+        }
+        if self.search.as_ref().is_none_or(|(of, _)| *of != shape.search) {
+            let Reconstruction { engine, k, .. } = settings.reconstruction;
+            self.search = Some((shape.search, compile(gpu, engine, k)?));
+        }
+        if shape.adaptive && self.adapt.is_none() {
+            self.adapt = Some(AdaptPasses::new(gpu)?);
+        }
+        if self.splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
+            self.splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
+        }
+        Ok(())
+    }
+}
+
+/// What a frame's buffers and steps were made for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Shape {
+    size: [u32; 2],
+    halves: bool,
+    search: SearchKind,
+    coherent: bool,
+    smooth: bool,
+    adaptive: bool,
+    depth_refinement: bool,
+    channels: Channels,
+    /// Runs of points by their sensors.
+    sensors: Option<usize>,
+    tone_backs: bool,
+    find_range: bool,
+    keep_linear: bool,
+    color: ColorMode,
+}
+
+impl Shape {
+    /// Of a picture of points that `sensors` runs of them were seen by.
+    pub(super) fn new(
+        size: [u32; 2],
+        halves: bool,
+        sensors: Option<usize>,
+        wanted: &Wanted,
+        Settings { reconstruction, shading, all_layers, .. }: &Settings,
+    ) -> Self {
+        Self {
+            size,
+            halves,
+            search: (discriminant(&reconstruction.engine), reconstruction.k),
+            coherent: reconstruction.remembers(),
+            smooth: reconstruction.smoothing() > 0.0,
+            adaptive: reconstruction.adaptive,
+            depth_refinement: reconstruction.depth_refinement,
+            channels: Channels {
+                color: wanted.colors.is_some(),
+                scalar: wanted.scalar.is_some(),
+                measures: wanted.measures,
+                backs: wanted.backs,
+            },
+            sensors,
+            tone_backs: wanted.backs && shading.tones_backs(),
+            find_range: finds_range(shading),
+            keep_linear: *all_layers,
+            color: shading.color.clone(),
+        }
+    }
+}
+
+/// What is on the device whatever the frame.
+#[derive(Clone, Copy)]
+pub(super) struct OnDevice<'a> {
+    pub(super) cloud: &'a DeviceCloud,
+    pub(super) sensors: Option<&'a wgpu::Buffer>,
+    pub(super) depth_noise: &'a DepthNoiseBuffer,
+    /// [`FrameUniform`].
+    pub(super) frame: &'a wgpu::Buffer,
+}
+
+/// A frame ready to be replayed.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    shape: Shape,
+    /// How the last frame was seen, if there was one.
+    pub(super) seen: Option<Seen>,
+    pub(super) screen: ScreenBuffers,
+    /// [`Surfel`](crate::fit::Surfel) per query.
+    pub(super) surfels: wgpu::Buffer,
+    pub(super) layers: LayerBuffers,
+    pub(super) picture: ShadeBuffers,
+    /// Of an engine that iterates.
+    pub(super) convergence: Option<wgpu::Buffer>,
+    pub(super) steps: Vec<Step>,
+}
+
+impl Prepared {
+    /// Makes buffers and steps for frames of a shape.
+    pub(super) fn new(
+        gpu: &Gpu,
+        shape: Shape,
+        passes: &mut Passes,
+        OnDevice { cloud, sensors, depth_noise, frame }: OnDevice<'_>,
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        passes.compile(gpu, &shape, settings)?;
+        let Passes { project, search, past, fit, orient, adapt, splat, shade } = passes;
+        let (Some((_, search)), Some((_, splat))) = (search, splat) else { unreachable!("they were just compiled") };
+        let adapt = adapt.as_ref().filter(|_| shape.adaptive);
+        let Shape { size, halves, .. } = shape;
+        let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
+        let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
+        let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
+        let surfels = surfel_buffer(gpu, screen.capacity)?;
+        let adapt = match adapt {
+            Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
+            None => None,
+        };
+        let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
+        let layers = LayerBuffers::new(gpu, size, shape.channels)?;
+        let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
+        let (steps, convergence) = gpu.checked(|| {
+            let mut steps = project.steps(gpu, frame, cloud, &screen);
+            if let Some((passes, buffers)) = &adapt {
+                steps.extend(passes.steps_cells(gpu, frame, &screen, buffers));
+            }
+            let buffers =
+                SearchBuffers { frame, cloud, screen: &screen, neighborhoods: &neighborhoods, past: &past_radii };
+            let EngineSteps { rounds, convergence } = search.steps(gpu, buffers)?;
+            for (round, search) in [Round::Active, Round::Recovered].into_iter().zip(rounds) {
+                if round == Round::Recovered {
+                    steps.extend(splat.steps_recover(gpu, frame, &screen, &splats));
+                }
+                steps.extend(search);
+                steps.extend(fit.steps(gpu, frame, &screen, &neighborhoods, &surfels, round));
+                if let Some((passes, buffers)) = &adapt {
+                    steps.extend(passes.steps(gpu, frame, &screen, &surfels, buffers, round));
+                }
+                if let (Some(orient), Some(sensors)) = (&*orient, sensors) {
+                    steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
+                }
+                if shape.smooth {
+                    steps.push(splat.step_over_time(gpu, frame, &screen, &surfels, &layers, round));
+                }
+                steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
+            }
+            if shape.coherent {
+                steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
+            }
+            let refine = shape.depth_refinement;
+            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
+            steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
+            Ok::<_, Error>((steps, convergence))
+        })??;
+        Ok(Self { shape, seen: None, screen, surfels, layers, picture, convergence, steps })
+    }
+
+    /// Whether it serves frames of this shape.
+    pub(super) fn is_for(&self, shape: &Shape) -> bool {
+        self.shape == *shape
+    }
+
+    /// Tells the passes what the next frame is to be.
+    pub(super) fn tell(
+        &mut self,
+        gpu: &Gpu,
+        frame: &wgpu::Buffer,
+        now: Seen,
+        settings: &Settings,
+        shading: &ShadeUniform,
+    ) {
+        let Settings { reconstruction, .. } = settings;
+        let rules = SearchRules {
+            k: reconstruction.k,
+            outlier_expansions: reconstruction.outlier_expansions,
+            gap_factor: reconstruction.gap_factor,
+        };
+        let told = FrameUniform {
+            halves: self.shape.halves.into(),
+            grid_culling: reconstruction.grid_culling.into(),
+            adaptive: reconstruction.adaptive.into(),
+            longest: reconstruction.longest(),
+            keep_outliers: reconstruction.outlier_expansions.is_none().into(),
+            splat_scale: reconstruction.splat_scale,
+            smoothing: reconstruction.smoothing(),
+            outlier_growth: rules.outlier_radius(1.0),
+            gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
+            first_radius: match reconstruction.engine {
+                SearchEngine::KdTree { first_radius } => first_radius,
+                _ => 0.0,
+            },
+            ..FrameUniform::new(&now.view, reconstruction.k)
+        };
+        // Steps that are made anew leave nothing to look back at, and those of another k are.
+        let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
+        let told = past.map_or(told, |past| told.after(&Reprojection::new(&now, &past)));
+        gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
+        self.picture.write(gpu, shading, &settings.shading);
+    }
+}
