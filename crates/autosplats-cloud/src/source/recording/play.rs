@@ -74,7 +74,7 @@ impl Recording {
             (cloud, missing) = placement.apply(cloud);
             if let Some(missing) = missing.filter(|_| !*told) {
                 *told = true;
-                progress.note(&crate::error::message(&format!("{topic}: {missing}")));
+                progress.note(&crate::error::message(&format!("{topic}: {missing}; its points stay as they are")));
             }
         }
         if message.no_returns > 0 && !*told {

@@ -212,7 +212,7 @@ pub(in crate::source) struct Placement {
 }
 
 impl Placement {
-    /// Brings points there; if no transforms lead there, they stay as they are, and that is told.
+    /// Brings points there; if no transforms lead there, they stay as they are, and why is told.
     pub(in crate::source) fn apply(self, cloud: PointCloud) -> (PointCloud, Option<String>) {
         let Self { frame, target, pose } = self;
         // It is all in one frame then, so that there is one answer to which way is up.
@@ -220,7 +220,7 @@ impl Placement {
         match pose {
             Some(pose) if !cloud.is_empty() => (PointCloud::merge(vec![(cloud, pose)]).with_axes(axes), None),
             Some(_) => (cloud, None),
-            None => (cloud, Some(format!("no transforms lead from '{frame}' to '{target}'; its points stay in it"))),
+            None => (cloud, Some(format!("no transforms lead from '{frame}' to '{target}'"))),
         }
     }
 }

@@ -63,9 +63,9 @@ impl Frames {
         });
         let Some((_, transforms)) = own.max_by_key(|((_, namespace), _)| namespace.len()) else {
             return match wanted {
-                Some(wanted) if wanted != frame => Err(format!(
-                    "no transforms of '{frame}' have come, which '{wanted}' would need; its points stay in it"
-                )),
+                Some(wanted) if wanted != frame => {
+                    Err(format!("no transforms of '{frame}' have come, which '{wanted}' would need"))
+                }
                 _ => Ok(None),
             };
         };

@@ -45,8 +45,9 @@ const SETTLE: Duration = Duration::from_millis(10);
 /// What is heard of robots, and how.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RemoteOptions {
-    /// The coordinate frame that all points are brought into; the topmost that is known of the first sensor, a second after its
-    /// first points, if there is none. So long these wait for transforms, or 0.3 s if nobody publishes any.
+    /// The coordinate frame that all points are brought into; those that cannot be are refused. If there is none, the topmost that
+    /// is known of the first sensor, a second after its first points. So long these wait for transforms, or 0.3 s if nobody
+    /// publishes any.
     pub frame: Option<String>,
     /// How points are read.
     pub read: ReadOptions,
@@ -116,7 +117,6 @@ impl Remote {
                 return None;
             }
         };
-        state.statistics.taken += 1;
         let stamp = if decoded.stamp == 0 { message.arrival } else { decoded.stamp };
         let placement = state.frames.placement(&topic, &decoded.frame_id, stamp);
         drop(state);
@@ -125,6 +125,19 @@ impl Remote {
             Ok(None) => (decoded.cloud, None),
             Err(missing) => (decoded.cloud, Some(missing)),
         };
+        let mut state = self.shared.lock();
+        // In another frame than was asked for they would be in the way of those in that one.
+        if let (Some(missing), Some(_)) = (&missing, &self.options.frame) {
+            let why = format!("{name}: {missing}");
+            state.unplaced = Some((channel, why.clone()));
+            state.refuse(why);
+            return None;
+        }
+        if state.unplaced.as_ref().is_some_and(|(unplaced, _)| *unplaced == channel) {
+            state.unplaced = None;
+        }
+        state.statistics.taken += 1;
+        drop(state);
         self.told.resize(self.told.len().max(channel + 1), [false; 2]);
         let [no_returns, frames] = &mut self.told[channel];
         if decoded.no_returns > 0 && !std::mem::replace(no_returns, true) {
@@ -135,7 +148,7 @@ impl Remote {
         if let Some(missing) = missing
             && !std::mem::replace(frames, true)
         {
-            progress.note(&crate::error::message(&format!("{name}: {missing}")));
+            progress.note(&crate::error::message(&format!("{name}: {missing}; its points stay as they are")));
         }
         Some(Update { channel, stamp, cloud: cloud.into() })
     }

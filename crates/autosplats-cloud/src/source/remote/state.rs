@@ -40,6 +40,8 @@ pub(super) struct State {
     pub(super) graph: Graph,
     pub(super) frames: Frames,
     pub(super) connection: Connection,
+    /// A channel whose points cannot be brought into the frame that was asked for, and why.
+    pub(super) unplaced: Option<(usize, String)>,
     /// When the first message came, and the last.
     first: Option<Instant>,
     heard: Option<Instant>,
@@ -187,6 +189,9 @@ impl State {
     /// Why nothing comes, in a line; nothing if something does.
     pub(super) fn waiting(&self, address: &Address) -> Option<String> {
         let silence = self.heard.map(|heard| heard.elapsed());
+        if let Some((_, why)) = self.unplaced.as_ref().filter(|_| self.connection.connected) {
+            return Some(crate::error::message(why));
+        }
         if !self.connection.connected {
             let place = match address.endpoint() {
                 Some(endpoint) => format!("no router at {endpoint}"),
