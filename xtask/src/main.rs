@@ -103,7 +103,7 @@ fn test(root: &Path) -> Result<()> {
     }
     step("documentation", &|| {
         let mut command = cargo_command(root);
-        // With examples, though there are none, it stands on what the lints have built.
+        // Of the libraries; with examples, though there are none, it stands on what the lints have built.
         command.args(["doc", "--locked", "--workspace", "--no-deps", "--lib", "--examples"]).args(FEATURES);
         run(command.env("RUSTDOCFLAGS", "-D warnings"))
     })?;

@@ -206,7 +206,10 @@ fn recordings_made_at_once_are_shown_at_once() {
     };
     let (aligned, said) = seconds(&["other.mcap"]);
     assert_eq!(aligned, [0.0, 0.1, 0.2, 0.4, 0.5], "by their stamps");
-    assert!(said.contains("other.mcap: begins 0.200 s after the first recording"), "which is said: {said}");
+    assert!(
+        said.contains("other.mcap: begins 0.200 s after the first recorded at the same time"),
+        "which is said: {said}"
+    );
     let (begun_at_once, said) = seconds(&["later.mcap"]);
     assert_eq!(begun_at_once, [0.0, 0.1, 0.3, 0.5], "stamps that have no time in common say nothing of each other");
     assert!(!said.contains("begins"), "{said}");

@@ -140,6 +140,7 @@ fn ten_minutes_of_live_points_become_pictures() {
     assert_eq!((kept.shown, kept.late + kept.duplicates), (told.taken, 0), "each that was taken is shown: {kept:?}");
     let grown = memory[memory.len() - 1] - memory[0];
     assert!(grown < GROWTH, "memory grew by {grown:.0} MB");
+    assert!(size[0] >= SIZE[0] / 3, "{size:?} is hardly a picture");
     let [median, ..] = percentiles(&since_sent);
     assert!(median < PERIOD, "{median:.1} ms from sending to the picture, where the next message comes after {PERIOD}");
 }

@@ -13,7 +13,7 @@ use std::{
 };
 
 use autosplats_cloud::{
-    Next, Progress, Statistics, Stream as _, Update,
+    Next, Statistics, Stream as _, Update,
     glam::DVec3,
     point_cloud2::Encoding,
     remote::{Remote, RemoteOptions, Topic, topics},
@@ -342,20 +342,8 @@ fn transforms_that_were_sent_before_anybody_listened_are_asked_for() {
     }
 }
 
-/// Keeps what it is told.
-#[derive(Default)]
-struct Notes(std::sync::Mutex<Vec<String>>);
-
-impl Progress for Notes {
-    fn report(&self, _: f32) {}
-
-    fn note(&self, note: &str) {
-        self.0.lock().unwrap().push(note.into());
-    }
-}
-
 #[test]
-fn points_wait_for_a_frame_that_is_asked_for() {
+fn points_are_refused_until_the_frame_that_is_asked_for_is_known() {
     let port = free_port();
     let there = listener("peer", port);
     let options = RemoteOptions { frame: Some("map".into()), ..RemoteOptions::default() };

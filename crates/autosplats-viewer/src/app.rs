@@ -255,7 +255,7 @@ impl App {
     /// Milliseconds that a picture and the window may take: as the view moves, or until the next frame of what is played.
     fn both_ms(&self, moving: bool) -> Option<f64> {
         let least_ms = self.look.moving_ms;
-        if moving { Some(least_ms) } else { self.playing.frame_ms().map(|frame_ms| frame_ms.max(least_ms)) }
+        if moving { Some(least_ms) } else { self.playing.frame_ms(least_ms) }
     }
 
     /// Asks for a picture if it would be another one than was asked for last.
@@ -285,7 +285,7 @@ impl App {
         let mut look = self.look.clone();
         // It lies over the picture here, where it stays as large when pictures become coarse.
         look.settings.shading.legend = false;
-        if self.playing.frame_ms().is_none() {
+        if self.both_ms(false).is_none() {
             // At rest it is of its points alone, not of a coarser picture before it.
             look.settings.reconstruction.frames_averaged = 1;
         }

@@ -37,7 +37,8 @@ pub(crate) struct PlayingArgs {
     /// Topic of a recording to play; can be given several times [default: all that have points]
     #[arg(long = "topic", value_name = "NAME")]
     pub(crate) topics: Vec<String>,
-    /// Coordinate frame that points of a recording or over Zenoh are brought into [default: the topmost of their sensors]
+    /// Coordinate frame that points of a recording or over Zenoh are brought into; live ones that cannot be are refused
+    /// [default: the topmost of their sensors]
     #[arg(long, value_name = "FRAME")]
     pub(crate) fixed_frame: Option<String>,
     /// Keep the points of the last so many seconds, such as 2s or 500ms

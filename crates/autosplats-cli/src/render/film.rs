@@ -103,7 +103,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
         for Playing { name, begins, .. } in &playing {
             if let Some(begins) = begins.filter(|begins| !begins.is_zero()) {
                 eprintln!(
-                    "note: {name}: begins {:.3} s after the first recording, by its stamps",
+                    "note: {name}: begins {:.3} s after the first recorded at the same time, by its stamps",
                     begins.as_secs_f64()
                 );
             }

@@ -19,7 +19,8 @@ const STEPS_BACK: usize = 16;
 /// Plays a stream: makes the cloud that is to be seen at a frame of its timeline, or now.
 ///
 /// A frame is the same points whatever was played before it, but for those that [decay](LatestOptions::decay) where frames cannot
-/// be read or channels have different rates: it counts from the newest of their channel.
+/// be read or channels have different rates: it counts from the newest of their channel. And where more than 16 frames of a
+/// channel in a row cannot be read, only who played on still sees its last points.
 pub struct Player {
     stream: Box<dyn Stream>,
     options: LatestOptions,
@@ -62,7 +63,8 @@ impl Player {
             self.latest.forget(0);
             (self.last, after) = (None, None);
         }
-        for needed in self.needed(frame).into_iter().filter(|&needed| after.is_none_or(|after| needed > after)) {
+        let all = self.needed(frame);
+        for &needed in all.iter().filter(|&&needed| after.is_none_or(|after| needed > after)) {
             // Instead of a frame that cannot be read whoever comes here sees what was before it, as all do who played on.
             let mut next = Some(needed);
             for _ in 0..=STEPS_BACK {
@@ -70,7 +72,8 @@ impl Player {
                 if self.put(tried, progress)? {
                     break;
                 }
-                next = self.before(tried);
+                // Those that are needed themselves have their own turn.
+                next = self.before(tried).filter(|before| all.binary_search(before).is_err());
             }
         }
         self.last = Some(frame);

@@ -75,7 +75,7 @@ pub struct Statistics {
     pub taken: u64,
     /// Replaced by newer ones before anyone took them.
     pub dropped: u64,
-    /// Not readable, or older than what had come before.
+    /// Not readable, older than what had come before, or not to be brought into the frame that was asked for.
     pub refused: u64,
     /// Why the last one was refused, in a line.
     pub last_refusal: Option<String>,

@@ -187,14 +187,15 @@ impl Playing {
         self.streams.iter().any(|moving| matches!(moving.thread.timeline(), Some(None)))
     }
 
-    /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second. Of what is live,
-    /// what a picture may take to be there before the next update.
-    pub(crate) fn frame_ms(&self) -> Option<f64> {
+    /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second, `least_ms` at least.
+    /// Of what is live, what a picture may take to be there before the next update.
+    pub(crate) fn frame_ms(&self, least_ms: f64) -> Option<f64> {
         let runs = self.clock.runs();
         let each = self
             .timelines()
             .filter(|(timeline, _)| runs && timeline.len() > 1)
             .map(|(timeline, _)| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
+        let each = each.map(|frame_ms| frame_ms.max(least_ms));
         let is_live = |moving: &&Moving| self.clock.playing && matches!(moving.thread.timeline(), Some(None));
         let live = self.streams.iter().filter(is_live).map(|moving| moving.heard.live_ms());
         each.chain(live).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
@@ -281,17 +282,15 @@ impl Playing {
         let span = |moving: &Moving| moving.input.source.clock_span(&*moving.timeline()?);
         let spans: Vec<_> = self.streams.iter().map(span).collect();
         let mut shift = None;
-        for ((moving, begins), span) in self.streams.iter_mut().zip(beginnings(&spans)).zip(spans) {
+        for (moving, begins) in self.streams.iter_mut().zip(beginnings(&spans)) {
             let [before, after] = [moving.begins, begins].map(|begins| begins.unwrap_or_default().as_secs_f64());
-            if moving.layer.is_some() && span.is_some() {
+            if moving.layer.is_some() {
                 shift.get_or_insert(after - before);
             }
             moving.begins = begins;
         }
         if let Some(shift) = shift.filter(|shift| *shift != 0.0 && !self.clock.is_held()) {
             self.clock.shift(shift);
-            let times = self.removed.iter_mut().map(|removed| &mut removed.position).chain(&mut self.edited_at);
-            times.for_each(|time| *time = (*time + shift).max(0.0));
         }
     }
 

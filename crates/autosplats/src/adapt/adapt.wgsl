@@ -98,8 +98,8 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
         sum.offset *= per_total;
         sum.normal = normalize(sum.normal);
         sum.curvature *= per_total;
-    } else if disagrees {
-        sum.weight = -1.0;
+    } else {
+        sum.weight = select(0.0, -1.0, disagrees);
     }
     return sum;
 }

@@ -19,7 +19,7 @@
 //! blends those of the four cells around it at its own place: the nearer the centre of a sheet's ball, the nearer the sheet
 //! itself and the smaller its error, the more it counts, and what is another surface does not. It turns to the blended
 //! normal, and its centre moves onto the surface. A surfel without a sheet tries its own balls; one whose own normal is
-//! reliable and unlike all sheets stays as it was.
+//! reliable and unlike all sheets is not moved.
 //!
 //! Points of a spinning lidar are dense along its rings and sparse across: their first neighbours are a *row* (`rows`), no
 //! surface. Balls around such a surfel grow until they hold more than the row.

@@ -96,7 +96,8 @@ pub(super) struct Surface {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Blend {
     Surface(Surface),
-    /// There are some, but none agrees with the surfel's first normal: it is at an edge, or of detail finer than sheets.
+    /// There are some, but each is unlike the surfel's first normal or scatters too much: it is at an edge, or of detail finer than
+    /// sheets.
     Disagrees,
     /// There are none.
     Nothing,

@@ -18,7 +18,7 @@ pub(crate) struct Reprojection {
     pub(crate) rotation: Mat3,
     /// Added after the rotation.
     pub(crate) shift: Vec3,
-    /// The earlier frame's.
+    /// The earlier frame's, but for the near plane, which is this one's.
     pub(crate) view: View,
 }
 
@@ -31,7 +31,7 @@ impl Reprojection {
         Self {
             rotation: (rotation * now.view.view_from_world.as_dmat3().transpose()).as_mat3(),
             shift: (rotation * between).as_vec3(),
-            view: past.view,
+            view: View { near: now.view.near, ..past.view },
         }
     }
 

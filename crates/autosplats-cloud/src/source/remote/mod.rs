@@ -129,13 +129,14 @@ impl Remote {
         // In another frame than was asked for they would be in the way of those in that one.
         if let (Some(missing), Some(_)) = (&missing, &self.options.frame) {
             let why = format!("{name}: {missing}");
-            state.unplaced = Some((channel, why.clone()));
+            let is_first = state.unplaced.as_ref().is_none_or(|(other, _)| channel <= *other);
+            if is_first && state.statistics.taken == 0 {
+                state.unplaced = Some((channel, why.clone()));
+            }
             state.refuse(why);
             return None;
         }
-        if state.unplaced.as_ref().is_some_and(|(unplaced, _)| *unplaced == channel) {
-            state.unplaced = None;
-        }
+        state.unplaced = None;
         state.statistics.taken += 1;
         drop(state);
         self.told.resize(self.told.len().max(channel + 1), [false; 2]);

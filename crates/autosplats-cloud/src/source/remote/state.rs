@@ -40,7 +40,7 @@ pub(super) struct State {
     pub(super) graph: Graph,
     pub(super) frames: Frames,
     pub(super) connection: Connection,
-    /// A channel whose points cannot be brought into the frame that was asked for, and why.
+    /// The first channel whose points cannot be brought into the frame that was asked for, and why, before any others could.
     pub(super) unplaced: Option<(usize, String)>,
     /// When the first message came, and the last.
     first: Option<Instant>,
@@ -189,9 +189,6 @@ impl State {
     /// Why nothing comes, in a line; nothing if something does.
     pub(super) fn waiting(&self, address: &Address) -> Option<String> {
         let silence = self.heard.map(|heard| heard.elapsed());
-        if let Some((_, why)) = self.unplaced.as_ref().filter(|_| self.connection.connected) {
-            return Some(crate::error::message(why));
-        }
         if !self.connection.connected {
             let place = match address.endpoint() {
                 Some(endpoint) => format!("no router at {endpoint}"),
@@ -201,7 +198,7 @@ impl State {
             return Some(crate::error::message(&(place + &why)));
         }
         if silence.is_some_and(|silence| silence < SILENCE) {
-            return None;
+            return self.unplaced.as_ref().map(|(_, why)| crate::error::message(why));
         }
         let told = match (self.graph.has(address), silence) {
             (true, None) => "publisher found, no message yet".into(),
