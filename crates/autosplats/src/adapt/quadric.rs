@@ -307,7 +307,7 @@ fn load<S: Simd>(simd: S, lanes: &[Lanes; 4], vector: usize) -> [F32s<S>; 4] {
     ]
 }
 
-/// Adds the `vector`-th part of the lanes of some sums to all of them.
+/// Puts the `vector`-th part of some sums at its place among all lanes.
 #[inline(always)]
 fn store<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, lanes: &mut [Lanes; N]) {
     for index in 0..N {
