@@ -142,10 +142,12 @@ fn print(outcome: &Outcome) {
     };
     println!("    ours / best fit: mean {}, band {}", best(|angles| angles.mean), best(|angles| angles.band));
     if let Some(motion) = &outcome.motion {
-        let truth = [("truth".to_owned(), motion.truth)];
+        let truth = [("truth".to_owned(), motion.truth), ("ours, alone".to_owned(), motion.alone)];
         let methods = motion.methods.iter().map(|(method, change)| (method.name(), *change));
         for (name, change) in truth.into_iter().chain(methods) {
             println!("    in motion, {name:<12} normals {:6.2}, lightness {:6.2}", change.degrees, change.lightness);
         }
+        let [alone, steady] = motion.degrees_off;
+        println!("    in the last picture normals are {alone:.2} off alone, {steady:.2} steady");
     }
 }

@@ -62,6 +62,7 @@ pub fn paper() -> Reconstruction {
         grid_culling: true,
         depth_refinement: true,
         coherent: false,
+        steady: false,
         frames_averaged: 1,
     }
 }

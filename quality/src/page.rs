@@ -84,8 +84,10 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels. The best fit is the one with the best \
          normals.\n\n",
         &lit(outcomes),
-        "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in \
-         255ths.\n\n",
+        "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in 255ths. \
+         Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is averaged over the \
+         last eight pictures, of which the first here has none. *Alone* are ours, each made by itself, and *off* is the mean error \
+         of normals in the last picture.\n\n",
         &motion(outcomes),
         CREDITS,
     ]
@@ -317,15 +319,29 @@ fn lit(outcomes: &[Outcome]) -> String {
 }
 
 fn motion(outcomes: &[Outcome]) -> String {
-    let mut table =
-        Table::new(&["case", "normals °: truth", "ours", "paper", "lightness: truth", "ours", "paper", "dots"]);
+    let mut table = Table::new(&[
+        "case",
+        "normals °: truth",
+        "ours",
+        "alone",
+        "paper",
+        "lightness: truth",
+        "ours",
+        "alone",
+        "paper",
+        "dots",
+        "off °: alone",
+        "steady",
+    ]);
     for outcome in outcomes {
         let Some(motion) = &outcome.motion else { continue };
         let of = |method| motion.methods.iter().find(|(other, _)| *other == method).map(|(_, change)| *change);
         let [ours, paper, dots] = [Method::Ours, Method::Paper, Method::Dots].map(of);
+        let [truth, alone] = [motion.truth, motion.alone].map(Some);
         let mut cells = vec![outcome.case.name()];
-        cells.extend([Some(motion.truth), ours, paper].map(|c| number(c.map_or(f64::NAN, |c| c.degrees), 2)));
-        cells.extend([Some(motion.truth), ours, paper, dots].map(|c| number(c.map_or(f64::NAN, |c| c.lightness), 2)));
+        cells.extend([truth, ours, alone, paper].map(|c| number(c.map_or(f64::NAN, |c| c.degrees), 2)));
+        cells.extend([truth, ours, alone, paper, dots].map(|c| number(c.map_or(f64::NAN, |c| c.lightness), 2)));
+        cells.extend(motion.degrees_off.map(|degrees| number(degrees, 2)));
         table.row(&cells);
     }
     table.finish()

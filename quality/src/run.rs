@@ -1,6 +1,7 @@
 //! Measures one case.
 
 use anyhow::{Context as _, Result};
+use autosplats::Reconstruction;
 
 use crate::case::Case;
 use crate::exact::Exact;
@@ -28,8 +29,12 @@ pub struct Outcome {
 pub struct Motion {
     /// In the true pictures: what light and pixels do.
     pub truth: Change,
-    /// In those of each method.
+    /// In those of each method; ours are steady, as the window has them while the view moves.
     pub methods: Vec<(Method, Change)>,
+    /// In ours, each made by itself.
+    pub alone: Change,
+    /// Mean error of normals in ours of the last step, degrees: by itself, and steady.
+    pub degrees_off: [f64; 2],
 }
 
 /// The pictures of a case.
@@ -69,27 +74,40 @@ pub fn measure(
 fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: &[Method]) -> Result<Motion> {
     let camera = case.shot.camera(subject, case.size)?;
     let methods: Vec<_> = methods.iter().copied().filter(|method| !matches!(method, Method::Fit(_))).collect();
-    let mut truth = Changes::default();
-    let mut changes = vec![Changes::default(); methods.len()];
+    // What is steady follows pictures of its own kind.
+    let mut follower = Painter::new(subject);
+    let steady = Reconstruction { steady: true, ..Reconstruction::default() };
+    let mut changes = vec![Changes::default(); 2 + methods.len()];
     let mut before: Option<(Exact, Vec<(Picture, Lit)>)> = None;
     for step in 0..=STEPS {
         let camera = orbit(&camera, step as f64 * STEP_DEGREES)?;
         let exact = Exact::trace_alone(subject, &camera, case.size)?;
-        let mut pictures = vec![Picture::truth(&exact)];
+        let mut pictures = vec![Picture::truth(&exact), painter.paint(Method::Ours, &camera, case.size)?];
         for &method in &methods {
-            pictures.push(painter.paint(method, &camera, case.size)?);
+            pictures.push(match method {
+                Method::Ours => follower.render(steady.clone(), &camera, case.size)?,
+                _ => painter.paint(method, &camera, case.size)?,
+            });
         }
         let lit: Vec<_> = pictures.iter().map(|picture| Lit::new(picture, &exact.rays)).collect();
         let pictures: Vec<_> = pictures.into_iter().zip(lit).collect();
         if let Some((exact_before, before)) = &before {
             let same = same(exact_before, &exact);
             let both = before.iter().zip(&pictures).map(|(one, other)| [(&one.0, &one.1), (&other.0, &other.1)]);
-            std::iter::once(&mut truth).chain(&mut changes).zip(both).for_each(|(sums, both)| sums.add(&same, both));
+            changes.iter_mut().zip(both).for_each(|(sums, both)| sums.add(&same, both));
         }
         before = Some((exact, pictures));
     }
-    let changes = methods.into_iter().zip(changes.iter().map(Changes::mean)).collect();
-    Ok(Motion { truth: truth.mean(), methods: changes })
+    let last = Truth::new(Exact::trace(subject, &orbit(&camera, STEPS as f64 * STEP_DEGREES)?, case.size)?);
+    let degrees_off = |picture: Option<&(Picture, Lit)>| {
+        let angles = picture.and_then(|(picture, lit)| last.measure(picture, lit, subject).angles);
+        angles.map_or(f64::NAN, |angles| angles.mean)
+    };
+    let ours = 2 + methods.iter().position(|&method| method == Method::Ours).unwrap_or(methods.len());
+    let degrees_off = before.map_or([f64::NAN; 2], |(_, shown)| [1, ours].map(|at| degrees_off(shown.get(at))));
+    let mut means = changes.iter().map(Changes::mean);
+    let (Some(truth), Some(alone)) = (means.next(), means.next()) else { unreachable!("there are two and more") };
+    Ok(Motion { truth, methods: methods.into_iter().zip(means).collect(), alone, degrees_off })
 }
 
 impl Outcome {

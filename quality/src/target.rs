@@ -118,7 +118,12 @@ mod tests {
             (Method::Fit(40), measures(fit, 28.0)),
         ];
         let change = |degrees| Change { degrees, lightness: 1.0 };
-        let motion = Motion { truth: change(1.0), methods: vec![(Method::Ours, change(ours))] };
+        let motion = Motion {
+            truth: change(1.0),
+            methods: vec![(Method::Ours, change(ours))],
+            alone: change(ours),
+            degrees_off: [1.0; 2],
+        };
         Outcome { case: quick()[0], measures: methods, motion: Some(motion) }
     }
 

@@ -285,6 +285,8 @@ impl App {
         let mut look = self.look.clone();
         // It lies over the picture here, where it stays as large when pictures become coarse.
         look.settings.shading.legend = false;
+        // Noise would look another in each picture.
+        look.settings.reconstruction.steady = moving;
         if self.both_ms(false).is_none() {
             // At rest it is of its points alone, not of a coarser picture before it.
             look.settings.reconstruction.frames_averaged = 1;

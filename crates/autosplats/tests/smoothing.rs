@@ -4,7 +4,7 @@
 mod test_clouds;
 
 use autosplats::cloud::PointCloud;
-use autosplats::cloud::glam::{DVec3, Vec3};
+use autosplats::cloud::glam::{DVec2, DVec3, Vec3};
 use autosplats::{Backend, Camera, Error, GBuffer, Projection, Reconstruction, Renderer, Settings};
 use test_clouds::Random;
 
@@ -108,7 +108,82 @@ fn a_moving_camera_sees_the_same_surface() {
     }
 }
 
-/// The same frames give the same bytes, and both backends about the same depths.
+/// Normals in the middle of the picture, in world coordinates.
+fn normals(layers: &GBuffer, camera: &Camera) -> Vec<Vec3> {
+    let axes = camera.axes().expect("a camera").map(|axis| axis.as_vec3());
+    let middle = |side: u32| side as usize / 4..3 * side as usize / 4;
+    let pixels = middle(SIZE[1]).flat_map(|y| middle(SIZE[0]).map(move |x| (x, y)));
+    let world = |normal: [f32; 3]| normal[0] * axes[0] + normal[1] * axes[1] + normal[2] * axes[2];
+    pixels.map(|(x, y)| world(layers.normal[layers.index(x, y)])).collect()
+}
+
+fn mean_degrees(a: &[Vec3], b: &[Vec3]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| a.cross(*b).length().atan2(a.dot(*b)).to_degrees()).sum::<f32>() / a.len() as f32
+}
+
+/// Noise looks another in each view, though the points are the same. With their past normals change less, and are as good.
+#[test]
+fn the_same_points_are_steady_while_the_camera_moves() {
+    for mut renderer in renderers() {
+        let adapter = renderer.adapter();
+        let cloud = wave(0.0, 0.02, &mut Random::new(6));
+        let truth = wave(0.0, 0.0, &mut Random::new(6));
+        // A fifth of a pixel a frame: pixels go on showing the same place.
+        let view = |frame: i32| camera(DVec3::new(0.3 + 0.002 * f64::from(frame), 0.2, 3.0));
+        let still = Settings { all_layers: true, ..Settings::default() };
+        let truth = normals(renderer.render(&truth, &view(9), SIZE, &still).expect("a picture").layers, &view(9));
+        let mut shown = |steady: bool| {
+            let reconstruction = Reconstruction { steady, ..Reconstruction::default() };
+            let settings = Settings { reconstruction, ..still.clone() };
+            let mut frames = (0..10).map(|frame| {
+                normals(renderer.render(&cloud, &view(frame), SIZE, &settings).expect("a picture").layers, &view(frame))
+            });
+            let [before, last] = [frames.nth(8), frames.next()].map(|normals| normals.expect("ten frames"));
+            [mean_degrees(&before, &last), mean_degrees(&last, &truth)]
+        };
+        let [alone, steady] = [false, true].map(&mut shown);
+        assert!(steady[0] * 3.0 < alone[0], "{adapter:?}: {} degrees a frame, alone {}", steady[0], alone[0]);
+        assert!(steady[1] < 1.05 * alone[1], "{adapter:?}: {} degrees wrong, alone {}", steady[1], alone[1]);
+    }
+}
+
+/// What was fitted to a point belongs to it alone: detail as fine as points is as right after some frames as in one by itself.
+#[test]
+fn detail_is_not_blurred() {
+    for mut renderer in renderers() {
+        let mut random = Random::new(7);
+        let ripple = |random: &mut Random| {
+            let [x, y] = [random.signed(), random.signed()];
+            Vec3::new(x, y, 0.02 * (60.0 * x).sin()).to_array()
+        };
+        let cloud = PointCloud::new(DVec3::ZERO, (0..60_000).map(|_| ripple(&mut random)).collect());
+        let view = |frame: i32| camera(DVec3::new(0.3 + 0.01 * f64::from(frame), 0.2, 3.0));
+        let mut wrong = |steady: bool| {
+            let reconstruction = Reconstruction { steady, ..Reconstruction::default() };
+            let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
+            for frame in 0..8 {
+                renderer.render(&cloud, &view(frame), SIZE, &settings).expect("a picture");
+            }
+            let layers = renderer.render(&cloud, &view(8), SIZE, &settings).expect("a picture").layers;
+            let depths = depths(layers);
+            let place = |(index, &depth): (usize, &f32)| {
+                let [x, y] = [index % (SIZE[0] / 2) as usize, index / (SIZE[0] / 2) as usize];
+                let pixel = DVec2::new(x as f64, y as f64) + 0.25 * DVec2::from(SIZE.map(f64::from)) + 0.5;
+                view(8).unproject(pixel, depth.into(), SIZE).expect("a camera")
+            };
+            let truth = depths.iter().enumerate().map(place).map(|place| {
+                let slope = 1.2 * (60.0 * place.x).cos();
+                DVec3::new(-slope, 0.0, 1.0).normalize().as_vec3()
+            });
+            mean_degrees(&normals(layers, &view(8)), &truth.collect::<Vec<_>>())
+        };
+        let [alone, steady] = [false, true].map(&mut wrong);
+        assert!(alone < 20.0, "{alone} degrees wrong");
+        assert!(steady < 1.01 * alone, "{:?}: {steady} degrees wrong, alone {alone}", renderer.adapter());
+    }
+}
+
+/// The same frames give the same bytes, and both backends about the same depths: of other points in each, and of the same.
 #[test]
 fn the_same_frames_again_are_the_same() {
     let film = |renderer: &mut Renderer| {
@@ -116,8 +191,10 @@ fn the_same_frames_again_are_the_same() {
         let mut last = Vec::new();
         for frame in 0..4 {
             let cloud = wave(0.01 * frame as f32, 0.02, &mut random);
-            let seen = renderer.render(&cloud, &camera(DVec3::new(0.3, 0.2, 3.0)), SIZE, &settings(8));
-            last = depths(seen.expect("a picture").layers);
+            for step in 0..3 {
+                let view = camera(DVec3::new(0.3, 0.2 + 0.01 * f64::from(step), 3.0));
+                last = depths(renderer.render(&cloud, &view, SIZE, &settings(8)).expect("a picture").layers);
+            }
         }
         last
     };

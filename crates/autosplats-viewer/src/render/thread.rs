@@ -12,6 +12,7 @@ use super::pace::{Costs, Pace};
 use super::task::{Outcome, Seen, enlarge};
 use super::{Answer, Depths, Outbox, Picture, Shared, Task, Wish};
 use crate::document::Shown;
+use crate::output::Goal;
 
 /// What selected points are mixed with, sRGB.
 const SELECTED: [u16; 3] = [255, 140, 20];
@@ -138,6 +139,7 @@ impl Studio {
         let mut settings = settings(wish, &shown.cloud, gpu).0;
         // What is done once does not follow any other picture.
         settings.reconstruction.frames_averaged = 1;
+        settings.reconstruction.steady = false;
         Ok(settings)
     }
 
@@ -266,7 +268,9 @@ impl Studio {
             }
             Task::Photograph { wish, goal } => {
                 let shown = self.shown(&wish)?;
-                let settings = self.settings(&wish, &shown, outbox)?;
+                let mut settings = self.settings(&wish, &shown, outbox)?;
+                // But for those of a film, which follow each other.
+                settings.reconstruction.steady = matches!(goal, Goal::Film(_));
                 let size = wish.rendered_size(1.0);
                 let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
                 let (image, range) = (Box::new(enlarge(frame.image, wish.size)), frame.counts.value_range);

@@ -23,16 +23,19 @@ pub(crate) struct Reprojection {
 }
 
 impl Reprojection {
-    /// From the frame seen `now` into the `past` one.
-    pub(crate) fn new(now: &Seen, past: &Seen) -> Self {
+    /// From the frame seen `now` into the `past` one; `None` if one is in perspective and the other is not.
+    pub(crate) fn new(now: &Seen, past: &Seen) -> Option<Self> {
+        if now.view.perspective != past.view.perspective {
+            return None;
+        }
         let rotation = past.view.view_from_world.as_dmat3();
         // The one from the other in f64: clouds far from each other have eyes far from their origins.
         let between = now.view.eye_local.as_dvec3() + (now.origin - past.origin) - past.view.eye_local.as_dvec3();
-        Self {
+        Some(Self {
             rotation: (rotation * now.view.view_from_world.as_dmat3().transpose()).as_mat3(),
             shift: (rotation * between).as_vec3(),
             view: View { near: now.view.near, ..past.view },
-        }
+        })
     }
 
     /// Where a view-space position was.
@@ -41,14 +44,20 @@ impl Reprojection {
         self.rotation * Vec3::from(position_view) + self.shift
     }
 
-    /// The pixel of the earlier frame that showed a view-space position, or whatever was before it: row by row.
+    /// Where in the earlier frame's picture a view-space position was, in pixels; `None` if it was not in it.
     #[inline(always)]
-    pub(crate) fn pixel(&self, position_view: [f32; 3]) -> Option<usize> {
-        let position = self.position(position_view);
+    pub(crate) fn place(&self, position_view: Vec3) -> Option<[f32; 2]> {
+        let position = self.position(position_view.to_array());
         let [x, y] = self.view.to_pixel(position);
         // What is not a number is in no picture.
         let inside = (x >= 0.0) & (x < self.view.width as f32) & (y >= 0.0) & (y < self.view.height as f32);
-        (inside & (position.z > self.view.near)).then(|| y as usize * self.view.width as usize + x as usize)
+        (inside & (position.z > self.view.near)).then_some([x, y])
+    }
+
+    /// The pixel of the earlier frame that showed a view-space position, or whatever was before it: row by row.
+    #[inline(always)]
+    pub(crate) fn pixel(&self, position_view: [f32; 3]) -> Option<usize> {
+        self.place(position_view.into()).map(|[x, y]| y as usize * self.view.width as usize + x as usize)
     }
 }
 
@@ -68,7 +77,7 @@ mod tests {
         for projection in [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(6.0)] {
             let past = seen(corner + DVec3::new(-7.0, 1.0, 2.0), corner + 3.0, projection);
             let now = seen(corner + DVec3::new(-6.0, -2.0, 1.0), corner - 1.0, projection);
-            let reprojection = Reprojection::new(&now, &past);
+            let reprojection = Reprojection::new(&now, &past).expect("the same kind of projection");
             for point in
                 [DVec3::ZERO, DVec3::new(0.5, 0.7, -0.3), DVec3::new(-1.0, 0.1, 1.2)].map(|point| corner + point)
             {
@@ -88,7 +97,7 @@ mod tests {
         let projection = Projection::PerspectiveFovDeg(40.0);
         let past = seen(corner + DVec3::new(-2.0, 0.0, 0.0), corner, projection);
         let now = seen(corner + DVec3::new(-9.0, 0.0, 0.0), corner, projection);
-        let reprojection = Reprojection::new(&now, &past);
+        let reprojection = Reprojection::new(&now, &past).expect("the same kind of projection");
         let pixel = |point: [f64; 3]| {
             let local = DVec3::from(point).as_vec3().to_array();
             reprojection.pixel(now.view.to_view(local).to_array())

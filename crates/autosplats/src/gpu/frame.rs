@@ -30,9 +30,10 @@ pub(crate) struct FrameUniform {
     pub(crate) first_radius: f32,
     /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     pub(crate) longest: f32,
-    /// By which share of the way surfels are drawn towards the last frame's surface.
-    pub(crate) smoothing: f32,
-    pub(crate) past_perspective: u32,
+    /// Over how many frames surfels are averaged.
+    pub(crate) frames_averaged: f32,
+    /// 1 if the last frame was one of the same points.
+    pub(crate) same_points: u32,
     /// Columns, each padded to four numbers.
     pub(crate) past_rotation: [[f32; 4]; 3],
     pub(crate) past_shift: [f32; 3],
@@ -60,8 +61,8 @@ impl FrameUniform {
             gap_growth: f32::INFINITY,
             first_radius: 1.0,
             longest: 1.0,
-            smoothing: 0.0,
-            past_perspective: 0,
+            frames_averaged: 1.0,
+            same_points: 0,
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],
             past_focal_px: 0.0,
@@ -71,13 +72,7 @@ impl FrameUniform {
     /// The same, with the last frame to look back into.
     pub(crate) fn after(self, past: &Reprojection) -> Self {
         let Reprojection { rotation, shift, view } = past;
-        Self {
-            past_perspective: view.perspective.into(),
-            past_rotation: columns(*rotation),
-            past_shift: shift.to_array(),
-            past_focal_px: view.focal_px,
-            ..self
-        }
+        Self { past_rotation: columns(*rotation), past_shift: shift.to_array(), past_focal_px: view.focal_px, ..self }
     }
 }
 

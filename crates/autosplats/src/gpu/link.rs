@@ -6,6 +6,8 @@ const SHARED: &[(&str, &str)] = &[
     ("groups", include_str!("../shared/groups.wgsl")),
     ("counters", include_str!("../shared/counters.wgsl")),
     ("rank", include_str!("../shared/rank.wgsl")),
+    ("half", include_str!("../shared/half.wgsl")),
+    ("fitted", include_str!("../shared/fitted.wgsl")),
     ("project_point", include_str!("../shared/project_point.wgsl")),
     ("count_dropped", include_str!("../shared/count_dropped.wgsl")),
     ("add_sixteenth", include_str!("../shared/add_sixteenth.wgsl")),

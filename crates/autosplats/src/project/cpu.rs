@@ -7,7 +7,7 @@ use autosplats_cloud::PointCloud;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::sixteenths::{Sixteenths, sixteenth, sixteenths_at};
+use super::sixteenths::{Sixteenths, half, sixteenth, sixteenths_at};
 use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
 use crate::camera::View;
 
@@ -188,8 +188,7 @@ fn project_chunk(
     dropped
 }
 
-/// Slot and depth of one point and the sixteenth of its pixel, without branches. Halves of pixels lie side by side and one
-/// below the other in turn, like the black and the white squares of a chessboard: so no direction is seen better than another.
+/// Slot and depth of one point and the sixteenth of its pixel, without branches.
 #[inline(always)]
 fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32) {
     let [x, y, z] = view.to_view(position).to_array();
@@ -199,8 +198,7 @@ fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u3
     let [x4, y4] = sixteenths_at([px, py]);
     let [column, row] = [x4 >> 2, y4 >> 2];
     let pixel = row.wrapping_mul(view.width).wrapping_add(column);
-    let along = if column.wrapping_add(row) & 1 == 1 { x4 } else { y4 };
-    let slot = if halves { (pixel << 1) | (along >> 1 & 1) } else { pixel };
+    let slot = if halves { half(pixel, [x4, y4]) } else { pixel };
     let slot = if inside { slot } else { OUTSIDE };
     let slot = if z > view.near { slot } else { BEHIND };
     // Finite coordinates so large that their transform is not count as not finite too.

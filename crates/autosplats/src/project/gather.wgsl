@@ -6,6 +6,7 @@
 #import groups
 #import counters
 #import screen
+#import half
 #import project_point
 
 @group(0) @binding(1) var<uniform> chunk: Chunk;

@@ -28,7 +28,7 @@ pub(crate) use cpu::Projector;
 #[cfg(test)]
 pub(crate) use device_cloud::ChunkUniform;
 pub(crate) use device_cloud::{Chunk, DeviceCloud, PointValues, Uploader};
-pub(crate) use sixteenths::Sixteenths;
+pub(crate) use sixteenths::{Sixteenths, half_at};
 
 use bytemuck::{Pod, Zeroable};
 

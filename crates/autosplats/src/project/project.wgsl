@@ -5,6 +5,7 @@
 #import frame
 #import groups
 #import counters
+#import half
 #import project_point
 #import count_dropped
 #import add_sixteenth

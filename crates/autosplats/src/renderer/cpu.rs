@@ -10,14 +10,14 @@ use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{AdaptRules, Adapter, DepthNoise};
-use crate::camera::{Camera, Reprojection, Seen, View};
+use crate::camera::{Camera, Seen, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
 use crate::search::{Neighborhoods, SearchCounts, SearchEngine, SearchRules, screen_grid};
 use crate::shade::{Image, Scene, linear_steps, shade};
-use crate::splat::{Attributes, PointColors, Splatter};
+use crate::splat::{Attributes, OverTime, PointColors, Splatter};
 
 /// Renders on the CPU, in the current rayon thread pool.
 #[derive(Debug)]
@@ -40,8 +40,7 @@ pub(super) struct CpuRenderer {
     linear: [f32; 256],
     /// Of the last frame.
     view: Option<View>,
-    /// Of the last frame that was averaged, if its layers are still there.
-    averaged: Option<Seen>,
+    over_time: OverTime,
 }
 
 impl Default for CpuRenderer {
@@ -61,7 +60,7 @@ impl Default for CpuRenderer {
             image: Image::default(),
             linear: linear_steps(),
             view: None,
-            averaged: None,
+            over_time: OverTime::default(),
         }
     }
 }
@@ -123,7 +122,7 @@ impl CpuRenderer {
             splatter,
             image,
             view: last_view,
-            averaged,
+            over_time,
             ..
         } = self;
         let mut clock = Clock::start(go_on);
@@ -157,29 +156,32 @@ impl CpuRenderer {
         splatter.begin(&view);
         let nothing = DepthNoise::default();
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
-        let smooths = settings_splat.smoothing() > 0.0 && given.is_none();
-        let before = averaged.filter(|_| smooths).map(|before| Reprojection::new(&now, &before));
-        let reconstruct = Reconstruct { screen, view: &view, settings, past, before, sensors, depth_noise, given };
-        let mut search_counts =
-            reconstruct.run(&screen.active, neighborhoods, surfels, adapter, splatter, &mut clock)?;
+        let smooths = settings_splat.smooths() && given.is_none();
+        if smooths {
+            over_time.begin(now, cloud.identity(), settings_splat.averaged());
+        } else {
+            over_time.forget();
+        }
+        let reconstruct = Reconstruct { screen, view: &view, settings, past, sensors, depth_noise, given };
+        let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
+        let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
         recovered.clear();
         let hidden = |&index: &u32| {
             let point = &screen.points[index as usize];
             let radius_px = screen.density.initial_radius_px(point, settings_splat.k);
-            splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
+            buffers.splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
         };
         recovered.extend(screen.passive.iter().filter(|index| !hidden(index)));
         clock.lap(|timings| &mut timings.splat)?;
         if !recovered.is_empty() {
-            search_counts =
-                search_counts + reconstruct.run(recovered, neighborhoods, surfels, adapter, splatter, &mut clock)?;
+            search_counts = search_counts + reconstruct.run(recovered, &mut buffers, &mut clock)?;
         }
 
+        let Buffers { surfels, over_time, splatter, .. } = buffers;
         if settings_splat.depth_refinement {
             splatter.refine(surfels, &view);
             splatter.refine(surfels, &view);
         }
-        *averaged = None;
         splatter.attributes(surfels, &view, &attributes);
         let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
         clock.lap(|timings| &mut timings.splat)?;
@@ -188,7 +190,9 @@ impl CpuRenderer {
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);
-        *averaged = smooths.then_some(now);
+        if smooths {
+            over_time.end(now, cloud.identity(), surfels, screen);
+        }
         past.end();
 
         let dropped = screen.dropped;
@@ -212,14 +216,21 @@ impl CpuRenderer {
     }
 }
 
+/// What stages work in and keep from frame to frame.
+struct Buffers<'a> {
+    neighborhoods: &'a mut Neighborhoods,
+    surfels: &'a mut Surfels,
+    adapter: &'a mut Adapter,
+    over_time: &'a mut OverTime,
+    splatter: &'a mut Splatter,
+}
+
 /// From screen points to splats in the depth map.
 struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     settings: &'a Settings,
     past: &'a Past,
-    /// The last frame, if surfels are to be drawn towards it.
-    before: Option<Reprojection>,
     sensors: &'a Sensors,
     depth_noise: &'a DepthNoise,
     given: Option<GivenPlanes<'a>>,
@@ -230,13 +241,10 @@ impl Reconstruct<'_> {
     fn run(
         &self,
         queries: &[u32],
-        neighborhoods: &mut Neighborhoods,
-        surfels: &mut Surfels,
-        adapter: &mut Adapter,
-        splatter: &mut Splatter,
+        Buffers { neighborhoods, surfels, adapter, over_time, splatter }: &mut Buffers<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, settings, past, before, sensors, depth_noise, given } = *self;
+        let Self { screen, view, settings, past, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -279,8 +287,8 @@ impl Reconstruct<'_> {
         sensors.orient(&mut surfels[first..], view);
         clock.lap(|timings| &mut timings.fit)?;
 
-        if let Some(before) = before {
-            splatter.smooth(&mut surfels[first..], &before, settings.smoothing(), view);
+        if settings.smooths() {
+            over_time.smooth(&mut surfels[first..], screen, splatter.last(), view);
         }
         splatter.add(surfels, first, view);
         clock.lap(|timings| &mut timings.splat)?;

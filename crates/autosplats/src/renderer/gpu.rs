@@ -224,7 +224,8 @@ impl GpuRenderer {
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        prepared.tell(gpu, frame, Seen { view: *view, origin: cloud.origin() }, settings, &uniform);
+        let now = (Seen { view: *view, origin: cloud.origin() }, cloud.identity());
+        prepared.tell(gpu, frame, now, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -238,7 +239,7 @@ impl GpuRenderer {
         *times = recorder.finish();
         // What was not submitted left the surfels as they were.
         *last_view = Some(*view);
-        prepared.seen = Some(Seen { view: *view, origin: cloud.origin() });
+        prepared.seen = Some(now);
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
@@ -300,7 +301,7 @@ impl GpuRenderer {
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = Seen { view: *view, origin: cloud.origin() };
+        let now = (Seen { view: *view, origin: cloud.origin() }, cloud.identity());
         prepared.tell(gpu, frame, now, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::fit::LONGEST;
 use crate::search::SearchEngine;
 use crate::shade::Shading;
+use crate::splat::STEADY_FRAMES;
 
 /// Everything about a picture but the cloud, the camera and the size.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -56,9 +57,16 @@ pub struct Reconstruction {
     ///
     /// [`Renderer`]: crate::Renderer
     pub coherent: bool,
-    /// Temporal smoothing, for live points that are noisy anew in each frame: surfaces are averaged over about so many frames
-    /// of the same [`Renderer`], 1 to 32, that follow each other with such a setting. 1, the default, takes each frame by itself. What moves lags behind, unless it moves by
-    /// more than half its k-radius a frame; a frame then depends on those before.
+    /// Temporal smoothing while nothing but the camera moves: what is fitted to a point is averaged over the last eight frames of
+    /// the same [`Renderer`] and the same cloud that follow each other with this setting. Noise shimmers less, and normals are
+    /// nearer to the truth. A frame then depends on those before.
+    ///
+    /// [`Renderer`]: crate::Renderer
+    pub steady: bool,
+    /// Temporal smoothing of points that are others in each frame, as live ones are, noisy anew each time: surfaces are averaged
+    /// over about so many frames of the same [`Renderer`], 1 to 32, that follow each other with such a setting. 1, the default,
+    /// takes each frame by itself. What moves lags behind, unless it moves by more than half its k-radius a frame; a frame then
+    /// depends on those before. Of the same points what is fitted to each is averaged, as if they were to be [`steady`](Self::steady).
     ///
     /// [`Renderer`]: crate::Renderer
     pub frames_averaged: u32,
@@ -78,6 +86,7 @@ impl Default for Reconstruction {
             grid_culling: true,
             depth_refinement: true,
             coherent: true,
+            steady: false,
             frames_averaged: 1,
         }
     }
@@ -89,9 +98,14 @@ impl Reconstruction {
         Self { points_per_pixel: 1, adaptive: false, coherent: false, ..Self::default() }
     }
 
-    /// By which share of the way surfels are drawn towards the last frame's surface; 0 for none.
-    pub(super) fn smoothing(&self) -> f32 {
-        1.0 - 1.0 / self.frames_averaged as f32
+    /// Over how many frames surfels are averaged: of the same points, and of others.
+    pub(super) fn averaged(&self) -> [u32; 2] {
+        [self.frames_averaged.max(if self.steady { STEADY_FRAMES } else { 1 }), self.frames_averaged]
+    }
+
+    /// Whether frames depend on those before.
+    pub(super) fn smooths(&self) -> bool {
+        self.averaged() != [1; 2]
     }
 
     /// Longest ellipse, semi-major over semi-minor axis.

@@ -27,11 +27,12 @@ struct Frame {
     first_radius: f32,
     // Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     longest: f32,
-    // By which share of the way surfels are drawn towards the last frame's surface.
-    smoothing: f32,
-    // Of the last frame, which had the same size: how its camera saw, and how its view space comes from this one. The focal
-    // length is 0 if nothing is known of it.
-    past_perspective: u32,
+    // Over how many frames surfels are averaged; 1 if each frame is taken by itself.
+    frames_averaged: f32,
+    // 1 if the last frame was one of the same points.
+    same_points: u32,
+    // Of the last frame, which had the same size and kind of projection: how its view space comes from this one, and its focal
+    // length, 0 if nothing is known of it.
     past_rotation: mat3x3f,
     past_shift: vec3f,
     past_focal_px: f32,

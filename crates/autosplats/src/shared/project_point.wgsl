@@ -1,4 +1,4 @@
-// Where a point goes [Paper, §3]. Imports: frame.
+// Where a point goes [Paper, §3]. Imports: frame, half.
 
 // A run of the cloud's points, in a buffer of its own.
 struct Chunk {
@@ -36,12 +36,9 @@ fn project_point(position: vec3f) -> Projected {
         return Projected(SLOT_OUTSIDE, 0.0, vec2u(0u));
     }
     let sixteenths = vec2u(4.0 * at);
-    let pixel = sixteenths / 4u;
-    let index = pixel.y * frame.size.x + pixel.x;
     if frame.halves == 0u {
-        return Projected(index, position_view.z, sixteenths);
+        let pixel = sixteenths / 4u;
+        return Projected(pixel.y * frame.size.x + pixel.x, position_view.z, sixteenths);
     }
-    // Halves of pixels lie side by side and one below the other in turn.
-    let along = select(sixteenths.y, sixteenths.x, ((pixel.x + pixel.y) & 1u) == 1u);
-    return Projected(2u * index + (along / 2u & 1u), position_view.z, sixteenths);
+    return Projected(half_at(sixteenths), position_view.z, sixteenths);
 }

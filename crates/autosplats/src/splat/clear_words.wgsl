@@ -1,4 +1,5 @@
-// Sets all words of a buffer to 0: refinement begins with no cell marked, the trim with no centre in any pixel.
+// Sets all words of a buffer to 0: refinement begins with no cell marked, the trim with no centre in any pixel, a frame to
+// be looked back at with no point in any half of a pixel.
 //
 // Writes: words.
 

@@ -5,12 +5,11 @@ use rayon::prelude::*;
 use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
 use super::centers::add_centers;
-use super::over_time::smooth;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_REACH;
 use super::trim::{Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
-use crate::camera::{Reprojection, View};
+use crate::camera::View;
 use crate::fit::Surfel;
 use crate::project::Sixteenths;
 
@@ -40,10 +39,9 @@ impl Splatter {
         clear(&mut self.depth, view);
     }
 
-    /// Draws `surfels` towards the surface that the last frame showed, by `share` of the way: temporal smoothing. For frames
-    /// after one that was drawn to its end.
-    pub(crate) fn smooth(&self, surfels: &mut [Surfel], past: &Reprojection, share: f32, view: &View) {
-        smooth(surfels, &self.layers, past, share, view);
+    /// What the last frame that was drawn to its end showed.
+    pub(crate) fn last(&self) -> &GBuffer {
+        &self.layers
     }
 
     /// Visibility pass: draws the surfels from index `first` on into the depth map [Paper, §7].

@@ -11,7 +11,6 @@
 
 use super::centers::STEPS;
 use super::layers::{Channels, LayerBuffers};
-use super::over_time::{ALIKE, NEAR};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::{
@@ -36,7 +35,6 @@ pub(crate) const PASSES: &[PassSource] = &[
     ERASE,
     ERASE_LARGE,
     REDRAW,
-    OVER_TIME,
     ATTRIBUTES,
     ADD_CENTERS,
     TRIM,
@@ -48,12 +46,11 @@ const DEPTH_LARGE: PassSource = PassSource::new("splat/depth_large", include_str
 const DEPTH: PassSource = PassSource::new("splat/depth", include_str!("depth.wgsl"));
 const RECOVER_COUNT: PassSource = PassSource::new("splat/recover_count", include_str!("recover_count.wgsl"));
 const RECOVER: PassSource = PassSource::new("splat/recover", include_str!("recover.wgsl"));
-const CLEAR_WORDS: PassSource = PassSource::new("splat/clear_words", include_str!("clear_words.wgsl"));
+pub(super) const CLEAR_WORDS: PassSource = PassSource::new("splat/clear_words", include_str!("clear_words.wgsl"));
 const REFINE: PassSource = PassSource::new("splat/refine", include_str!("refine.wgsl"));
 const ERASE: PassSource = PassSource::new("splat/erase", include_str!("erase.wgsl"));
 const ERASE_LARGE: PassSource = PassSource::new("splat/erase_large", include_str!("erase_large.wgsl"));
 const REDRAW: PassSource = PassSource::new("splat/redraw", include_str!("redraw.wgsl"));
-const OVER_TIME: PassSource = PassSource::new("splat/over_time", include_str!("over_time.wgsl"));
 const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
 const ADD_CENTERS: PassSource = PassSource::new("splat/add_centers", include_str!("add_centers.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
@@ -129,8 +126,6 @@ pub(crate) struct SplatPasses {
     erase: Pass,
     erase_large: Pass,
     redraw: Pass,
-    /// For each [`Round`].
-    over_time: [Pass; 2],
     attributes: Pass,
     add_centers: Pass,
     trim: Pass,
@@ -195,10 +190,6 @@ impl SplatPasses {
             ("FEWEST_SPLATS", FEWEST_SPLATS.into()),
             ("STEPS", STEPS.into()),
         ];
-        let over_time = |round: Round| {
-            let constants = [("ROUND", f64::from(round as u32)), ("NEAR", NEAR.into()), ("ALIKE", ALIKE.into())];
-            Pass::new(gpu, &OVER_TIME, &constants)
-        };
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
@@ -218,26 +209,11 @@ impl SplatPasses {
             erase: Pass::new(gpu, &ERASE, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
             erase_large: Pass::new(gpu, &ERASE_LARGE, &[dot_radius])?,
             redraw: Pass::new(gpu, &REDRAW, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
-            over_time: [over_time(Round::Active)?, over_time(Round::Recovered)?],
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             add_centers: Pass::new(gpu, &ADD_CENTERS, &[("STEPS", STEPS.into())])?,
             trim: Pass::new(gpu, &TRIM, &trim)?,
             linear: steps,
         })
-    }
-
-    /// Draws the surfels of a round towards the surface of the last frame, which `layers` still hold.
-    pub(crate) fn step_over_time(
-        &self,
-        gpu: &Gpu,
-        frame: &wgpu::Buffer,
-        screen: &ScreenBuffers,
-        surfels: &wgpu::Buffer,
-        layers: &LayerBuffers,
-        round: Round,
-    ) -> Step {
-        let buffers = [frame, &screen.counters, &layers.surface, surfels];
-        self.over_time[round as usize].step(gpu, &buffers, screen.groups(round.work_64()))
     }
 
     /// Visibility pass: draws the surfels of a round into the depth map, which the first round clears [Paper, §7].

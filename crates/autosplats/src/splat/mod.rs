@@ -17,7 +17,7 @@ mod centers;
 mod cpu;
 pub(crate) mod gpu;
 mod layers;
-mod over_time;
+pub(crate) mod over_time;
 mod raster;
 mod setup;
 #[cfg(test)]
@@ -29,6 +29,7 @@ pub(crate) use cpu::Splatter;
 pub(crate) use layers::{Channels, LayerBuffers};
 #[cfg(test)]
 pub(crate) use layers::{Cover, upload_layers};
+pub(crate) use over_time::{OverTime, STEADY_FRAMES};
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
 pub const TILE: usize = 64;

@@ -19,6 +19,7 @@ use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
 use crate::shade::{ColorMode, linear_steps};
 use crate::splat::gpu::{SplatBuffers, SplatPasses};
+use crate::splat::over_time::gpu::{OverTimeBuffers, OverTimePasses};
 use crate::splat::{Channels, LayerBuffers};
 
 /// Which engine, whatever its parameters, and k: what search passes are compiled for.
@@ -35,6 +36,8 @@ pub(super) struct Passes {
     orient: Option<OrientPasses>,
     /// Compiled when first asked for.
     adapt: Option<AdaptPasses>,
+    /// Compiled when first asked for.
+    over_time: Option<OverTimePasses>,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
 }
@@ -48,6 +51,7 @@ impl Passes {
             fit: FitPasses::new(gpu)?,
             orient: None,
             adapt: None,
+            over_time: None,
             splat: None,
             shade: ShadePasses::new(gpu)?,
         })
@@ -64,6 +68,9 @@ impl Passes {
         }
         if shape.adaptive && self.adapt.is_none() {
             self.adapt = Some(AdaptPasses::new(gpu)?);
+        }
+        if shape.smooth && self.over_time.is_none() {
+            self.over_time = Some(OverTimePasses::new(gpu)?);
         }
         if self.splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
             self.splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
@@ -105,7 +112,7 @@ impl Shape {
             halves,
             search: (discriminant(&reconstruction.engine), reconstruction.k),
             coherent: reconstruction.remembers(),
-            smooth: reconstruction.smoothing() > 0.0,
+            smooth: reconstruction.smooths(),
             adaptive: reconstruction.adaptive,
             depth_refinement: reconstruction.depth_refinement,
             channels: Channels {
@@ -137,8 +144,8 @@ pub(super) struct OnDevice<'a> {
 #[derive(Debug)]
 pub(super) struct Prepared {
     shape: Shape,
-    /// How the last frame was seen, if there was one.
-    pub(super) seen: Option<Seen>,
+    /// How the last frame was seen, and the identity of its points, if there was one.
+    pub(super) seen: Option<(Seen, u64)>,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
     pub(super) surfels: wgpu::Buffer,
@@ -159,7 +166,7 @@ impl Prepared {
         settings: &Settings,
     ) -> Result<Self, Error> {
         passes.compile(gpu, &shape, settings)?;
-        let Passes { project, search, past, fit, orient, adapt, splat, shade } = passes;
+        let Passes { project, search, past, fit, orient, adapt, over_time, splat, shade } = passes;
         let (Some((_, search)), Some((_, splat))) = (search, splat) else { unreachable!("they were just compiled") };
         let adapt = adapt.as_ref().filter(|_| shape.adaptive);
         let Shape { size, halves, .. } = shape;
@@ -169,6 +176,10 @@ impl Prepared {
         let surfels = surfel_buffer(gpu, screen.capacity)?;
         let adapt = match adapt {
             Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
+            None => None,
+        };
+        let over_time = match over_time.as_ref().filter(|_| shape.smooth) {
+            Some(passes) => Some((passes, OverTimeBuffers::new(gpu, screen.capacity, size)?)),
             None => None,
         };
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
@@ -194,13 +205,16 @@ impl Prepared {
                 if let (Some(orient), Some(sensors)) = (&*orient, sensors) {
                     steps.push(orient.step(gpu, frame, &screen, sensors, &surfels, round));
                 }
-                if shape.smooth {
-                    steps.push(splat.step_over_time(gpu, frame, &screen, &surfels, &layers, round));
+                if let Some((passes, buffers)) = &over_time {
+                    steps.push(passes.step(gpu, frame, &screen, &surfels, (&layers, buffers), round));
                 }
                 steps.extend(splat.steps_visibility(gpu, frame, &screen, &surfels, &splats, round));
             }
             if shape.coherent {
                 steps.extend(past.steps(gpu, frame, &screen, &neighborhoods, &past_radii));
+            }
+            if let Some((passes, buffers)) = &over_time {
+                steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
             }
             let refine = shape.depth_refinement;
             steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
@@ -220,7 +234,7 @@ impl Prepared {
         &mut self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
-        now: Seen,
+        (now, identity): (Seen, u64),
         settings: &Settings,
         shading: &ShadeUniform,
     ) {
@@ -237,7 +251,6 @@ impl Prepared {
             longest: reconstruction.longest(),
             keep_outliers: reconstruction.outlier_expansions.is_none().into(),
             splat_scale: reconstruction.splat_scale,
-            smoothing: reconstruction.smoothing(),
             outlier_growth: rules.outlier_radius(1.0),
             gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
             first_radius: match reconstruction.engine {
@@ -248,7 +261,12 @@ impl Prepared {
         };
         // Steps that are made anew leave nothing to look back at, and those of another k are.
         let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
-        let told = past.map_or(told, |past| told.after(&Reprojection::new(&now, &past)));
+        let reprojected = past.and_then(|(past, points)| Some((Reprojection::new(&now, &past)?, points == identity)));
+        let told = reprojected.map_or(told, |(past, same_points)| {
+            let [of_same, of_others] = reconstruction.averaged();
+            let frames_averaged = if same_points { of_same } else { of_others } as f32;
+            FrameUniform { frames_averaged, same_points: same_points.into(), ..told.after(&past) }
+        });
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
         self.picture.write(gpu, shading, &settings.shading);
     }

@@ -23,6 +23,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::fit::orient::gpu::PASSES,
         crate::adapt::gpu::PASSES,
         crate::splat::gpu::PASSES,
+        crate::splat::over_time::gpu::PASSES,
         crate::shade::gpu::PASSES,
     ];
     stages.into_iter().flatten()

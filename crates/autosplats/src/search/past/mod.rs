@@ -86,7 +86,7 @@ impl Past {
     /// A frame begins. What one that was given up left is forgotten.
     pub(crate) fn begin(&mut self, now: Seen, k: u32) {
         let past = self.last.seen.filter(|&(_, known)| known == k);
-        self.reprojection = past.map(|(past, _)| Reprojection::new(&now, &past));
+        self.reprojection = past.and_then(|(past, _)| Reprojection::new(&now, &past));
         let Radii { seen, pixels } = &mut self.next;
         *seen = Some((now, k));
         pixels.resize_with(now.view.width as usize * now.view.height as usize, AtomicU32::default);

@@ -14,6 +14,7 @@ use crate::project::{ChunkUniform, ScreenPoint};
 use crate::search::splat_communication::gpu::Arguments;
 use crate::shade::gpu::{ShadeUniform, Shown};
 use crate::splat::Cover;
+use crate::splat::over_time::Fitted;
 
 /// Name, offset and size of a field.
 type Field = (String, usize, usize);
@@ -42,7 +43,7 @@ macro_rules! mirrored {
     }};
 }
 
-fn mirrored() -> [Mirrored; 9] {
+fn mirrored() -> [Mirrored; 10] {
     [
         mirrored!(
             "Frame",
@@ -63,8 +64,8 @@ fn mirrored() -> [Mirrored; 9] {
                 gap_growth,
                 first_radius,
                 longest,
-                smoothing,
-                past_perspective,
+                frames_averaged,
+                same_points,
                 past_rotation,
                 past_shift,
                 past_focal_px,
@@ -80,6 +81,7 @@ fn mirrored() -> [Mirrored; 9] {
             "Surfel",
             Surfel { center, radius, normal, k_radius, major_axis, major_ratio, curvature, pixel, source, screen }
         ),
+        mirrored!("Fitted", Fitted { offset, source, normal, frames }),
         mirrored!(
             "ShadeUniform",
             ShadeUniform {

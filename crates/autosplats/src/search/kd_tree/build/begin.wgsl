@@ -4,6 +4,7 @@
 
 #import frame
 #import groups
+#import half
 #import project_point
 #import range_keys
 #import kd_build

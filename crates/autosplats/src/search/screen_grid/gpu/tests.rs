@@ -32,7 +32,7 @@ pub(crate) fn frame_buffer_after(
         return (frame_buffer(gpu, view, rules), past_buffer(gpu, None).expect("room"));
     };
     let seen = Seen { view: *view, origin: DVec3::ZERO };
-    let told = told(view, rules).after(&Reprojection::new(&seen, &seen));
+    let told = told(view, rules).after(&Reprojection::new(&seen, &seen).expect("the same camera"));
     (frame_buffer_with(gpu, &told), gpu.storage_with("past", radii).expect("room"))
 }
 

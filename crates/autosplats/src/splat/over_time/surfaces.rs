@@ -1,34 +1,22 @@
-//! Temporal smoothing: surfels drawn towards the surface that the last frame showed.
+//! The surface that the last frame showed.
 //!
-//! Points that a live scanner measures anew for each frame have other noise each time, and surfaces that stand still shiver. A
-//! surfel looks back to where it lay in the last frame. If the surface seen there is near and faces the same way, it is taken
+//! A surfel looks back to where it lay in the last frame. If the surface seen there is near and faces the same way, it is taken
 //! for the same one, and the surfel moves towards it, along its normal, and turns towards it, by a share of the way: so noise
 //! is averaged over frames, with weights that fade, and nothing is kept but the last frame's picture. What moves is drawn
-//! behind by as many frames; what moves by more than [`NEAR`] k-radii a frame is left alone.
+//! behind by as many frames; what moves by more than [`NEAR`] k-radii a frame is left alone. Detail as fine as pixels is blurred.
 
 use glam::Vec3;
-use rayon::prelude::*;
 
-use super::GBuffer;
+use super::points::ALIKE;
 use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
+use crate::splat::GBuffer;
 
 /// How far away the same surface may have been in the last frame, in k-radii of the surfel.
 pub(super) const NEAR: f32 = 0.5;
-/// Cosine of the angle by which it may face another way.
-pub(super) const ALIKE: f32 = 0.7;
-
-/// Draws `surfels` towards the surface `last` shown, by `share` of the way, 0 to below 1.
-pub(crate) fn smooth(surfels: &mut [Surfel], last: &GBuffer, past: &Reprojection, share: f32, view: &View) {
-    surfels.par_iter_mut().with_min_len(1024).for_each(|surfel| {
-        if let Some(surface) = seen_before(surfel, last, past) {
-            draw_towards(surfel, &surface, share, view);
-        }
-    });
-}
 
 /// A surface of the last frame, in view space.
-struct Surface {
+pub(super) struct Surface {
     /// Unit normal, to the same side as the surfel's.
     normal: Vec3,
     /// How far the surfel lies in front of it.
@@ -36,7 +24,7 @@ struct Surface {
 }
 
 /// The same surface in the last frame.
-fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<Surface> {
+pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<Surface> {
     let pixel = past.pixel(surfel.center)?;
     let width = past.view.width as usize;
     let [x, y] = [pixel % width, pixel / width];
@@ -53,9 +41,14 @@ fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<S
     is_same.then(|| Surface { normal: normal * facing.signum(), distance: distance * facing.signum() })
 }
 
-fn draw_towards(surfel: &mut Surfel, surface: &Surface, share: f32, view: &View) {
-    let &Surface { normal: then, distance } = surface;
-    let center = Vec3::from(surfel.center) - share * distance * then;
+/// Draws a surfel towards a surface by `share` of the way, 0 to below 1.
+pub(super) fn draw_towards(surfel: &mut Surfel, surface: &Surface, share: f32, view: &View) {
+    let center = Vec3::from(surfel.center) - share * surface.distance * surface.normal;
+    draw_to(surfel, center, surface.normal, share, view);
+}
+
+/// Moves a surfel to `center` and turns it towards `then`, a normal to the same side, by `share` of the way.
+pub(super) fn draw_to(surfel: &mut Surfel, center: Vec3, then: Vec3, share: f32, view: &View) {
     let now = Vec3::from(surfel.normal);
     let normal = view.turned_to_eye((now + share * (then - now)).normalize(), center);
     let major_axis = Vec3::from(surfel.major_axis);

@@ -1,0 +1,34 @@
+// Keeps what was fitted to each point for the next frame, which finds it by the half of a pixel that the point lies in.
+//
+// Reads: counters, points, surfels, frames. Writes: fitted, halves (set to 0 before).
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import surfel
+#import half
+#import fitted
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(3) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(4) var<storage, read> frames: array<f32>;
+@group(0) @binding(5) var<storage, read_write> fitted: array<Fitted>;
+@group(0) @binding(6) var<storage, read_write> halves: array<atomic<u32>>;
+
+@compute @workgroup_size(256)
+fn keep_fitted(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let index = group_index(workgroup) * 256u + local;
+    if index >= counters[ACTIVE] + counters[RECOVERED] {
+        return;
+    }
+    let surfel = surfels[index];
+    let point = points[surfel.screen & ~BACK].position_view;
+    fitted[index] = Fitted(surfel.center - point, surfel.source, surfel.normal, frames[index]);
+    let at = to_pixel(point);
+    if surfel.radius > 0.0 && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
+        // Rounding may put two into one half: always the same one stays.
+        atomicMax(&halves[half_at(vec2u(4.0 * at))], index + 1u);
+    }
+}

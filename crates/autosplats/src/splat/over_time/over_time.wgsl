@@ -1,0 +1,107 @@
+// Averages surfels with what the last frame found. The CPU form, `points.rs` and `surfaces.rs`, says how.
+//
+// Reads: counters, surface, halves, fitted (all three of the last frame), points. Reads and writes: surfels. Writes: frames.
+
+#import frame
+#import groups
+#import counters
+#import screen
+#import surfel
+#import half
+#import reproject
+#import fitted
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> surface: array<vec4f>;
+@group(0) @binding(3) var<storage, read> points: array<ScreenPoint>;
+@group(0) @binding(4) var<storage, read> halves: array<u32>;
+@group(0) @binding(5) var<storage, read> fitted: array<Fitted>;
+@group(0) @binding(6) var<storage, read_write> surfels: array<Surfel>;
+@group(0) @binding(7) var<storage, read_write> frames: array<f32>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+override NEAR: f32;
+override ALIKE: f32;
+
+// Moves a surfel to `center` and turns it towards `before`, a normal to the same side, by `share` of the way.
+fn draw_to(place: u32, center: vec3f, before: vec3f, share: f32) {
+    let surfel = surfels[place];
+    let normal = turned_to_eye(normalize(surfel.normal + share * (before - surfel.normal)), center);
+    surfels[place].normal = normal;
+    surfels[place].major_axis = normalize(surfel.major_axis - normal * dot(normal, surfel.major_axis));
+    let middle = to_pixel(center);
+    // A centre beside the picture has no pixel to be hidden at.
+    if center.z > frame.near && all(middle >= vec2f(0.0)) && all(middle < vec2f(frame.size)) {
+        let own = vec2u(middle);
+        surfels[place].center = center;
+        surfels[place].pixel = (own.y << 16u) | own.x;
+    }
+}
+
+// The place from 1 on, in `fitted`, of what was found for a point of the cloud that is at `point` now; 0 if nothing was.
+fn place_then(source: u32, point: vec3f) -> u32 {
+    let position = past_position(point);
+    let at = past_place(position);
+    if !was_inside(position, at) {
+        return 0u;
+    }
+    let place = halves[half_at(vec2u(4.0 * at))];
+    if place == 0u || fitted[place - 1u].source != source {
+        return 0u;
+    }
+    return place;
+}
+
+// Averages a surfel; returns over how many frames it is the mean then.
+fn smoothed(place: u32) -> f32 {
+    let surfel = surfels[place];
+    if !has_past() || frame.frames_averaged == 1.0 || surfel.radius == 0.0 {
+        return 1.0;
+    }
+    let back = transpose(frame.past_rotation);
+    if frame.same_points == 1u {
+        let point = points[surfel.screen & ~BACK].position_view;
+        let found = place_then(surfel.source, point);
+        if found != 0u {
+            let then = fitted[found - 1u];
+            let normal = back * then.normal;
+            let facing = dot(normal, surfel.normal);
+            if abs(facing) >= ALIKE {
+                let count = min(then.frames + 1.0, frame.frames_averaged);
+                let share = 1.0 - 1.0 / count;
+                let moved = surfel.center + share * (point + back * then.offset - surfel.center);
+                draw_to(place, moved, normal * sign(facing), share);
+                return count;
+            }
+        }
+        if all(point == surfel.center) {
+            return 1.0;
+        }
+    }
+    let position = past_position(surfel.center);
+    let pixel = past_pixel(position);
+    if pixel == NO_PIXEL || !is_finite(surface[pixel].w) {
+        return 1.0;
+    }
+    let seen = surface[pixel];
+    let distance = dot(seen.xyz, position - past_unproject(pixel, seen.w));
+    let normal = back * seen.xyz;
+    let facing = dot(normal, surfel.normal);
+    if !(abs(distance) <= NEAR * surfel.k_radius && abs(facing) >= ALIKE) {
+        return 1.0;
+    }
+    let share = 1.0 - 1.0 / frame.frames_averaged;
+    draw_to(place, surfel.center - share * distance * normal, normal * sign(facing), share);
+    return frame.frames_averaged;
+}
+
+@compute @workgroup_size(64)
+fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let first = select(0u, counters[ACTIVE], ROUND == 1u);
+    let len = counters[select(ACTIVE, RECOVERED, ROUND == 1u)];
+    let index = group_index(workgroup) * 64u + local;
+    if index < len {
+        frames[first + index] = smoothed(first + index);
+    }
+}
