@@ -47,7 +47,7 @@ struct Surface {
 }
 
 // The surface beside a surfel, from the sheets of the four cells around it that agree with the `first` normal.
-fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
+fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     var sum = Surface();
     let level = levels[sheet_level()];
     if level.side_px == 0u {
@@ -78,7 +78,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32) -> Surface {
                 let across = cross(normal, first.xyz);
                 // The smallest of a sheet's balls was held against nothing.
                 let agrees = dot(across, across) <= AGREE * AGREE * (sheet.error * sheet.error + first.w * first.w);
-                if first.w >= 0.0 && !(agrees && sheet.scatter <= SCATTER * noise) {
+                if first.w >= 0.0 && !(agrees && sheet.scatter <= scatter) {
                     disagrees = true;
                     continue;
                 }
@@ -218,11 +218,12 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if calls(surfel, noise, enough) {
         let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
         let first = vec4f(surfel.normal, select(-1.0, noise / surfel.k_radius, is_reliable));
-        surface = blend(surfel.center, first, noise);
+        let scatter = most_scatter(noise, known.noise > 0.0);
+        surface = blend(surfel.center, first, noise, scatter);
         if surface.weight == 0.0 {
             let cell_px = atomicLoad(&counters[CELL_PX]);
             let radius = base_radius(surfel, cell_px, atomicLoad(&counters[CELL_COLUMNS]));
-            let quadric = choose(surfel.center, radius, first, noise, enough);
+            let quadric = choose(surfel.center, radius, first, noise, enough, scatter);
             if quadric.len > 0u {
                 surface = Surface(quadric.axis * quadric.height, 1.0, quadric.normal, quadric.curvature);
             }

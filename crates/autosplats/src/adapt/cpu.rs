@@ -31,21 +31,23 @@ pub(super) const MOST_TINY: f32 = 3.0;
 /// Largest standard error of a normal that others are held against.
 pub(super) const RELIABLE: f32 = 0.12;
 /// Most noise, as a part of a ball's radius, with which its points are a surface at all.
-pub(super) const THICKEST: f32 = 0.28;
+pub(super) const THICKEST: f32 = 0.2;
 /// The same of the first neighbourhood, whose plane has no error of its own to tell.
-pub(super) const THICKEST_FIRST: f32 = 0.15;
+pub(super) const THICKEST_FIRST: f32 = 0.075;
 /// Least trace, times weight, of what [`Quadric::error`] is the root of, in radii: that of a round ball, evenly filled. Where
 /// even that is no reliable error the quadric need not be fitted: true of most first balls.
 pub(super) const LEAST_TRACE: f32 = 8.0;
-/// Larger balls may scatter this many times the noise.
-pub(super) const SCATTER: f32 = 2.2;
+/// Larger balls may scatter this many times the noise,
+pub(super) const SCATTER: f32 = 1.9;
+/// or that of depth cameras, which is known for what it does to normals: neighbours err alike.
+pub(super) const SCATTER_KNOWN: f32 = 0.8;
 /// Normals agree within this many standard errors.
 pub(super) const AGREE: f32 = 3.0;
 
 /// The k-radius of a point that lies between surfaces counts as at most this many first search radii.
 pub(super) const WIDEST: f32 = 3.0;
 /// A surfel moves at most this many times the noise; a quadric further away is another surface.
-pub(super) const FARTHEST: f32 = 6.0;
+pub(super) const FARTHEST: f32 = 9.0;
 /// Points whose surface variation, times the square of the k-radius in usual ones, is at least this are drawn as dots. Surface
 /// variation is up to 0.15 at edges and corners, which stay where points are up to four times as far apart as usual; in a
 /// cloud that fills space it is 0.2 by mean, and much less for some.
@@ -119,7 +121,11 @@ impl Adapter {
                 sheets.ask(surfel, cells, view);
             });
         });
-        sheets.fit(cells, &|place, k_radius, point| task.noise(place, k_radius, point).0, view);
+        let noise = |place, k_radius, point| {
+            let (noise, known) = task.noise(place, k_radius, point);
+            (noise, known.is_some())
+        };
+        sheets.fit(cells, &noise, view);
         let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
             adapt_all(surfels, &task, sheets, gathered);
@@ -145,12 +151,29 @@ enum Call {
 
 #[derive(Clone, Copy)]
 struct Noisy {
-    /// Standard deviation of points from their surface, world units.
-    noise: f32,
-    /// Standard error of a normal that is good enough, radians.
-    enough: f32,
+    goal: Goal,
     /// Where it is the noise of a depth camera.
     known: Option<Known>,
+}
+
+/// What a fit has to reach.
+#[derive(Clone, Copy)]
+pub(super) struct Goal {
+    /// Standard deviation of points from their surface, world units.
+    pub(super) noise: f32,
+    /// Standard error of a normal that is good enough, radians.
+    pub(super) enough: f32,
+    /// Most that points may scatter about larger balls' quadrics, world units.
+    pub(super) scatter: f32,
+}
+
+impl Goal {
+    /// Of points with a k-radius at a depth, whose noise is `known` as that of a depth camera.
+    #[inline(always)]
+    pub(super) fn new(noise: f32, known: bool, k_radius: f32, depth: f32, view: &View) -> Self {
+        let scatter = if known { SCATTER_KNOWN } else { SCATTER };
+        Self { noise, enough: good_enough(noise, k_radius, depth, view), scatter: scatter * noise }
+    }
 }
 
 impl Task<'_> {
@@ -166,14 +189,14 @@ impl Task<'_> {
     fn call(&self, surfel: &Surfel) -> Call {
         // The first neighbourhood's error is about that of its k points over the k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
-        let enough = good_enough(noise, surfel.k_radius, surfel.center[2], self.view);
+        let goal = Goal::new(noise, known.is_some(), surfel.k_radius, surfel.center[2], self.view);
         if surfel.radius == 0.0 {
             Call::Nothing
         } else if is_row(surfel) && known.is_none() {
             // Steps of a depth camera's depths are rows too, but the surface is not in them.
             Call::Row
-        } else if noise > enough * surfel.k_radius {
-            Call::Noise(Noisy { noise, enough, known })
+        } else if noise > goal.enough * surfel.k_radius {
+            Call::Noise(Noisy { goal, known })
         } else {
             Call::Nothing
         }
@@ -202,19 +225,19 @@ fn adapt_all_with<'a, S: Simd>(
         // A line has no width to draw.
         let is_line = surfel.major_ratio == f32::MAX;
         surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
-        let Call::Noise(Noisy { noise, enough, known }) = call else {
+        let Call::Noise(Noisy { goal, known }) = call else {
             shrink(simd, surfel, task, gathered);
             continue;
         };
-        let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
-        let first = is_reliable.then(|| (surfel.normal.into(), noise / surfel.k_radius));
+        let is_reliable = goal.noise < THICKEST_FIRST * surfel.k_radius;
+        let first = is_reliable.then(|| (surfel.normal.into(), goal.noise / surfel.k_radius));
         let mut alone = || {
             let radius = first_radius(surfel, density, view, k);
-            let quadric = choose(simd, surfel.center, radius, first, (noise, enough), (cells, view), gathered)?;
+            let quadric = choose(simd, surfel.center, radius, first, &goal, (cells, view), gathered)?;
             let Quadric { normal, height, axis, curvature, .. } = quadric;
             Some(Surface { offset: axis * height, normal, curvature })
         };
-        let surface = match sheets.blend(surfel.center, first, noise, cells, view) {
+        let surface = match sheets.blend(surfel.center, first, &goal, cells, view) {
             Blend::Surface(surface) => Some(surface),
             // So would nine of ten quadrics of its own, each at the cost of a sheet.
             Blend::Disagrees => None,
@@ -248,7 +271,7 @@ pub(super) fn choose<S: Simd>(
     center: [f32; 3],
     mut radius: f32,
     first: Option<(Vec3, f32)>,
-    (noise, enough): (f32, f32),
+    &Goal { noise, enough, scatter }: &Goal,
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<Quadric> {
@@ -295,7 +318,7 @@ pub(super) fn choose<S: Simd>(
         let agrees = |&(normal, other): &(Vec3, f32)| {
             quadric.normal.cross(normal).length_squared() <= AGREE * AGREE * (error * error + other * other)
         };
-        let agrees = reliable[..count].iter().all(agrees) & ((count == 0) | (quadric.scatter <= SCATTER * noise));
+        let agrees = reliable[..count].iter().all(agrees) & ((count == 0) | (quadric.scatter <= scatter));
         if !agrees {
             break;
         }

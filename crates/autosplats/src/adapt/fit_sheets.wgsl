@@ -77,8 +77,11 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         left[largest] = 0.0;
         let center = clusters[first + largest].xyz;
         let radius = around.k_radius_px * pixel_size(center.z);
-        let noise = max(noise_at(radius), known_at(center, around.point).noise);
-        let quadric = choose(center, radius, vec4f(-1.0), noise, good_enough(noise, radius, center.z));
+        let measured_noise = noise_at(radius);
+        let known = known_beyond(measured_noise, center, around.point).noise;
+        let noise = max(measured_noise, known);
+        let enough = good_enough(noise, radius, center.z);
+        let quadric = choose(center, radius, vec4f(-1.0), noise, enough, most_scatter(noise, known > 0.0));
         if quadric.len == 0u {
             continue;
         }

@@ -2,11 +2,11 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, AROUND_SPARSE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, MOST_TINY, RELIABLE, SCATTER, SPARSE, STRAY_DOT,
-    STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
+    AGREE, AROUND_SPARSE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, MOST_TINY, RELIABLE, SCATTER, SCATTER_KNOWN, SPARSE,
+    STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
-use super::noise::{APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
+use super::noise::{APART, FAR_APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
 use super::rows::{
     AREA, AREA_BESIDE, AREA_BEYOND, AREA_NEAR, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH,
@@ -187,13 +187,14 @@ impl AdaptPasses {
             ("TINY_REACH_PX", TINY_REACH_PX.into()),
             ("MOST_TINY", MOST_TINY.into()),
             ("ROW", ROW.into()),
+            ("SCATTER", SCATTER.into()),
+            ("SCATTER_KNOWN", SCATTER_KNOWN.into()),
         ];
         let choose = [
             step,
             ("RELIABLE", RELIABLE.into()),
             ("LEAST_TRACE", LEAST_TRACE.into()),
             ("THICKEST", THICKEST.into()),
-            ("SCATTER", SCATTER.into()),
             ("AGREE", AGREE.into()),
             ("FARTHEST", FARTHEST.into()),
         ];
@@ -278,6 +279,7 @@ impl AdaptPasses {
                     sample,
                     ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
                     ("APART", APART.into()),
+                    ("FAR_APART", FAR_APART.into()),
                     ("BEYOND", noise::BEYOND as f64),
                     ("THICK_NOISE", THICK_NOISE.into()),
                     ("FINE_SHEETS", SHEET_LEVELS[0] as f64),

@@ -14,9 +14,12 @@ use crate::project::DensityGrid;
 
 /// Surfels looked at.
 pub(crate) const SAMPLE: usize = 2048;
-/// The densest and the sparsest third of a sample tell how noise grows with the k-radius if k-radii are this much larger in
-/// the one than in the other.
-pub(super) const APART: f32 = 1.2;
+/// The densest and the sparsest third of a sample tell how noise grows with the k-radius if the median k-radius is larger in the
+/// one than in the other by this factor, and the more, the further apart they are: points evenly strewn are 1.2 apart by chance,
+/// very noisy ones 1.7.
+pub(super) const APART: f32 = 1.7;
+/// All of the growth counts from so many times [`APART`] on.
+pub(super) const FAR_APART: f32 = 1.3;
 /// Noise grows up to twice the k-radius that one of this many of the sample exceeds: strewn points may be as far apart as
 /// they like.
 pub(super) const BEYOND: usize = 8;
@@ -29,9 +32,9 @@ pub(super) const LEAST_SHARE: usize = 5;
 /// A surface is thin in a ball if points scatter less than this part of the radius: of points that fill it, it is 0.4.
 pub(super) const THIN: f32 = 0.2;
 /// A scale tells the noise if this share of the sample finds a thin surface.
-pub(super) const THIN_SHARE: f32 = 0.3;
+pub(super) const THIN_SHARE: f32 = 0.8;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
-pub(super) const QUANTILE: f32 = 0.3;
+pub(super) const QUANTILE: f32 = 0.33;
 
 /// Noise that is more than this part of the k-radius needs balls so large that twice as large cells do for sheets: fits are a
 /// quarter as many then, and as good. With less noise they are 5 to 15 % worse.
@@ -48,9 +51,7 @@ pub(crate) struct Usual {
 }
 
 /// Standard deviation of points from their surface, which may grow with the k-radius: what a scanner measures far away is
-/// sparser and has more noise. Where it is more than half the distance of points it is measured too large, three times at
-/// nearly three distances: clusters that noise puts into slabs of their own weigh like as many that it does not. Larger
-/// neighbourhoods than needed are the consequence.
+/// sparser and has more noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {
     /// At [`most`](Self::most) and beyond, world units.
@@ -72,15 +73,16 @@ impl Noise {
     fn of(sample: &[Sampled]) -> Self {
         let [dense, sparse] = ends(sample);
         let third = dense.len();
-        if let ([.., last], [first, ..]) = (dense, sparse)
-            && first.surfel.k_radius > APART * last.surfel.k_radius
+        if third > 0
+            && let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius)
+            && large > APART * small
         {
-            let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius);
             let [least, most] = [dense, sparse].map(scatter_level);
             if least > 0.0 && most > least {
                 let growth = (most / least).ln() / (large / small).ln();
                 // Little growth is chance, or other things where points are sparse.
-                let power = (2.0 * (growth - 0.5)).clamp(0.0, 2.0);
+                let sure = (large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0));
+                let power = (2.0 * (growth - 0.5)).clamp(0.0, 2.0) * sure.min(1.0);
                 if power > 0.0 {
                     // Through the middle of the two.
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;

@@ -16,6 +16,7 @@ override SCALES: u32;
 override SAMPLE: u32;
 override LEAST_SAMPLE: u32;
 override APART: f32;
+override FAR_APART: f32;
 override BEYOND: u32;
 override THICK_NOISE: f32;
 override FINE_SHEETS: u32;
@@ -53,15 +54,19 @@ fn k_radius(rank: u32) -> f32 {
 fn noise_of_sample() -> vec3f {
     let len = sampled[SAMPLE];
     let third = len / 3u;
-    if third > 0u && k_radius(len - third) > APART * k_radius(third - 1u) {
-        let small = k_radius(third / 2u);
-        let large = k_radius(len - third + third / 2u);
+    if third == 0u {
+        return vec3f(scatter_level(ALL), 0.0, 0.0);
+    }
+    let small = k_radius(third / 2u);
+    let large = k_radius(len - third + third / 2u);
+    if large > APART * small {
         let least = scatter_level(DENSEST);
         let most = scatter_level(SPARSEST);
         if least > 0.0 && most > least {
             let growth = log(most / least) / log(large / small);
             // Little growth is chance, or other things where points are sparse.
-            let power = clamp(2.0 * (growth - 0.5), 0.0, 2.0);
+            let sure = (large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0));
+            let power = clamp(2.0 * (growth - 0.5), 0.0, 2.0) * min(sure, 1.0);
             if power > 0.0 {
                 // Through the middle of the two.
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);

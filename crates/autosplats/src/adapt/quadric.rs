@@ -72,6 +72,8 @@ impl<'a> Window<'a> {
 pub(super) struct Gathered {
     lanes: Vec<[Lanes; 4]>,
     len: usize,
+    /// Side of the cells that they are of, radii: clusters are slabs about as thick.
+    side: f32,
 }
 
 /// The plane through a ball's clusters.
@@ -128,6 +130,7 @@ impl Gathered {
         let Some(window) = Window::around(cells, center.into(), radius, view) else { return 0 };
         let [cx, cy, cz] = center;
         let per_radius = 1.0 / radius;
+        self.side = window.level.side_px as f32 * view.pixel_size(cz) * per_radius;
         let most = window.len() * SLABS;
         // One more, that the last cluster is written to if it is outside.
         self.lanes.resize((most + 1).div_ceil(LANES), [Lanes::default(); 4]);
@@ -280,12 +283,17 @@ impl Gathered {
         // Trace of the inverse of the 2×2 matrix that is left for the slopes.
         let tilt = rows[4][5] / pivot(4);
         let trace = 1.0 / pivot(4) + (1.0 + tilt * tilt) / pivot(5);
-        let freedom = self.len.max(LEAST_CLUSTERS) as f32 - 6.0;
+        let len = self.len.max(LEAST_CLUSTERS) as f32;
+        // A cluster counts as often as it has points, and its mean scatters less than they do by the root of that number, unless
+        // the noise is thicker than slabs: then these cut it, and clusters scatter as points do, but for what is left within a
+        // slab. Either variance is too large where the other holds.
+        let squares = rest.max(0.0) / (len - 6.0);
+        let variance = squares.min(squares * len / w + self.side * self.side * (1.0 / 12.0));
         Quadric {
             normal: (axis - u * slope_x - v * slope_y).normalize(),
             height: height * radius,
             axis,
-            scatter: (rest.max(0.0) / freedom).sqrt() * radius,
+            scatter: variance.sqrt() * radius,
             error: trace.sqrt() / radius,
             curvature,
             radius,

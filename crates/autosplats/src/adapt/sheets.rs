@@ -7,7 +7,7 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::{Cell, Cells, Level, SLABS};
-use super::cpu::{AGREE, FARTHEST, SCATTER, choose, good_enough};
+use super::cpu::{AGREE, FARTHEST, Goal, choose};
 use super::quadric::Gathered;
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -103,8 +103,9 @@ pub(super) enum Blend {
     Nothing,
 }
 
-/// Noise at a place in view space, of a cloud's point with a k-radius, world units.
-type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> f32 + Sync + 'a;
+/// Noise at a place in view space, of a cloud's point with a k-radius, world units, and whether it is known as that of a depth
+/// camera.
+type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> (f32, bool) + Sync + 'a;
 
 /// Sheets of a cell.
 type Stack = [Sheet; SLABS];
@@ -182,7 +183,7 @@ impl Sheets {
         &self,
         center: [f32; 3],
         first: Option<(Vec3, f32)>,
-        noise: f32,
+        goal: &Goal,
         cells: &Cells,
         view: &View,
     ) -> Blend {
@@ -194,7 +195,7 @@ impl Sheets {
         let x1 = ((x + 1.0) as usize).min(level.columns - 1);
         let y1 = ((y + 1.0) as usize).min(level.rows - 1);
         let center = Vec3::from(center);
-        let per_farthest = 1.0 / (FARTHEST * noise);
+        let per_farthest = 1.0 / (FARTHEST * goal.noise);
         let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
         let mut total = 0.0;
         let mut disagrees = false;
@@ -219,7 +220,7 @@ impl Sheets {
                         let across = normal.cross(first).length_squared();
                         // The smallest of a sheet's balls was held against nothing.
                         let agrees = across <= AGREE * AGREE * (sheet.error * sheet.error + error * error);
-                        if !(agrees & (sheet.scatter <= SCATTER * noise)) {
+                        if !(agrees & (sheet.scatter <= goal.scatter)) {
                             disagrees = true;
                             continue;
                         }
@@ -324,9 +325,9 @@ fn fit_cell<S: Simd>(
         left[largest] = 0.0;
         let center = cell[largest].mean;
         let radius = k_radius_px * view.pixel_size(center[2]);
-        let noise = noise(center.into(), radius, point);
-        let enough = good_enough(noise, radius, center[2], view);
-        let Some(quadric) = choose(simd, center, radius, None, (noise, enough), (cells, view), gathered) else {
+        let (noise, known) = noise(center.into(), radius, point);
+        let goal = Goal::new(noise, known, radius, center[2], view);
+        let Some(quadric) = choose(simd, center, radius, None, &goal, (cells, view), gathered) else {
             continue;
         };
         let sheet = Sheet {

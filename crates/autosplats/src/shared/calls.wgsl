@@ -8,6 +8,8 @@ override TINY_SLOPE: f32;
 override TINY_REACH_PX: f32;
 override MOST_TINY: f32;
 override ROW: f32;
+override SCATTER: f32;
+override SCATTER_KNOWN: f32;
 
 // Standard deviation of points from their surface, of points with a k-radius above 0.
 fn noise_at(k_radius: f32) -> f32 {
@@ -25,6 +27,11 @@ fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {
     let pixel = pixel_size(depth);
     let dense = TINY_REACH_PX * pixel / k_radius;
     return ENOUGH + TINY_SLOPE * min(dense * dense, MOST_TINY) * max(TINY_PX - noise / pixel, 0.0);
+}
+
+// Most that points may scatter about larger balls' quadrics, world units, where the noise is `known` as that of a depth camera.
+fn most_scatter(noise: f32, known: bool) -> f32 {
+    return select(SCATTER, SCATTER_KNOWN, known) * noise;
 }
 
 // Whether the first neighbours of a surfel are a row. Steps of a depth camera's depths, whose noise is known, are rows too,

@@ -7,14 +7,13 @@ override STEP: f32;
 override RELIABLE: f32;
 override LEAST_TRACE: f32;
 override THICKEST: f32;
-override SCATTER: f32;
 override AGREE: f32;
 override FARTHEST: f32;
 
 // The quadric of the largest ball around `center` that agrees with the smaller ones and with the `first` normal, whose
 // standard error follows it, negative if it is not known; of no clusters if none is better than the first neighbours. Radii
 // are multiples of `least_radius`.
-fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f32) -> Quadric {
+fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f32, scatter: f32) -> Quadric {
     var radius = least_radius;
     // Normals to agree with, and their errors.
     var reliable: array<vec4f, SCALES + 1u>;
@@ -56,7 +55,7 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
             }
             continue;
         }
-        var agrees = count == 0u || quadric.scatter <= SCATTER * noise;
+        var agrees = count == 0u || quadric.scatter <= scatter;
         for (var index = 0u; index < count; index++) {
             let other = reliable[index];
             let across = cross(quadric.normal, other.xyz);

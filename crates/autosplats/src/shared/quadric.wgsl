@@ -244,12 +244,14 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     // Trace of the inverse of the 2×2 matrix that is left for the slopes.
     let tilt = r4.right.y * i4;
     let trace = i4 + (1.0 + tilt * tilt) * i5;
-    let freedom = f32(len) - 6.0;
+    let squares = select(0.0, rest, rest > 0.0) / (f32(len) - 6.0);
+    let side = f32(ball.level.side_px) * pixel_size(ball.center.z) * per_radius;
+    let variance = min(squares, squares * f32(len) / w + side * side * (1.0 / 12.0));
     return Quadric(
         normalize(axis - u * slope_x - v * slope_y),
         height * ball.radius,
         axis,
-        sqrt(select(0.0, rest, rest > 0.0) / freedom) * ball.radius,
+        sqrt(variance) * ball.radius,
         sqrt(trace) / ball.radius,
         curvature,
         len,
