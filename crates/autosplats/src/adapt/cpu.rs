@@ -33,7 +33,7 @@ pub(super) const RELIABLE: f32 = 0.12;
 /// Most noise, as a part of a ball's radius, with which its points are a surface at all.
 pub(super) const THICKEST: f32 = 0.2;
 /// The same of the first neighbourhood, whose plane has no error of its own to tell.
-pub(super) const THICKEST_FIRST: f32 = 0.075;
+pub(super) const THICKEST_FIRST: f32 = 0.085;
 /// Least trace, times weight, of what [`Quadric::error`] is the root of, in radii: that of a round ball, evenly filled. Where
 /// even that is no reliable error the quadric need not be fitted: true of most first balls.
 pub(super) const LEAST_TRACE: f32 = 8.0;

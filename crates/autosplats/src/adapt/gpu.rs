@@ -6,7 +6,9 @@ use super::cpu::{
     STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
-use super::noise::{APART, FAR_APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE};
+use super::noise::{
+    APART, FAR_APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, RISE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE,
+};
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
 use super::rows::{
     AREA, AREA_BESIDE, AREA_BEYOND, AREA_NEAR, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH,
@@ -253,6 +255,7 @@ impl AdaptPasses {
             ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
             ("LEAST_SHARE", LEAST_SHARE as f64),
             ("THIN_SHARE", THIN_SHARE.into()),
+            ("RISE", RISE.into()),
             ("QUANTILE", QUANTILE.into()),
         ];
         Ok(Self {

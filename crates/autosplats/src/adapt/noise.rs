@@ -30,9 +30,11 @@ pub(super) const LEAST_SAMPLE: usize = 64;
 /// So does less than one of this many.
 pub(super) const LEAST_SHARE: usize = 5;
 /// A surface is thin in a ball if points scatter less than this part of the radius: of points that fill it, it is 0.4.
-pub(super) const THIN: f32 = 0.2;
-/// A scale tells the noise if this share of the sample finds a thin surface.
-pub(super) const THIN_SHARE: f32 = 0.8;
+pub(super) const THIN: f32 = 0.15;
+/// A scale tells the noise if this share of the sample finds a thin surface: the others may be of structure too small for it.
+pub(super) const THIN_SHARE: f32 = 0.3;
+/// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance.
+pub(super) const RISE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
 
@@ -82,7 +84,7 @@ impl Noise {
                 let growth = (most / least).ln() / (large / small).ln();
                 // Little growth is chance, or other things where points are sparse.
                 let sure = (large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0));
-                let power = (2.0 * (growth - 0.5)).clamp(0.0, 2.0) * sure.min(1.0);
+                let power = growth.min(2.0) * (2.0 * growth - 1.0).clamp(0.0, 1.0) * sure.min(1.0);
                 if power > 0.0 {
                     // Through the middle of the two.
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
@@ -210,9 +212,12 @@ fn is_enough(found: usize, sample: &[Sampled]) -> bool {
 
 /// Distances from thin surfaces, if so many balls of a scale found one that they tell the noise.
 fn tells_noise(sample: &[Sampled], scale: usize) -> Option<Vec<f32>> {
-    let thin: Vec<f32> = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
-    let found = found(sample, scale).count();
-    (is_enough(found, sample) && thin.len() as f32 >= THIN_SHARE * found as f32).then_some(thin)
+    let thin = |scale: usize| found(sample, scale).filter(|found| found.thin);
+    let share = |scale: usize| thin(scale).count() as f32 / found(sample, scale).count().max(1) as f32;
+    let enough = |scale: usize| is_enough(found(sample, scale).count(), sample);
+    let rises = || scale + 1 < SCALES && !(enough(scale + 1) && share(scale + 1) <= share(scale) + RISE);
+    let tells = enough(scale) && share(scale) >= THIN_SHARE && (share(scale) >= 1.0 - RISE || !rises());
+    tells.then(|| thin(scale).map(|found| found.distance).collect())
 }
 
 fn quantile(values: &mut [f32]) -> f32 {

@@ -66,7 +66,7 @@ fn noise_of_sample() -> vec3f {
             let growth = log(most / least) / log(large / small);
             // Little growth is chance, or other things where points are sparse.
             let sure = (large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0));
-            let power = clamp(2.0 * (growth - 0.5), 0.0, 2.0) * min(sure, 1.0);
+            let power = min(growth, 2.0) * clamp(2.0 * growth - 1.0, 0.0, 1.0) * min(sure, 1.0);
             if power > 0.0 {
                 // Through the middle of the two.
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);

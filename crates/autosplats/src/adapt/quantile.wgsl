@@ -16,11 +16,12 @@ override SAMPLE: u32;
 override LEAST_SAMPLE: u32;
 override LEAST_SHARE: u32;
 override THIN_SHARE: f32;
+override RISE: f32;
 override QUANTILE: f32;
 
-// Balls that hold enough to fit, and those that are thin.
-var<workgroup> fitted: atomic<u32>;
-var<workgroup> thin: atomic<u32>;
+// Balls that hold enough to fit, and those that are thin: of the workgroup's size, then of the next.
+var<workgroup> fitted: array<atomic<u32>, 2>;
+var<workgroup> thin: array<atomic<u32>, 2>;
 // Values below the one tried for each bit.
 var<workgroup> below: array<atomic<u32>, 32>;
 
@@ -32,27 +33,35 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let len = select(kept / 3u, kept, part == ALL);
     let begin = select(0u, kept - len, part == SPARSEST);
     let first = scale * SAMPLE + begin;
+    let next = min(scale + 1u, SCALES - 1u) * SAMPLE + begin;
+    if local < 2u {
+        atomicStore(&fitted[local], 0u);
+        atomicStore(&thin[local], 0u);
+    }
     if local < 32u {
         atomicStore(&below[local], 0u);
     }
-    if local == 0u {
-        atomicStore(&fitted, 0u);
-        atomicStore(&thin, 0u);
-    }
     workgroupBarrier();
-    var own_fitted = 0u;
-    var own_thin = 0u;
+    var own_fitted = vec2u(0u);
+    var own_thin = vec2u(0u);
     for (var index = local; index < len; index += 64u) {
-        let bits = scatters[first + index];
-        own_fitted += select(0u, 1u, bits != TOO_FEW);
-        own_thin += select(0u, 1u, bits < THICK);
+        let bits = vec2u(scatters[first + index], scatters[next + index]);
+        own_fitted += select(vec2u(0u), vec2u(1u), bits != vec2u(TOO_FEW));
+        own_thin += select(vec2u(0u), vec2u(1u), bits < vec2u(THICK));
     }
-    atomicAdd(&fitted, own_fitted);
-    atomicAdd(&thin, own_thin);
+    for (var size = 0u; size < 2u; size++) {
+        atomicAdd(&fitted[size], own_fitted[size]);
+        atomicAdd(&thin[size], own_thin[size]);
+    }
     workgroupBarrier();
-    let all_fitted = atomicLoad(&fitted);
-    let all_thin = atomicLoad(&thin);
-    let is_thin = f32(all_thin) >= THIN_SHARE * f32(all_fitted);
+    let least = max(LEAST_SAMPLE, len / LEAST_SHARE);
+    let all_fitted = atomicLoad(&fitted[0]);
+    let all_thin = atomicLoad(&thin[0]);
+    let next_fitted = atomicLoad(&fitted[1]);
+    let share = f32(all_thin) / f32(max(all_fitted, 1u));
+    let next_share = f32(atomicLoad(&thin[1])) / f32(max(next_fitted, 1u));
+    let rises = scale + 1u < SCALES && !(next_fitted >= least && next_share <= share + RISE);
+    let is_thin = share >= THIN_SHARE && (share >= 1.0 - RISE || !rises);
     let at = u32(QUANTILE * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value that at most `at` are below, bit by bit.
     var found = 0u;
@@ -70,7 +79,6 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     }
     if local == 0u {
         let tells = select(ALL_TELL, THIN_TELL, is_thin);
-        let enough = all_fitted >= max(LEAST_SAMPLE, len / LEAST_SHARE);
-        quantiles[workgroup.x] = vec2u(select(NONE_TELL, tells, enough), found);
+        quantiles[workgroup.x] = vec2u(select(NONE_TELL, tells, all_fitted >= least), found);
     }
 }
