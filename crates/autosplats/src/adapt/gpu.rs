@@ -7,7 +7,8 @@ use super::cpu::{
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
-    APART, FAR_APART, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, RISE, SAMPLE, THICK_NOISE, THIN, THIN_SHARE,
+    APART, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, RISE, SAMPLE, THICK_NOISE, THIN,
+    THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -283,6 +284,8 @@ impl AdaptPasses {
                     ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
                     ("APART", APART.into()),
                     ("FAR_APART", FAR_APART.into()),
+                    ("GROWTH", GROWTH.into()),
+                    ("GROWTH_SURE", GROWTH_SURE.into()),
                     ("BEYOND", noise::BEYOND as f64),
                     ("THICK_NOISE", THICK_NOISE.into()),
                     ("FINE_SHEETS", SHEET_LEVELS[0] as f64),

@@ -20,6 +20,10 @@ pub(crate) const SAMPLE: usize = 2048;
 pub(super) const APART: f32 = 1.7;
 /// All of the growth counts from so many times [`APART`] on.
 pub(super) const FAR_APART: f32 = 1.3;
+/// Growth with less than this power of the k-radius is that of structure,
+pub(super) const GROWTH: f32 = 0.8;
+/// and with more than that by this, of noise alone.
+pub(super) const GROWTH_SURE: f32 = 0.4;
 /// Noise grows up to twice the k-radius that one of this many of the sample exceeds: strewn points may be as far apart as
 /// they like.
 pub(super) const BEYOND: usize = 8;
@@ -83,8 +87,9 @@ impl Noise {
             if least > 0.0 && most > least {
                 let growth = (most / least).ln() / (large / small).ln();
                 // Little growth is chance, or other things where points are sparse.
-                let sure = (large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0));
-                let power = growth.min(2.0) * (2.0 * growth - 1.0).clamp(0.0, 1.0) * sure.min(1.0);
+                let much = ((growth - GROWTH) * (1.0 / GROWTH_SURE)).clamp(0.0, 1.0);
+                let apart = ((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0))).min(1.0);
+                let power = growth.min(2.0) * much * apart;
                 if power > 0.0 {
                     // Through the middle of the two.
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;

@@ -17,6 +17,8 @@ override SAMPLE: u32;
 override LEAST_SAMPLE: u32;
 override APART: f32;
 override FAR_APART: f32;
+override GROWTH: f32;
+override GROWTH_SURE: f32;
 override BEYOND: u32;
 override THICK_NOISE: f32;
 override FINE_SHEETS: u32;
@@ -65,8 +67,9 @@ fn noise_of_sample() -> vec3f {
         if least > 0.0 && most > least {
             let growth = log(most / least) / log(large / small);
             // Little growth is chance, or other things where points are sparse.
-            let sure = (large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0));
-            let power = min(growth, 2.0) * clamp(2.0 * growth - 1.0, 0.0, 1.0) * min(sure, 1.0);
+            let much = clamp((growth - GROWTH) * (1.0 / GROWTH_SURE), 0.0, 1.0);
+            let apart = min((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0)), 1.0);
+            let power = min(growth, 2.0) * much * apart;
             if power > 0.0 {
                 // Through the middle of the two.
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
