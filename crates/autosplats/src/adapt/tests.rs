@@ -173,6 +173,19 @@ fn the_noise_of_a_plane_is_measured() {
     }
 }
 
+/// Up to nearly three times the distance of points, where noise fills the first balls and is cut by slabs.
+#[test]
+fn thick_noise_is_measured() {
+    for sigma in [0.02, 0.04, 0.06] {
+        for projection in PROJECTIONS {
+            let case = Case::new(&noisy(test_clouds::plane(8000), sigma), projection, [240, 180]);
+            let Noise { level, power, .. } = case.noise();
+            let ratio = level / sigma;
+            assert!(power == 0.0 && (0.75..1.25).contains(&ratio), "{sigma} {projection:?}: {ratio} times, {power}");
+        }
+    }
+}
+
 #[test]
 fn noise_that_grows_with_distance_is_measured() {
     let sigma = 0.0004;
