@@ -82,7 +82,7 @@ fn measure_all(cases: &[Case]) -> Result<(Vec<Outcome>, Vec<Row>)> {
                 outcomes.len() + 1,
                 cases.len()
             );
-            let (outcome, pictures) = measure(case, &subject, &mut painter, &[Method::Ours])?;
+            let (outcome, pictures) = measure(case, &subject, &mut painter, &Method::ALL)?;
             print(&outcome);
             if case.sheet {
                 rows.push(Row::new(case, &pictures));
