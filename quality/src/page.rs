@@ -85,8 +85,8 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
          normals.\n\n",
         &lit(outcomes),
         "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in 255ths. \
-         Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is averaged over the \
-         last eight pictures, of which the first here has none. *Alone* are ours, each made by itself, and *off* is the mean error \
+         Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is averaged over \
+         about eight pictures; the first here follows none. *Alone* are ours, each made by itself, and *off* is the mean error \
          of normals in the last picture.\n\n",
         &motion(outcomes),
         CREDITS,

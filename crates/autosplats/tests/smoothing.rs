@@ -114,7 +114,9 @@ fn normals(layers: &GBuffer, camera: &Camera) -> Vec<Vec3> {
     let middle = |side: u32| side as usize / 4..3 * side as usize / 4;
     let pixels = middle(SIZE[1]).flat_map(|y| middle(SIZE[0]).map(move |x| (x, y)));
     let world = |normal: [f32; 3]| normal[0] * axes[0] + normal[1] * axes[1] + normal[2] * axes[2];
-    pixels.map(|(x, y)| world(layers.normal[layers.index(x, y)])).collect()
+    let normals: Vec<Vec3> = pixels.map(|(x, y)| world(layers.normal[layers.index(x, y)])).collect();
+    assert!(normals.iter().all(|normal| normal.is_normalized()), "a closed surface");
+    normals
 }
 
 fn mean_degrees(a: &[Vec3], b: &[Vec3]) -> f32 {
@@ -145,6 +147,59 @@ fn the_same_points_are_steady_while_the_camera_moves() {
         assert!(steady[0] * 3.0 < alone[0], "{adapter:?}: {} degrees a frame, alone {}", steady[0], alone[0]);
         assert!(steady[1] < 1.05 * alone[1], "{adapter:?}: {} degrees wrong, alone {}", steady[1], alone[1]);
     }
+}
+
+/// Frames of other settings, another size, another projection or one that was given up have nothing to be averaged with.
+#[test]
+fn what_is_not_alike_begins_anew() {
+    let cloud = wave(0.0, 0.02, &mut Random::new(8));
+    let view = |frame: i32| camera(DVec3::new(0.3 + 0.02 * f64::from(frame), 0.2, 3.0));
+    let with = |change: &dyn Fn(&mut Reconstruction)| {
+        let mut settings = Settings { all_layers: true, ..Settings::default() };
+        settings.reconstruction.steady = true;
+        change(&mut settings.reconstruction);
+        settings
+    };
+    let usual = with(&|_| ());
+    let parallel = Camera { projection: Projection::OrthographicHeight(2.0), ..view(3) };
+    let others: [(&str, Settings, Camera); 4] = [
+        ("k", with(&|reconstruction| reconstruction.k = 14), view(3)),
+        ("one point a pixel", with(&|reconstruction| reconstruction.points_per_pixel = 1), view(3)),
+        ("larger splats", with(&|reconstruction| reconstruction.splat_scale = 1.3), view(3)),
+        ("projection", usual.clone(), parallel),
+    ];
+    for mut renderer in renderers() {
+        let backend = if renderer.adapter().is_some() { Backend::Gpu } else { Backend::Cpu };
+        for (name, settings, camera) in &others {
+            for frame in 0..3 {
+                renderer.render(&cloud, &view(frame), SIZE, &usual).expect("a picture");
+            }
+            let after = depths(renderer.render(&cloud, camera, SIZE, settings).expect("a picture").layers);
+            let mut fresh = Renderer::with_backend(backend).expect("a device");
+            let alone = depths(fresh.render(&cloud, camera, SIZE, settings).expect("a picture").layers);
+            assert!(after == alone, "{backend:?}, {name}: not the same as the first of its kind");
+        }
+        for side in [100, 240] {
+            renderer.render(&cloud, &view(4), [side, 180], &usual).expect("a picture of another size");
+        }
+    }
+    // A point in the middle tells that the past is used at all, and that a frame given up ends it.
+    let mut renderer = Renderer::new();
+    let mut last = |given_up: bool| {
+        for frame in 0..3 {
+            renderer.render(&cloud, &view(frame), SIZE, &usual).expect("a picture");
+        }
+        if given_up {
+            let stages = std::cell::Cell::new(0);
+            let go_on = || stages.replace(stages.get() + 1) < 4;
+            let outcome = renderer.render_while(&cloud, &view(3), SIZE, &usual, &go_on).map(|_| ());
+            assert!(matches!(outcome, Err(Error::Cancelled)), "{outcome:?}");
+        }
+        depths(renderer.render(&cloud, &view(3), SIZE, &usual).expect("a picture").layers)
+    };
+    let [averaged, anew] = [false, true].map(&mut last);
+    let alone = depths(Renderer::new().render(&cloud, &view(3), SIZE, &usual).expect("a picture").layers);
+    assert!(anew == alone && averaged != alone, "given up: {}, not: {}", anew == alone, averaged == alone);
 }
 
 /// What was fitted to a point belongs to it alone: detail as fine as points is as right after some frames as in one by itself.

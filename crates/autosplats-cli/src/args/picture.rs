@@ -101,7 +101,7 @@ pub(crate) struct SurfaceArgs {
     #[arg(long)]
     pub(crate) ellipses: bool,
     /// Average surfaces over about so many frames, 1 to 32, where points are new and noisy in each; what moves slowly lags
-    /// behind
+    /// behind. Points that are the same in each frame are averaged each by itself
     #[arg(
         long,
         value_name = "COUNT",

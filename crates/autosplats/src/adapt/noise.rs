@@ -37,7 +37,8 @@ pub(super) const LEAST_SHARE: usize = 5;
 pub(super) const THIN: f32 = 0.15;
 /// A scale tells the noise if this share of the sample finds a thin surface: the others may be of structure too small for it.
 pub(super) const THIN_SHARE: f32 = 0.3;
-/// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance.
+/// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance. Where it
+/// could not be larger by more, or there is no next scale, nothing more is asked.
 pub(super) const RISE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
@@ -89,11 +90,16 @@ impl Noise {
                 // Little growth is chance, or other things where points are sparse.
                 let much = ((growth - GROWTH) * (1.0 / GROWTH_SURE)).clamp(0.0, 1.0);
                 let apart = ((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0))).min(1.0);
-                let power = growth.min(2.0) * much * apart;
-                if power > 0.0 {
-                    // Through the middle of the two.
+                let sure = much * apart;
+                if sure > 0.0 {
+                    let power = sure * growth.min(2.0);
+                    // Through the middle of the two, coming from what all say together.
+                    let middle = match scatter_level(sample) {
+                        0.0 => least.sqrt() * most.sqrt(),
+                        all => all.powf(1.0 - sure) * (least.sqrt() * most.sqrt()).powf(sure),
+                    };
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
-                    let level = least.sqrt() * most.sqrt() * (beyond / (small.sqrt() * large.sqrt())).powf(power);
+                    let level = middle * (beyond / (small.sqrt() * large.sqrt())).powf(power);
                     return Self { level, power, most: beyond };
                 }
             }

@@ -69,11 +69,15 @@ fn noise_of_sample() -> vec3f {
             // Little growth is chance, or other things where points are sparse.
             let much = clamp((growth - GROWTH) * (1.0 / GROWTH_SURE), 0.0, 1.0);
             let apart = min((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0)), 1.0);
-            let power = min(growth, 2.0) * much * apart;
-            if power > 0.0 {
-                // Through the middle of the two.
+            let sure = much * apart;
+            if sure > 0.0 {
+                let power = sure * min(growth, 2.0);
+                // Through the middle of the two, coming from what all say together.
+                let both = sqrt(least) * sqrt(most);
+                let all = scatter_level(ALL);
+                let middle = select(pow(all, 1.0 - sure) * pow(both, sure), both, all == 0.0);
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
-                let level = sqrt(least) * sqrt(most) * pow(beyond / (sqrt(small) * sqrt(large)), power);
+                let level = middle * pow(beyond / (sqrt(small) * sqrt(large)), power);
                 return vec3f(level, power, beyond);
             }
         }

@@ -7,7 +7,7 @@ use autosplats_cloud::PointCloud;
 use super::attributes::Wanted;
 use super::surfels::point_surfels;
 use super::upward::Upward;
-use super::{Counts, Frame, PointSurfel, Settings, Timings, check};
+use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{AdaptRules, Adapter, DepthNoise};
 use crate::camera::{Camera, Seen, View};
@@ -40,7 +40,7 @@ pub(super) struct CpuRenderer {
     linear: [f32; 256],
     /// Of the last frame.
     view: Option<View>,
-    over_time: OverTime,
+    over_time: OverTime<Reconstruction>,
 }
 
 impl Default for CpuRenderer {
@@ -158,7 +158,7 @@ impl CpuRenderer {
         let depth_noise = depth_noise.as_ref().unwrap_or(&nothing);
         let smooths = settings_splat.smooths() && given.is_none();
         if smooths {
-            over_time.begin(now, cloud.identity(), settings_splat.averaged());
+            over_time.begin(now, cloud.identity(), settings_splat, settings_splat.averaged());
         } else {
             over_time.forget();
         }
@@ -184,15 +184,15 @@ impl CpuRenderer {
         }
         splatter.attributes(surfels, &view, &attributes);
         let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
+        if smooths {
+            over_time.end(now, cloud.identity(), settings_splat.clone(), surfels, screen);
+        }
         clock.lap(|timings| &mut timings.splat)?;
 
         let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);
-        if smooths {
-            over_time.end(now, cloud.identity(), surfels, screen);
-        }
         past.end();
 
         let dropped = screen.dropped;
@@ -221,7 +221,7 @@ struct Buffers<'a> {
     neighborhoods: &'a mut Neighborhoods,
     surfels: &'a mut Surfels,
     adapter: &'a mut Adapter,
-    over_time: &'a mut OverTime,
+    over_time: &'a mut OverTime<Reconstruction>,
     splatter: &'a mut Splatter,
 }
 

@@ -239,7 +239,7 @@ impl GpuRenderer {
         *times = recorder.finish();
         // What was not submitted left the surfels as they were.
         *last_view = Some(*view);
-        prepared.seen = Some(now);
+        prepared.seen = Some((now.0, now.1, settings.reconstruction.clone()));
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
@@ -308,7 +308,7 @@ impl GpuRenderer {
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
         recorder.finish();
         *last_view = Some(*view);
-        prepared.seen = Some(now);
+        prepared.seen = Some((now.0, now.1, settings.reconstruction.clone()));
         gpu.check_lost()
     }
 

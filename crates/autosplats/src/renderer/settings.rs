@@ -57,9 +57,9 @@ pub struct Reconstruction {
     ///
     /// [`Renderer`]: crate::Renderer
     pub coherent: bool,
-    /// Temporal smoothing while nothing but the camera moves: what is fitted to a point is averaged over the last eight frames of
-    /// the same [`Renderer`] and the same cloud that follow each other with this setting. Noise shimmers less, and normals are
-    /// nearer to the truth. A frame then depends on those before.
+    /// Temporal smoothing while nothing but the camera moves: what is fitted to a point is averaged over about eight frames of
+    /// the same [`Renderer`], cloud and settings that follow each other, with weights that fade. Noise shimmers less, and normals are
+    /// nearer to the truth. A frame then depends on those before; one that is given up, or of another size on a device, begins anew.
     ///
     /// [`Renderer`]: crate::Renderer
     pub steady: bool,

@@ -39,7 +39,7 @@ impl Splatter {
         clear(&mut self.depth, view);
     }
 
-    /// What the last frame that was drawn to its end showed.
+    /// The layers: of the last frame, until those of this one are drawn.
     pub(crate) fn last(&self) -> &GBuffer {
         &self.layers
     }

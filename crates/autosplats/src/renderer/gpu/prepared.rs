@@ -144,8 +144,8 @@ pub(super) struct OnDevice<'a> {
 #[derive(Debug)]
 pub(super) struct Prepared {
     shape: Shape,
-    /// How the last frame was seen, and the identity of its points, if there was one.
-    pub(super) seen: Option<(Seen, u64)>,
+    /// How the last frame was seen and made, and the identity of its points, if there was one.
+    pub(super) seen: Option<(Seen, u64, Reconstruction)>,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
     pub(super) surfels: wgpu::Buffer,
@@ -261,9 +261,10 @@ impl Prepared {
         };
         // Steps that are made anew leave nothing to look back at, and those of another k are.
         let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
-        let reprojected = past.and_then(|(past, points)| Some((Reprojection::new(&now, &past)?, points == identity)));
-        let told = reprojected.map_or(told, |(past, same_points)| {
-            let [of_same, of_others] = reconstruction.averaged();
+        let reprojected = past.and_then(|(past, points, made)| Some((Reprojection::new(&now, &past)?, points, made)));
+        let told = reprojected.map_or(told, |(past, points, made)| {
+            let same_points = points == identity;
+            let [of_same, of_others] = if made == *reconstruction { made.averaged() } else { [1; 2] };
             let frames_averaged = if same_points { of_same } else { of_others } as f32;
             FrameUniform { frames_averaged, same_points: same_points.into(), ..told.after(&past) }
         });

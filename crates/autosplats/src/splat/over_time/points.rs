@@ -33,11 +33,11 @@ pub(crate) struct Fitted {
     pub(crate) frames: f32,
 }
 
-/// What the last frame leaves for the next one; keeps its buffers.
-#[derive(Debug, Default)]
-pub(crate) struct OverTime {
-    /// How the last frame was seen, and the identity of its points; `None` if it left nothing.
-    seen: Option<(Seen, u64)>,
+/// What the last frame, made by settings `M`, leaves for the next one; keeps its buffers.
+#[derive(Debug)]
+pub(crate) struct OverTime<M> {
+    /// How the last frame was seen and made, and the identity of its points; `None` if it left nothing.
+    seen: Option<(Seen, u64, M)>,
     /// Of each half of a pixel, the place of its point's surfel in `fitted`, from 1 on; 0 if it has none.
     halves: Vec<AtomicU32>,
     fitted: Vec<Fitted>,
@@ -56,12 +56,19 @@ pub(super) struct Past {
     frames: f32,
 }
 
-impl OverTime {
-    /// A frame of the cloud with this identity begins, to be averaged with so many of the same points, or of others. What one that
-    /// was given up left is forgotten.
-    pub(crate) fn begin(&mut self, now: Seen, identity: u64, [of_same, of_others]: [u32; 2]) {
+impl<M> Default for OverTime<M> {
+    fn default() -> Self {
+        Self { seen: None, halves: Vec::new(), fitted: Vec::new(), past: None, frames: Vec::new() }
+    }
+}
+
+impl<M: PartialEq> OverTime<M> {
+    /// A frame of the cloud with this identity begins, to be averaged with so many of the same points, or of others, if they were
+    /// `made` by the same settings. What one that was given up left is forgotten.
+    pub(crate) fn begin(&mut self, now: Seen, identity: u64, made: &M, [of_same, of_others]: [u32; 2]) {
         self.frames.clear();
-        self.past = self.seen.take().and_then(|(then, points)| {
+        let last = self.seen.take().filter(|(.., before)| before == made);
+        self.past = last.and_then(|(then, points, _)| {
             let same_points = points == identity;
             let frames = if same_points { of_same } else { of_others } as f32;
             let reprojection = Reprojection::new(&now, &then)?;
@@ -91,7 +98,7 @@ impl OverTime {
     }
 
     /// Keeps what was fitted in this frame, all of whose surfels these are.
-    pub(crate) fn end(&mut self, now: Seen, identity: u64, surfels: &Surfels, screen: &ScreenPoints) {
+    pub(crate) fn end(&mut self, now: Seen, identity: u64, made: M, surfels: &Surfels, screen: &ScreenPoints) {
         let Self { halves, fitted, frames, .. } = self;
         let view = &now.view;
         halves.resize_with(2 * view.width as usize * view.height as usize, AtomicU32::default);
@@ -112,7 +119,7 @@ impl OverTime {
                 }
             }
         });
-        self.seen = Some((now, identity));
+        self.seen = Some((now, identity, made));
     }
 }
 
