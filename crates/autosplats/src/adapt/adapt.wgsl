@@ -30,7 +30,9 @@ override GRAZING: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
 override SPARSE: f32;
+override LONE: f32;
 override AROUND_SPARSE: f32;
+override ASIDE: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
 override DOT_PX: f32;
@@ -155,11 +157,8 @@ fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
     }
 }
 
-// Most that the k-radius of a depth camera's point counts as: between two surfaces it is the way to one of them.
-fn widest(surfel: Surfel) -> f32 {
-    let cell_px = atomicLoad(&counters[CELL_PX]);
-    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, atomicLoad(&counters[CELL_COLUMNS]))];
-    return WIDEST * first_radius(cell.x, cell_px, surfel.center.z);
+fn own_initial_radius(surfel: Surfel) -> f32 {
+    return initial_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
 }
 
 // Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from all
@@ -172,11 +171,16 @@ fn shrink(place: u32, surfel: Surfel) {
     }
     let ratio = surfel.k_radius / usual;
     var stray = surfel.curvature * ratio * ratio;
-    if ratio > SPARSE {
+    let is_sparse = ratio > SPARSE;
+    let local = surfel.k_radius / own_initial_radius(surfel);
+    if is_sparse || surfel.curvature * local * local > LONE {
         let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius));
-        if around.len >= LEAST_CLUSTERS {
+        if is_sparse && around.len >= LEAST_CLUSTERS {
             stray = max(stray, curvature_of(around) * ratio * ratio);
-        } else if around.weight < f32(frame.k) {
+        } else if is_sparse && around.weight < f32(frame.k) {
+            stray = max(stray, STRAY_DOT);
+        }
+        if around.len >= LEAST_OF_PLANE && abs(around.height) * AROUND_SPARSE > ASIDE {
             stray = max(stray, STRAY_DOT);
         }
     }
@@ -231,7 +235,9 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     if surface.weight > 0.0 {
         if known.noise > 0.0 {
-            surfels[first_of_round + index].radius = surfel.radius * min(widest(surfel) / surfel.k_radius, 1.0);
+            // Between two surfaces the k-radius is the way to one of them.
+            let widest = WIDEST * own_initial_radius(surfel);
+            surfels[first_of_round + index].radius = surfel.radius * min(widest / surfel.k_radius, 1.0);
         }
         move_onto(first_of_round + index, surfel, surface, known);
     } else if surfel.radius > 0.0 {

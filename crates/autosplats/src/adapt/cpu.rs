@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
-use super::quadric::{Gathered, LEAST_CLUSTERS, Quadric};
+use super::quadric::{Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Quadric};
 use super::rows::{is_row, turn};
 use super::sheets::{Blend, Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
@@ -56,8 +56,14 @@ pub(super) const STRAY_DOT: f32 = 2.5;
 pub(super) const STRAY_DROPPED: f32 = 5.0;
 /// Where k-radii are this many usual ones, a ball is asked as well: few neighbours lie flat by chance, or are cut off by gaps.
 pub(super) const SPARSE: f32 = 2.5;
+/// The same where surface variation times the square of the k-radius in first search radii is this: what stands before a surface
+/// is sparser than what surrounds it, and its neighbours are hardly flat.
+pub(super) const LONE: f32 = 0.5;
 /// Radius of the ball in k-radii. With less weight of points in it than there are neighbours to be, it is no surface.
 pub(super) const AROUND_SPARSE: f32 = 2.0;
+/// Nor is a point that is this far from the plane through the ball, in k-radii: it stands by itself, and its disc would hide what
+/// its neighbours are. At borders and edges hardly a point is a third of a k-radius away.
+pub(super) const ASIDE: f32 = 0.5;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
@@ -136,8 +142,7 @@ impl Adapter {
 /// Radius that the balls around a surfel are multiples of.
 #[inline(always)]
 pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
-    let point = ScreenPoint { position_view: surfel.center, pixel: surfel.pixel };
-    surfel.k_radius.max(LEAST_REACH * density.initial_radius(&point, k, view))
+    surfel.k_radius.max(LEAST_REACH * initial_radius(surfel, density, view, k))
 }
 
 /// What calls for more than the first neighbours of a surfel.
@@ -246,7 +251,9 @@ fn adapt_all_with<'a, S: Simd>(
         match surface {
             Some(surface) => {
                 if known.is_some() {
-                    surfel.radius *= (widest(surfel, task) / surfel.k_radius).min(1.0);
+                    // Between two surfaces the k-radius is the way to one of them.
+                    let widest = WIDEST * initial_radius(surfel, density, view, k);
+                    surfel.radius *= (widest / surfel.k_radius).min(1.0);
                 }
                 place(surfel, &surface, known.as_ref(), view);
             }
@@ -334,11 +341,10 @@ pub(super) fn choose<S: Simd>(
     quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
 }
 
-/// Most that the k-radius of a depth camera's point counts as: between two surfaces it is the way to one of them.
+/// First search radius of a surfel's point.
 #[inline(always)]
-fn widest(surfel: &Surfel, task: &Task) -> f32 {
-    let point = ScreenPoint { position_view: surfel.center, pixel: surfel.pixel };
-    WIDEST * task.density.initial_radius(&point, task.rules.k, task.view)
+fn initial_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
+    density.initial_radius(&ScreenPoint { position_view: surfel.center, pixel: surfel.pixel }, k, view)
 }
 
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from
@@ -351,11 +357,20 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
     }
     let ratio = surfel.k_radius / task.usual.k_radius;
     let mut stray = surfel.curvature * ratio * ratio;
-    if ratio > SPARSE {
+    let is_sparse = ratio > SPARSE;
+    let local = surfel.k_radius / initial_radius(surfel, task.density, task.view, task.rules.k);
+    if is_sparse | (surfel.curvature * local * local > LONE) {
         let len = gathered.read(task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
-        if len >= LEAST_CLUSTERS {
-            stray = stray.max(gathered.plane(simd).curvature() * ratio * ratio);
-        } else if gathered.weight() < task.rules.k as f32 {
+        let plane = (len >= LEAST_OF_PLANE).then(|| gathered.plane(simd));
+        if let Some(plane) = plane
+            && is_sparse
+            && len >= LEAST_CLUSTERS
+        {
+            stray = stray.max(plane.curvature() * ratio * ratio);
+        } else if is_sparse && gathered.weight() < task.rules.k as f32 {
+            stray = stray.max(STRAY_DOT);
+        }
+        if plane.is_some_and(|plane| plane.height.abs() * AROUND_SPARSE > ASIDE) {
             stray = stray.max(STRAY_DOT);
         }
     }

@@ -2,15 +2,16 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, AROUND_SPARSE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, MOST_TINY, RELIABLE, SCATTER, SCATTER_KNOWN, SPARSE,
-    STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
+    AGREE, AROUND_SPARSE, ASIDE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, RELIABLE, SCATTER,
+    SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE,
+    WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
     APART, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, RISE, SAMPLE, THICK_NOISE, THIN,
     THIN_SHARE,
 };
-use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_PIVOT, RIDGE};
+use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
     AREA, AREA_BESIDE, AREA_BEYOND, AREA_NEAR, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH,
     ROW, ROW_TILT, SEEN_THROUGH, THIN_ROW,
@@ -177,6 +178,7 @@ impl AdaptPasses {
             ("MOST_LEVELS", MOST_LEVELS as f64),
             ("CELLS_PER_RADIUS", CELLS_PER_RADIUS.into()),
             ("LEAST_CLUSTERS", LEAST_CLUSTERS as f64),
+            ("LEAST_OF_PLANE", LEAST_OF_PLANE as f64),
             ("FULL", FULL.into()),
             ("RIDGE", RIDGE.into()),
             ("LEAST_PIVOT", LEAST_PIVOT.into()),
@@ -234,7 +236,9 @@ impl AdaptPasses {
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("WIDEST", WIDEST.into()),
                 ("SPARSE", SPARSE.into()),
+                ("LONE", LONE.into()),
                 ("AROUND_SPARSE", AROUND_SPARSE.into()),
+                ("ASIDE", ASIDE.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),

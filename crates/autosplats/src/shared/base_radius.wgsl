@@ -6,8 +6,13 @@
 
 override LEAST_REACH: f32;
 
+// First search radius of a surfel's point.
+fn initial_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
+    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, cell_columns)];
+    return first_radius(cell.x, cell_px, surfel.center.z);
+}
+
 // Radius that the balls around a surfel are multiples of.
 fn base_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
-    let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, cell_columns)];
-    return max(surfel.k_radius, LEAST_REACH * first_radius(cell.x, cell_px, surfel.center.z));
+    return max(surfel.k_radius, LEAST_REACH * initial_radius(surfel, cell_px, cell_columns));
 }

@@ -11,6 +11,7 @@ const SCALES = 6u;
 override MOST_LEVELS: u32;
 override CELLS_PER_RADIUS: f32;
 override LEAST_CLUSTERS: u32;
+override LEAST_OF_PLANE: u32;
 override FULL: f32;
 override RIDGE: f32;
 override LEAST_PIVOT: f32;
@@ -33,7 +34,7 @@ struct Plane {
     variances: vec3f,
     // Sum of the clusters' weights.
     weight: f32,
-    // Clusters in the ball.
+    // Clusters in the ball; with fewer than LEAST_OF_PLANE there is no plane.
     len: u32,
 }
 
@@ -123,7 +124,7 @@ fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
             }
         }
     }
-    if len < LEAST_CLUSTERS {
+    if len < LEAST_OF_PLANE {
         return Plane(vec3f(0.0, 0.0, 1.0), 0.0, vec3f(0.0), first.w, len);
     }
     let share = 1.0 / first.w;
