@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{FRONT, Folder, SPHERE_POINTS, sphere_point};
+use common::{FRONT, Folder, SPHERE_POINTS, ply, sphere_point};
 use exr::prelude::{AnyChannels, FlatSamples, read_first_flat_layer_from_file};
 use image::{ColorType, DynamicImage, GenericImageView as _};
 use serde_json::Value;
@@ -161,6 +161,27 @@ fn every_look_changes_the_picture() {
         folder.read("a.png")
     });
     assert!(pictures[0] != pictures[1], "occlusion changes nothing");
+}
+
+#[test]
+fn dark_colours_are_shown_brighter_unless_it_is_forbidden() {
+    let folder = Folder::new();
+    let rows = (0..2000).map(|index| {
+        let [x, y, z] = sphere_point(index);
+        format!("{x} {y} {z} 60 50 40")
+    });
+    let properties = ["float x", "float y", "float z", "uchar red", "uchar green", "uchar blue"];
+    folder.write("dark.ply", &ply(&properties, rows));
+    let brightness = |options: &[&str]| {
+        let outcome = folder.succeed(&[&["render", "dark.ply", "--size", "160x120", "-o", "a.png"], options].concat());
+        let picture = image::open(folder.path("a.png")).expect("the picture can be read").to_rgb8();
+        (picture.get_pixel(80, 60).0[0], outcome.stderr.contains("--exposure 1"))
+    };
+    let (usual, told) = brightness(&[]);
+    let (left, told_then) = brightness(&["--exposure", "1"]);
+    assert!(usual > 130 && told, "{usual}, told: {told}");
+    assert!((40..70).contains(&left) && !told_then, "{left}, told: {told_then}");
+    assert!(!brightness(&["--color", "height"]).1, "heights have no brightness");
 }
 
 #[test]

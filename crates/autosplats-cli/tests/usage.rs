@@ -21,6 +21,8 @@ fn options_that_do_not_fit() {
         (&["--splat-scale", "0"], &["0.01"]),
         (&["--occlusion", "11"], &["0 to 10"]),
         (&["--occlusion", "nan"], &["0 to 10"]),
+        (&["--exposure", "0"], &["exposure 0", "0.01 to 100"]),
+        (&["--exposure", "nan"], &["0.01 to 100"]),
         (&["--supersample", "0"], &["1..=8"]),
         (&["--supersample", "2", "-o", "layers.exr"], &["--supersample", ".exr"]),
         (&["--range", "2..1"], &["lower"]),

@@ -136,6 +136,9 @@ pub(crate) struct LookArgs {
     /// Show colours as they are, without light
     #[arg(long)]
     pub(crate) no_lighting: bool,
+    /// How many times as bright the points' own colours are shown, 0.01 to 100 [default: 1, and up to 8 where they are all dark]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    pub(crate) exposure: Option<f32>,
     /// Strength of occlusion, the darkening of creases and of what lies behind something, 0 (off) to 10
     #[arg(long, alias = "eye-dome", value_name = "STRENGTH", default_value_t = Shading::default().occlusion, allow_negative_numbers = true)]
     pub(crate) occlusion: f32,

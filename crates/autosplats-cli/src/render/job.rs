@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use autosplats::{
     Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer, Settings, Shading,
+    usual_exposure,
 };
 use autosplats_cloud::{PointCloud, check_memory};
 
@@ -174,6 +175,15 @@ impl Job {
         }
     }
 
+    /// Says so if dark colours are shown brighter than they are.
+    pub(super) fn tell_exposure(&self, cloud: &PointCloud) -> Option<String> {
+        let shading = &self.settings.shading;
+        let lifts = shading.lighting && shading.exposure.is_none();
+        let exposure = usual_exposure(cloud);
+        let is_lifted = lifts && matches!(shading.color, ColorMode::Auto | ColorMode::Rgb) && exposure > 1.0;
+        is_lifted.then(|| format!("dark colours are shown {exposure:.1} times as bright; --exposure 1 leaves them"))
+    }
+
     /// Refuses a colour mode that the points do not have what it needs for.
     pub(super) fn check_color(&self, cloud: &PointCloud) -> Result<(), Failure> {
         let fields = || cloud.fields().iter().map(|field| field.name.as_str());
@@ -222,6 +232,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         }),
         legend: look.legend,
         lighting: !look.no_lighting,
+        exposure: look.exposure,
         occlusion: look.occlusion,
         backs: look.backs.into(),
         background: look.background.unwrap_or(Shading::default().background),

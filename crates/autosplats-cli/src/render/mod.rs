@@ -58,6 +58,9 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
         if let Some(note) = fewer {
             eprintln!("note: {note}");
         }
+        if let Some(note) = job.tell_exposure(&cloud) {
+            eprintln!("note: {note}");
+        }
     }
 
     let started = Instant::now();

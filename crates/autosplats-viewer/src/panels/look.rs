@@ -1,6 +1,6 @@
 //! How the points are shown.
 
-use autosplats::{Backend, Background, Backs, ColorMap, ColorMode, SearchEngine, Settings};
+use autosplats::{Backend, Background, Backs, ColorMap, ColorMode, SearchEngine, Settings, usual_exposure};
 use eframe::egui::{self, ComboBox, DragValue, Slider};
 
 use crate::app::App;
@@ -49,7 +49,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         ui.separator();
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             section(ui, "Colour", |ui| color(app, ui));
-            section(ui, "Light", |ui| light(&mut app.look.settings, ui));
+            section(ui, "Light", |ui| light(app, ui));
             section(ui, "Points", |ui| {
                 ui.checkbox(&mut app.look.dots, "Raw points").on_hover_text("Dots in place of the surface (Tab)");
                 ui.add(Slider::new(&mut app.look.dot_size, 1..=8).text("dot size").suffix(" px"));
@@ -124,9 +124,20 @@ fn color(app: &mut App, ui: &mut egui::Ui) {
     ui.checkbox(&mut shading.legend, "Legend");
 }
 
-fn light(settings: &mut Settings, ui: &mut egui::Ui) {
-    let shading = &mut settings.shading;
+fn light(app: &mut App, ui: &mut egui::Ui) {
+    let shading = &mut app.look.settings.shading;
     ui.checkbox(&mut shading.lighting, "Light").on_hover_text("Otherwise colours as they are");
+    ui.horizontal(|ui| {
+        let mut given = shading.exposure.is_some();
+        let hint = "How bright the points' own colours are; otherwise brighter only where all are dark";
+        if ui.checkbox(&mut given, "exposure").on_hover_text(hint).changed() {
+            let usual = app.shot.as_ref().map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
+            shading.exposure = given.then_some(usual);
+        }
+        if let Some(exposure) = &mut shading.exposure {
+            ui.add(DragValue::new(exposure).speed(0.02).range(0.01..=100.0));
+        }
+    });
     ui.add(Slider::new(&mut shading.occlusion, 0.0..=4.0).text("occlusion"))
         .on_hover_text("Darkens creases and what lies behind something; eye-dome lighting");
     let mut toned = shading.backs == Backs::Toned;

@@ -5,6 +5,7 @@ use std::time::Instant;
 use autosplats_cloud::PointCloud;
 
 use super::attributes::Wanted;
+use super::exposure::Exposure;
 use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
@@ -31,6 +32,7 @@ pub(super) struct CpuRenderer {
     known: Option<u64>,
     sensors: Sensors,
     upward: Upward,
+    exposure: Exposure,
     /// Once a frame of these points was adapted.
     depth_noise: Option<DepthNoise>,
     /// Passive points to be reconstructed after all.
@@ -54,6 +56,7 @@ impl Default for CpuRenderer {
             known: None,
             sensors: Sensors::default(),
             upward: Upward::default(),
+            exposure: Exposure::default(),
             depth_noise: None,
             recovered: Vec::new(),
             splatter: Splatter::default(),
@@ -117,6 +120,7 @@ impl CpuRenderer {
             known,
             sensors,
             upward,
+            exposure,
             depth_noise,
             recovered,
             splatter,
@@ -189,7 +193,8 @@ impl CpuRenderer {
         }
         clock.lap(|timings| &mut timings.splat)?;
 
-        let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin() };
+        let exposure = exposure.of(cloud, &settings.shading);
+        let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);

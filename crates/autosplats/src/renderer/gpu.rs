@@ -10,6 +10,7 @@ use autosplats_cloud::PointCloud;
 
 use self::prepared::{OnDevice, Passes, Prepared, Shape};
 use super::attributes::{ColorSource, Wanted};
+use super::exposure::Exposure;
 use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
@@ -46,6 +47,7 @@ pub(super) struct GpuRenderer {
     passes: Passes,
     prepared: Option<Prepared>,
     upward: Upward,
+    exposure: Exposure,
     /// Of the last frame.
     view: Option<View>,
     readback: Readback,
@@ -76,6 +78,7 @@ impl GpuRenderer {
             passes: Passes::new(&gpu)?,
             prepared: None,
             upward: Upward::default(),
+            exposure: Exposure::default(),
             view: None,
             readback: Readback::default(),
             image: Image::default(),
@@ -220,9 +223,12 @@ impl GpuRenderer {
         self.make_resident(cloud, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
         self.prepare(size, &wanted, settings)?;
-        let Self { gpu, clock, prepared, upward, view: last_view, readback, image, layers, times, frame, .. } = self;
+        let Self {
+            gpu, clock, prepared, upward, exposure, view: last_view, readback, image, layers, times, frame, ..
+        } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
+        let exposure = exposure.of(cloud, &settings.shading);
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (Seen { view: *view, origin: cloud.origin() }, cloud.identity());
         prepared.tell(gpu, frame, now, settings, &uniform);
@@ -297,9 +303,10 @@ impl GpuRenderer {
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
         self.prepare([texture.width(), texture.height()], &wanted, settings)?;
-        let Self { gpu, prepared, upward, view: last_view, frame, .. } = self;
+        let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
-        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin() };
+        let exposure = exposure.of(cloud, &settings.shading);
+        let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (Seen { view: *view, origin: cloud.origin() }, cloud.identity());
         prepared.tell(gpu, frame, now, settings, &uniform.into_format(texture.format()));

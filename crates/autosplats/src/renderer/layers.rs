@@ -37,7 +37,9 @@ pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Res
     if let Some((layer, values)) = always.chain(optional).chain(needed).find(|(_, len)| *len != area) {
         return Err(Error::Layers { layer, values, wanted: area });
     }
-    let scene = Scene { view: &view, up: camera.up.normalize(), origin: DVec3::ZERO };
+    // Whose colours these are is not known.
+    let exposure = shading.exposure.unwrap_or(1.0);
+    let scene = Scene { view: &view, up: camera.up.normalize(), origin: DVec3::ZERO, exposure };
     let mut image = Image::default();
     shade(layers, &scene, shading, true, &mut image);
     Ok(image)

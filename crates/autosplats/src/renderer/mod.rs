@@ -2,6 +2,7 @@
 
 mod attributes;
 mod cpu;
+mod exposure;
 mod first_radius;
 mod gpu;
 mod layers;
@@ -21,6 +22,7 @@ use crate::normals::Normals;
 use crate::shade::Image;
 use crate::splat::GBuffer;
 
+pub use exposure::usual_exposure;
 pub use first_radius::{RadiusTrial, best_first_radius};
 pub use layers::shade_layers;
 pub use settings::{Reconstruction, Settings};

@@ -156,6 +156,8 @@ impl Settings {
         within("gap_factor", lambda > 1.0 && lambda.is_finite(), lambda, "above 1")?;
         within("splat_scale", (0.01..=10.0).contains(&splat_scale), splat_scale, "within 0.01 to 10")?;
         within("frames_averaged", (1..=32).contains(&frames_averaged), frames_averaged, "within 1 to 32")?;
+        let exposure = self.shading.exposure.unwrap_or(1.0);
+        within("exposure", (0.01..=100.0).contains(&exposure), exposure, "within 0.01 to 100")?;
         within("occlusion", (0.0..=10.0).contains(&self.shading.occlusion), self.shading.occlusion, "within 0 to 10")?;
         if let Some([low, high]) = self.shading.range {
             within(

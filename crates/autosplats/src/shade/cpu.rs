@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::color_map::Scale;
 use super::depths::{Depths, LANES};
 use super::edges::{Edges, INWARD, SEARCH};
-use super::light::{CLAY, EDGE_ON, light, tone};
+use super::light::{CLAY, EDGE_ON, SCANNED_LIGHT, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
 use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
@@ -35,6 +35,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) up: DVec3,
     /// The cloud's origin.
     pub(crate) origin: DVec3,
+    /// How many times as bright the points' colours are shown.
+    pub(crate) exposure: f32,
 }
 
 impl Scene<'_> {
@@ -187,6 +189,8 @@ pub(super) struct Shader<'a> {
     shading: &'a Shading,
     /// Whether the layer of colours is shown, which may be there though something else is.
     colored: bool,
+    /// Light whatever the normal, and the share of the lights.
+    given_light: [f32; 2],
     pairs: [Pair; PAIR_COUNT],
     edges: Edges,
     /// For colour modes that are a value.
@@ -197,7 +201,8 @@ impl<'a> Shader<'a> {
     pub(super) fn new(layers: &'a GBuffer, scene: &'a Scene<'a>, shading: &'a Shading) -> Self {
         let colored = shows_colors(&shading.color) && !layers.color.is_empty();
         let (pairs, edges) = (pairs(layers.height), Edges::new(scene.view));
-        let mut shader = Self { layers, scene, shading, colored, pairs, edges, scale: None };
+        let given_light = given_light(scene, colored);
+        let mut shader = Self { layers, scene, shading, colored, given_light, pairs, edges, scale: None };
         if let Some(map) = shading.color.usual_map() {
             let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
             shader.scale = Some(Scale::new(shading.color_map.unwrap_or(map), range));
@@ -215,7 +220,7 @@ impl<'a> Shader<'a> {
         if !self.shading.lighting {
             return Some(base.map(|channel| channel * left));
         }
-        let light = light(self.outward_normal(depths, x, y, index), self.colored);
+        let light = light(self.outward_normal(depths, x, y, index), self.given_light);
         Some(std::array::from_fn(|i| tone(base[i] * light[i] * left)))
     }
 
@@ -296,6 +301,11 @@ impl<'a> Shader<'a> {
     fn world_normal(&self, index: usize) -> Vec3 {
         self.scene.view.view_from_world.transpose() * Vec3::from(self.layers.normal[index])
     }
+}
+
+/// Light whatever the normal, and the share of the lights, on the points' own colours or on others.
+pub(super) fn given_light(scene: &Scene<'_>, colored: bool) -> [f32; 2] {
+    if colored { SCANNED_LIGHT.map(|part| part * scene.exposure) } else { [0.0, 1.0] }
 }
 
 /// How much occlusion darkens, on the points' own colours or on others.

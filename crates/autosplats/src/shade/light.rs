@@ -24,12 +24,11 @@ pub(super) const EDGE_ON: f32 = 0.6;
 /// Brightness from which a lit colour rises less, so that it nears white and never reaches it.
 pub(super) const SHOULDER: f32 = 0.8;
 
-/// The light on a surface with this normal, view space.
-pub(super) fn light(normal: Vec3, colored: bool) -> [f32; 3] {
+/// The light on a surface with this normal, view space: so much whatever the normal, and a share of the lights.
+pub(super) fn light(normal: Vec3, [base, share]: [f32; 2]) -> [f32; 3] {
     let key = ((normal.dot(KEY) + KEY_WRAP) / (1.0 + KEY_WRAP)).max(0.0);
     let fill = normal.dot(FILL).max(0.0);
     let up = 0.5 - 0.5 * normal.y;
-    let [base, share] = if colored { SCANNED_LIGHT } else { [0.0, 1.0] };
     std::array::from_fn(|i| {
         let around = GROUND[i] + (SKY[i] - GROUND[i]) * up;
         base + share * (KEY_LIGHT[i] * key + FILL_LIGHT[i] * fill + around)
@@ -60,7 +59,7 @@ mod tests {
 
     #[test]
     fn colours_seen_straight_on_stay() {
-        let light = light(Vec3::NEG_Z, true);
+        let light = light(Vec3::NEG_Z, SCANNED_LIGHT);
         assert!(
             light.iter().all(|&channel| (0.85..1.05).contains(&channel)),
             "a scan's colours are shown by {light:?}"

@@ -14,6 +14,10 @@ pub struct Shading {
     pub legend: bool,
     /// Light the surface by its normals; otherwise colours are shown as they are.
     pub lighting: bool,
+    /// How many times as bright the points' own colours are shown, 0.01 to 100; `None` takes what
+    /// [`usual_exposure`](crate::usual_exposure) says of the cloud, which is more than 1 where its colours are all dark. Only with
+    /// [lighting](Self::lighting).
+    pub exposure: Option<f32>,
     /// Strength of occlusion, the darkening of creases and of what lies behind something; 0 (off) to 10.
     pub occlusion: f32,
     /// How the side of a surface is shown that its sensor did not see.
@@ -130,6 +134,7 @@ impl Default for Shading {
             color_map: None,
             legend: false,
             lighting: true,
+            exposure: None,
             occlusion: 1.0,
             backs: Backs::default(),
             background: Background::Gradient([0x4a, 0x53, 0x5f], [0x1e, 0x22, 0x28]),

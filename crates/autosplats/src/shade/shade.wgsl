@@ -82,7 +82,7 @@ fn light(normal: vec3f) -> vec3f {
     let fill = max(dot(normal, shading.fill), 0.0);
     let around = shading.ground + (shading.sky - shading.ground) * (0.5 - 0.5 * normal.y);
     let sum = shading.key_light * key + shading.fill_light * fill + around;
-    return shading.scanned_light.x + shading.scanned_light.y * sum;
+    return shading.given_light.x + shading.given_light.y * sum;
 }
 
 // A lit colour as it is shown.

@@ -33,9 +33,14 @@ fn half_a_wall(size: [u32; 2]) -> GBuffer {
 }
 
 fn shaded(layers: &GBuffer, shading: &Shading) -> Image {
+    exposed(layers, shading, 1.0)
+}
+
+fn exposed(layers: &GBuffer, shading: &Shading, exposure: f32) -> Image {
     let view = view([layers.width, layers.height]);
     let mut image = Image::default();
-    let _ = shade(layers, &Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO }, shading, true, &mut image);
+    let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure };
+    let _ = shade(layers, &scene, shading, true, &mut image);
     assert_eq!(image.pixels.len(), (layers.width * layers.height) as usize, "size of the image");
     image
 }
@@ -119,7 +124,13 @@ fn the_range_that_was_shown_is_told() {
     let layers = half_a_wall([8, 4]);
     let view = view([8, 4]);
     let range = |shading: &Shading, origin: DVec3| {
-        shade(&layers, &Scene { view: &view, up: DVec3::Y, origin }, shading, false, &mut Image::default())
+        shade(
+            &layers,
+            &Scene { view: &view, up: DVec3::Y, origin, exposure: 1.0 },
+            shading,
+            false,
+            &mut Image::default(),
+        )
     };
     let given = |color| Shading { range: Some([1.0, 3.0]), ..flat(color) };
     assert_eq!(range(&given(ColorMode::Depth), DVec3::ZERO), Some([1.0, 3.0]), "as it was given");
@@ -299,4 +310,18 @@ fn legends_go_where_nothing_is() {
         let left = drawn.iter().all(|at| at % 600 < 300);
         assert_eq!(left, name != "nothing", "{name} is covered: the right is its usual place");
     }
+}
+
+#[test]
+fn exposure_is_of_lit_colours_alone() {
+    let clay = half_a_wall([8, 4]);
+    let mut colored = clay.clone();
+    colored.color = vec![[0.1; 3]; colored.weight.len()];
+    let ratio = |layers: &GBuffer, lighting| {
+        let shading = Shading { lighting, occlusion: 0.0, ..Shading::default() };
+        let [once, thrice] = [1.0, 3.0].map(|exposure| exposed(layers, &shading, exposure).linear[0][1]);
+        thrice / once
+    };
+    assert!((ratio(&colored, true) - 3.0).abs() < 1e-3, "{}", ratio(&colored, true));
+    assert_eq!([ratio(&colored, false), ratio(&clay, true)], [1.0; 2], "as they are, or clay");
 }

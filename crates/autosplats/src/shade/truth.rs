@@ -97,7 +97,13 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
     let shaded = |layers: &GBuffer| {
         let view = camera.view(DVec3::ZERO, [layers.width, layers.height]).expect("a view");
         let mut image = Image::default();
-        shade(layers, &Scene { view: &view, up: DVec3::Z, origin: DVec3::ZERO }, &shading, true, &mut image);
+        shade(
+            layers,
+            &Scene { view: &view, up: DVec3::Z, origin: DVec3::ZERO, exposure: 1.0 },
+            &shading,
+            true,
+            &mut image,
+        );
         image
     };
     let fine = traced(&exact, &camera, size.map(|side| side * SAMPLES));

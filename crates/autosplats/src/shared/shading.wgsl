@@ -29,7 +29,7 @@ struct ShadeUniform {
     up: vec3f,
     edge_offset: f32,
     // Light whatever the normal, and the share of the lights above.
-    scanned_light: vec2f,
+    given_light: vec2f,
     // Ends of the colour map, if they are not to be found.
     range: vec2f,
     find_range: u32,

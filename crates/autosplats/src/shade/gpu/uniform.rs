@@ -2,11 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::super::cpu::{ENCODE_STEPS, Scene, darkening, sample_step, shows_colors};
+use super::super::cpu::{ENCODE_STEPS, Scene, darkening, given_light, sample_step, shows_colors};
 use super::super::edges::{Edges, SEARCH};
-use super::super::light::{
-    CLAY, EDGE_ON, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SCANNED_LIGHT, SHOULDER, SKY,
-};
+use super::super::light::{CLAY, EDGE_ON, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY};
 use super::super::occlusion::{FURTHEST, LEAST_RISE, PAIR_COUNT, STEEPEST, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
@@ -63,7 +61,7 @@ pub(crate) struct ShadeUniform {
     pub(crate) edge_factor: f32,
     pub(crate) up: [f32; 3],
     pub(crate) edge_offset: f32,
-    pub(crate) scanned_light: [f32; 2],
+    pub(crate) given_light: [f32; 2],
     pub(crate) range: [f32; 2],
     pub(crate) find_range: u32,
     pub(crate) lighting: u32,
@@ -110,7 +108,7 @@ impl ShadeUniform {
             edge_factor: edges.factor,
             up: scene.up.as_vec3().to_array(),
             edge_offset: edges.offset,
-            scanned_light: if colored { SCANNED_LIGHT } else { [0.0, 1.0] },
+            given_light: given_light(scene, colored),
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
             lighting: shading.lighting.into(),

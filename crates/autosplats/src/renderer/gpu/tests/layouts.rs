@@ -101,7 +101,7 @@ fn mirrored() -> [Mirrored; 10] {
                 edge_factor,
                 up,
                 edge_offset,
-                scanned_light,
+                given_light,
                 range,
                 find_range,
                 lighting,

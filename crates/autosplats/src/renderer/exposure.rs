@@ -1,0 +1,98 @@
+//! How bright the colours of points are shown.
+
+use autosplats_cloud::PointCloud;
+
+use crate::shade::{ColorMode, Shading, linear_steps};
+
+/// Points looked at.
+const SAMPLES: usize = 1 << 12;
+/// Brightness that the brightest colours are to have, of the channel that is brightest, linear. Scans whose camera was exposed
+/// well have 0.43 to 1, those that look black without help 0.02 to 0.17.
+const BRIGHT: f32 = 0.4;
+/// The share of colours that are darker than the brightest: lamps and highlights tell nothing.
+const DARKER: f32 = 0.95;
+/// Light is never made more than so many times as bright: what is darker still is noise.
+const MOST: f32 = 8.0;
+
+/// How many times as bright a cloud's own colours are shown if [`Shading::exposure`] is `None`: 1, or up to 8 where they are all
+/// dark, as those of a camera without a flash in a cellar are. Black points count as points without a colour.
+#[must_use]
+pub fn usual_exposure(cloud: &PointCloud) -> f32 {
+    let Some(colors) = cloud.colors() else { return 1.0 };
+    let step = colors.len().div_ceil(SAMPLES).max(1);
+    let sample = colors.iter().step_by(step).map(|color| color.iter().copied().max().unwrap_or(0));
+    let mut brightest: Vec<u8> = sample.filter(|&channel| channel > 0).collect();
+    if brightest.is_empty() {
+        return 1.0;
+    }
+    let at = (brightest.len() as f32 * DARKER) as usize;
+    let (_, &mut channel, _) = brightest.select_nth_unstable(at);
+    (BRIGHT / linear_steps()[usize::from(channel)]).clamp(1.0, MOST)
+}
+
+/// The last cloud's, as it looks at thousands of points.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Exposure {
+    found: Option<(u64, f32)>,
+}
+
+impl Exposure {
+    /// How many times as bright a cloud's colours are shown.
+    pub(super) fn of(&mut self, cloud: &PointCloud, shading: &Shading) -> f32 {
+        if !matches!(shading.color, ColorMode::Auto | ColorMode::Rgb) {
+            return 1.0;
+        }
+        let identity = cloud.identity();
+        let usual = || match self.found {
+            Some((known, exposure)) if known == identity => exposure,
+            _ => {
+                let exposure = usual_exposure(cloud);
+                self.found = Some((identity, exposure));
+                exposure
+            }
+        };
+        shading.exposure.unwrap_or_else(usual)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use autosplats_cloud::glam::DVec3;
+
+    use super::*;
+
+    fn cloud(colors: Vec<[u8; 3]>) -> PointCloud {
+        PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; colors.len()]).with_colors(colors).expect("as many")
+    }
+
+    #[test]
+    fn dark_colours_are_lifted_and_others_left() {
+        let gray = |level| cloud(vec![[level; 3]; 500]);
+        assert_eq!(usual_exposure(&PointCloud::new(DVec3::ZERO, vec![[0.0; 3]])), 1.0, "no colours");
+        assert_eq!(usual_exposure(&gray(0)), 1.0, "black");
+        assert_eq!(usual_exposure(&gray(200)), 1.0, "bright");
+        assert_eq!(usual_exposure(&cloud(vec![[0, 0, 255]; 500])), 1.0, "blue is dark, and as bright as it gets");
+        assert_eq!(usual_exposure(&gray(1)), MOST, "next to nothing");
+        let dark = usual_exposure(&gray(80));
+        assert!((4.0..6.0).contains(&dark), "{dark}");
+        let lamps = [vec![[80; 3]; 480], vec![[255; 3]; 20]].concat();
+        assert_eq!(usual_exposure(&cloud(lamps)), dark, "lamps tell nothing");
+        let unknown = [vec![[80; 3]; 100], vec![[0; 3]; 9900]].concat();
+        assert_eq!(usual_exposure(&cloud(unknown)), dark, "nor do points without a colour");
+    }
+
+    #[test]
+    fn only_the_points_own_colours_are_exposed() {
+        let dark = cloud(vec![[80; 3]; 500]);
+        let by = |color, exposure| Shading { color, exposure, ..Shading::default() };
+        let mut known = Exposure::default();
+        assert_eq!(known.of(&dark, &by(ColorMode::Auto, None)), usual_exposure(&dark));
+        assert_eq!(known.of(&cloud(vec![[250; 3]; 500]), &by(ColorMode::Auto, None)), 1.0, "of another cloud");
+        assert_eq!(known.of(&dark, &by(ColorMode::Rgb, Some(2.5))), 2.5, "as asked for");
+        assert_eq!(
+            known.of(&dark, &by(ColorMode::Classification, Some(2.5))),
+            1.0,
+            "colours of classes mean something"
+        );
+    }
+}
