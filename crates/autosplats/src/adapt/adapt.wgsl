@@ -10,6 +10,7 @@
 #import calls
 #import choose
 #import depth_noise
+#import moved
 #import rows
 #import sheet
 
@@ -140,21 +141,16 @@ fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
     }
     let center = surfel.center + offset;
     let normal = turned_to_eye(surface.normal, center);
-    surfels[place].normal = normal;
+    var out = surfel;
+    out.normal = normal;
     var shadow = vec4f(any_orthonormal(normal), 1.0);
     if known.noise > 0.0 {
         shadow = shadow_along(known, surfel.normal, normal, shadow);
     }
-    surfels[place].major_axis = shadow.xyz;
-    surfels[place].major_ratio = shadow.w;
-    surfels[place].curvature = surface.curvature;
-    let at = to_pixel(center);
-    // A centre beside the picture has no pixel to be hidden at.
-    if center.z > frame.near && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
-        let pixel = vec2u(at);
-        surfels[place].center = center;
-        surfels[place].pixel = (pixel.y << 16u) | pixel.x;
-    }
+    out.major_axis = shadow.xyz;
+    out.major_ratio = shadow.w;
+    out.curvature = surface.curvature;
+    surfels[place] = moved(out, center);
 }
 
 fn own_initial_radius(surfel: Surfel) -> f32 {
@@ -234,12 +230,13 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         }
     }
     if surface.weight > 0.0 {
+        var shrunk = surfel;
         if known.noise > 0.0 {
             // Between two surfaces the k-radius is the way to one of them.
             let widest = WIDEST * own_initial_radius(surfel);
-            surfels[first_of_round + index].radius = surfel.radius * min(widest / surfel.k_radius, 1.0);
+            shrunk.radius *= min(widest / surfel.k_radius, 1.0);
         }
-        move_onto(first_of_round + index, surfel, surface, known);
+        move_onto(first_of_round + index, shrunk, surface, known);
     } else if surfel.radius > 0.0 {
         shrink(first_of_round + index, surfel);
     }

@@ -394,10 +394,5 @@ fn place(surfel: &mut Surfel, surface: &Surface, known: Option<&Known>, view: &V
     surfel.major_axis = major_axis.to_array();
     surfel.major_ratio = major_ratio;
     surfel.curvature = curvature;
-    let [x, y] = view.to_pixel(center);
-    // A centre beside the picture has no pixel to be hidden at.
-    if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {
-        surfel.center = center.to_array();
-        surfel.pixel = (y as u32) << 16 | x as u32;
-    }
+    surfel.move_to(center, view);
 }

@@ -19,6 +19,10 @@ pub(crate) use cpu::{FitRules, Fitted, LONGEST, fit};
 pub(crate) use eigen::{SWEEPS, eigenvectors};
 pub(crate) use given::{GivenPlanes, place};
 
+use glam::Vec3;
+
+use crate::camera::View;
+
 /// An oriented disc in view space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -53,6 +57,16 @@ impl Surfel {
     #[inline(always)]
     pub(crate) fn shows_back(&self) -> bool {
         self.screen & Self::BACK != 0
+    }
+
+    /// Moves the centre, unless that is out of the picture: it would have no pixel to be hidden at.
+    #[inline(always)]
+    pub(crate) fn move_to(&mut self, center: Vec3, view: &View) {
+        let [x, y] = view.to_pixel(center);
+        if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {
+            self.center = center.to_array();
+            self.pixel = (y as u32) << 16 | x as u32;
+        }
     }
 }
 

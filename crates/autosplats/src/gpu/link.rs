@@ -3,6 +3,7 @@
 /// What several passes share, by name; a file may import only files that stand before it.
 const SHARED: &[(&str, &str)] = &[
     ("frame", include_str!("../shared/frame.wgsl")),
+    ("gaps", include_str!("../shared/gaps.wgsl")),
     ("groups", include_str!("../shared/groups.wgsl")),
     ("counters", include_str!("../shared/counters.wgsl")),
     ("rank", include_str!("../shared/rank.wgsl")),
@@ -55,6 +56,7 @@ const SHARED: &[(&str, &str)] = &[
     ("fragment", include_str!("../shared/fragment.wgsl")),
     ("redraw", include_str!("../shared/redraw.wgsl")),
     ("marked", include_str!("../shared/marked.wgsl")),
+    ("moved", include_str!("../shared/moved.wgsl")),
     ("erased", include_str!("../shared/erased.wgsl")),
     ("patch", include_str!("../shared/patch.wgsl")),
 ];

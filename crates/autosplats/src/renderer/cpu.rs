@@ -263,6 +263,7 @@ impl Reconstruct<'_> {
             k: settings.k,
             outlier_expansions: settings.outlier_expansions,
             gap_factor: settings.gap_factor,
+            adaptive: settings.adaptive,
         };
         match settings.engine {
             SearchEngine::ScreenGrid => screen_grid::search(screen, queries, view, &rules, past, neighborhoods),

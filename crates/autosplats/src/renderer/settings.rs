@@ -40,7 +40,8 @@ pub struct Reconstruction {
     /// are discarded as outliers; 0 to 8. `None` keeps every point [Paper, §5.3].
     pub outlier_expansions: Option<u32>,
     /// λ: a search that has at least one neighbour ends with those it has when its circle's area grows by this factor
-    /// without meeting another; above 1. `None` bridges any gap [Paper, §5.3].
+    /// without meeting another; above 1. `None` bridges any gap [Paper, §5.3]. With [`adaptive`](Self::adaptive) it has to
+    /// grow by λ² after a single neighbour.
     pub gap_factor: Option<f32>,
     /// Factor on every splat radius, 0.01 to 10.
     pub splat_scale: f32,

@@ -7,7 +7,8 @@
 //!
 //! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions that met nothing;
 //! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
-//!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ;
+//!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ; with adaptive rules
+//!   d₂ > λ·d₁ is asked of a gap after one neighbour;
 //! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
 //! - *bound*: a search need not look further than the largest of the radii r̃₀·1.25ⁱ, i any whole number, whose sphere
 //!   projects to a rectangle with at most [`MAX_CANDIDATES`] screen points. If no rule ended the neighbourhood and its k-th
@@ -125,6 +126,8 @@ pub(crate) struct SearchRules {
     pub(crate) outlier_expansions: Option<u32>,
     /// λ; `None` bridges any gap.
     pub(crate) gap_factor: Option<f32>,
+    /// Whether a gap after one neighbour has to be wider, so that strewn points have it no more often than one after two.
+    pub(crate) adaptive: bool,
 }
 
 /// How a neighbourhood ends before its k-th neighbour.
@@ -145,6 +148,15 @@ impl SearchRules {
         self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * growth.powf(0.5 * e0 as f32))
     }
 
+    /// How much further than its furthest neighbour a neighbourhood of so many may go without another.
+    // Differs from the paper: of strewn points the second is more than √λ times as far as the first in one neighbourhood of λ.
+    // The first search radius is to keep that from being a gap, but it is too short where a surface is steep, or the back of a
+    // thing is seen through its front, in close-ups.
+    fn gap_growth(&self, neighbors: usize) -> Option<f32> {
+        let gap_factor = self.gap_factor?;
+        Some(if self.adaptive && neighbors == 1 { gap_factor } else { gap_factor.sqrt() })
+    }
+
     /// Applies the rules to the squared distances, ascending and complete up to distance `known`.
     ///
     /// `None` says that no rule ends the neighbourhood within `known`.
@@ -153,9 +165,9 @@ impl SearchRules {
         if nearest > self.outlier_radius(initial_radius) {
             return Some(EarlyEnd::Outlier);
         }
-        let growth = self.gap_factor?.sqrt();
+        let least_reach = self.gap_factor?.sqrt() * initial_radius;
         for neighbors in 1..=squared.len().min(self.k as usize - 1) {
-            let reach = growth * squared[neighbors - 1].sqrt().max(initial_radius);
+            let reach = least_reach.max(self.gap_growth(neighbors)? * squared[neighbors - 1].sqrt());
             let next = squared.get(neighbors).map_or(known, |d| d.sqrt());
             if next > reach {
                 return Some(EarlyEnd::Gap(neighbors));

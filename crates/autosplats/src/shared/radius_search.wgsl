@@ -1,5 +1,7 @@
 // The search for a point's k-radius, step by step [Paper, §5.2, §5.3]; the rules are stated in search/mod.rs. Imports: frame.
 
+#import gaps
+
 // Between which distances the k-th neighbour is being looked for: a and b of the paper.
 struct Search {
     // While the radius expands, the distance to the furthest neighbour, below 0; see first_sample.
@@ -122,12 +124,13 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
         let growth = min(sqrt(max(f32(frame.k), 10.0)), frame.gap_growth);
         return Search(radius, min(min(radius * growth, limit), MOST), 0.0);
     }
-    // Differs from the paper: no step is wider than the gap that would end the search, or it would step over the gap.
-    let reach = frame.gap_growth * max(known.furthest, initial_radius);
+    let reach = max(frame.gap_growth * initial_radius, gap_growth_after(u32(count)) * known.furthest);
     if is_all || radius >= reach {
         return ended(up_to(known.furthest), CLAMPED_AT_GAP);
     }
-    return Search(-known.furthest, min(min(radius * expansion(count), reach), MOST), count);
+    // Differs from the paper: no step is wider than a gap, or it would step over one.
+    let step = min(radius * expansion(count), frame.gap_growth * max(radius, initial_radius));
+    return Search(-known.furthest, min(min(step, reach), MOST), count);
 }
 
 fn bracket(known: Known) -> Search {

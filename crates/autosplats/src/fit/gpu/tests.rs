@@ -31,7 +31,7 @@ impl Case {
         let view = camera.view(DVec3::ZERO, [121, 90]).expect("a view");
         let cloud = PointCloud::new(DVec3::ZERO, positions.to_vec());
         let screen = Projector::default().project(&cloud, &view, &ProjectRules::usual(RULES.k)).clone();
-        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor };
+        let rules = SearchRules { k: RULES.k, outlier_expansions: Some(1), gap_factor, adaptive: true };
         let neighborhoods = [&screen.active, &screen.passive].map(|queries| {
             let mut neighborhoods = Neighborhoods::default();
             screen_grid::search(&screen, queries, &view, &rules, &Past::default(), &mut neighborhoods);

@@ -243,6 +243,7 @@ impl Prepared {
             k: reconstruction.k,
             outlier_expansions: reconstruction.outlier_expansions,
             gap_factor: reconstruction.gap_factor,
+            adaptive: reconstruction.adaptive,
         };
         let told = FrameUniform {
             halves: self.shape.halves.into(),

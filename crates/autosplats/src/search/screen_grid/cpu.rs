@@ -260,6 +260,7 @@ fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known)
 ///
 /// A gap starts at some b from r̃₀ on and is an annulus (b, √λ·b] without a point. So from b = r̃₀ the furthest point
 /// within √λ·b becomes the next b, until the k-radius is within reach; where there is none, there is a gap, or nothing near.
+/// Adaptive rules have fewer gaps than these.
 #[inline(always)]
 fn unruled<S: Simd>(
     simd: S,

@@ -10,6 +10,7 @@
 #import groups
 #import counters
 #import density
+#import gaps
 #import screen
 #import surfel
 #import window
@@ -91,6 +92,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
     var seen = Seen(MOST, 0u, 0.0, MOST, 0.0, 0.0);
     var last_squared = 0.0;
     var last = 0.0;
+    var neighbors = 0u;
     for (var place = 0u; place < 4u * QUADS; place++) {
         let squared = nearest_take(&list);
         // Points in the same place tell nothing of distances.
@@ -98,7 +100,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
             continue;
         }
         let distance = sqrt(squared);
-        let reach = frame.gap_growth * max(last, initial_radius);
+        let reach = max(frame.gap_growth * initial_radius, gap_growth_after(neighbors) * last);
         if last > 0.0 && seen.gap_squared == MOST && distance > reach {
             seen.gap_squared = last_squared;
             seen.gap_reach = reach;
@@ -114,6 +116,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
         }
         last_squared = squared;
         last = distance;
+        neighbors++;
     }
     return seen;
 }

@@ -7,6 +7,7 @@
 #import counters
 #import screen
 #import surfel
+#import moved
 #import half
 #import reproject
 #import fitted
@@ -26,17 +27,11 @@ override ALIKE: f32;
 
 // Moves a surfel to `center` and turns it towards `before`, a normal to the same side, by `share` of the way.
 fn draw_to(place: u32, center: vec3f, before: vec3f, share: f32) {
-    let surfel = surfels[place];
+    var surfel = surfels[place];
     let normal = turned_to_eye(normalize(surfel.normal + share * (before - surfel.normal)), center);
-    surfels[place].normal = normal;
-    surfels[place].major_axis = normalize(surfel.major_axis - normal * dot(normal, surfel.major_axis));
-    let middle = to_pixel(center);
-    // A centre beside the picture has no pixel to be hidden at.
-    if center.z > frame.near && all(middle >= vec2f(0.0)) && all(middle < vec2f(frame.size)) {
-        let own = vec2u(middle);
-        surfels[place].center = center;
-        surfels[place].pixel = (own.y << 16u) | own.x;
-    }
+    surfel.normal = normal;
+    surfel.major_axis = normalize(surfel.major_axis - normal * dot(normal, surfel.major_axis));
+    surfels[place] = moved(surfel, center);
 }
 
 // The place from 1 on, in `fitted`, of what was found for a point of the cloud that is at `point` now; 0 if nothing was.

@@ -54,10 +54,5 @@ pub(super) fn draw_to(surfel: &mut Surfel, center: Vec3, then: Vec3, share: f32,
     let major_axis = Vec3::from(surfel.major_axis);
     surfel.normal = normal.to_array();
     surfel.major_axis = (major_axis - normal * normal.dot(major_axis)).normalize().to_array();
-    let [x, y] = view.to_pixel(center);
-    // A centre beside the picture has no pixel to be hidden at.
-    if center.z > view.near && x >= 0.0 && y >= 0.0 && x < view.width as f32 && y < view.height as f32 {
-        surfel.center = center.to_array();
-        surfel.pixel = (y as u32) << 16 | x as u32;
-    }
+    surfel.move_to(center, view);
 }
