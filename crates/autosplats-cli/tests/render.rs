@@ -185,6 +185,28 @@ fn dark_colours_are_shown_brighter_unless_it_is_forbidden() {
 }
 
 #[test]
+fn frames_are_as_bright_as_the_first() {
+    let folder = Folder::new();
+    let properties = ["float x", "float y", "float z", "uchar red", "uchar green", "uchar blue"];
+    for (name, color) in [("f_0.ply", "50 50 50"), ("f_1.ply", "100 100 100")] {
+        let rows = (0..2000).map(|index| {
+            let [x, y, z] = sphere_point(index);
+            format!("{x} {y} {z} {color}")
+        });
+        folder.write(name, &ply(&properties, rows));
+    }
+    let brightness = |name: &str| {
+        let picture = image::open(folder.path(name)).expect("the picture can be read").to_rgb8();
+        picture.get_pixel(80, 60).0[0]
+    };
+    let outcome = folder.succeed(&["render", "f_*.ply", "--size", "160x120", "-o", "p_%d.png"]);
+    let [first, second] = ["p_0.png", "p_1.png"].map(brightness);
+    assert!(outcome.stderr.contains("--exposure 1"), "it is told: {}", outcome.stderr);
+    // By itself the second would be no brighter than the first.
+    assert!(first > 130 && second > first + 30, "{first}, then {second}");
+}
+
+#[test]
 fn views_and_projections() {
     let folder = Folder::with_sphere();
     let mut seen = Vec::new();

@@ -12,8 +12,9 @@ const RECENT: &str = "recent";
 /// Keeps the look, and what was opened last with how it is read and played.
 pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
     let mut look = app.look.clone();
-    // The range of one file's values is not that of another's.
+    // The range of one file's values is not that of another's, nor is what its colours need.
     look.settings.shading.range = None;
+    look.settings.shading.exposure = None;
     eframe::set_value(storage, LOOK, &look);
     eframe::set_value(storage, RECENT, &app.recent);
 }

@@ -81,7 +81,8 @@ pub(crate) struct SurfaceArgs {
     /// Keep points that have no neighbour, or are far from all of them
     #[arg(long)]
     pub(crate) keep_outliers: bool,
-    /// How much emptier the surroundings have to become for a group of points to end there, above 1
+    /// How much emptier the surroundings have to become for a group of points to end there, above 1; with '-k auto' the square of
+    /// it for a single neighbour
     #[arg(
         long,
         value_name = "FACTOR",
@@ -136,7 +137,8 @@ pub(crate) struct LookArgs {
     /// Show colours as they are, without light
     #[arg(long)]
     pub(crate) no_lighting: bool,
-    /// How many times as bright the points' own colours are shown, 0.01 to 100 [default: 1, and up to 8 where they are all dark]
+    /// How many times as bright the points' own colours are shown where they are lit, 0.01 to 100 [default: 1, and up to 8 where
+    /// all are dark, which the first picture decides for those that follow]
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     pub(crate) exposure: Option<f32>,
     /// Strength of occlusion, the darkening of creases and of what lies behind something, 0 (off) to 10

@@ -175,13 +175,19 @@ impl Job {
         }
     }
 
-    /// Says so if dark colours are shown brighter than they are.
-    pub(super) fn tell_exposure(&self, cloud: &PointCloud) -> Option<String> {
-        let shading = &self.settings.shading;
-        let lifts = shading.lighting && shading.exposure.is_none();
+    /// Settles how bright colours are shown by these points, and says so if it is brighter than they are.
+    pub(super) fn settle_exposure(&mut self, cloud: &PointCloud) {
+        let shading = &mut self.settings.shading;
+        if shading.exposure.is_some() {
+            return;
+        }
         let exposure = usual_exposure(cloud);
-        let is_lifted = lifts && matches!(shading.color, ColorMode::Auto | ColorMode::Rgb) && exposure > 1.0;
-        is_lifted.then(|| format!("dark colours are shown {exposure:.1} times as bright; --exposure 1 leaves them"))
+        shading.exposure = Some(exposure);
+        let shown = shading.lighting && matches!(shading.color, ColorMode::Auto | ColorMode::Rgb);
+        // Less cannot be seen.
+        if shown && exposure >= 1.05 && !self.quiet {
+            eprintln!("note: dark colours are shown {exposure:.1} times as bright; --exposure 1 leaves them");
+        }
     }
 
     /// Refuses a colour mode that the points do not have what it needs for.

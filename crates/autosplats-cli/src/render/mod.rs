@@ -46,6 +46,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let (camera, axes) = job.camera.place(&cloud, job.inputs.only_scene(), job.size)?;
     let cloud = cloud.with_axes(axes);
 
+    job.settle_exposure(&cloud);
     job.settle_first_radius(&mut renderer, &cloud, &camera)?;
     let bar = Bar::spinner("rendering", job.quiet);
     let frame = job.render(&mut renderer, &cloud, &camera)?;
@@ -56,9 +57,6 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
             eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
         }
         if let Some(note) = fewer {
-            eprintln!("note: {note}");
-        }
-        if let Some(note) = job.tell_exposure(&cloud) {
             eprintln!("note: {note}");
         }
     }

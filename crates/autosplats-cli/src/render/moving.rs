@@ -124,8 +124,8 @@ impl Place {
         cloud
     }
 
-    /// Places the camera before `all` points, and settles by the `first` ones what is to be the same in all pictures: the range
-    /// of a colour map, so that colours mean the same, and the first radius of the kd-tree.
+    /// Places the camera before `all` points, and settles by the `first` ones what is to be the same in all pictures: exposure,
+    /// the range of a colour map, so that colours mean the same, and the first radius of the kd-tree.
     pub(super) fn settle(
         &mut self,
         job: &mut Job,
@@ -134,6 +134,7 @@ impl Place {
         first: Arc<PointCloud>,
     ) -> Result<Camera, Failure> {
         job.check_color(all)?;
+        job.settle_exposure(&first);
         let (camera, axes) = job.camera.place(all, job.inputs.only_scene(), job.size)?;
         self.axes = Some(axes);
         let first = self.upright(first);

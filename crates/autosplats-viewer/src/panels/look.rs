@@ -129,7 +129,7 @@ fn light(app: &mut App, ui: &mut egui::Ui) {
     ui.checkbox(&mut shading.lighting, "Light").on_hover_text("Otherwise colours as they are");
     ui.horizontal(|ui| {
         let mut given = shading.exposure.is_some();
-        let hint = "How bright the points' own colours are; otherwise brighter only where all are dark";
+        let hint = "How bright the points' own colours are lit; otherwise brighter only where all are dark";
         if ui.checkbox(&mut given, "exposure").on_hover_text(hint).changed() {
             let usual = app.shot.as_ref().map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
             shading.exposure = given.then_some(usual);

@@ -5,13 +5,15 @@ use std::time::Instant;
 
 use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud, check_memory};
-use autosplats::{Backend, ColorMode, Error, Frame, Image, Reconstruction, Renderer, SearchEngine, Settings};
+use autosplats::{
+    Backend, ColorMode, Error, Frame, Image, Reconstruction, Renderer, SearchEngine, Settings, usual_exposure,
+};
 use rayon::prelude::*;
 
 use super::pace::{Costs, Pace};
 use super::task::{Outcome, Seen, enlarge};
 use super::{Answer, Depths, Outbox, Picture, Shared, Task, Wish};
-use crate::document::Shown;
+use crate::document::{Document, LayerId, Shown};
 use crate::output::Goal;
 
 /// What selected points are mixed with, sRGB.
@@ -68,6 +70,31 @@ struct Studio {
     costs: Costs,
     shown: Option<(Option<Axes>, Arc<Shown>)>,
     sparse: Option<Sparse>,
+    exposure: Exposure,
+}
+
+/// How bright colours are shown if that is not said: as the first picture of some layers needs it, or it would change while they
+/// are edited, and while they play.
+#[derive(Default)]
+struct Exposure {
+    found: Option<f32>,
+    /// Of which layers, with their tints.
+    layers: Vec<(LayerId, Option<[u8; 3]>)>,
+}
+
+impl Exposure {
+    fn of(&mut self, document: &Document, cloud: &PointCloud) -> f32 {
+        if document.layers.iter().any(|layer| layer.incomplete) {
+            // More points are to come, and with them perhaps colours.
+            self.layers.clear();
+            return usual_exposure(cloud);
+        }
+        let layers: Vec<_> = document.layers.iter().map(|layer| (layer.id, layer.tint)).collect();
+        if self.layers != layers {
+            (self.found, self.layers) = (None, layers);
+        }
+        *self.found.get_or_insert_with(|| usual_exposure(cloud))
+    }
 }
 
 /// A part of the points, for pictures in haste.
@@ -137,6 +164,8 @@ impl Studio {
     fn settings(&mut self, wish: &Wish, shown: &Shown, outbox: &Outbox) -> Result<Settings, Error> {
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
         let mut settings = settings(wish, &shown.cloud, gpu).0;
+        let exposure = self.exposure.of(&wish.document, &shown.cloud);
+        settings.shading.exposure.get_or_insert(exposure);
         // What is done once does not follow any other picture.
         settings.reconstruction.frames_averaged = 1;
         settings.reconstruction.steady = false;
@@ -161,12 +190,14 @@ impl Studio {
         if pace.halvings > 0 && !self.sparse.as_ref().is_some_and(fits) {
             self.sparse = Some(Sparse::new(&shown.cloud, pace.halvings));
         }
+        let exposure = self.exposure.of(&wish.document, &shown.cloud);
         let Self { renderer: Some((_, renderer)), sparse, costs, .. } = self else { return Ok(Answer::Empty) };
         let part = sparse.as_ref().filter(|_| pace.halvings > 0);
         let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
         let size = wish.rendered_size(pace.scale);
         let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
         let (mut settings, remark) = settings(wish, cloud, gpu);
+        settings.shading.exposure.get_or_insert(exposure);
         // A GPU hands out layers only if it is asked, which takes time: at rest the pointer needs depths.
         settings.all_layers = selected.is_some() || gpu && wish.budget_ms.is_none();
         let Frame { image, layers, counts, timings, .. } =
@@ -327,7 +358,24 @@ mod tests {
     use std::sync::{Condvar, Mutex};
 
     use super::*;
-    use crate::document::Document;
+    use crate::document::Layer;
+
+    #[test]
+    fn brightness_stays_while_layers_are_edited_and_play() {
+        let gray = |level| {
+            let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3]; 100]).with_colors(vec![[level; 3]; 100]);
+            Arc::new(cloud.expect("as many"))
+        };
+        let [dark, bright] = [40, 200].map(gray);
+        let mut document = Document::default();
+        let id = document.add(Layer::new("cellar", None, Arc::clone(&dark)));
+        let mut exposure = Exposure::default();
+        assert!(exposure.of(&document, &dark) > 4.0);
+        assert_eq!(exposure.of(&document, &bright), usual_exposure(&dark), "the next frame of the same");
+        document.remove(id);
+        document.add(Layer::new("yard", None, Arc::clone(&bright)));
+        assert_eq!(exposure.of(&document, &bright), 1.0, "another file");
+    }
 
     fn wish(color: ColorMode, engine: SearchEngine) -> Wish {
         let projection = Projection::PerspectiveFovDeg(40.0);

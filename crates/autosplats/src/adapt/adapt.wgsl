@@ -34,6 +34,7 @@ override SPARSE: f32;
 override LONE: f32;
 override AROUND_SPARSE: f32;
 override ASIDE: f32;
+override CROWD: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
 override DOT_PX: f32;
@@ -176,7 +177,9 @@ fn shrink(place: u32, surfel: Surfel) {
         } else if is_sparse && around.weight < f32(frame.k) {
             stray = max(stray, STRAY_DOT);
         }
-        if around.len >= LEAST_OF_PLANE && abs(around.height) * AROUND_SPARSE > ASIDE {
+        let is_crowd = around.weight > CROWD * f32(frame.k);
+        let stands_alone = is_crowd || around.len < LEAST_CLUSTERS;
+        if around.len >= LEAST_OF_PLANE && stands_alone && abs(around.height) * AROUND_SPARSE > ASIDE {
             stray = max(stray, STRAY_DOT);
         }
     }

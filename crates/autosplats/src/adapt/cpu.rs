@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
 use super::noise::{Usual, measure};
-use super::quadric::{Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Quadric};
+use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
 use super::rows::{is_row, turn};
 use super::sheets::{Blend, Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
@@ -62,8 +62,10 @@ pub(super) const LONE: f32 = 0.5;
 /// Radius of the ball in k-radii. With less weight of points in it than there are neighbours to be, it is no surface.
 pub(super) const AROUND_SPARSE: f32 = 2.0;
 /// Nor is a point that is this far from the plane through the ball, in k-radii: it stands by itself, and its disc would hide what
-/// its neighbours are. At borders and edges hardly a point is a third of a k-radius away.
+/// its neighbours are. On a ridge it is about as far, at a corner further,
 pub(super) const ASIDE: f32 = 0.5;
+/// but there the ball holds no more than so many times the neighbours: this is twice what it does where points are even.
+pub(super) const CROWD: f32 = 2.0 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
@@ -370,7 +372,11 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
         } else if is_sparse && gathered.weight() < task.rules.k as f32 {
             stray = stray.max(STRAY_DOT);
         }
-        if plane.is_some_and(|plane| plane.height.abs() * AROUND_SPARSE > ASIDE) {
+        let is_aside = |plane: Plane| {
+            let is_crowd = plane.weight > CROWD * task.rules.k as f32;
+            is_crowd | (len < LEAST_CLUSTERS) && plane.height.abs() * AROUND_SPARSE > ASIDE
+        };
+        if plane.is_some_and(is_aside) {
             stray = stray.max(STRAY_DOT);
         }
     }

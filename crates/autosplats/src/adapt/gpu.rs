@@ -2,7 +2,7 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, AROUND_SPARSE, ASIDE, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, RELIABLE, SCATTER,
+    AGREE, AROUND_SPARSE, ASIDE, CROWD, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, RELIABLE, SCATTER,
     SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE,
     WIDEST,
 };
@@ -239,6 +239,7 @@ impl AdaptPasses {
                 ("LONE", LONE.into()),
                 ("AROUND_SPARSE", AROUND_SPARSE.into()),
                 ("ASIDE", ASIDE.into()),
+                ("CROWD", CROWD.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),

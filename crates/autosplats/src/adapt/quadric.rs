@@ -15,8 +15,8 @@ use crate::simd::F32s;
 pub(super) const CELLS_PER_RADIUS: f32 = 2.0;
 /// Fewer clusters than this tell too little of six coefficients.
 pub(super) const LEAST_CLUSTERS: usize = 12;
-/// And fewer than this have no plane.
-pub(super) const LEAST_OF_PLANE: usize = 3;
+/// And fewer than this of no plane: through three there always is one.
+pub(super) const LEAST_OF_PLANE: usize = 4;
 /// Clusters count in full up to this part of the squared radius, and less and less beyond: none comes or goes at once.
 pub(super) const FULL: f32 = 0.5;
 /// Weight, as a share of all, that pulls curvatures to 0: a one-sided ball tells little of them.

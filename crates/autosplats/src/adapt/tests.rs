@@ -14,7 +14,7 @@ use crate::fit::{FitRules, Surfel, Surfels, fit};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
-use crate::test_clouds::{self, EYE, Random, noisy};
+use crate::test_clouds::{self, EYE, Positions, Random, noisy};
 
 pub(crate) const K: u32 = 10;
 /// Shapes stay as the fit leaves them.
@@ -295,9 +295,9 @@ fn rings_of_a_lidar_are_ground() {
 }
 
 /// Points half a hundredth apart along lines at these heights, before what else there is.
-fn lines(heights: &[f32], rest: test_clouds::Positions) -> Case {
+fn lines(heights: &[f32], rest: Positions) -> Case {
     let line = |&y: &f32| (0..400).map(move |step| [0.005 * step as f32 - 1.0, y, 0.0]);
-    let mut positions: test_clouds::Positions = heights.iter().flat_map(line).collect();
+    let mut positions: Positions = heights.iter().flat_map(line).collect();
     positions.extend(rest);
     let camera = Camera { eye: DVec3::NEG_Z * 4.0, look_at: DVec3::ZERO, up: DVec3::Y, projection: PROJECTIONS[1] };
     Case::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [600, 600])
@@ -358,6 +358,29 @@ fn points_just_before_a_surface_are_dots() {
         let of_sphere = fitted.iter().zip(&adapted).filter(|(before, _)| before.source < surface);
         let shrunk = of_sphere.filter(|(before, after)| after.radius < before.radius).count();
         assert!(shrunk * 1000 < fitted.len(), "{shrunk} of the sphere's");
+    }
+}
+
+/// A cube of few points above a dense floor: none of it stands aside of what surrounds it.
+#[test]
+fn sparse_edges_and_corners_are_surface() {
+    for projection in PROJECTIONS {
+        let mut random = Random::new(19);
+        let floor = (0..60_000).map(|_| [1.2 * random.signed(), 0.9, 1.2 * random.signed()]);
+        let mut positions: Positions = floor.collect();
+        let floor = positions.len() as u32;
+        let mut random = Random::new(20);
+        positions.extend((0..2400).map(|at| {
+            let [a, b] = [random.signed(), random.signed()].map(|c| 0.45 * c);
+            let side = if at % 2 == 0 { 0.45 } else { -0.45 };
+            [[a, b, side], [a, side, b], [side, a, b]][at % 3]
+        }));
+        let case = Case::new(&positions, projection, [480, 360]);
+        let (fitted, adapted) = (case.fitted.concat(), case.adapted());
+        let of_cube = fitted.iter().zip(&adapted).filter(|(before, _)| before.source >= floor && before.radius > 0.0);
+        let (all, dots) = of_cube
+            .fold((0, 0), |(all, dots), (before, after)| (all + 1, dots + usize::from(after.radius < before.radius)));
+        assert!(all > 1500 && dots * 33 < all, "{dots} of {all} are dots");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use autosplats_cloud::PointCloud;
 
-use crate::shade::{ColorMode, Shading, linear_steps};
+use crate::shade::{Shading, linear_steps};
 
 /// Points looked at.
 const SAMPLES: usize = 1 << 12;
@@ -39,19 +39,15 @@ pub(super) struct Exposure {
 impl Exposure {
     /// How many times as bright a cloud's colours are shown.
     pub(super) fn of(&mut self, cloud: &PointCloud, shading: &Shading) -> f32 {
-        if !matches!(shading.color, ColorMode::Auto | ColorMode::Rgb) {
-            return 1.0;
-        }
         let identity = cloud.identity();
-        let usual = || match self.found {
+        shading.exposure.unwrap_or_else(|| match self.found {
             Some((known, exposure)) if known == identity => exposure,
             _ => {
                 let exposure = usual_exposure(cloud);
                 self.found = Some((identity, exposure));
                 exposure
             }
-        };
-        shading.exposure.unwrap_or_else(usual)
+        })
     }
 }
 
@@ -82,17 +78,12 @@ mod tests {
     }
 
     #[test]
-    fn only_the_points_own_colours_are_exposed() {
+    fn what_is_asked_for_counts_more() {
         let dark = cloud(vec![[80; 3]; 500]);
-        let by = |color, exposure| Shading { color, exposure, ..Shading::default() };
+        let by = |exposure| Shading { exposure, ..Shading::default() };
         let mut known = Exposure::default();
-        assert_eq!(known.of(&dark, &by(ColorMode::Auto, None)), usual_exposure(&dark));
-        assert_eq!(known.of(&cloud(vec![[250; 3]; 500]), &by(ColorMode::Auto, None)), 1.0, "of another cloud");
-        assert_eq!(known.of(&dark, &by(ColorMode::Rgb, Some(2.5))), 2.5, "as asked for");
-        assert_eq!(
-            known.of(&dark, &by(ColorMode::Classification, Some(2.5))),
-            1.0,
-            "colours of classes mean something"
-        );
+        assert_eq!(known.of(&dark, &by(None)), usual_exposure(&dark));
+        assert_eq!(known.of(&cloud(vec![[250; 3]; 500]), &by(None)), 1.0, "of another cloud");
+        assert_eq!(known.of(&dark, &by(Some(2.5))), 2.5, "as asked for");
     }
 }

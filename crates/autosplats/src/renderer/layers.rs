@@ -10,7 +10,8 @@ use crate::splat::GBuffer;
 use super::{MAX_SIDE, Settings};
 
 /// Shades `layers` as a frame would be, on the CPU: another look at a frame's surface without rendering it again, or a
-/// picture of a surface that comes from elsewhere, begun with [`GBuffer::new`]. Heights are told along the camera's up axis.
+/// picture of a surface that comes from elsewhere, begun with [`GBuffer::new`]. Heights are told along the camera's up axis;
+/// without an [exposure](Shading::exposure) colours are shown as bright as they are, whatever cloud they were of.
 ///
 /// # Errors
 /// [`Error::ImageSize`], [`Error::Camera`], [`Error::Setting`]; [`Error::Layers`] if a layer that is needed has not one value

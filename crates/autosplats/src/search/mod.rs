@@ -152,9 +152,8 @@ impl SearchRules {
     // Differs from the paper: of strewn points the second is more than √λ times as far as the first in one neighbourhood of λ.
     // The first search radius is to keep that from being a gap, but it is too short where a surface is steep, or the back of a
     // thing is seen through its front, in close-ups.
-    fn gap_growth(&self, neighbors: usize) -> Option<f32> {
-        let gap_factor = self.gap_factor?;
-        Some(if self.adaptive && neighbors == 1 { gap_factor } else { gap_factor.sqrt() })
+    fn gap_growth(&self, gap_factor: f32, neighbors: usize) -> f32 {
+        if self.adaptive && neighbors == 1 { gap_factor } else { gap_factor.sqrt() }
     }
 
     /// Applies the rules to the squared distances, ascending and complete up to distance `known`.
@@ -165,9 +164,10 @@ impl SearchRules {
         if nearest > self.outlier_radius(initial_radius) {
             return Some(EarlyEnd::Outlier);
         }
-        let least_reach = self.gap_factor?.sqrt() * initial_radius;
+        let gap_factor = self.gap_factor?;
+        let least_reach = gap_factor.sqrt() * initial_radius;
         for neighbors in 1..=squared.len().min(self.k as usize - 1) {
-            let reach = least_reach.max(self.gap_growth(neighbors)? * squared[neighbors - 1].sqrt());
+            let reach = least_reach.max(self.gap_growth(gap_factor, neighbors) * squared[neighbors - 1].sqrt());
             let next = squared.get(neighbors).map_or(known, |d| d.sqrt());
             if next > reach {
                 return Some(EarlyEnd::Gap(neighbors));

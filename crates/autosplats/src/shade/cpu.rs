@@ -201,7 +201,7 @@ impl<'a> Shader<'a> {
     pub(super) fn new(layers: &'a GBuffer, scene: &'a Scene<'a>, shading: &'a Shading) -> Self {
         let colored = shows_colors(&shading.color) && !layers.color.is_empty();
         let (pairs, edges) = (pairs(layers.height), Edges::new(scene.view));
-        let given_light = given_light(scene, colored);
+        let given_light = given_light(scene, shading, colored);
         let mut shader = Self { layers, scene, shading, colored, given_light, pairs, edges, scale: None };
         if let Some(map) = shading.color.usual_map() {
             let range = scene.given_range(shading).unwrap_or_else(|| shader.usual_range());
@@ -303,9 +303,11 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// Light whatever the normal, and the share of the lights, on the points' own colours or on others.
-pub(super) fn given_light(scene: &Scene<'_>, colored: bool) -> [f32; 2] {
-    if colored { SCANNED_LIGHT.map(|part| part * scene.exposure) } else { [0.0, 1.0] }
+/// Light whatever the normal, and the share of the lights, on colours or on what has none.
+pub(super) fn given_light(scene: &Scene<'_>, shading: &Shading, colored: bool) -> [f32; 2] {
+    // Colours of classes mean something.
+    let exposure = if shading.color == ColorMode::Classification { 1.0 } else { scene.exposure };
+    if colored { SCANNED_LIGHT.map(|part| part * exposure) } else { [0.0, 1.0] }
 }
 
 /// How much occlusion darkens, on the points' own colours or on others.

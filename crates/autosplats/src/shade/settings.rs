@@ -16,7 +16,7 @@ pub struct Shading {
     pub lighting: bool,
     /// How many times as bright the points' own colours are shown, 0.01 to 100; `None` takes what
     /// [`usual_exposure`](crate::usual_exposure) says of the cloud, which is more than 1 where its colours are all dark. Only with
-    /// [lighting](Self::lighting).
+    /// [lighting](Self::lighting). Of points that move it would change with them: give what the first need.
     pub exposure: Option<f32>,
     /// Strength of occlusion, the darkening of creases and of what lies behind something; 0 (off) to 10.
     pub occlusion: f32,

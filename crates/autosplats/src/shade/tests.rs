@@ -317,11 +317,14 @@ fn exposure_is_of_lit_colours_alone() {
     let clay = half_a_wall([8, 4]);
     let mut colored = clay.clone();
     colored.color = vec![[0.1; 3]; colored.weight.len()];
-    let ratio = |layers: &GBuffer, lighting| {
-        let shading = Shading { lighting, occlusion: 0.0, ..Shading::default() };
+    let ratio = |layers: &GBuffer, lighting, color| {
+        let shading = Shading { color, lighting, occlusion: 0.0, ..Shading::default() };
         let [once, thrice] = [1.0, 3.0].map(|exposure| exposed(layers, &shading, exposure).linear[0][1]);
         thrice / once
     };
-    assert!((ratio(&colored, true) - 3.0).abs() < 1e-3, "{}", ratio(&colored, true));
-    assert_eq!([ratio(&colored, false), ratio(&clay, true)], [1.0; 2], "as they are, or clay");
+    let own = ratio(&colored, true, ColorMode::Auto);
+    assert!((own - 3.0).abs() < 1e-3, "{own}");
+    assert_eq!(ratio(&colored, false, ColorMode::Auto), 1.0, "without light they are as they are");
+    assert_eq!(ratio(&colored, true, ColorMode::Classification), 1.0, "colours of classes mean something");
+    assert_eq!(ratio(&clay, true, ColorMode::Auto), 1.0, "clay");
 }

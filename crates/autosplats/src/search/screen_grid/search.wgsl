@@ -100,7 +100,10 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
             continue;
         }
         let distance = sqrt(squared);
-        let reach = max(frame.gap_growth * initial_radius, gap_growth_after(neighbors) * last);
+        var reach = frame.gap_growth * initial_radius;
+        if last > 0.0 {
+            reach = max(reach, gap_growth_after(neighbors) * last);
+        }
         if last > 0.0 && seen.gap_squared == MOST && distance > reach {
             seen.gap_squared = last_squared;
             seen.gap_reach = reach;

@@ -108,7 +108,7 @@ impl ShadeUniform {
             edge_factor: edges.factor,
             up: scene.up.as_vec3().to_array(),
             edge_offset: edges.offset,
-            given_light: given_light(scene, colored),
+            given_light: given_light(scene, shading, colored),
             range: scene.given_range(shading).unwrap_or_default(),
             find_range: finds_range(shading).into(),
             lighting: shading.lighting.into(),

@@ -176,8 +176,10 @@ fn the_device_finds_what_the_host_finds() {
             let sized = |size| test_clouds::all(4000).into_iter().map(move |(name, cloud)| (name, cloud, size));
             for (name, positions, size) in [[121, 90], [300, 2], [1, 1]].into_iter().flat_map(sized) {
                 let (screen, view) = screen(&positions, &camera, size, k);
-                for (e0, lambda) in [(Some(3), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)] {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                for (e0, lambda) in
+                    [(Some(3), Some(4.0)), (Some(1), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)]
+                {
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
                     let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
                     for (form, passes) in &forms {
@@ -311,7 +313,7 @@ fn tall_pictures_are_searched_to_the_end() {
         for k in [10, 64] {
             let (screen, view) = screen(&positions, &camera, size, k);
             for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
-                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
                 let (host, counted_by_host) = on_host(&screen, &view, &rules);
                 for (form, passes) in forms(&gpu, k) {
                     let case = format!("{form}, {name}, {rules:?}");
@@ -348,7 +350,7 @@ fn all_at_the_same_distance_are_neighbours() {
         let is_middle = |&query: &u32| screen.points[query as usize].position_view[..2] == [0.0, 0.0];
         let middle = queries.iter().position(is_middle).expect("the middle");
         for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
-            let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+            let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
             let (host, _) = on_host(&screen, &view, &rules);
             assert!(lambda.is_some() || host[middle].count > 100.0, "{rules:?}: {:?}", host[middle]);
             for (form, passes) in forms(&gpu, k) {
@@ -372,7 +374,7 @@ fn the_past_changes_nothing() {
             let (screen, view) = screen(&positions, &cameras()[0], [121, 90], k);
             let pasts = [past::tests::found(&screen, &view, k), past::tests::garbage(&screen, &view, k, &mut random)];
             for (e0, lambda) in [(Some(1), Some(4.0)), (None, None)] {
-                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
                 for (form, passes) in &forms {
                     let without = on_device(&gpu, passes, &screen, &view, &rules, None);
                     for radii in &pasts {

@@ -87,8 +87,8 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
         for camera in cameras() {
             for (name, positions) in test_clouds::all(2000) {
                 let (screen, view) = screen(&positions, &camera, SIZE, k);
-                for (e0, lambda) in [(Some(1), Some(4.0)), (Some(3), None), (None, Some(2.0))] {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
+                for (e0, lambda) in [(Some(1), Some(4.0)), (Some(3), Some(4.0)), (Some(3), None), (None, Some(2.0))] {
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
                     let case = format!("{name}, {:?}, {rules:?}", camera.projection);
                     let (host, [clamped, _]) = on_host(&screen, &view, &rules);
                     let found = on_device(&gpu, &passes, &screen, &view, &rules);
