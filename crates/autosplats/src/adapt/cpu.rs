@@ -64,8 +64,8 @@ pub(super) const AROUND_SPARSE: f32 = 2.0;
 /// Nor is a point that is this far from the plane through the ball, in k-radii: it stands by itself, and its disc would hide what
 /// its neighbours are. On a ridge it is about as far, at a corner further,
 pub(super) const ASIDE: f32 = 0.5;
-/// but there the ball holds no more than so many times the neighbours: this is twice what it does where points are even.
-pub(super) const CROWD: f32 = 2.0 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
+/// but there the ball holds no more than so many times the neighbours: this is 1.4 times what it does where points are even.
+pub(super) const CROWD: f32 = 1.4 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
