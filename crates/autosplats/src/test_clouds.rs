@@ -145,6 +145,13 @@ pub(crate) fn noisy(mut points: Positions, sigma: f32) -> Positions {
     points
 }
 
+/// Every other point of a sphere `apart` further to one side, as scans of it that do not fit.
+pub(crate) fn misfit(count: usize, apart: f32) -> Positions {
+    let mut points = sphere(count);
+    points.iter_mut().step_by(2).for_each(|point| point[0] += apart);
+    points
+}
+
 /// A surface of hills and hollows.
 pub(crate) fn bumpy(count: usize) -> Positions {
     patch(11, count, |x, y| [x, y, 0.15 * (5.0 * x).sin() * (4.0 * y).cos()])

@@ -8,8 +8,8 @@ use super::cpu::{
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
-    APART, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, RISE, SAMPLE, THICK_NOISE, THIN,
-    THIN_SHARE,
+    APART, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, QUANTILE_STEADY, RISE, SAMPLE, STEADY,
+    STEADY_SHARES, THICK_NOISE, THIN, THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -263,6 +263,10 @@ impl AdaptPasses {
             ("THIN_SHARE", THIN_SHARE.into()),
             ("RISE", RISE.into()),
             ("QUANTILE", QUANTILE.into()),
+            ("STEADY", STEADY.into()),
+            ("STEADY_FROM", STEADY_SHARES[0].into()),
+            ("STEADY_TO", STEADY_SHARES[1].into()),
+            ("QUANTILE_STEADY", QUANTILE_STEADY.into()),
         ];
         Ok(Self {
             arrange: Pass::new(

@@ -42,6 +42,13 @@ pub(super) const THIN_SHARE: f32 = 0.3;
 pub(super) const RISE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
+/// But scatter of structure grows from ball to ball, and noise's does not: less than so many times in these shares of the balls.
+pub(super) const STEADY: f32 = 1.3;
+/// Above the first of them, noise begins to differ from place to place, as where two scans do not fit and the way from one to
+/// the other is across the surface in one place and along it in the next,
+pub(super) const STEADY_SHARES: [f32; 2] = [0.55, 0.7];
+/// and at the second it is this quantile.
+pub(super) const QUANTILE_STEADY: f32 = 0.67;
 
 /// Noise that is more than this part of the k-radius needs balls so large that twice as large cells do for sheets: fits are a
 /// quarter as many then, and as good. With less noise they are 5 to 15 % worse.
@@ -123,9 +130,9 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
         sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
             measure_scatter(sample, scale, &Task { cells, view }, gathered);
         });
-        // What larger balls would say is not asked for then; most frames need the first alone.
+        // What balls larger than the next would say is not asked for then; most frames need the first two.
         let [dense, sparse] = ends(&sample);
-        if [dense, sparse, &sample].iter().all(|part| (0..=scale).any(|scale| tells_noise(part, scale).is_some())) {
+        if [dense, sparse, &sample].iter().all(|part| (0..scale).any(|scale| thin_scatter(part, scale).is_some())) {
             break;
         }
     }
@@ -191,8 +198,8 @@ fn scatter_level(sample: &[Sampled]) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
-        if let Some(mut thin) = tells_noise(sample, scale) {
-            return quantile(&mut thin);
+        if let Some(level) = thin_scatter(sample, scale) {
+            return level;
         }
         // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
         // fill the ball or of structure.
@@ -201,7 +208,7 @@ fn scatter_level(sample: &[Sampled]) -> f32 {
             before = None;
             continue;
         }
-        let now = quantile(&mut all);
+        let now = quantile(&mut all, QUANTILE);
         if let Some(before) = before
             && now < least_growth * before
         {
@@ -221,17 +228,40 @@ fn is_enough(found: usize, sample: &[Sampled]) -> bool {
     found >= LEAST_SAMPLE.max(sample.len() / LEAST_SHARE)
 }
 
-/// Distances from thin surfaces, if so many balls of a scale found one that they tell the noise.
-fn tells_noise(sample: &[Sampled], scale: usize) -> Option<Vec<f32>> {
-    let thin = |scale: usize| found(sample, scale).filter(|found| found.thin);
-    let share = |scale: usize| thin(scale).count() as f32 / found(sample, scale).count().max(1) as f32;
-    let enough = |scale: usize| is_enough(found(sample, scale).count(), sample);
-    let rises = || scale + 1 < SCALES && !(enough(scale + 1) && share(scale + 1) <= share(scale) + RISE);
-    let tells = enough(scale) && share(scale) >= THIN_SHARE && (share(scale) >= 1.0 - RISE || !rises());
-    tells.then(|| thin(scale).map(|found| found.distance).collect())
+/// The noise, if so many balls of a scale found a thin surface that they tell it.
+fn thin_scatter(sample: &[Sampled], scale: usize) -> Option<f32> {
+    let share = |scale: usize| {
+        let (count, thin) =
+            found(sample, scale).fold((0, 0), |(count, thin), found| (count + 1, thin + usize::from(found.thin)));
+        is_enough(count, sample).then(|| thin as f32 / count as f32)
+    };
+    let own = share(scale)?;
+    let rises = || scale + 1 < SCALES && share(scale + 1).is_none_or(|next| next > own + RISE);
+    if own < THIN_SHARE || own < 1.0 - RISE && rises() {
+        return None;
+    }
+    let mut thin: Vec<f32> = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
+    let share = if scale == 0 { QUANTILE + differs(sample) * (QUANTILE_STEADY - QUANTILE) } else { QUANTILE };
+    Some(quantile(&mut thin, share))
 }
 
-fn quantile(values: &mut [f32]) -> f32 {
-    let at = (QUANTILE * values.len() as f32) as usize;
+/// How surely noise differs from place to place, 0 to 1, by the smallest balls and the next: those after that are so wide against
+/// cells that noise of one thickness has two scatters, as slabs cut it or not.
+fn differs(sample: &[Sampled]) -> f32 {
+    let (mut pairs, mut steady) = (0, 0);
+    for sampled in sample {
+        if let [Some(own), Some(next), ..] = sampled.scatter
+            && own.thin
+        {
+            pairs += 1;
+            steady += usize::from(next.distance < STEADY * own.distance);
+        }
+    }
+    let [from, to] = STEADY_SHARES;
+    ((steady as f32 / pairs.max(1) as f32 - from) * (1.0 / (to - from))).clamp(0.0, 1.0)
+}
+
+fn quantile(values: &mut [f32], share: f32) -> f32 {
+    let at = (share * values.len() as f32) as usize;
     *values.select_nth_unstable_by(at, f32::total_cmp).1
 }

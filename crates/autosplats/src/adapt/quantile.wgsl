@@ -18,10 +18,17 @@ override LEAST_SHARE: u32;
 override THIN_SHARE: f32;
 override RISE: f32;
 override QUANTILE: f32;
+override STEADY: f32;
+override STEADY_FROM: f32;
+override STEADY_TO: f32;
+override QUANTILE_STEADY: f32;
 
 // Balls that hold enough to fit, and those that are thin: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
 var<workgroup> thin: array<atomic<u32>, 2>;
+// Thin balls the next of which holds enough, and those of which it scatters no more.
+var<workgroup> pairs: atomic<u32>;
+var<workgroup> steady: atomic<u32>;
 // Values below the one tried for each bit.
 var<workgroup> below: array<atomic<u32>, 32>;
 
@@ -41,14 +48,27 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     if local < 32u {
         atomicStore(&below[local], 0u);
     }
+    if local == 0u {
+        atomicStore(&pairs, 0u);
+        atomicStore(&steady, 0u);
+    }
     workgroupBarrier();
     var own_fitted = vec2u(0u);
     var own_thin = vec2u(0u);
+    var own_pairs = 0u;
+    var own_steady = 0u;
     for (var index = local; index < len; index += 64u) {
         let bits = vec2u(scatters[first + index], scatters[next + index]);
         own_fitted += select(vec2u(0u), vec2u(1u), bits != vec2u(TOO_FEW));
         own_thin += select(vec2u(0u), vec2u(1u), bits < vec2u(THICK));
+        if bits.x < THICK && bits.y != TOO_FEW {
+            own_pairs += 1u;
+            let distance = bitcast<vec2f>(bits & vec2u(~THICK));
+            own_steady += select(0u, 1u, distance.y < STEADY * distance.x);
+        }
     }
+    atomicAdd(&pairs, own_pairs);
+    atomicAdd(&steady, own_steady);
     for (var size = 0u; size < 2u; size++) {
         atomicAdd(&fitted[size], own_fitted[size]);
         atomicAdd(&thin[size], own_thin[size]);
@@ -62,7 +82,10 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let next_share = f32(atomicLoad(&thin[1])) / f32(max(next_fitted, 1u));
     let rises = scale + 1u < SCALES && !(next_fitted >= least && next_share <= share + RISE);
     let is_thin = share >= THIN_SHARE && (share >= 1.0 - RISE || !rises);
-    let at = u32(QUANTILE * f32(select(all_fitted, all_thin, is_thin)));
+    let steady_share = f32(atomicLoad(&steady)) / f32(max(atomicLoad(&pairs), 1u));
+    let differs = saturate((steady_share - STEADY_FROM) * (1.0 / (STEADY_TO - STEADY_FROM)));
+    let raised = select(0.0, differs * (QUANTILE_STEADY - QUANTILE), is_thin && scale == 0u);
+    let at = u32((QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value that at most `at` are below, bit by bit.
     var found = 0u;
     for (var bit = 31u; bit > 0u; bit--) {
