@@ -107,6 +107,7 @@ fn print(outcome: &Outcome) {
             rms: f64::NAN,
             below_5: f64::NAN,
             below_10: f64::NAN,
+            above_90: f64::NAN,
             flipped: f64::NAN,
             band: f64::NAN,
         };

@@ -21,7 +21,10 @@ pub struct Angles {
     pub below_5: f64,
     /// Share below 10°.
     pub below_10: f64,
-    /// Share above 90°: surface lit from the wrong side.
+    /// Share above 90°.
+    pub above_90: f64,
+    /// Share above 90° to all that is truly seen at the pixel and the eight around it: lit from the wrong side. At an edge either
+    /// side may be seen.
     pub flipped: f64,
     /// Mean near silhouettes.
     pub band: f64,
@@ -105,22 +108,33 @@ impl Truth {
 
 /// Degrees between the normal shown at a pixel and the true one, if there are both.
 pub fn angle(exact: &Exact, picture: &Picture, pixel: usize) -> Option<f64> {
-    let (seen, shown) = (exact.seen[pixel]?, picture.shown[pixel]?);
+    between(&exact.seen[pixel]?, &picture.shown[pixel]?)
+}
+
+fn between(seen: &Seen, shown: &Shown) -> Option<f64> {
     // The angle's sine is exact where its cosine is not.
     let sine = shown.normal.cross(seen.normal).length();
     (shown.normal.length_squared() > 0.0).then(|| sine.atan2(shown.normal.dot(seen.normal)).to_degrees())
 }
 
+/// Whether the normal shown at a pixel is turned away from all true ones there and around.
+fn is_flipped(exact: &Exact, picture: &Picture, pixel: usize) -> bool {
+    let turned_away = |seen: &Seen| picture.shown[pixel].is_some_and(|shown| between(seen, &shown) > Some(90.0));
+    exact.around(pixel, 1).flatten().all(turned_away)
+}
+
 fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
     let asked = (0..band.len()).filter(|&pixel| exact.is_asked(pixel));
-    let each = asked.filter_map(|pixel| Some((angle(exact, picture, pixel)?, band[pixel])));
+    let each = asked.filter_map(|pixel| Some((pixel, angle(exact, picture, pixel)?)));
+    let mut flipped = 0;
     let mut near = Mean::default();
     let mut all: Vec<f64> = Vec::new();
-    for (angle, in_band) in each {
+    for (pixel, angle) in each {
         all.push(angle);
-        if in_band {
+        if band[pixel] {
             near.add(angle);
         }
+        flipped += usize::from(angle > 90.0 && is_flipped(exact, picture, pixel));
     }
     all.sort_unstable_by(f64::total_cmp);
     let count = all.len() as f64;
@@ -131,7 +145,8 @@ fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
         rms: (all.iter().map(|angle| angle * angle).sum::<f64>() / count).sqrt(),
         below_5: below(5.0),
         below_10: below(10.0),
-        flipped: 1.0 - below(90.0),
+        above_90: 1.0 - below(90.0),
+        flipped: flipped as f64 / count,
         band: near.value(),
     })
 }

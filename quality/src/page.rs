@@ -34,7 +34,8 @@ occlusion to show the shape.
 outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
 
 Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \
-pixels of a silhouette, *flipped* the share above 90°. *Holes* are empty pixels at least two pixels inside the true \
+pixels of a silhouette, *flipped* the share above 90° to all that is truly seen at the pixel and the eight around it, at an edge \
+either side. *Holes* are empty pixels at least two pixels inside the true \
 silhouette, *leaks* pixels that show something behind the surface and all that is seen beside it, *before* the same in \
 front of it, *IoU* is the covered pixels' intersection over union, *wider* the pixels by which the silhouette is too wide: \
 all five only where points lie at most 1.5 pixels apart (*sampled*), swept ones from ring to ring, and left out if that is \
@@ -190,9 +191,11 @@ fn normals(outcomes: &[Outcome]) -> String {
         "RMS",
         "< 5°",
         "< 10°",
+        "> 90°",
         "flipped",
         "band",
         "paper: mean",
+        "> 90°",
         "flipped",
         "band",
     ];
@@ -209,9 +212,11 @@ fn normals(outcomes: &[Outcome]) -> String {
             number(ours.rms, 2),
             percent(ours.below_5, 1),
             percent(ours.below_10, 1),
+            percent(ours.above_90, 2),
             percent(ours.flipped, 2),
             number(ours.band, 2),
             number(paper.mean, 2),
+            percent(paper.above_90, 2),
             percent(paper.flipped, 2),
             number(paper.band, 2),
         ];

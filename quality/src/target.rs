@@ -105,8 +105,16 @@ mod tests {
         let cover =
             Cover { spacing_px: 1.0, sampled: 1.0, iou: 0.999, wider_px: 0.0, holes: 0.0, leaks: 0.0, before: 0.0 };
         let measures = |mean: f64, psnr| {
-            let angles =
-                Angles { mean, median: mean, rms: mean, below_5: 1.0, below_10: 1.0, flipped: 0.0, band: mean };
+            let angles = Angles {
+                mean,
+                median: mean,
+                rms: mean,
+                below_5: 1.0,
+                below_10: 1.0,
+                above_90: 0.0,
+                flipped: 0.0,
+                band: mean,
+            };
             Measures { cover, swept: None, angles: Some(angles), depth_px: 0.1, psnr, flip: 0.1 }
         };
         let dots = Measures { angles: None, ..measures(0.0, 20.0) };

@@ -79,7 +79,7 @@ impl CameraJob {
         let mut camera = match self.place {
             Place::File(_, camera) => return Ok((camera, axes)),
             Place::Eye { eye, look_at, up } => {
-                let look_at = look_at.map_or_else(|| fitted(None).map(|fitted| fitted.look_at), Ok)?;
+                let look_at = look_at.map_or_else(|| fitted(Some(Side::Iso)).map(|fitted| fitted.look_at), Ok)?;
                 let up = up.unwrap_or_else(|| upward(axes, look_at - eye));
                 let projection = match self.ortho {
                     Some(Ortho(None)) => fitted(None)?.projection,

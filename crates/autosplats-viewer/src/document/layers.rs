@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use autosplats::cloud::{
-    PointCloud,
+    PointCloud, Scan,
     glam::{DMat4, DVec3},
 };
 
@@ -107,7 +107,14 @@ impl Document {
             places.extend(own.filter(|place| place.is_finite() && clip.is_none_or(|clip| clip.contains(*place))));
         }
         let origin = places.first().map_or(DVec3::ZERO, |place: &DVec3| place.round());
+        // Where sensors stood tells from where to look; which points they saw does not.
+        let scans = visible().filter(|layer| layer.local.is_none()).flat_map(|layer| {
+            let moved =
+                |scan: &Scan| Scan { name: None, world_from_sensor: layer.pose * scan.world_from_sensor, points: 0..0 };
+            layer.cloud.scans().iter().map(moved)
+        });
         PointCloud::new(origin, places.into_iter().map(|place| (place - origin).as_vec3().to_array()).collect())
+            .with_scans(scans.collect())
     }
 
     /// The box around most of what is shown, by a part of the points.

@@ -1,7 +1,7 @@
 //! A camera that shows a whole cloud, for those who name none.
 
-use autosplats_cloud::{Axes, PointCloud};
-use glam::DVec3;
+use autosplats_cloud::{Axes, PointCloud, Scan};
+use glam::{DVec2, DVec3};
 
 use super::{Camera, Projection};
 use crate::Error;
@@ -19,11 +19,25 @@ const BORDER: f64 = 0.04;
 /// the picture. One that is cut by the picture's edge cannot be told from a surface that goes on.
 const RIM: f64 = 2.5;
 
+/// A sensor stands among its points if they reach so many times as far from it, on the ground, as half of them do: seen from
+/// where all of them are in the picture, what is told best would be small.
+const FAR_REACH: f64 = 4.0;
+/// How far behind such a sensor to stand and how far above it, and how far ahead of it to look, as parts of the mean of how far
+/// half of its points are and nine of ten.
+const BEHIND: f64 = 1.15;
+const ABOVE: f64 = 0.75;
+const AHEAD: f64 = 0.45;
+/// Turned about the sensor by so much, in degrees: more is seen of what stands along the way.
+const ASIDE_DEG: f64 = 20.0;
+/// What is as close to the way to the eye as this part of the distance is in the way.
+const IN_THE_WAY: f64 = 0.15;
+
 /// Where to stand in relation to the cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ViewDirection {
-    /// The sensor's own view for points in a camera's frame, otherwise [`Iso`](Self::Iso).
+    /// The sensor's own view for points in a camera's frame; from behind and above the sensor for a scan that is far denser near
+    /// it, as of a lidar on a car, where its position is known, or else the origin; otherwise [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.
@@ -70,7 +84,8 @@ pub fn guess_axes(cloud: &PointCloud) -> Axes {
 }
 
 impl Camera {
-    /// A camera that sees all of `cloud` from `direction`, but for a few points far from the others.
+    /// A camera that sees all of `cloud` from `direction`, but for a few points far from the others, and but for where it stands
+    /// among them ([`ViewDirection::Auto`]).
     ///
     /// `aspect` is width over height. With an orthographic `projection` its height is replaced by the one that fits; with
     /// a perspective one the field of view is kept, but for the sensor's own view, which takes the one that fits.
@@ -95,6 +110,14 @@ impl Camera {
             ViewDirection::Top => (up, -front),
             ViewDirection::Bottom => (-up, front),
         };
+        if direction == ViewDirection::Auto
+            && axes == Axes::ZUp
+            && matches!(projection, Projection::PerspectiveFovDeg(_))
+            && let Some([eye, look_at]) = behind_sensor(cloud)
+        {
+            let camera = Self { eye, look_at, up: picture_up, projection };
+            return camera.axes().map(|_| camera);
+        }
         let camera = Self { eye: to_viewer, look_at: DVec3::ZERO, up: picture_up, projection };
         camera.place(cloud, aspect, axes == Axes::Camera && direction == ViewDirection::Auto)
     }
@@ -188,6 +211,50 @@ fn from_origin(
     Ok((fov < 120.0).then_some(camera))
 }
 
+/// The eye behind and above the sensor of a cloud with Z up, in the middle of several, or at the origin if none is known, and the
+/// point ahead of it to look at; `None` if it does not stand among the points.
+fn behind_sensor(cloud: &PointCloud) -> Option<[DVec3; 2]> {
+    let scans = cloud.scans();
+    let sensor = scans.iter().map(Scan::position).sum::<DVec3>() / scans.len().max(1) as f64;
+    let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
+    let points: Vec<DVec3> = samples.into_iter().map(|p| p + (cloud.origin() - sensor)).collect();
+    let mut ranges: Vec<f64> = points.iter().map(|p| p.truncate().length()).collect();
+    ranges.sort_unstable_by(f64::total_cmp);
+    let range = |share: f64| ranges.get((share * ranges.len() as f64) as usize).copied();
+    let [half, most, all] = [range(0.5)?, range(0.9)?, range(1.0 - 2.0 * TRIM)?];
+    if !(half > 0.0 && all > FAR_REACH * half) {
+        return None;
+    }
+    let distance = (half * most).sqrt();
+    let (count, sum) = points
+        .iter()
+        .filter(|p| p.truncate().length() <= most)
+        .fold((0.0, DVec3::ZERO), |(count, sum), p| (count + 1.0, sum + p));
+    let middle = sum / count;
+    // Along the way on which points reach furthest, which angles doubled tell for either end of it.
+    let doubled = |p: &DVec3| DVec2::new(p.x * p.x - p.y * p.y, 2.0 * p.x * p.y) / p.truncate().length().max(distance);
+    let way = DVec2::from_angle(0.5 * points.iter().map(doubled).sum::<DVec2>().to_angle());
+    // From either end, on either side, whichever has the least in the way; from behind what is ahead of the sensor, if it sees
+    // but one side, and else along X and Y, the one of which is forward in most conventions.
+    let is_ahead = if middle.truncate().length() > 0.3 * distance { middle.truncate() } else { DVec2::new(1.0, 0.9) };
+    let forward = way * way.dot(is_ahead).signum();
+    let eyes = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(end, side): (f64, f64)| {
+        let forward = forward * end;
+        let back = -DVec2::from_angle(side * ASIDE_DEG.to_radians()).rotate(forward);
+        let eye = 0.5 * middle + (back * BEHIND).extend(ABOVE) * distance;
+        [eye, middle + (forward * AHEAD).extend(0.0) * distance]
+    });
+    let in_the_way = |[eye, _]: &[DVec3; 2]| {
+        let close = |p: &&DVec3| {
+            let along = (p.dot(*eye) / eye.length_squared()).clamp(0.4, 1.0);
+            p.distance(*eye * along) < IN_THE_WAY * distance
+        };
+        points.iter().filter(close).count()
+    };
+    let best = eyes.iter().min_by_key(|eye| in_the_way(eye))?;
+    Some(best.map(|place| sensor + place))
+}
+
 /// Finite positions about the cloud's origin along `axes`, evenly picked.
 fn samples(cloud: &PointCloud, axes: [DVec3; 3]) -> Vec<DVec3> {
     let positions = cloud.positions();
@@ -218,6 +285,7 @@ fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DMat4;
 
     fn ball(extra: &[[f32; 3]]) -> PointCloud {
         let golden = 2.399963f32;
@@ -258,6 +326,39 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Ground that a lidar at `sensor` sees 2 to 80 m away, denser near it, and a post at `post` from it, 4 m high.
+    fn swept(sensor: DVec3, post: DVec2) -> PointCloud {
+        let golden = 2.399963f64;
+        let ground = (0..4000).map(|i| {
+            let range = 2.0 * 40f64.powf(f64::from(i) / 4000.0);
+            (DVec2::from_angle(f64::from(i) * golden) * range).extend(-1.7)
+        });
+        let post = (0..200).map(|i| post.extend(-1.7 + 0.08 * f64::from(i)));
+        let positions: Vec<_> = ground.chain(post).map(|p| p.as_vec3().to_array()).collect();
+        let scan = Scan { name: None, world_from_sensor: DMat4::from_translation(sensor), points: 0..positions.len() };
+        PointCloud::new(sensor, positions).with_scans(vec![scan])
+    }
+
+    fn auto(cloud: &PointCloud) -> Camera {
+        Camera::fit(cloud, Axes::ZUp, ViewDirection::Auto, 1.5, Projection::PerspectiveFovDeg(40.0)).expect("a fit")
+    }
+
+    #[test]
+    fn a_scan_around_its_sensor_is_seen_from_behind_it() {
+        let nowhere = DVec2::new(300.0, 0.0);
+        let sensor = DVec3::new(5e5, -4e6, 80.0);
+        let camera = auto(&swept(sensor, nowhere));
+        let [eye, look_at] = [camera.eye, camera.look_at].map(|place| place - sensor);
+        assert!((10.0..50.0).contains(&eye.length()) && eye.z > 5.0, "near and above the sensor: {eye}");
+        assert!(eye.truncate().dot(look_at.truncate()) < 0.0, "the sensor is between {eye} and {look_at}");
+        let unknown = auto(&swept(DVec3::ZERO, nowhere).with_scans(Vec::new()));
+        assert!(unknown.eye.abs_diff_eq(eye, 1e-6), "without a sensor the origin is one: {}, {eye}", unknown.eye);
+        let blocked = auto(&swept(DVec3::ZERO, eye.truncate() * 0.8));
+        assert!(blocked.eye.distance(eye) > 5.0, "a post is in the way: {}", blocked.eye);
+        let elsewhere = swept(sensor, nowhere).with_scans(Vec::new());
+        assert!(auto(&elsewhere).eye.distance(sensor) > 100.0, "nobody knows that it stands among the points");
     }
 
     #[test]
