@@ -134,7 +134,7 @@ fn angles(exact: &Exact, band: &[bool], picture: &Picture) -> Option<Angles> {
         if band[pixel] {
             near.add(angle);
         }
-        flipped += usize::from(angle > 90.0 && is_flipped(exact, picture, pixel));
+        flipped += usize::from(is_flipped(exact, picture, pixel));
     }
     all.sort_unstable_by(f64::total_cmp);
     let count = all.len() as f64;
@@ -201,5 +201,36 @@ impl Mean {
     /// The mean.
     pub fn value(&self) -> f64 {
         self.sum / self.count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use autosplats::cloud::glam::DVec3;
+    use autosplats::{Camera, Projection};
+
+    use super::*;
+    use crate::view::Rays;
+
+    #[test]
+    fn the_other_side_of_an_edge_is_not_flipped() {
+        let sides = [0.9, 0.9, 0.9, -0.9, -0.9].map(|x| DVec3::new(x, 0.0, -0.44).normalize());
+        let seen = |normal| Seen { depth: 1.0, normal, spacing_px: 1.0, swept: None, sampled: true, tolerance: 0.1 };
+        let camera = Camera {
+            eye: DVec3::ZERO,
+            look_at: DVec3::Z,
+            up: DVec3::NEG_Y,
+            projection: Projection::OrthographicHeight(1.0),
+        };
+        let rays = Rays::new(&camera, [5, 1]).expect("a view");
+        let exact = Exact { width: 5, rays, seen: sides.map(|normal| Some(seen(normal))).to_vec() };
+        let shares = |wrong: usize| {
+            let mut shown = sides.map(|normal| Some(Shown { depth: 1.0, normal, point: 0 }));
+            shown[wrong] = Some(Shown { depth: 1.0, normal: sides[4], point: 0 });
+            let angles = angles(&exact, &[false; 5], &Picture { width: 5, shown: shown.to_vec() }).expect("normals");
+            [angles.above_90, angles.flipped].map(|share| (5.0 * share).round() as usize)
+        };
+        assert_eq!(shares(2), [1, 0], "beside the edge it is what is seen beyond");
+        assert_eq!(shares(0), [1, 1], "further away it is wrong");
     }
 }

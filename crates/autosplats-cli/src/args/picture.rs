@@ -13,9 +13,9 @@ use crate::values::{self, Neighbors, Ortho};
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
-    /// Direction to look from, at a distance that shows everything but far outliers [default: iso, the sensor's own view
-    /// where the points are in a camera's frame, or from behind it where it stood among points that are far denser
-    /// near it]
+    /// Direction to look from, at a distance that shows everything but far outliers [default: iso; in perspective the
+    /// sensor's own view where the points are in a camera's frame, and from behind it, not showing everything, where it
+    /// stood among points that are far denser near it]
     #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
     pub(crate) view: Option<Side>,
     /// Position of the eye in world coordinates

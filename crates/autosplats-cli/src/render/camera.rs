@@ -82,7 +82,7 @@ impl CameraJob {
                 let look_at = look_at.map_or_else(|| fitted(Some(Side::Iso)).map(|fitted| fitted.look_at), Ok)?;
                 let up = up.unwrap_or_else(|| upward(axes, look_at - eye));
                 let projection = match self.ortho {
-                    Some(Ortho(None)) => fitted(None)?.projection,
+                    Some(Ortho(None)) => fitted(Some(Side::Iso))?.projection,
                     _ => self.projection(),
                 };
                 Camera { eye, look_at, up, projection }

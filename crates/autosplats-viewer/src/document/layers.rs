@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use autosplats::cloud::{
-    PointCloud, Scan,
+    Crs, PointCloud, Scan, Unit,
     glam::{DMat4, DVec3},
 };
 
@@ -108,13 +108,21 @@ impl Document {
         }
         let origin = places.first().map_or(DVec3::ZERO, |place: &DVec3| place.round());
         // Where sensors stood tells from where to look; which points they saw does not.
-        let scans = visible().filter(|layer| layer.local.is_none()).flat_map(|layer| {
-            let moved =
-                |scan: &Scan| Scan { name: None, world_from_sensor: layer.pose * scan.world_from_sensor, points: 0..0 };
+        let scans = visible().flat_map(|layer| {
+            let moved = |scan: &Scan| {
+                let place = layer.local.map_or(scan.position(), |local| local.metres(scan.position()));
+                let world_from_sensor = layer.pose * DMat4::from_translation(place);
+                Scan { name: None, world_from_sensor, points: 0..0 }
+            };
             layer.cloud.scans().iter().map(moved)
+        });
+        let crs = visible().next().map(|layer| {
+            let in_metres = layer.local.map(|_| Crs { unit: Some(Unit::Metre), ..Crs::default() });
+            in_metres.unwrap_or_else(|| layer.cloud.crs().clone())
         });
         PointCloud::new(origin, places.into_iter().map(|place| (place - origin).as_vec3().to_array()).collect())
             .with_scans(scans.collect())
+            .with_crs(crs.unwrap_or_default())
     }
 
     /// The box around most of what is shown, by a part of the points.

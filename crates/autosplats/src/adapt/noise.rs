@@ -38,7 +38,7 @@ pub(super) const THIN: f32 = 0.15;
 /// A scale tells the noise if this share of the sample finds a thin surface: the others may be of structure too small for it.
 pub(super) const THIN_SHARE: f32 = 0.3;
 /// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance. Where it
-/// could not be larger by more, or there is no next scale, nothing more is asked.
+/// could not be larger by more, or there is no next scale, that does not count.
 pub(super) const RISE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
@@ -86,6 +86,8 @@ impl Noise {
     /// From a sample, densest first.
     fn of(sample: &[Sampled]) -> Self {
         let [dense, sparse] = ends(sample);
+        let quantile_of_first = quantile_of_first(sample);
+        let scatter_level = |part| scatter_level(part, quantile_of_first);
         let third = dense.len();
         if third > 0
             && let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius)
@@ -132,7 +134,7 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
         });
         // What balls larger than the next would say is not asked for then; most frames need the first two.
         let [dense, sparse] = ends(&sample);
-        if [dense, sparse, &sample].iter().all(|part| (0..scale).any(|scale| thin_scatter(part, scale).is_some())) {
+        if [dense, sparse, &sample].iter().all(|part| (0..scale).any(|scale| tells_noise(part, scale))) {
             break;
         }
     }
@@ -193,13 +195,15 @@ struct Scatter {
     thin: bool,
 }
 
-/// The noise of a sample of points about as dense; 0 if it is too small to tell.
-fn scatter_level(sample: &[Sampled]) -> f32 {
+/// The noise of a part of a sample whose points are about as dense, which is `quantile_of_first` of the first balls where
+/// these tell it; 0 if the part is too small to tell.
+fn scatter_level(sample: &[Sampled], quantile_of_first: f32) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
-        if let Some(level) = thin_scatter(sample, scale) {
-            return level;
+        if tells_noise(sample, scale) {
+            let mut thin = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
+            return quantile(&mut thin, if scale == 0 { quantile_of_first } else { QUANTILE });
         }
         // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
         // fill the ball or of structure.
@@ -228,26 +232,21 @@ fn is_enough(found: usize, sample: &[Sampled]) -> bool {
     found >= LEAST_SAMPLE.max(sample.len() / LEAST_SHARE)
 }
 
-/// The noise, if so many balls of a scale found a thin surface that they tell it.
-fn thin_scatter(sample: &[Sampled], scale: usize) -> Option<f32> {
-    let share = |scale: usize| {
-        let (count, thin) =
-            found(sample, scale).fold((0, 0), |(count, thin), found| (count + 1, thin + usize::from(found.thin)));
+/// Whether so many balls of a scale found a thin surface that they tell the noise.
+fn tells_noise(sample: &[Sampled], scale: usize) -> bool {
+    let thin_share = |scale: usize| {
+        let count = found(sample, scale).count();
+        let thin = found(sample, scale).filter(|found| found.thin).count();
         is_enough(count, sample).then(|| thin as f32 / count as f32)
     };
-    let own = share(scale)?;
-    let rises = || scale + 1 < SCALES && share(scale + 1).is_none_or(|next| next > own + RISE);
-    if own < THIN_SHARE || own < 1.0 - RISE && rises() {
-        return None;
-    }
-    let mut thin: Vec<f32> = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
-    let share = if scale == 0 { QUANTILE + differs(sample) * (QUANTILE_STEADY - QUANTILE) } else { QUANTILE };
-    Some(quantile(&mut thin, share))
+    let Some(own) = thin_share(scale) else { return false };
+    let rises = || scale + 1 < SCALES && thin_share(scale + 1).is_none_or(|next| next > own + RISE);
+    own >= THIN_SHARE && (own >= 1.0 - RISE || !rises())
 }
 
-/// How surely noise differs from place to place, 0 to 1, by the smallest balls and the next: those after that are so wide against
-/// cells that noise of one thickness has two scatters, as slabs cut it or not.
-fn differs(sample: &[Sampled]) -> f32 {
+/// The quantile of the first balls that is the noise, by how sure a whole sample is that noise differs from place to place. Balls
+/// after the second are so wide against cells that noise of one thickness has two scatters, as slabs cut it or not.
+fn quantile_of_first(sample: &[Sampled]) -> f32 {
     let (mut pairs, mut steady) = (0, 0);
     for sampled in sample {
         if let [Some(own), Some(next), ..] = sampled.scatter
@@ -258,10 +257,11 @@ fn differs(sample: &[Sampled]) -> f32 {
         }
     }
     let [from, to] = STEADY_SHARES;
-    ((steady as f32 / pairs.max(1) as f32 - from) * (1.0 / (to - from))).clamp(0.0, 1.0)
+    let differs = ((steady as f32 / pairs.max(1) as f32 - from) * (1.0 / (to - from))).clamp(0.0, 1.0);
+    QUANTILE + differs * (QUANTILE_STEADY - QUANTILE)
 }
 
-fn quantile(values: &mut [f32], share: f32) -> f32 {
+fn quantile(values: &mut Vec<f32>, share: f32) -> f32 {
     let at = (share * values.len() as f32) as usize;
     *values.select_nth_unstable_by(at, f32::total_cmp).1
 }

@@ -26,7 +26,7 @@ override QUANTILE_STEADY: f32;
 // Balls that hold enough to fit, and those that are thin: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
 var<workgroup> thin: array<atomic<u32>, 2>;
-// Thin balls the next of which holds enough, and those of which it scatters no more.
+// Of the whole sample's first balls, thin ones the next of which holds enough, and those of which it scatters no more.
 var<workgroup> pairs: atomic<u32>;
 var<workgroup> steady: atomic<u32>;
 // Values below the one tried for each bit.
@@ -61,6 +61,9 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         let bits = vec2u(scatters[first + index], scatters[next + index]);
         own_fitted += select(vec2u(0u), vec2u(1u), bits != vec2u(TOO_FEW));
         own_thin += select(vec2u(0u), vec2u(1u), bits < vec2u(THICK));
+    }
+    for (var index = local; index < kept; index += 64u) {
+        let bits = vec2u(scatters[index], scatters[SAMPLE + index]);
         if bits.x < THICK && bits.y != TOO_FEW {
             own_pairs += 1u;
             let distance = bitcast<vec2f>(bits & vec2u(~THICK));

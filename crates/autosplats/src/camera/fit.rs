@@ -1,6 +1,6 @@
 //! A camera that shows a whole cloud, for those who name none.
 
-use autosplats_cloud::{Axes, PointCloud, Scan};
+use autosplats_cloud::{Axes, Crs, PointCloud, Scan};
 use glam::{DVec2, DVec3};
 
 use super::{Camera, Projection};
@@ -29,15 +29,22 @@ const ABOVE: f64 = 0.75;
 const AHEAD: f64 = 0.45;
 /// Turned about the sensor by so much, in degrees: more is seen of what stands along the way.
 const ASIDE_DEG: f64 = 20.0;
-/// What is as close to the way to the eye as this part of the distance is in the way.
+/// Height of the picture over its distance from the eye for which these hold: at 40°.
+const UPRIGHT: f64 = 0.728;
+/// What is as close to the way to the eye as this part of the distance is in the way,
 const IN_THE_WAY: f64 = 0.15;
+/// if it is one point in so many.
+const A_FEW: usize = 500;
+/// A sensor sees one side if the middle of its points is further from it than this part of the distance.
+const ONE_SIDE: f64 = 0.3;
 
 /// Where to stand in relation to the cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ViewDirection {
-    /// The sensor's own view for points in a camera's frame; from behind and above the sensor for a scan that is far denser near
-    /// it, as of a lidar on a car, where its position is known, or else the origin; otherwise [`Iso`](Self::Iso).
+    /// In perspective, the sensor's own view for points in a camera's frame, and with Z up from behind and above the sensor
+    /// for a scan that is far denser near it, as of a lidar on a car: in the middle of several, or at the origin of points
+    /// without a coordinate system where no sensor is known. Otherwise [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.
@@ -110,16 +117,18 @@ impl Camera {
             ViewDirection::Top => (up, -front),
             ViewDirection::Bottom => (-up, front),
         };
-        if direction == ViewDirection::Auto
-            && axes == Axes::ZUp
-            && matches!(projection, Projection::PerspectiveFovDeg(_))
-            && let Some([eye, look_at]) = behind_sensor(cloud)
+        let own = match projection {
+            Projection::PerspectiveFovDeg(fov) if direction == ViewDirection::Auto => Some((axes, fov)),
+            _ => None,
+        };
+        if let Some((Axes::ZUp, fov)) = own
+            && let Some([eye, look_at]) = behind_sensor(cloud, fov, aspect)
         {
             let camera = Self { eye, look_at, up: picture_up, projection };
             return camera.axes().map(|_| camera);
         }
         let camera = Self { eye: to_viewer, look_at: DVec3::ZERO, up: picture_up, projection };
-        camera.place(cloud, aspect, axes == Axes::Camera && direction == ViewDirection::Auto)
+        camera.place(cloud, aspect, matches!(own, Some((Axes::Camera, _))))
     }
 
     /// This camera, moved without being turned to where it sees all of `cloud`, but for a few points far from the others.
@@ -211,47 +220,54 @@ fn from_origin(
     Ok((fov < 120.0).then_some(camera))
 }
 
-/// The eye behind and above the sensor of a cloud with Z up, in the middle of several, or at the origin if none is known, and the
-/// point ahead of it to look at; `None` if it does not stand among the points.
-fn behind_sensor(cloud: &PointCloud) -> Option<[DVec3; 2]> {
-    let scans = cloud.scans();
-    let sensor = scans.iter().map(Scan::position).sum::<DVec3>() / scans.len().max(1) as f64;
+/// The eye behind and above the sensor of a cloud with Z up, in the middle of several, or at the origin of one without
+/// a coordinate system, and the point ahead of it to look at; `None` if it does not stand among the points. `fov` is upright, in degrees.
+fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]> {
+    let sensor = match cloud.scans() {
+        [] if *cloud.crs() != Crs::default() => return None,
+        scans => scans.iter().map(Scan::position).sum::<DVec3>() / scans.len().max(1) as f64,
+    };
     let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
     let points: Vec<DVec3> = samples.into_iter().map(|p| p + (cloud.origin() - sensor)).collect();
     let mut ranges: Vec<f64> = points.iter().map(|p| p.truncate().length()).collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let range = |share: f64| ranges.get((share * ranges.len() as f64) as usize).copied();
     let [half, most, all] = [range(0.5)?, range(0.9)?, range(1.0 - 2.0 * TRIM)?];
-    if !(half > 0.0 && all > FAR_REACH * half) {
+    let distance = (half * most).sqrt();
+    let [low, high] = robust_range(&points, 2);
+    // Most of what is high and thin would be above the picture.
+    if !(half > 0.0 && all > FAR_REACH * half && high - low < all.min(FAR_REACH * distance)) {
         return None;
     }
-    let distance = (half * most).sqrt();
-    let (count, sum) = points
-        .iter()
-        .filter(|p| p.truncate().length() <= most)
-        .fold((0.0, DVec3::ZERO), |(count, sum), p| (count + 1.0, sum + p));
-    let middle = sum / count;
+    let near = || points.iter().filter(|p| p.truncate().length() <= most);
+    let middle = near().sum::<DVec3>() / near().count() as f64;
     // Along the way on which points reach furthest, which angles doubled tell for either end of it.
     let doubled = |p: &DVec3| DVec2::new(p.x * p.x - p.y * p.y, 2.0 * p.x * p.y) / p.truncate().length().max(distance);
     let way = DVec2::from_angle(0.5 * points.iter().map(doubled).sum::<DVec2>().to_angle());
-    // From either end, on either side, whichever has the least in the way; from behind what is ahead of the sensor, if it sees
-    // but one side, and else along X and Y, the one of which is forward in most conventions.
-    let is_ahead = if middle.truncate().length() > 0.3 * distance { middle.truncate() } else { DVec2::new(1.0, 0.9) };
+    // A sensor that sees one side alone is seen from behind. Else X or Y is ahead in most conventions.
+    let sees_one_side = middle.truncate().length() > ONE_SIDE * distance;
+    let is_ahead = if sees_one_side { middle.truncate() } else { DVec2::new(1.0, 0.9) };
     let forward = way * way.dot(is_ahead).signum();
-    let eyes = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(end, side): (f64, f64)| {
+    let upright_at_1 = 2.0 * (0.5 * fov).to_radians().tan() * aspect.min(1.0);
+    let place = |(end, side): (f64, f64)| {
         let forward = forward * end;
         let back = -DVec2::from_angle(side * ASIDE_DEG.to_radians()).rotate(forward);
         let eye = 0.5 * middle + (back * BEHIND).extend(ABOVE) * distance;
-        [eye, middle + (forward * AHEAD).extend(0.0) * distance]
-    });
+        let look_at = middle + (forward * AHEAD).extend(0.0) * distance;
+        [look_at + (eye - look_at) * (UPRIGHT / upright_at_1), look_at]
+    };
+    // On either side, and from either end, whichever has less in the way; a few points are nothing.
+    let places = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(place);
     let in_the_way = |[eye, _]: &[DVec3; 2]| {
         let close = |p: &&DVec3| {
+            // Not the points around the sensor.
             let along = (p.dot(*eye) / eye.length_squared()).clamp(0.4, 1.0);
             p.distance(*eye * along) < IN_THE_WAY * distance
         };
-        points.iter().filter(close).count()
+        points.iter().filter(close).count() * A_FEW / points.len()
     };
-    let best = eyes.iter().min_by_key(|eye| in_the_way(eye))?;
+    let places = if sees_one_side { &places[..2] } else { &places };
+    let best = places.iter().min_by_key(|place| in_the_way(place))?;
     Some(best.map(|place| sensor + place))
 }
 
@@ -284,8 +300,12 @@ fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::f64::consts::TAU;
+
+    use autosplats_cloud::Unit;
     use glam::DMat4;
+
+    use super::*;
 
     fn ball(extra: &[[f32; 3]]) -> PointCloud {
         let golden = 2.399963f32;
@@ -328,37 +348,85 @@ mod tests {
         }
     }
 
-    /// Ground that a lidar at `sensor` sees 2 to 80 m away, denser near it, and a post at `post` from it, 4 m high.
-    fn swept(sensor: DVec3, post: DVec2) -> PointCloud {
-        let golden = 2.399963f64;
+    /// Ground that a lidar at `sensor` sees 2 to 80 m away, denser near it, at azimuths of so much, and other points about it.
+    fn swept(sensor: DVec3, azimuths: f64, others: impl IntoIterator<Item = DVec3>) -> PointCloud {
         let ground = (0..4000).map(|i| {
-            let range = 2.0 * 40f64.powf(f64::from(i) / 4000.0);
-            (DVec2::from_angle(f64::from(i) * golden) * range).extend(-1.7)
+            let azimuth = azimuths * ((f64::from(i) * 0.618034).fract() - 0.5);
+            (DVec2::from_angle(azimuth) * 2.0 * 40f64.powf(f64::from(i) / 4000.0)).extend(-1.7)
         });
-        let post = (0..200).map(|i| post.extend(-1.7 + 0.08 * f64::from(i)));
-        let positions: Vec<_> = ground.chain(post).map(|p| p.as_vec3().to_array()).collect();
+        let positions: Vec<_> = ground.chain(others).map(|p| p.as_vec3().to_array()).collect();
         let scan = Scan { name: None, world_from_sensor: DMat4::from_translation(sensor), points: 0..positions.len() };
         PointCloud::new(sensor, positions).with_scans(vec![scan])
     }
 
-    fn auto(cloud: &PointCloud) -> Camera {
-        Camera::fit(cloud, Axes::ZUp, ViewDirection::Auto, 1.5, Projection::PerspectiveFovDeg(40.0)).expect("a fit")
+    fn auto(cloud: &PointCloud, fov: f64, aspect: f64) -> Camera {
+        Camera::fit(cloud, Axes::ZUp, ViewDirection::Auto, aspect, Projection::PerspectiveFovDeg(fov)).expect("a fit")
     }
 
     #[test]
     fn a_scan_around_its_sensor_is_seen_from_behind_it() {
-        let nowhere = DVec2::new(300.0, 0.0);
         let sensor = DVec3::new(5e5, -4e6, 80.0);
-        let camera = auto(&swept(sensor, nowhere));
+        let camera = auto(&swept(sensor, TAU, []), 40.0, 1.5);
         let [eye, look_at] = [camera.eye, camera.look_at].map(|place| place - sensor);
         assert!((10.0..50.0).contains(&eye.length()) && eye.z > 5.0, "near and above the sensor: {eye}");
         assert!(eye.truncate().dot(look_at.truncate()) < 0.0, "the sensor is between {eye} and {look_at}");
-        let unknown = auto(&swept(DVec3::ZERO, nowhere).with_scans(Vec::new()));
-        assert!(unknown.eye.abs_diff_eq(eye, 1e-6), "without a sensor the origin is one: {}, {eye}", unknown.eye);
-        let blocked = auto(&swept(DVec3::ZERO, eye.truncate() * 0.8));
-        assert!(blocked.eye.distance(eye) > 5.0, "a post is in the way: {}", blocked.eye);
-        let elsewhere = swept(sensor, nowhere).with_scans(Vec::new());
-        assert!(auto(&elsewhere).eye.distance(sensor) > 100.0, "nobody knows that it stands among the points");
+        let unknown = |sensor| swept(sensor, TAU, []).with_scans(Vec::new());
+        let of_origin = auto(&unknown(DVec3::ZERO), 40.0, 1.5);
+        assert!(of_origin.eye.abs_diff_eq(eye, 1e-6), "without a sensor the origin is one: {}, {eye}", of_origin.eye);
+        assert!(auto(&unknown(sensor), 40.0, 1.5).eye.distance(sensor) > 100.0, "nobody knows where it stood");
+        let surveyed = unknown(DVec3::ZERO).with_crs(Crs { unit: Some(Unit::Metre), ..Crs::default() });
+        assert!(auto(&surveyed, 40.0, 1.5).eye.length() > 100.0, "the origin of a coordinate system is no sensor");
+    }
+
+    #[test]
+    fn what_is_in_the_way_is_gone_around() {
+        // A street says which way to look.
+        let street = || (0..600).map(|i| DVec3::new(f64::from(i - 300) * 0.25, 3.0, -1.7));
+        let free = auto(&swept(DVec3::ZERO, TAU, street()), 40.0, 1.5).eye;
+        let before = |count: usize| (0..count).map(move |i| free * (0.6 + 0.2 * i as f64 / count as f64));
+        let eye = |count: usize| auto(&swept(DVec3::ZERO, TAU, street().chain(before(count))), 40.0, 1.5).eye;
+        assert!(eye(40).distance(free) > 5.0, "something is in the way: {}, {free}", eye(40));
+        assert!(eye(3).distance(free) < 2.0, "three points are nothing: {}, {free}", eye(3));
+    }
+
+    #[test]
+    fn a_sensor_that_sees_one_side_is_seen_from_behind() {
+        let behind = |i: usize| DVec3::new(-10.0, 0.1 * i as f64, 4.0);
+        let camera = auto(&swept(DVec3::ZERO, 1.5, (0..60).map(behind)), 40.0, 1.5);
+        assert!(camera.eye.x < -5.0 && camera.look_at.x > 5.0, "whatever is there: {camera:?}");
+    }
+
+    #[test]
+    fn as_much_is_seen_whatever_the_field_of_view() {
+        let cloud = swept(DVec3::ZERO, TAU, []);
+        for (fov, aspect) in [(20.0, 1.5), (40.0, 1.5), (70.0, 1.5), (40.0, 0.5)] {
+            let camera = auto(&cloud, fov, aspect);
+            let view = camera.view(DVec3::ZERO, [(300.0 * aspect) as u32, 300]).expect("a view");
+            let [x, y] = view.to_pixel(view.to_view([0.0, 0.0, -1.7]));
+            let size = [300.0 * aspect as f32, 300.0];
+            assert!(x > 0.1 * size[0] && x < 0.9 * size[0], "{fov}, {aspect}: {x}");
+            assert!(y > 0.55 * size[1] && y < 0.95 * size[1], "{fov}, {aspect}: {y}");
+        }
+    }
+
+    #[test]
+    fn what_is_high_and_thin_is_seen_whole() {
+        let mast = (0..9000)
+            .map(|i| (DVec2::from_angle(f64::from(i) * 2.4) * 0.5).extend(100.0 * (f64::from(i) * 0.618034).fract()));
+        let camera = auto(&swept(DVec3::ZERO, TAU, mast), 40.0, 1.5);
+        let view = camera.view(DVec3::ZERO, [300, 200]).expect("a view");
+        let [_, y] = view.to_pixel(view.to_view([0.0, 0.0, 100.0]));
+        assert!(y > 0.0, "its top is above the picture: {y}");
+    }
+
+    #[test]
+    fn an_orthographic_camera_stays_one() {
+        for axes in [Axes::ZUp, Axes::Camera] {
+            let projection = Projection::OrthographicHeight(1.0);
+            let cloud = swept(DVec3::ZERO, TAU, []);
+            let camera = Camera::fit(&cloud, axes, ViewDirection::Auto, 1.5, projection).expect("a fit");
+            assert!(matches!(camera.projection, Projection::OrthographicHeight(height) if height > 10.0), "{camera:?}");
+        }
     }
 
     #[test]

@@ -45,6 +45,22 @@ fn neighbours_keep_their_places_to_each_other() {
 }
 
 #[test]
+fn sensors_of_an_overview_stand_where_they_stood() {
+    let (mut document, [first, second]) = neighbours();
+    let shift = DVec3::new(0.0, 7.0, 0.0);
+    let posed = Layer::new("posed", None, degrees(DVec3::new(10.0, 50.0, 100.0)));
+    let posed = document.add(posed.opened_at(DMat4::from_translation(shift)));
+    let overview = document.overview();
+    let place = |id| document.layer(id).expect("there").position(0);
+    // The points differ from the corner by their residuals.
+    for (scan, id) in overview.scans().iter().zip([first, second, posed]) {
+        assert!(scan.position().distance(place(id)) < 1e-3, "{} is not {}", scan.position(), place(id));
+    }
+    assert_eq!(overview.scans().len(), 3, "one each");
+    assert_eq!(overview.crs().unit, Some(Unit::Metre), "not what the file has");
+}
+
+#[test]
 fn a_file_read_again_stays_on_the_map() {
     let (mut document, [_, second]) = neighbours();
     let place = document.layers[1].position(3);
