@@ -13,7 +13,7 @@ use crate::fit::Surfel;
 use crate::project::DensityGrid;
 
 /// Surfels looked at.
-pub(crate) const SAMPLE: usize = 2048;
+pub(crate) const SAMPLE: usize = 1024;
 /// The densest and the sparsest third of a sample tell how noise grows with the k-radius if the median k-radius is larger in the
 /// one than in the other by this factor, and the more, the further apart they are: points evenly strewn are 1.2 apart by chance,
 /// very noisy ones 1.7.
