@@ -8,8 +8,8 @@ use super::cpu::{
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
-    APART, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, QUANTILE, QUANTILE_STEADY, RISE, SAMPLE, STEADY,
-    STEADY_SHARES, THICK_NOISE, THIN, THIN_SHARE,
+    APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES, QUANTILE,
+    QUANTILE_DIFFERS, RISE, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -264,9 +264,12 @@ impl AdaptPasses {
             ("RISE", RISE.into()),
             ("QUANTILE", QUANTILE.into()),
             ("STEADY", STEADY.into()),
-            ("STEADY_FROM", STEADY_SHARES[0].into()),
-            ("STEADY_TO", STEADY_SHARES[1].into()),
-            ("QUANTILE_STEADY", QUANTILE_STEADY.into()),
+            ("NOISE_FROM", NOISE_SHARES[0].into()),
+            ("NOISE_TO", NOISE_SHARES[1].into()),
+            ("DIFFERS_FROM", DIFFERS_SHARES[0].into()),
+            ("DIFFERS_TO", DIFFERS_SHARES[1].into()),
+            ("QUANTILE_DIFFERS", QUANTILE_DIFFERS.into()),
+            ("STEADY_SCALES", STEADY_SCALES as f64),
         ];
         Ok(Self {
             arrange: Pass::new(

@@ -42,13 +42,19 @@ pub(super) const THIN_SHARE: f32 = 0.3;
 pub(super) const RISE: f32 = 0.3;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
-/// But scatter of structure grows from ball to ball, and noise's does not: less than so many times in these shares of the balls.
+/// But scatter of structure grows from ball to ball, and noise's does not: it is *steady* where the next ball scatters less than so
+/// many times as much.
 pub(super) const STEADY: f32 = 1.3;
-/// Above the first of them, noise begins to differ from place to place, as where two scans do not fit and the way from one to
-/// the other is across the surface in one place and along it in the next,
-pub(super) const STEADY_SHARES: [f32; 2] = [0.55, 0.7];
+/// Up to the first of these shares of steady balls there is structure and no noise, from the second on there is.
+pub(super) const NOISE_SHARES: [f32; 2] = [0.05, 0.15];
+/// Above the first of these, noise begins to differ from place to place, as where two scans do not fit and the way from one to the
+/// other is across the surface in one place and along it in the next,
+pub(super) const DIFFERS_SHARES: [f32; 2] = [0.55, 0.7];
 /// and at the second it is this quantile.
-pub(super) const QUANTILE_STEADY: f32 = 0.67;
+pub(super) const QUANTILE_DIFFERS: f32 = 0.67;
+/// Scales that this is known of. Balls after these and the next are so wide against cells that noise of one thickness has two
+/// scatters, as slabs cut it or not.
+pub(super) const STEADY_SCALES: usize = 2;
 
 /// Noise that is more than this part of the k-radius needs balls so large that twice as large cells do for sheets: fits are a
 /// quarter as many then, and as good. With less noise they are 5 to 15 % worse.
@@ -86,8 +92,8 @@ impl Noise {
     /// From a sample, densest first.
     fn of(sample: &[Sampled]) -> Self {
         let [dense, sparse] = ends(sample);
-        let quantile_of_first = quantile_of_first(sample);
-        let scatter_level = |part| scatter_level(part, quantile_of_first);
+        let steady = std::array::from_fn(|scale| steady_share(sample, scale));
+        let scatter_level = |part| scatter_level(part, steady);
         let third = dense.len();
         if third > 0
             && let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius)
@@ -195,15 +201,20 @@ struct Scatter {
     thin: bool,
 }
 
-/// The noise of a part of a sample whose points are about as dense, which is `quantile_of_first` of the first balls where
-/// these tell it; 0 if the part is too small to tell.
-fn scatter_level(sample: &[Sampled], quantile_of_first: f32) -> f32 {
+/// The noise of a part of a sample whose points are about as dense; 0 if the part is too small to tell. Of the whole sample the
+/// steady shares are known.
+fn scatter_level(sample: &[Sampled], steady: [f32; STEADY_SCALES]) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
         if tells_noise(sample, scale) {
             let mut thin = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
-            return quantile(&mut thin, if scale == 0 { quantile_of_first } else { QUANTILE });
+            // Where there is structure as well, noise is steady in the smaller balls.
+            let most = steady.get(..=scale).map(|steady| steady.iter().copied().fold(0.0, f32::max));
+            let is_noise = most.map_or(1.0, |steady| between(NOISE_SHARES, steady));
+            // From the first scale to the next, cells are as fine as can be.
+            let differs = if scale == 0 { between(DIFFERS_SHARES, steady[0]) } else { 0.0 };
+            return is_noise * quantile(&mut thin, QUANTILE + differs * (QUANTILE_DIFFERS - QUANTILE));
         }
         // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
         // fill the ball or of structure.
@@ -244,21 +255,23 @@ fn tells_noise(sample: &[Sampled], scale: usize) -> bool {
     own >= THIN_SHARE && (own >= 1.0 - RISE || !rises())
 }
 
-/// The quantile of the first balls that is the noise, by how sure a whole sample is that noise differs from place to place. Balls
-/// after the second are so wide against cells that noise of one thickness has two scatters, as slabs cut it or not.
-fn quantile_of_first(sample: &[Sampled]) -> f32 {
+/// Of the thin balls of a scale, those that are steady.
+fn steady_share(sample: &[Sampled], scale: usize) -> f32 {
     let (mut pairs, mut steady) = (0, 0);
     for sampled in sample {
-        if let [Some(own), Some(next), ..] = sampled.scatter
+        if let [Some(own), Some(next)] = [scale, scale + 1].map(|scale| sampled.scatter[scale])
             && own.thin
         {
             pairs += 1;
             steady += usize::from(next.distance < STEADY * own.distance);
         }
     }
-    let [from, to] = STEADY_SHARES;
-    let differs = ((steady as f32 / pairs.max(1) as f32 - from) * (1.0 / (to - from))).clamp(0.0, 1.0);
-    QUANTILE + differs * (QUANTILE_STEADY - QUANTILE)
+    steady as f32 / pairs.max(1) as f32
+}
+
+/// How far a value is from the first to the second, 0 to 1.
+fn between([from, to]: [f32; 2], value: f32) -> f32 {
+    ((value - from) * (1.0 / (to - from))).clamp(0.0, 1.0)
 }
 
 fn quantile(values: &mut Vec<f32>, share: f32) -> f32 {

@@ -19,16 +19,20 @@ override THIN_SHARE: f32;
 override RISE: f32;
 override QUANTILE: f32;
 override STEADY: f32;
-override STEADY_FROM: f32;
-override STEADY_TO: f32;
-override QUANTILE_STEADY: f32;
+override NOISE_FROM: f32;
+override NOISE_TO: f32;
+override DIFFERS_FROM: f32;
+override DIFFERS_TO: f32;
+override QUANTILE_DIFFERS: f32;
+override STEADY_SCALES: u32;
 
 // Balls that hold enough to fit, and those that are thin: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
 var<workgroup> thin: array<atomic<u32>, 2>;
-// Of the whole sample's first balls, thin ones the next of which holds enough, and those of which it scatters no more.
-var<workgroup> pairs: atomic<u32>;
-var<workgroup> steady: atomic<u32>;
+// Of the whole sample's balls of the first sizes, thin ones the next of which holds enough, and those of which it scatters no
+// more.
+var<workgroup> pairs: array<atomic<u32>, STEADY_SCALES>;
+var<workgroup> steady: array<atomic<u32>, STEADY_SCALES>;
 // Values below the one tried for each bit.
 var<workgroup> below: array<atomic<u32>, 32>;
 
@@ -48,30 +52,32 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     if local < 32u {
         atomicStore(&below[local], 0u);
     }
-    if local == 0u {
-        atomicStore(&pairs, 0u);
-        atomicStore(&steady, 0u);
+    if local < STEADY_SCALES {
+        atomicStore(&pairs[local], 0u);
+        atomicStore(&steady[local], 0u);
     }
     workgroupBarrier();
     var own_fitted = vec2u(0u);
     var own_thin = vec2u(0u);
-    var own_pairs = 0u;
-    var own_steady = 0u;
     for (var index = local; index < len; index += 64u) {
         let bits = vec2u(scatters[first + index], scatters[next + index]);
         own_fitted += select(vec2u(0u), vec2u(1u), bits != vec2u(TOO_FEW));
         own_thin += select(vec2u(0u), vec2u(1u), bits < vec2u(THICK));
     }
-    for (var index = local; index < kept; index += 64u) {
-        let bits = vec2u(scatters[index], scatters[SAMPLE + index]);
-        if bits.x < THICK && bits.y != TOO_FEW {
-            own_pairs += 1u;
-            let distance = bitcast<vec2f>(bits & vec2u(~THICK));
-            own_steady += select(0u, 1u, distance.y < STEADY * distance.x);
+    for (var size = 0u; size < STEADY_SCALES && scale < STEADY_SCALES; size++) {
+        var own_pairs = 0u;
+        var own_steady = 0u;
+        for (var index = local; index < kept; index += 64u) {
+            let bits = vec2u(scatters[size * SAMPLE + index], scatters[(size + 1u) * SAMPLE + index]);
+            if bits.x < THICK && bits.y != TOO_FEW {
+                own_pairs += 1u;
+                let distance = bitcast<vec2f>(bits & vec2u(~THICK));
+                own_steady += select(0u, 1u, distance.y < STEADY * distance.x);
+            }
         }
+        atomicAdd(&pairs[size], own_pairs);
+        atomicAdd(&steady[size], own_steady);
     }
-    atomicAdd(&pairs, own_pairs);
-    atomicAdd(&steady, own_steady);
     for (var size = 0u; size < 2u; size++) {
         atomicAdd(&fitted[size], own_fitted[size]);
         atomicAdd(&thin[size], own_thin[size]);
@@ -85,9 +91,13 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let next_share = f32(atomicLoad(&thin[1])) / f32(max(next_fitted, 1u));
     let rises = scale + 1u < SCALES && !(next_fitted >= least && next_share <= share + RISE);
     let is_thin = share >= THIN_SHARE && (share >= 1.0 - RISE || !rises);
-    let steady_share = f32(atomicLoad(&steady)) / f32(max(atomicLoad(&pairs), 1u));
-    let differs = saturate((steady_share - STEADY_FROM) * (1.0 / (STEADY_TO - STEADY_FROM)));
-    let raised = select(0.0, differs * (QUANTILE_STEADY - QUANTILE), is_thin && scale == 0u);
+    let first_steady = f32(atomicLoad(&steady[0])) / f32(max(atomicLoad(&pairs[0]), 1u));
+    var most_steady = first_steady;
+    for (var size = 1u; size < STEADY_SCALES && size <= scale; size++) {
+        most_steady = max(most_steady, f32(atomicLoad(&steady[size])) / f32(max(atomicLoad(&pairs[size]), 1u)));
+    }
+    let differs = saturate((first_steady - DIFFERS_FROM) * (1.0 / (DIFFERS_TO - DIFFERS_FROM)));
+    let raised = select(0.0, differs * (QUANTILE_DIFFERS - QUANTILE), is_thin && scale == 0u);
     let at = u32((QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value that at most `at` are below, bit by bit.
     var found = 0u;
@@ -102,6 +112,10 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         atomicAdd(&below[bit], own);
         workgroupBarrier();
         found = select(found, tried, atomicLoad(&below[bit]) <= at);
+    }
+    let is_noise = saturate((most_steady - NOISE_FROM) * (1.0 / (NOISE_TO - NOISE_FROM)));
+    if is_thin && scale < STEADY_SCALES {
+        found = bitcast<u32>(is_noise * bitcast<f32>(found));
     }
     if local == 0u {
         let tells = select(ALL_TELL, THIN_TELL, is_thin);

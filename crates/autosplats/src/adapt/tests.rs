@@ -224,6 +224,19 @@ fn normals_of_a_noisy_sphere_are_the_spheres() {
     assert!(before > 15.0 && after < 5.0, "{before} degrees off, then {after}");
 }
 
+/// What is finer than the first balls scatters in them as noise does, but the more the larger the ball.
+#[test]
+fn structure_is_no_noise() {
+    for projection in PROJECTIONS {
+        let noise = |sigma| Case::new(&noisy(test_clouds::bumpy(6_000), sigma), projection, [96, 72]).noise().level;
+        assert_eq!(noise(0.0), 0.0, "{projection:?}");
+        for sigma in [0.008, 0.012, 0.016, 0.02] {
+            let ratio = noise(sigma) / sigma;
+            assert!((0.75..1.3).contains(&ratio), "{sigma} {projection:?}: {ratio} times the noise");
+        }
+    }
+}
+
 /// Scatter differs from place to place, and most of it is more than the third that tells of noise as thick everywhere.
 #[test]
 fn scans_that_do_not_fit_are_one_surface() {
