@@ -212,7 +212,7 @@ fn scatter_level(sample: &[Sampled], steady: [f32; STEADY_SCALES]) -> f32 {
             // Where there is structure as well, noise is steady in the smaller balls.
             let most = steady.get(..=scale).map(|steady| steady.iter().copied().fold(0.0, f32::max));
             let is_noise = most.map_or(1.0, |steady| between(NOISE_SHARES, steady));
-            // From the first scale to the next, cells are as fine as can be.
+            // At the second scale, noise as thick everywhere has two scatters as well.
             let differs = if scale == 0 { between(DIFFERS_SHARES, steady[0]) } else { 0.0 };
             return is_noise * quantile(&mut thin, QUANTILE + differs * (QUANTILE_DIFFERS - QUANTILE));
         }
