@@ -208,7 +208,8 @@ fn scatter_level(sample: &[Sampled], steady: [f32; STEADY_SCALES]) -> f32 {
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
         if tells_noise(sample, scale) {
-            let mut thin = found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
+            let mut thin: Vec<f32> =
+                found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
             // Where there is structure as well, noise is steady in the smaller balls.
             let most = steady.get(..=scale).map(|steady| steady.iter().copied().fold(0.0, f32::max));
             let is_noise = most.map_or(1.0, |steady| between(NOISE_SHARES, steady));
@@ -274,7 +275,7 @@ fn between([from, to]: [f32; 2], value: f32) -> f32 {
     ((value - from) * (1.0 / (to - from))).clamp(0.0, 1.0)
 }
 
-fn quantile(values: &mut Vec<f32>, share: f32) -> f32 {
+fn quantile(values: &mut [f32], share: f32) -> f32 {
     let at = (share * values.len() as f32) as usize;
     *values.select_nth_unstable_by(at, f32::total_cmp).1
 }
