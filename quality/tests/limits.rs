@@ -257,7 +257,7 @@ fn a_shifted_picture_is_noticed() {
 #[test]
 fn flipped_normals_are_noticed() {
     let flipped = |shown: Shown| Some(Shown { normal: -shown.normal, ..shown });
-    notices(&sample().spoilt(200, flipped), &["flipped", "normals:", "PSNR"]);
+    notices(&sample().spoilt(200, flipped), &["above 90°", "flipped", "normals:", "PSNR"]);
 }
 
 #[test]

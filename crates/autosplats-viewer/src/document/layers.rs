@@ -107,22 +107,28 @@ impl Document {
             places.extend(own.filter(|place| place.is_finite() && clip.is_none_or(|clip| clip.contains(*place))));
         }
         let origin = places.first().map_or(DVec3::ZERO, |place: &DVec3| place.round());
-        // Where sensors stood tells from where to look; which points they saw does not.
-        let scans = visible().flat_map(|layer| {
-            let moved = |scan: &Scan| {
-                let place = layer.local.map_or(scan.position(), |local| local.metres(scan.position()));
-                let world_from_sensor = layer.pose * DMat4::from_translation(place);
-                Scan { name: None, world_from_sensor, points: 0..0 }
-            };
-            layer.cloud.scans().iter().map(moved)
+        // Where sensors stood tells from where to look; which points they saw does not. Of points in a frame of their own that
+        // may be its origin.
+        let at = |world_from_sensor| Scan { name: None, world_from_sensor, points: 0..0 };
+        let sensors = |layer: &Layer| {
+            let place = |scan: &Scan| layer.local.map_or(scan.position(), |local| local.metres(scan.position()));
+            let mut places: Vec<DVec3> = layer.cloud.scans().iter().map(place).collect();
+            if places.is_empty() && *layer.cloud.crs() == Crs::default() {
+                places.push(DVec3::ZERO);
+            }
+            let pose = layer.pose;
+            places.into_iter().map(move |place| at(pose * DMat4::from_translation(place)))
+        };
+        let scans = visible().flat_map(sensors).collect();
+        let known = visible().filter(|layer| *layer.cloud.crs() != Crs::default());
+        let mut crs = known.map(|layer| match layer.local {
+            Some(_) => Crs { unit: Some(Unit::Metre), ..Crs::default() },
+            None => layer.cloud.crs().clone(),
         });
-        let crs = visible().next().map(|layer| {
-            let in_metres = layer.local.map(|_| Crs { unit: Some(Unit::Metre), ..Crs::default() });
-            in_metres.unwrap_or_else(|| layer.cloud.crs().clone())
-        });
+        let crs = crs.next().unwrap_or_default();
         PointCloud::new(origin, places.into_iter().map(|place| (place - origin).as_vec3().to_array()).collect())
-            .with_scans(scans.collect())
-            .with_crs(crs.unwrap_or_default())
+            .with_scans(scans)
+            .with_crs(crs)
     }
 
     /// The box around most of what is shown, by a part of the points.

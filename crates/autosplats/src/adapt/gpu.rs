@@ -8,8 +8,8 @@ use super::cpu::{
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
-    APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES, QUANTILE,
-    QUANTILE_DIFFERS, RISE, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
+    APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES,
+    QUANTILE, QUANTILE_DIFFERS, RISE, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -40,8 +40,8 @@ const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgs
 
 /// Invocations in a workgroup of the passes.
 const GROUP: usize = 64;
-/// Quantiles: of scatters at each scale, of the densest third of the sample, of the sparsest, and of all.
-const QUANTILES_TAKEN: usize = 3 * SCALES;
+/// Quantiles: of scatters at each scale, of the densest third of the sample, of the sparsest, of all, and of all by steady shares.
+const QUANTILES_TAKEN: usize = 4 * SCALES;
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 
@@ -270,6 +270,7 @@ impl AdaptPasses {
             ("DIFFERS_TO", DIFFERS_SHARES[1].into()),
             ("QUANTILE_DIFFERS", QUANTILE_DIFFERS.into()),
             ("STEADY_SCALES", STEADY_SCALES as f64),
+            ("LEAST_PAIRS", LEAST_PAIRS as f64),
         ];
         Ok(Self {
             arrange: Pass::new(

@@ -45,7 +45,10 @@ pub(super) const QUANTILE: f32 = 0.33;
 /// But scatter of structure grows from ball to ball, and noise's does not: it is *steady* where the next ball scatters less than so
 /// many times as much.
 pub(super) const STEADY: f32 = 1.3;
-/// Up to the first of these shares of steady balls there is structure and no noise, from the second on there is.
+/// Fewer thin balls say nothing of that.
+pub(super) const LEAST_PAIRS: usize = 32;
+/// Up to the first of these shares of steady balls there is structure and no noise, from the second on there is. Where the first
+/// scales tell nothing of noise, larger ones are not asked this.
 pub(super) const NOISE_SHARES: [f32; 2] = [0.05, 0.15];
 /// Above the first of these, noise begins to differ from place to place, as where two scans do not fit and the way from one to the
 /// other is across the surface in one place and along it in the next,
@@ -92,14 +95,16 @@ impl Noise {
     /// From a sample, densest first.
     fn of(sample: &[Sampled]) -> Self {
         let [dense, sparse] = ends(sample);
+        let all = scatter_level(sample, None);
+        // Of all, as the ends need not be told by the same scale.
         let steady = std::array::from_fn(|scale| steady_share(sample, scale));
-        let scatter_level = |part| scatter_level(part, steady);
+        let by_steady = if all > 0.0 { scatter_level(sample, Some(steady)) / all } else { 1.0 };
         let third = dense.len();
         if third > 0
             && let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius)
             && large > APART * small
         {
-            let [least, most] = [dense, sparse].map(scatter_level);
+            let [least, most] = [dense, sparse].map(|part| scatter_level(part, None));
             if least > 0.0 && most > least {
                 let growth = (most / least).ln() / (large / small).ln();
                 // Little growth is chance, or other things where points are sparse.
@@ -109,17 +114,15 @@ impl Noise {
                 if sure > 0.0 {
                     let power = sure * growth.min(2.0);
                     // Through the middle of the two, coming from what all say together.
-                    let middle = match scatter_level(sample) {
-                        0.0 => least.sqrt() * most.sqrt(),
-                        all => all.powf(1.0 - sure) * (least.sqrt() * most.sqrt()).powf(sure),
-                    };
+                    let both = least.sqrt() * most.sqrt();
+                    let middle = if all > 0.0 { all.powf(1.0 - sure) * both.powf(sure) } else { both };
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
-                    let level = middle * (beyond / (small.sqrt() * large.sqrt())).powf(power);
+                    let level = by_steady * middle * (beyond / (small.sqrt() * large.sqrt())).powf(power);
                     return Self { level, power, most: beyond };
                 }
             }
         }
-        Self { level: scatter_level(sample), power: 0.0, most: 0.0 }
+        Self { level: by_steady * all, power: 0.0, most: 0.0 }
     }
 }
 
@@ -201,20 +204,21 @@ struct Scatter {
     thin: bool,
 }
 
-/// The noise of a part of a sample whose points are about as dense; 0 if the part is too small to tell. Of the whole sample the
-/// steady shares are known.
-fn scatter_level(sample: &[Sampled], steady: [f32; STEADY_SCALES]) -> f32 {
+/// The noise of a part of a sample whose points are about as dense; 0 if the part is too small to tell. By the steady shares of
+/// each of the first scales, where they are asked.
+fn scatter_level(sample: &[Sampled], steady: Option<[Option<f32>; STEADY_SCALES]>) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
         if tells_noise(sample, scale) {
             let mut thin: Vec<f32> =
                 found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
+            let Some(steady) = steady else { return quantile(&mut thin, QUANTILE) };
             // Where there is structure as well, noise is steady in the smaller balls.
-            let most = steady.get(..=scale).map(|steady| steady.iter().copied().fold(0.0, f32::max));
-            let is_noise = most.map_or(1.0, |steady| between(NOISE_SHARES, steady));
+            let most = steady.get(..=scale).and_then(|known| known.iter().flatten().copied().reduce(f32::max));
+            let is_noise = most.map_or(1.0, |share| between(NOISE_SHARES, share));
             // At the second scale, noise as thick everywhere has two scatters as well.
-            let differs = if scale == 0 { between(DIFFERS_SHARES, steady[0]) } else { 0.0 };
+            let differs = steady[0].filter(|_| scale == 0).map_or(0.0, |share| between(DIFFERS_SHARES, share));
             return is_noise * quantile(&mut thin, QUANTILE + differs * (QUANTILE_DIFFERS - QUANTILE));
         }
         // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
@@ -256,8 +260,8 @@ fn tells_noise(sample: &[Sampled], scale: usize) -> bool {
     own >= THIN_SHARE && (own >= 1.0 - RISE || !rises())
 }
 
-/// Of the thin balls of a scale, those that are steady.
-fn steady_share(sample: &[Sampled], scale: usize) -> f32 {
+/// Share of a scale's thin balls that are steady, if there are enough.
+fn steady_share(sample: &[Sampled], scale: usize) -> Option<f32> {
     let (mut pairs, mut steady) = (0, 0);
     for sampled in sample {
         if let [Some(own), Some(next)] = [scale, scale + 1].map(|scale| sampled.scatter[scale])
@@ -267,7 +271,7 @@ fn steady_share(sample: &[Sampled], scale: usize) -> f32 {
             steady += usize::from(next.distance < STEADY * own.distance);
         }
     }
-    steady as f32 / pairs.max(1) as f32
+    (pairs >= LEAST_PAIRS).then(|| steady as f32 / pairs as f32)
 }
 
 /// How far a value is from the first to the second, 0 to 1.

@@ -55,9 +55,12 @@ fn k_radius(rank: u32) -> f32 {
 // Its level, power and largest k-radius.
 fn noise_of_sample() -> vec3f {
     let len = sampled[SAMPLE];
+    let all = scatter_level(ALL);
+    // Of all, as the ends need not be told by the same scale.
+    let by_steady = select(1.0, scatter_level(STEADY_ALL) / all, all > 0.0);
     let third = len / 3u;
     if third == 0u {
-        return vec3f(scatter_level(ALL), 0.0, 0.0);
+        return vec3f(by_steady * all, 0.0, 0.0);
     }
     let small = k_radius(third / 2u);
     let large = k_radius(len - third + third / 2u);
@@ -74,15 +77,14 @@ fn noise_of_sample() -> vec3f {
                 let power = sure * min(growth, 2.0);
                 // Through the middle of the two, coming from what all say together.
                 let both = sqrt(least) * sqrt(most);
-                let all = scatter_level(ALL);
-                let middle = select(pow(all, 1.0 - sure) * pow(both, sure), both, all == 0.0);
+                let middle = select(both, pow(all, 1.0 - sure) * pow(both, sure), all > 0.0);
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
-                let level = middle * pow(beyond / (sqrt(small) * sqrt(large)), power);
+                let level = by_steady * middle * pow(beyond / (sqrt(small) * sqrt(large)), power);
                 return vec3f(level, power, beyond);
             }
         }
     }
-    return vec3f(scatter_level(ALL), 0.0, 0.0);
+    return vec3f(by_steady * all, 0.0, 0.0);
 }
 
 @compute @workgroup_size(1)

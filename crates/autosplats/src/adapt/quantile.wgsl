@@ -1,5 +1,5 @@
 // A quantile of the scatter in balls of one size: a workgroup for each size of the densest third of the sample, then of the
-// sparsest, then of all of it.
+// sparsest, then of all of it, and once more of all of it by the steady shares.
 //
 // Reads: sampled, scatters. Writes: quantiles, each as what it tells and its bits.
 
@@ -25,6 +25,7 @@ override DIFFERS_FROM: f32;
 override DIFFERS_TO: f32;
 override QUANTILE_DIFFERS: f32;
 override STEADY_SCALES: u32;
+override LEAST_PAIRS: u32;
 
 // Balls that hold enough to fit, and those that are thin: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
@@ -36,12 +37,18 @@ var<workgroup> steady: array<atomic<u32>, STEADY_SCALES>;
 // Values below the one tried for each bit.
 var<workgroup> below: array<atomic<u32>, 32>;
 
+// Below 0 if too few balls tell it.
+fn steady_share(size: u32) -> f32 {
+    let count = atomicLoad(&pairs[size]);
+    return select(-1.0, f32(atomicLoad(&steady[size])) / f32(max(count, 1u)), count >= LEAST_PAIRS);
+}
+
 @compute @workgroup_size(64)
 fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let part = workgroup.x / SCALES;
     let scale = workgroup.x % SCALES;
     let kept = sampled[SAMPLE];
-    let len = select(kept / 3u, kept, part == ALL);
+    let len = select(kept / 3u, kept, part >= ALL);
     let begin = select(0u, kept - len, part == SPARSEST);
     let first = scale * SAMPLE + begin;
     let next = min(scale + 1u, SCALES - 1u) * SAMPLE + begin;
@@ -91,13 +98,14 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let next_share = f32(atomicLoad(&thin[1])) / f32(max(next_fitted, 1u));
     let rises = scale + 1u < SCALES && !(next_fitted >= least && next_share <= share + RISE);
     let is_thin = share >= THIN_SHARE && (share >= 1.0 - RISE || !rises);
-    let first_steady = f32(atomicLoad(&steady[0])) / f32(max(atomicLoad(&pairs[0]), 1u));
+    let first_steady = steady_share(0u);
     var most_steady = first_steady;
     for (var size = 1u; size < STEADY_SCALES && size <= scale; size++) {
-        most_steady = max(most_steady, f32(atomicLoad(&steady[size])) / f32(max(atomicLoad(&pairs[size]), 1u)));
+        most_steady = max(most_steady, steady_share(size));
     }
+    let is_asked = is_thin && part == STEADY_ALL;
     let differs = saturate((first_steady - DIFFERS_FROM) * (1.0 / (DIFFERS_TO - DIFFERS_FROM)));
-    let raised = select(0.0, differs * (QUANTILE_DIFFERS - QUANTILE), is_thin && scale == 0u);
+    let raised = select(0.0, differs * (QUANTILE_DIFFERS - QUANTILE), is_asked && scale == 0u);
     let at = u32((QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value that at most `at` are below, bit by bit.
     var found = 0u;
@@ -114,7 +122,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         found = select(found, tried, atomicLoad(&below[bit]) <= at);
     }
     let is_noise = saturate((most_steady - NOISE_FROM) * (1.0 / (NOISE_TO - NOISE_FROM)));
-    if is_thin && scale < STEADY_SCALES {
+    if is_asked && scale < STEADY_SCALES && most_steady >= 0.0 {
         found = bitcast<u32>(is_noise * bitcast<f32>(found));
     }
     if local == 0u {

@@ -31,6 +31,8 @@ const AHEAD: f64 = 0.45;
 const ASIDE_DEG: f64 = 20.0;
 /// Height of the picture over its distance from the eye for which these hold: at 40°.
 const UPRIGHT: f64 = 0.728;
+/// No field of view brings the eye nearer than this part of the way, or it would be past the sensor.
+const NEAREST: f64 = 0.4;
 /// What is as close to the way to the eye as this part of the distance is in the way,
 const IN_THE_WAY: f64 = 0.15;
 /// if it is one point in so many.
@@ -241,20 +243,23 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     }
     let near = || points.iter().filter(|p| p.truncate().length() <= most);
     let middle = near().sum::<DVec3>() / near().count() as f64;
-    // Along the way on which points reach furthest, which angles doubled tell for either end of it.
-    let doubled = |p: &DVec3| DVec2::new(p.x * p.x - p.y * p.y, 2.0 * p.x * p.y) / p.truncate().length().max(distance);
-    let way = DVec2::from_angle(0.5 * points.iter().map(doubled).sum::<DVec2>().to_angle());
-    // A sensor that sees one side alone is seen from behind. Else X or Y is ahead in most conventions.
+    // A sensor that sees one side is seen from behind, others along the way on which points reach furthest, which angles doubled
+    // tell for either end of it: towards X or Y, one of which is ahead in most conventions.
     let sees_one_side = middle.truncate().length() > ONE_SIDE * distance;
-    let is_ahead = if sees_one_side { middle.truncate() } else { DVec2::new(1.0, 0.9) };
-    let forward = way * way.dot(is_ahead).signum();
+    let doubled = |p: &DVec3| DVec2::new(p.x * p.x - p.y * p.y, 2.0 * p.x * p.y) / p.truncate().length().max(distance);
+    let forward = if sees_one_side {
+        middle.truncate().normalize()
+    } else {
+        let way = DVec2::from_angle(0.5 * points.iter().map(doubled).sum::<DVec2>().to_angle());
+        way * way.dot(DVec2::new(1.0, 0.9)).signum()
+    };
     let upright_at_1 = 2.0 * (0.5 * fov).to_radians().tan() * aspect.min(1.0);
     let place = |(end, side): (f64, f64)| {
         let forward = forward * end;
         let back = -DVec2::from_angle(side * ASIDE_DEG.to_radians()).rotate(forward);
         let eye = 0.5 * middle + (back * BEHIND).extend(ABOVE) * distance;
         let look_at = middle + (forward * AHEAD).extend(0.0) * distance;
-        [look_at + (eye - look_at) * (UPRIGHT / upright_at_1), look_at]
+        [look_at + (eye - look_at) * (UPRIGHT / upright_at_1).max(NEAREST), look_at]
     };
     // On either side, and from either end, whichever has less in the way; a few points are nothing.
     let places = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(place);
@@ -300,7 +305,7 @@ fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
+    use std::f64::consts::{PI, TAU};
 
     use autosplats_cloud::Unit;
     use glam::DMat4;
@@ -392,15 +397,20 @@ mod tests {
     #[test]
     fn a_sensor_that_sees_one_side_is_seen_from_behind() {
         let behind = |i: usize| DVec3::new(-10.0, 0.1 * i as f64, 4.0);
-        let camera = auto(&swept(DVec3::ZERO, 1.5, (0..60).map(behind)), 40.0, 1.5);
-        assert!(camera.eye.x < -5.0 && camera.look_at.x > 5.0, "whatever is there: {camera:?}");
+        let wall = |i: usize| DVec3::new(30.0, 0.1 * (i as f64 - 300.0), 0.0);
+        for azimuths in [1.5, PI, 3.6] {
+            let others = (0..60).map(behind).chain((0..600).map(wall));
+            let camera = auto(&swept(DVec3::ZERO, azimuths, others), 40.0, 1.5);
+            assert!(camera.eye.x < -5.0 && camera.look_at.x > 5.0, "{azimuths}, whatever is there: {camera:?}");
+        }
     }
 
     #[test]
     fn as_much_is_seen_whatever_the_field_of_view() {
         let cloud = swept(DVec3::ZERO, TAU, []);
-        for (fov, aspect) in [(20.0, 1.5), (40.0, 1.5), (70.0, 1.5), (40.0, 0.5)] {
+        for (fov, aspect) in [(20.0, 1.5), (40.0, 1.5), (70.0, 1.5), (110.0, 1.5), (40.0, 0.5)] {
             let camera = auto(&cloud, fov, aspect);
+            assert!(camera.eye.truncate().dot(camera.look_at.truncate()) < 0.0, "{fov}: the sensor is in between");
             let view = camera.view(DVec3::ZERO, [(300.0 * aspect) as u32, 300]).expect("a view");
             let [x, y] = view.to_pixel(view.to_view([0.0, 0.0, -1.7]));
             let size = [300.0 * aspect as f32, 300.0];

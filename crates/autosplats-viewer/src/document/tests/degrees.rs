@@ -58,6 +58,11 @@ fn sensors_of_an_overview_stand_where_they_stood() {
     }
     assert_eq!(overview.scans().len(), 3, "one each");
     assert_eq!(overview.crs().unit, Some(Unit::Metre), "not what the file has");
+    let mut document = Document::default();
+    document
+        .add(Layer::new("in its own frame", None, cloud(10, DVec3::ZERO)).opened_at(DMat4::from_translation(shift)));
+    let [scan] = document.overview().scans().to_vec().try_into().expect("one sensor");
+    assert_eq!(scan.position(), shift, "the origin moves with the points");
 }
 
 #[test]

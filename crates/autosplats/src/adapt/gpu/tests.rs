@@ -169,6 +169,7 @@ fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
         ("noisy bumps", true, noisy(test_clouds::bumpy(20_000), 0.015)),
         ("noisy edge", true, noisy(test_clouds::edge(20_000), 0.01)),
         ("scans that do not fit", true, test_clouds::misfit(40_000, 0.02)),
+        ("noise and structure", true, noisy(test_clouds::bumpy(6_000), 0.02)),
         ("receding", true, test_clouds::receding(30_000, 0.0008)),
         ("clean sphere", false, test_clouds::sphere(20_000)),
         ("clean bumps", false, test_clouds::bumpy(20_000)),
