@@ -9,7 +9,7 @@ use super::cpu::{
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
     APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES,
-    QUANTILE, QUANTILE_DIFFERS, RISE, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
+    QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -285,7 +285,8 @@ impl AdaptPasses {
             scatter: Pass::new(
                 gpu,
                 &SCATTERS,
-                &[&quadric[..], &[sample, step, least_reach, ("THIN", THIN.into())]].concat(),
+                &[&quadric[..], &[sample, step, least_reach, ("THIN", THIN.into()), ("ROUNDING", ROUNDING.into())]]
+                    .concat(),
             )?,
             quantile: Pass::new(gpu, &QUANTILES, &quantile)?,
             noise: Pass::new(

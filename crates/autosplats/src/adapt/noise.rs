@@ -35,6 +35,8 @@ pub(super) const LEAST_SAMPLE: usize = 64;
 pub(super) const LEAST_SHARE: usize = 5;
 /// A surface is thin in a ball if points scatter less than this part of the radius: of points that fill it, it is 0.4.
 pub(super) const THIN: f32 = 0.15;
+/// Less than this part of the radius is none: rounding leaves as much, and which ball has more of it is chance.
+pub(super) const ROUNDING: f32 = 1e-3;
 /// A scale tells the noise if this share of the sample finds a thin surface: the others may be of structure too small for it.
 pub(super) const THIN_SHARE: f32 = 0.3;
 /// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance. Where it
@@ -191,6 +193,7 @@ fn measure_scatter_with<'a, S: Simd>(
         if gathered.read(task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
             let plane = gathered.plane(simd);
             let distance = gathered.quadric(simd, *radius, plane.axis, plane.curvature()).scatter;
+            let distance = if distance < ROUNDING * *radius { 0.0 } else { distance };
             scatter[scale] = Some(Scatter { distance, thin: distance < THIN * *radius });
         }
     }
@@ -266,6 +269,7 @@ fn steady_share(sample: &[Sampled], scale: usize) -> Option<f32> {
     for sampled in sample {
         if let [Some(own), Some(next)] = [scale, scale + 1].map(|scale| sampled.scatter[scale])
             && own.thin
+            && own.distance > 0.0
         {
             pairs += 1;
             steady += usize::from(next.distance < STEADY * own.distance);

@@ -76,7 +76,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         var own_steady = 0u;
         for (var index = local; index < kept; index += 64u) {
             let bits = vec2u(scatters[size * SAMPLE + index], scatters[(size + 1u) * SAMPLE + index]);
-            if bits.x < THICK && bits.y != TOO_FEW {
+            if bits.x > 0u && bits.x < THICK && bits.y != TOO_FEW {
                 own_pairs += 1u;
                 let distance = bitcast<vec2f>(bits & vec2u(~THICK));
                 own_steady += select(0u, 1u, distance.y < STEADY * distance.x);

@@ -20,6 +20,7 @@
 override SAMPLE: u32;
 override STEP: f32;
 override THIN: f32;
+override ROUNDING: f32;
 
 @compute @workgroup_size(64)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -38,7 +39,8 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     let plane = plane_of(ball);
     var found = TOO_FEW;
     if plane.len >= LEAST_CLUSTERS {
-        let distance = quadric_of(ball, plane.axis, curvature_of(plane)).scatter;
+        let scatter = quadric_of(ball, plane.axis, curvature_of(plane)).scatter;
+        let distance = select(scatter, 0.0, scatter < ROUNDING * radius);
         found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN * radius);
     }
     scatters[index] = found;
