@@ -182,12 +182,14 @@ impl SplatPasses {
             ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
             ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
             ("LEAST_SHARE", LEAST_SHARE.into()),
-            ("FEWEST_POINTS", FEWEST_POINTS.into()),
+            ("FEWEST_POINTS_DENSE", FEWEST_POINTS[0].into()),
+            ("FEWEST_POINTS_SPARSE", FEWEST_POINTS[1].into()),
             ("MANY_POINTS", MANY_POINTS.into()),
             ("AROUND_PX", AROUND_PX.into()),
             ("OFF_PX", OFF_PX.into()),
+            ("FEWEST_SPLATS_DENSE", FEWEST_SPLATS[0].into()),
+            ("FEWEST_SPLATS_SPARSE", FEWEST_SPLATS[1].into()),
             ("DENSE_REACH_PX", DENSE_REACH_PX.into()),
-            ("FEWEST_SPLATS", FEWEST_SPLATS.into()),
             ("STEPS", STEPS.into()),
         ];
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];

@@ -10,7 +10,8 @@
 //! themselves, all of them, hidden or not (`Sixteenths`): close to an empty square of three pixels, a pixel stays if points lie
 //! on both sides of its middle, whichever line through it parts them. Where they are few, the mean of the splats around has to
 //! be close to its middle as well: noise strews points past the border, and splats are back on the surface. Lines between
-//! cores kept a row of tails wherever two cores stood out of a border.
+//! cores kept a row of tails wherever two cores stood out of a border. A surface that curves away has its points close together
+//! there, however far apart they are elsewhere: so it is how many there are at the pixel that decides.
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
 use super::centers::mean;
@@ -35,19 +36,20 @@ pub(super) const LEAST_REACH_PX: usize = 2;
 /// Of the sixteenths of pixels around a pixel that hold points, one in so many lies on either side at least, or the pixel is
 /// beside the surface.
 pub(super) const LEAST_SHARE: u32 = 8;
-/// Fewest of them, out of some 50, that tell; from how many on they do so alone.
-pub(super) const FEWEST_POINTS: u32 = 5;
+/// From how many of them on, out of some 50, they tell: where splats are dense, and where they are not; and from how many on they
+/// do so alone.
+pub(super) const FEWEST_POINTS: [u32; 2] = [5, 8];
 pub(super) const MANY_POINTS: u32 = 18;
 /// Splats closer than so many pixels are those around a pixel.
-pub(super) const AROUND_PX: f32 = 2.5;
-/// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it would be 0.6 pixels,
+pub(super) const AROUND_PX: f32 = 3.0;
+/// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it would be 0.72 pixels,
 /// at that of a surface which curves away, where they lie ever closer, less.
-pub(super) const OFF_PX: f32 = 0.58;
-/// Reach in pixels up to which a splat says that points are so dense: they are about two pixels apart then. By 3.5 the IoU
-/// gains another 0.0006, and gaps in noisy clouds and among sparse points open twice as far.
+pub(super) const OFF_PX: f32 = 0.7;
+/// From how many of them on their mean tells: where they are dense, and where they are not. There only a surface that curves away
+/// has as many at its border, and no gap among sparse points does.
+pub(super) const FEWEST_SPLATS: [f32; 2] = [3.0, 14.0];
+/// Reach in pixels up to which a splat says that splats are dense: points are about two pixels apart then.
 pub(super) const DENSE_REACH_PX: f32 = 3.0;
-/// Fewest of them whose mean tells.
-pub(super) const FEWEST_SPLATS: f32 = 3.0;
 /// Pixels from the middle of an empty square of three that are the border, along an axis; in a square, but for its corners. An
 /// empty pixel alone is a gap between points, which the rule for borders would widen.
 const BORDER_PX: usize = 3;
@@ -151,12 +153,13 @@ impl Outline<'_> {
         if own == EMPTY {
             return false;
         }
-        let by_points = if border && own.abs() <= DENSE_REACH_PX { self.is_beside([x, y]) } else { None };
+        let density = usize::from(own.abs() > DENSE_REACH_PX);
+        let by_points = if border { self.is_beside([x, y], density) } else { None };
         by_points.unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }
 
-    /// Whether pixel (x, y) is beside the surface, by the points around, if they tell.
-    fn is_beside(&self, [x, y]: [usize; 2]) -> Option<bool> {
+    /// Whether pixel (x, y) is beside the surface, by the points around, if they tell; `density` is 0 where splats are dense, or 1.
+    fn is_beside(&self, [x, y]: [usize; 2], density: usize) -> Option<bool> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
         // Of points beyond the picture nothing is known.
@@ -165,7 +168,7 @@ impl Outline<'_> {
         }
         let points = self.sixteenths.around([x, y]);
         let count = (points & DISC).count_ones();
-        if let Some(side) = open_side(points).filter(|_| count >= FEWEST_POINTS) {
+        if let Some(side) = open_side(points).filter(|_| count >= FEWEST_POINTS[density]) {
             // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
             let back = if side < LINES.len() { -1 } else { 1 };
             let [dx, dy] = LINES[side % LINES.len()].map(|along| back * along.signum());
@@ -176,11 +179,12 @@ impl Outline<'_> {
         if count >= MANY_POINTS {
             return Some(false);
         }
-        self.splats_offset([x, y]).map(|offset| square(offset) > OFF_PX * OFF_PX)
+        let (splats, offset) = self.splats_around([x, y]);
+        (splats >= FEWEST_SPLATS[density]).then(|| square(offset) > OFF_PX * OFF_PX)
     }
 
-    /// The mean offset, in pixels, of the splats around pixel (x, y), if they are dense enough to tell.
-    fn splats_offset(&self, [x, y]: [usize; 2]) -> Option<[f32; 2]> {
+    /// The number of splats around pixel (x, y) and their mean offset in pixels.
+    fn splats_around(&self, [x, y]: [usize; 2]) -> (f32, [f32; 2]) {
         let window = AROUND_PX as usize;
         let mut splats = 0.0;
         let mut sums = [0f32; 3];
@@ -195,7 +199,7 @@ impl Outline<'_> {
             }
         }
         let [weight, ox, oy] = sums;
-        (splats >= FEWEST_SPLATS).then(|| [ox / weight, oy / weight])
+        (splats, [ox / weight, oy / weight])
     }
 
     /// Whether the pixel is a tail that nothing closes in, of a splat that reaches so far.

@@ -20,15 +20,17 @@ override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 // Longest stride that stops where those of neighbours do.
 override LONGEST_ALIGNED: i32;
-// What part of the points around a pixel lies on each side, how many tell, and how many alone.
+// What part of the points around a pixel lies on each side, how many tell where splats are dense and where not, and how many alone.
 override LEAST_SHARE: u32;
-override FEWEST_POINTS: u32;
+override FEWEST_POINTS_DENSE: u32;
+override FEWEST_POINTS_SPARSE: u32;
 override MANY_POINTS: u32;
-// What splats around a pixel are, where their mean may be, and when they tell.
+// What splats around a pixel are, where their mean may be, how many tell where they are dense and where not, and which are dense.
 override AROUND_PX: f32;
 override OFF_PX: f32;
+override FEWEST_SPLATS_DENSE: f32;
+override FEWEST_SPLATS_SPARSE: f32;
 override DENSE_REACH_PX: f32;
-override FEWEST_SPLATS: f32;
 // Steps of a centre's place in its pixel.
 override STEPS: f32;
 
@@ -168,8 +170,8 @@ fn side(which: u32) -> vec2u {
 
 fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
     var answer = SILENT;
-    if border && abs(own) <= DENSE_REACH_PX {
-        answer = is_beside(pixel);
+    if border {
+        answer = is_beside(pixel, abs(own) <= DENSE_REACH_PX);
     }
     if answer == SILENT {
         return own > EMPTY_RIM && is_open(vec2i(pixel), own);
@@ -182,8 +184,8 @@ const SILENT = 0u;
 const YES = 1u;
 const NO = 2u;
 
-// Whether a pixel is beside the surface, by the points around.
-fn is_beside(pixel: vec2u) -> u32 {
+// Whether a pixel is beside the surface, by the points around; `dense` says whether splats are.
+fn is_beside(pixel: vec2u, dense: bool) -> u32 {
     let window = u32(AROUND_PX);
     // Of points beyond the picture nothing is known.
     if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
@@ -192,7 +194,7 @@ fn is_beside(pixel: vec2u) -> u32 {
     let points = around(pixel);
     let of_disc = count(points & (sides[0] | sides[8]));
     let open = open_side(points);
-    if of_disc >= FEWEST_POINTS && open < 16u {
+    if of_disc >= select(FEWEST_POINTS_SPARSE, FEWEST_POINTS_DENSE, dense) && open < 16u {
         // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
         if all((points & OWN) == vec2u(0u)) {
             return YES;
@@ -206,7 +208,7 @@ fn is_beside(pixel: vec2u) -> u32 {
     if of_disc >= MANY_POINTS {
         return NO;
     }
-    return mean_of_splats(pixel);
+    return mean_of_splats(pixel, select(FEWEST_SPLATS_SPARSE, FEWEST_SPLATS_DENSE, dense));
 }
 
 fn count(bits: vec2u) -> u32 {
@@ -248,8 +250,8 @@ fn of_pixel_at(index: u32) -> u32 {
     return (sixteenths[index / 2u] >> (16u * (index % 2u))) & 0xffffu;
 }
 
-// Whether the mean of the splats around a pixel is far from its middle.
-fn mean_of_splats(pixel: vec2u) -> u32 {
+// Whether the mean of the splats around a pixel is far from its middle, if there are enough of them.
+fn mean_of_splats(pixel: vec2u, fewest: f32) -> u32 {
     let window = u32(AROUND_PX);
     var splats = 0.0;
     var sum = 0.0;
@@ -265,7 +267,7 @@ fn mean_of_splats(pixel: vec2u) -> u32 {
             offsets += weight * offset;
         }
     }
-    if splats < FEWEST_SPLATS {
+    if splats < fewest {
         return SILENT;
     }
     let offset = offsets / sum;
