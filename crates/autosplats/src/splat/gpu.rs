@@ -14,8 +14,8 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::{
-    AROUND_PX, CORE_WEIGHT, DENSE_REACH_PX, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
-    LEAST_SHARE, LONGEST_ALIGNED, MANY_POINTS, OFF_PX, STRIDES_PER_REACH,
+    AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
+    LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
 };
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -182,14 +182,14 @@ impl SplatPasses {
             ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
             ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
             ("LEAST_SHARE", LEAST_SHARE.into()),
-            ("FEWEST_POINTS_DENSE", FEWEST_POINTS[0].into()),
-            ("FEWEST_POINTS_SPARSE", FEWEST_POINTS[1].into()),
+            ("FEWEST_POINTS_NARROW", FEWEST_POINTS[0].into()),
+            ("FEWEST_POINTS_WIDE", FEWEST_POINTS[1].into()),
             ("MANY_POINTS", MANY_POINTS.into()),
             ("AROUND_PX", AROUND_PX.into()),
             ("OFF_PX", OFF_PX.into()),
-            ("FEWEST_SPLATS_DENSE", FEWEST_SPLATS[0].into()),
-            ("FEWEST_SPLATS_SPARSE", FEWEST_SPLATS[1].into()),
-            ("DENSE_REACH_PX", DENSE_REACH_PX.into()),
+            ("FEWEST_SPLATS_NARROW", FEWEST_SPLATS[0].into()),
+            ("FEWEST_SPLATS_WIDE", FEWEST_SPLATS[1].into()),
+            ("NARROW_PX", NARROW_PX.into()),
             ("STEPS", STEPS.into()),
         ];
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];

@@ -6,12 +6,12 @@
 //! if on one of eight lines through it there is a core in both directions, at most five times as far as the splat there
 //! reaches, and nothing empty in between; or if there is no core around it at all.
 //!
-//! Where points are about as dense as pixels, discs are too coarse a measure, and what ends the surface are the points
-//! themselves, all of them, hidden or not (`Sixteenths`): close to an empty square of three pixels, a pixel stays if points lie
-//! on both sides of its middle, whichever line through it parts them. Where they are few, the mean of the splats around has to
-//! be close to its middle as well: noise strews points past the border, and splats are back on the surface. Lines between
-//! cores kept a row of tails wherever two cores stood out of a border. A surface that curves away has its points close together
-//! there, however far apart they are elsewhere: so it is how many there are at the pixel that decides.
+//! Where points are dense, discs are too coarse a measure, and what ends the surface are the points themselves, all of them,
+//! hidden or not (`Sixteenths`): close to an empty square of three pixels, a pixel stays if points lie on both sides of its
+//! middle, whichever line through it parts them. Where they are few, the mean of the splats around has to be close to its middle
+//! as well: noise strews points past the border, and splats are back on the surface. Lines between cores kept a row of tails
+//! wherever two cores stood out of a border. A surface that curves away has its points close together at its border, however wide
+//! its splats are where it faces the eye: so wide splats are asked as well, but more points have to say it.
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
 use super::centers::mean;
@@ -36,8 +36,8 @@ pub(super) const LEAST_REACH_PX: usize = 2;
 /// Of the sixteenths of pixels around a pixel that hold points, one in so many lies on either side at least, or the pixel is
 /// beside the surface.
 pub(super) const LEAST_SHARE: u32 = 8;
-/// From how many of them on, out of some 50, they tell: where splats are dense, and where they are not; and from how many on they
-/// do so alone.
+/// From how many of them on, out of some 50, they tell: around narrow splats, and around wide ones; and from how many on they do so
+/// alone.
 pub(super) const FEWEST_POINTS: [u32; 2] = [5, 8];
 pub(super) const MANY_POINTS: u32 = 18;
 /// Splats closer than so many pixels are those around a pixel.
@@ -45,11 +45,11 @@ pub(super) const AROUND_PX: f32 = 3.0;
 /// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it would be 0.72 pixels,
 /// at that of a surface which curves away, where they lie ever closer, less.
 pub(super) const OFF_PX: f32 = 0.7;
-/// From how many of them on their mean tells: where they are dense, and where they are not. There only a surface that curves away
-/// has as many at its border, and no gap among sparse points does.
+/// From how many of them on their mean tells: around narrow splats, and around wide ones, of which only a surface that curves away
+/// has as many at its border, and no gap among sparse points.
 pub(super) const FEWEST_SPLATS: [f32; 2] = [3.0, 14.0];
-/// Reach in pixels up to which a splat says that splats are dense: points are about two pixels apart then.
-pub(super) const DENSE_REACH_PX: f32 = 3.0;
+/// Reach in pixels of the widest narrow splat: points are about two pixels apart then.
+pub(super) const NARROW_PX: f32 = 3.0;
 /// Pixels from the middle of an empty square of three that are the border, along an axis; in a square, but for its corners. An
 /// empty pixel alone is a gap between points, which the rule for borders would widen.
 const BORDER_PX: usize = 3;
@@ -153,13 +153,12 @@ impl Outline<'_> {
         if own == EMPTY {
             return false;
         }
-        let density = usize::from(own.abs() > DENSE_REACH_PX);
-        let by_points = if border { self.is_beside([x, y], density) } else { None };
+        let by_points = if border { self.is_beside([x, y], own.abs() > NARROW_PX) } else { None };
         by_points.unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }
 
-    /// Whether pixel (x, y) is beside the surface, by the points around, if they tell; `density` is 0 where splats are dense, or 1.
-    fn is_beside(&self, [x, y]: [usize; 2], density: usize) -> Option<bool> {
+    /// Whether pixel (x, y) is beside the surface, by the points around, if they tell; `wide` says whether its splat is.
+    fn is_beside(&self, [x, y]: [usize; 2], wide: bool) -> Option<bool> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
         // Of points beyond the picture nothing is known.
@@ -168,7 +167,7 @@ impl Outline<'_> {
         }
         let points = self.sixteenths.around([x, y]);
         let count = (points & DISC).count_ones();
-        if let Some(side) = open_side(points).filter(|_| count >= FEWEST_POINTS[density]) {
+        if let Some(side) = open_side(points).filter(|_| count >= FEWEST_POINTS[usize::from(wide)]) {
             // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
             let back = if side < LINES.len() { -1 } else { 1 };
             let [dx, dy] = LINES[side % LINES.len()].map(|along| back * along.signum());
@@ -179,12 +178,12 @@ impl Outline<'_> {
         if count >= MANY_POINTS {
             return Some(false);
         }
-        let (splats, offset) = self.splats_around([x, y]);
-        (splats >= FEWEST_SPLATS[density]).then(|| square(offset) > OFF_PX * OFF_PX)
+        let offset = self.splats_offset([x, y], FEWEST_SPLATS[usize::from(wide)])?;
+        Some(square(offset) > OFF_PX * OFF_PX)
     }
 
-    /// The number of splats around pixel (x, y) and their mean offset in pixels.
-    fn splats_around(&self, [x, y]: [usize; 2]) -> (f32, [f32; 2]) {
+    /// The mean offset, in pixels, of the splats around pixel (x, y), if there are so many.
+    fn splats_offset(&self, [x, y]: [usize; 2], fewest: f32) -> Option<[f32; 2]> {
         let window = AROUND_PX as usize;
         let mut splats = 0.0;
         let mut sums = [0f32; 3];
@@ -199,7 +198,7 @@ impl Outline<'_> {
             }
         }
         let [weight, ox, oy] = sums;
-        (splats, [ox / weight, oy / weight])
+        (splats >= fewest).then(|| [ox / weight, oy / weight])
     }
 
     /// Whether the pixel is a tail that nothing closes in, of a splat that reaches so far.
@@ -290,8 +289,8 @@ mod tests {
                 };
             }
         }
-        let outline =
-            Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &Sixteenths::default(), view: &view };
+        let sixteenths = Sixteenths::with(size.map(|side| side as usize), []);
+        let outline = Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view };
         let border = outline.border([0, 0]);
         let row = |(y, row): (usize, &&str)| {
             let goes = |x: usize| outline.sticks_out(x, y, border[y] >> x & 1 == 1);
@@ -405,6 +404,47 @@ mod tests {
                 "{density} points a pixel: {some} wrong by those drawn, {all} by all"
             );
         }
+    }
+
+    /// Of the pixels within two of a slanted line, below which points lie at depths that `depth` makes of numbers from 0 to 1, in
+    /// pixels: the share where points tell whether it is beside the surface, and of those the share that are right.
+    fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
+        let size = [TILE, TILE];
+        let line = |x: f32| 12.0 + 0.27 * x;
+        let mut random = Random::new(54);
+        let point = |at: usize| {
+            let x = (at / per_column) as f32 + random.unit();
+            [x, line(x) + depth(random.unit())]
+        };
+        let points: Vec<_> = (0..size[0] * per_column).map(point).filter(|point| point[1] < TILE as f32).collect();
+        let mut centers = vec![0; TILE_AREA];
+        for &[x, y] in &points {
+            centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
+        }
+        let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
+        let outline = Outline { rims: &[4.0; TILE_AREA], centers: &centers, sixteenths: &sixteenths, view: &view };
+        let mut counts = [0, 0, 0];
+        for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
+            let below = y as f32 + 0.5 - line(x as f32 + 0.5);
+            if below.abs() < 2.0 {
+                let is_beside = outline.is_beside([x, y], wide);
+                let is_right = is_beside == Some(below < 0.0);
+                counts =
+                    [counts[0] + 1, counts[1] + usize::from(is_beside.is_some()), counts[2] + usize::from(is_right)];
+            }
+        }
+        [counts[1] as f64 / counts[0] as f64, counts[2] as f64 / counts[1] as f64]
+    }
+
+    #[test]
+    fn wide_splats_end_by_points_where_these_lie_close() {
+        // A surface that curves away: a fifth of its points lie in the last of 30 pixels before it ends.
+        let [share, right] = told(true, 20, |part| 30.0 * part * part);
+        assert!(share > 0.9 && right > 0.85, "of a curved surface {share} told, {right} of them right");
+        // The border of a gap among points three pixels apart.
+        let sparse = |wide: bool| told(wide, 3, |part| 30.0 * part)[0];
+        let [narrow, wide] = [false, true].map(sparse);
+        assert!(narrow > 0.1 && wide < 0.02, "of a gap's border {wide} told, {narrow} if splats were narrow");
     }
 
     #[test]

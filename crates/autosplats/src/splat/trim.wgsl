@@ -20,17 +20,19 @@ override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
 // Longest stride that stops where those of neighbours do.
 override LONGEST_ALIGNED: i32;
-// What part of the points around a pixel lies on each side, how many tell where splats are dense and where not, and how many alone.
+// What part of the points around a pixel lies on each side, how many tell around narrow splats and around wide ones, and how many
+// alone.
 override LEAST_SHARE: u32;
-override FEWEST_POINTS_DENSE: u32;
-override FEWEST_POINTS_SPARSE: u32;
+override FEWEST_POINTS_NARROW: u32;
+override FEWEST_POINTS_WIDE: u32;
 override MANY_POINTS: u32;
-// What splats around a pixel are, where their mean may be, how many tell where they are dense and where not, and which are dense.
+// What splats around a pixel are, where their mean may be, how many tell around narrow ones and around wide ones, and which are
+// narrow.
 override AROUND_PX: f32;
 override OFF_PX: f32;
-override FEWEST_SPLATS_DENSE: f32;
-override FEWEST_SPLATS_SPARSE: f32;
-override DENSE_REACH_PX: f32;
+override FEWEST_SPLATS_NARROW: f32;
+override FEWEST_SPLATS_WIDE: f32;
+override NARROW_PX: f32;
 // Steps of a centre's place in its pixel.
 override STEPS: f32;
 
@@ -171,7 +173,7 @@ fn side(which: u32) -> vec2u {
 fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
     var answer = SILENT;
     if border {
-        answer = is_beside(pixel, abs(own) <= DENSE_REACH_PX);
+        answer = is_beside(pixel, abs(own) > NARROW_PX);
     }
     if answer == SILENT {
         return own > EMPTY_RIM && is_open(vec2i(pixel), own);
@@ -184,8 +186,8 @@ const SILENT = 0u;
 const YES = 1u;
 const NO = 2u;
 
-// Whether a pixel is beside the surface, by the points around; `dense` says whether splats are.
-fn is_beside(pixel: vec2u, dense: bool) -> u32 {
+// Whether a pixel is beside the surface, by the points around; `wide` says whether its splat is.
+fn is_beside(pixel: vec2u, wide: bool) -> u32 {
     let window = u32(AROUND_PX);
     // Of points beyond the picture nothing is known.
     if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
@@ -194,7 +196,7 @@ fn is_beside(pixel: vec2u, dense: bool) -> u32 {
     let points = around(pixel);
     let of_disc = count(points & (sides[0] | sides[8]));
     let open = open_side(points);
-    if of_disc >= select(FEWEST_POINTS_SPARSE, FEWEST_POINTS_DENSE, dense) && open < 16u {
+    if of_disc >= select(FEWEST_POINTS_NARROW, FEWEST_POINTS_WIDE, wide) && open < 16u {
         // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
         if all((points & OWN) == vec2u(0u)) {
             return YES;
@@ -208,7 +210,7 @@ fn is_beside(pixel: vec2u, dense: bool) -> u32 {
     if of_disc >= MANY_POINTS {
         return NO;
     }
-    return mean_of_splats(pixel, select(FEWEST_SPLATS_SPARSE, FEWEST_SPLATS_DENSE, dense));
+    return mean_of_splats(pixel, select(FEWEST_SPLATS_NARROW, FEWEST_SPLATS_WIDE, wide));
 }
 
 fn count(bits: vec2u) -> u32 {
