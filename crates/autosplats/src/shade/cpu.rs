@@ -7,8 +7,8 @@ use rayon::prelude::*;
 
 use super::color_map::Scale;
 use super::depths::{Depths, LANES};
-use super::edges::{Edges, INWARD, SEARCH};
-use super::light::{CLAY, EDGE_ON, SCANNED_LIGHT, light, tone};
+use super::edges::{Edges, INWARD, LESS_TILTED, SEARCH};
+use super::light::{CLAY, SCANNED_LIGHT, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
 use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
@@ -162,7 +162,7 @@ impl Band {
             let background = background(shader.shading.background, (y as f32 + 0.5) / height as f32);
             shader.edges.mark(depths, y as isize, edges);
             for (x, (out, &edge)) in out.iter_mut().zip(&*edges).enumerate() {
-                let color = shader.pixel(depths, x, y, left(x, y));
+                let color = shader.pixel(depths, x, y, left(x, y), edge);
                 *out = color.map_or(background, |color| inks.encode(color));
                 if let (Some(color), Some(linear)) = (color, linear.get_mut(row * width + x)) {
                     *linear = color;
@@ -171,7 +171,7 @@ impl Band {
                     continue;
                 }
                 let Some(blend) = shader.edges.blend(depths, [width, height], x, y) else { continue };
-                let other = shader.pixel(depths, blend.x, blend.y, left(blend.x, blend.y));
+                let other = shader.pixel(depths, blend.x, blend.y, left(blend.x, blend.y), true);
                 *out = match (color, other) {
                     (Some(color), Some(other)) => inks.encode(mix(color, other, blend.part)),
                     (Some(color), None) => inks.over(color, 1.0 - blend.part, background),
@@ -210,8 +210,8 @@ impl<'a> Shader<'a> {
         shader
     }
 
-    /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion.
-    fn pixel(&self, depths: &Depths, x: usize, y: usize, left: f32) -> Option<[f32; 3]> {
+    /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion; `edge` says whether it is at one.
+    fn pixel(&self, depths: &Depths, x: usize, y: usize, left: f32, edge: bool) -> Option<[f32; 3]> {
         let index = self.layers.index(x, y);
         if !(self.layers.weight[index] > 0.0) {
             return None;
@@ -220,7 +220,8 @@ impl<'a> Shader<'a> {
         if !self.shading.lighting {
             return Some(base.map(|channel| channel * left));
         }
-        let light = light(self.outward_normal(depths, x, y, index), self.given_light);
+        let normal = if edge { self.outward_normal(depths, x, y, index) } else { self.layers.normal[index].into() };
+        let light = light(normal, self.given_light);
         Some(std::array::from_fn(|i| tone(base[i] * light[i] * left)))
     }
 
@@ -236,20 +237,20 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The normal that light falls on. Normals face the eye; one seen nearly edge on, at a border, may have been turned
-    /// round for it by a hair's breadth, and would catch the light of the other side. There the surface falls back
-    /// towards the border though the normal says that it rises.
+    /// The normal that light falls on at an edge. Of points close to a silhouette some are seen although their surface looks away;
+    /// their normals, turned to the eye, catch the light of the other side, and among others make one that is nobody's. Where the
+    /// surface falls back towards its border but the normal there is tilted less towards it than further in, that one is taken.
     fn outward_normal(&self, depths: &Depths, x: usize, y: usize, index: usize) -> Vec3 {
         let normal = Vec3::from(self.layers.normal[index]);
-        if normal.z < -EDGE_ON {
-            return normal;
-        }
         let size = [self.layers.width as usize, self.layers.height as usize];
         let [out_x, out_y] = self.edges.outward(depths, size, x, y);
-        let inner = depths.at(x as isize - INWARD * out_x, y as isize - INWARD * out_y);
-        let rises = normal.x * (out_x as f32) + normal.y * (out_y as f32) < 0.0;
-        let turned = rises && inner < self.layers.depth[index];
-        if turned { Vec3::new(-normal.x, -normal.y, normal.z) } else { normal }
+        let [inner_x, inner_y] = [x as isize - INWARD * out_x, y as isize - INWARD * out_y];
+        if !(depths.at(inner_x, inner_y) < self.layers.depth[index]) {
+            return normal;
+        }
+        let inner = Vec3::from(self.layers.normal[self.layers.index(inner_x as usize, inner_y as usize)]);
+        let tilt = |normal: Vec3| normal.x * out_x as f32 + normal.y * out_y as f32;
+        if tilt(normal) < tilt(inner) - LESS_TILTED { inner } else { normal }
     }
 
     fn base_color(&self, x: usize, y: usize, index: usize) -> [f32; 3] {

@@ -17,6 +17,8 @@ const STEEPEST: f32 = 4.0;
 pub(super) const SEARCH: isize = 12;
 /// How far from a border it is seen where the surface comes from, in pixels: the splats of the border itself may be tilted.
 pub(super) const INWARD: isize = 3;
+/// How much less than there, by components of unit normals towards the border, its normal has to be tilted to be of no use.
+pub(super) const LESS_TILTED: f32 = 0.3;
 /// Sides of a pixel.
 const SIDES: [[isize; 2]; 4] = [[0, -1], [0, 1], [-1, 0], [1, 0]];
 

@@ -19,8 +19,6 @@ pub(super) const SKY: [f32; 3] = [0.125, 0.142, 0.165];
 /// Light on points with colours, which were lit once when they were scanned: a part whatever the normal, and a share of
 /// the lights above, so that a surface seen straight on keeps its colour.
 pub(super) const SCANNED_LIGHT: [f32; 2] = [0.42, 0.74];
-/// Cosine between the line of sight and a normal up to which a surface is seen nearly edge on.
-pub(super) const EDGE_ON: f32 = 0.6;
 /// Brightness from which a lit colour rises less, so that it nears white and never reaches it.
 pub(super) const SHOULDER: f32 = 0.8;
 

@@ -154,19 +154,23 @@ fn side_of(index: u32) -> vec2i {
     return select(vec2i(0, step), vec2i(step, 0), index >= 2u);
 }
 
-// The normal that light falls on: one seen nearly edge on, at a border, was turned round if the surface falls back towards
-// the border though the normal says that it rises.
+// The normal that light falls on: where the surface falls back towards its border but the normal there is tilted less towards
+// it than further in, that one.
 fn outward_normal(pixel: vec2i, surface_here: vec4f) -> vec3f {
-    let normal = surface_here.xyz;
     var outward = vec2i(0);
-    for (var index = select(0u, 4u, normal.z < -shading.edge_on); index < 4u; index++) {
+    for (var index = 0u; index < 4u; index++) {
         let side = side_of(index);
         if is_inside(pixel + side) && edge_step(surface_here.w, depth_at(pixel + side)) == 1 {
             outward += side;
         }
     }
-    let rises = normal.x * f32(outward.x) + normal.y * f32(outward.y) < 0.0;
-    return select(normal, vec3f(-normal.xy, normal.z), rises && depth_at(pixel - INWARD * outward) < surface_here.w);
+    let inner_pixel = pixel - INWARD * outward;
+    if !(depth_at(inner_pixel) < surface_here.w) {
+        return surface_here.xyz;
+    }
+    let inner = surface[u32(inner_pixel.y) * frame.size.x + u32(inner_pixel.x)].xyz;
+    let tilts = vec2f(outward) * mat2x2f(surface_here.xy, inner.xy);
+    return select(surface_here.xyz, inner, tilts.x < tilts.y - shading.less_tilted);
 }
 
 // The colour of the surface at a pixel.

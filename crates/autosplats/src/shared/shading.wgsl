@@ -50,8 +50,8 @@ struct ShadeUniform {
     measures: u32,
     // How far the ends of a row of edges are looked for, in pixels.
     edge_search: i32,
-    // Cosine up to which a surface is seen nearly edge on.
-    edge_on: f32,
+    // How much less than further in a normal at a border has to be tilted to be of no use.
+    less_tilted: f32,
     // Pairs of pixels for occlusion: the step to the second one, one by its length in pixels, and the pair's part.
     pairs: array<vec4f, 10>,
 }

@@ -438,7 +438,7 @@ mod tests {
 
     #[test]
     fn wide_splats_end_by_points_where_these_lie_close() {
-        // A surface that curves away: a fifth of its points lie in the last of 30 pixels before it ends.
+        // A surface that curves away: of the points of 30 pixels nearly a fifth lie in the last one before it ends.
         let [share, right] = told(true, 20, |part| 30.0 * part * part);
         assert!(share > 0.9 && right > 0.85, "of a curved surface {share} told, {right} of them right");
         // The border of a gap among points three pixels apart.

@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::super::cpu::{ENCODE_STEPS, Scene, darkening, given_light, sample_step, shows_colors};
-use super::super::edges::{Edges, SEARCH};
-use super::super::light::{CLAY, EDGE_ON, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY};
+use super::super::edges::{Edges, LESS_TILTED, SEARCH};
+use super::super::light::{CLAY, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY};
 use super::super::occlusion::{FURTHEST, LEAST_RISE, PAIR_COUNT, STEEPEST, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
@@ -74,7 +74,7 @@ pub(crate) struct ShadeUniform {
     pub(crate) backgrounds: u32,
     pub(crate) measures: u32,
     pub(crate) edge_search: i32,
-    pub(crate) edge_on: f32,
+    pub(crate) less_tilted: f32,
     pub(crate) pairs: [[f32; 4]; PAIR_COUNT],
 }
 
@@ -121,7 +121,7 @@ impl ShadeUniform {
             backgrounds: encode_words() as u32,
             measures: if layers.channels.color { pixels as u32 } else { 0 },
             edge_search: SEARCH as i32,
-            edge_on: EDGE_ON,
+            less_tilted: LESS_TILTED,
             pairs: pairs(height).map(|pair| {
                 let [dx, dy] = pair.step.map(|side| side as f32);
                 [dx, dy, pair.inverse_px, pair.part]

@@ -114,7 +114,7 @@ fn mirrored() -> [Mirrored; 10] {
                 backgrounds,
                 measures,
                 edge_search,
-                edge_on,
+                less_tilted,
                 pairs,
             }
         ),
