@@ -15,9 +15,11 @@ use crate::camera::View;
 const STEEPEST: f32 = 4.0;
 /// How far the ends of a row of edges are looked for, in pixels to either side.
 pub(super) const SEARCH: isize = 12;
-/// How far from a border it is seen where the surface comes from, in pixels: the splats of the border itself may be tilted.
+/// How far from a border it is seen where the surface comes from and how it is tilted, in pixels: the splats of the border itself
+/// may be tilted otherwise.
 pub(super) const INWARD: isize = 3;
-/// How much less than there, by components of unit normals towards the border, its normal has to be tilted to be of no use.
+/// A normal at a border is not used if its component towards the border is so much smaller than that of the normal further in; at
+/// a corner of pixels, the sum of both components.
 pub(super) const LESS_TILTED: f32 = 0.3;
 /// Sides of a pixel.
 const SIDES: [[isize; 2]; 4] = [[0, -1], [0, 1], [-1, 0], [1, 0]];

@@ -155,10 +155,10 @@ fn side_of(index: u32) -> vec2i {
 }
 
 // The normal that light falls on: where the surface falls back towards its border but the normal there is tilted less towards
-// it than further in, that one.
-fn outward_normal(pixel: vec2i, surface_here: vec4f) -> vec3f {
+// it than further in, that one. Away from edges nothing has to be looked at.
+fn outward_normal(pixel: vec2i, surface_here: vec4f, at_edge: bool) -> vec3f {
     var outward = vec2i(0);
-    for (var index = 0u; index < 4u; index++) {
+    for (var index = select(4u, 0u, at_edge); index < 4u; index++) {
         let side = side_of(index);
         if is_inside(pixel + side) && edge_step(surface_here.w, depth_at(pixel + side)) == 1 {
             outward += side;
@@ -174,7 +174,7 @@ fn outward_normal(pixel: vec2i, surface_here: vec4f) -> vec3f {
 }
 
 // The colour of the surface at a pixel.
-fn surface_color(pixel: vec2u) -> vec3f {
+fn surface_color(pixel: vec2u, at_edge: bool) -> vec3f {
     let index = pixel.y * frame.size.x + pixel.x;
     let surface_here = surface[index];
     var color = tone_back(base_color(pixel, index, surface_here), index);
@@ -182,7 +182,7 @@ fn surface_color(pixel: vec2u) -> vec3f {
         color *= light_left(vec2i(pixel), surface_here.w);
     }
     if shading.lighting == 1u {
-        color = tone(color * light(outward_normal(vec2i(pixel), surface_here)));
+        color = tone(color * light(outward_normal(vec2i(pixel), surface_here, at_edge)));
     }
     return color;
 }
@@ -291,7 +291,8 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
         let pixel = first + vec2u(0u, 2u * step);
         var side = vec2i(0);
         var part = 0.0;
-        for (var index = select(4u, 0u, (edges & (1u << step)) != 0u); index < 4u; index++) {
+        let at_edge = (edges & (1u << step)) != 0u;
+        for (var index = select(4u, 0u, at_edge); index < 4u; index++) {
             let side_part = part_of(side_of(index), vec2i(pixel));
             if side_part > part {
                 side = side_of(index);
@@ -304,7 +305,7 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
         var own = vec3f(0.0);
         var beside = vec3f(0.0);
         for (var index = select(1u, 0u, is_surface); index < select(1u, 2u, beside_is_surface); index++) {
-            let color = surface_color(vec2u(vec2i(pixel) + select(vec2i(0), side, index == 1u)));
+            let color = surface_color(vec2u(vec2i(pixel) + select(vec2i(0), side, index == 1u)), at_edge);
             own = select(own, color, index == 0u);
             beside = select(beside, color, index == 1u);
         }

@@ -50,7 +50,7 @@ struct ShadeUniform {
     measures: u32,
     // How far the ends of a row of edges are looked for, in pixels.
     edge_search: i32,
-    // How much less than further in a normal at a border has to be tilted to be of no use.
+    // A normal at a border is not used if it is tilted so much less towards it than one further in.
     less_tilted: f32,
     // Pairs of pixels for occlusion: the step to the second one, one by its length in pixels, and the pair's part.
     pairs: array<vec4f, 10>,

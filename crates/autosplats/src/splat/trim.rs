@@ -42,8 +42,8 @@ pub(super) const FEWEST_POINTS: [u32; 2] = [5, 8];
 pub(super) const MANY_POINTS: u32 = 18;
 /// Splats closer than so many pixels are those around a pixel.
 pub(super) const AROUND_PX: f32 = 3.0;
-/// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it would be 0.72 pixels,
-/// at that of a surface which curves away, where they lie ever closer, less.
+/// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it is 0.8 pixels off, at that
+/// of a surface which curves away, where they lie ever closer, less.
 pub(super) const OFF_PX: f32 = 0.7;
 /// From how many of them on their mean tells: around narrow splats, and around wide ones, of which only a surface that curves away
 /// has as many at its border, and no gap among sparse points.
