@@ -210,7 +210,8 @@ impl<'a> Shader<'a> {
         shader
     }
 
-    /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion; `edge` says whether it is at one.
+    /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion; `edge` says whether it is
+    /// at one.
     fn pixel(&self, depths: &Depths, x: usize, y: usize, left: f32, edge: bool) -> Option<[f32; 3]> {
         let index = self.layers.index(x, y);
         if !(self.layers.weight[index] > 0.0) {
@@ -237,9 +238,10 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The normal that light falls on at an edge. Of points close to a silhouette some are seen although their surface looks away;
-    /// their normals, turned to the eye, catch the light of the other side, and among others make one that is nobody's. Where the
-    /// surface falls back towards its border but the normal there is tilted clearly less towards it than further in, that one is taken.
+    /// The normal that light falls on at an edge. Of points close to a silhouette some are seen although their surface looks
+    /// away; their normals, turned to the eye, catch the light of the other side, and among others make one that is nobody's.
+    /// Where the surface falls back towards its border but the normal there is tilted clearly less towards it than further in,
+    /// that one is taken.
     fn outward_normal(&self, depths: &Depths, x: usize, y: usize, index: usize) -> Vec3 {
         let normal = Vec3::from(self.layers.normal[index]);
         let size = [self.layers.width as usize, self.layers.height as usize];

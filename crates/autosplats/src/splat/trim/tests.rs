@@ -1,0 +1,252 @@
+//! Trimming drawings, and borders of points strewn below lines.
+
+use super::super::centers::one;
+use super::*;
+use crate::camera::{Camera, Projection};
+use crate::test_clouds::Random;
+use autosplats_cloud::glam::DVec3;
+
+fn view(size: [u32; 2]) -> View {
+    let camera =
+        Camera { eye: DVec3::ZERO, look_at: DVec3::X, up: DVec3::Z, projection: Projection::OrthographicHeight(1.0) };
+    camera.view(DVec3::ZERO, size).expect("a view")
+}
+
+/// The pixels of a drawing (`#` core, `+` tail that reaches 4 pixels, `*` one that reaches 12, blank empty) that trimming
+/// takes off, as `x`.
+fn trimmed(drawing: &[&str]) -> Vec<String> {
+    let size = [drawing[0].len() as u32, drawing.len() as u32];
+    let view = view(size);
+    let mut rims = vec![EMPTY; TILE_AREA];
+    for (y, row) in drawing.iter().enumerate() {
+        for (x, pixel) in row.bytes().enumerate() {
+            rims[tiled_index(size[0] as usize, x, y)] = match pixel {
+                b'#' => -4.0,
+                b'+' => 4.0,
+                b'*' => 12.0,
+                _ => EMPTY,
+            };
+        }
+    }
+    let sixteenths = Sixteenths::with(size.map(|side| side as usize), []);
+    let outline = Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view };
+    let border = outline.border([0, 0]);
+    let row = |(y, row): (usize, &&str)| {
+        let goes = |x: usize| outline.sticks_out(x, y, border[y] >> x & 1 == 1);
+        let pixel = |(x, pixel): (usize, char)| if goes(x) { 'x' } else { pixel };
+        row.chars().enumerate().map(pixel).collect()
+    };
+    drawing.iter().enumerate().map(row).collect()
+}
+
+#[test]
+fn a_rim_is_taken_off_and_a_gap_stays() {
+    let drawing = [
+        "            ", //
+        "            ",
+        "  ++++++++  ",
+        "  +######+  ",
+        "  +#++###+  ",
+        "  +#++###+  ",
+        "  +######+  ",
+        "  ++++++++  ",
+        "            ",
+        "            ",
+    ];
+    let expected = [
+        "            ", //
+        "            ",
+        "  xxxxxxxx  ",
+        "  x######x  ",
+        "  x#++###x  ",
+        "  x#++###x  ",
+        "  x######x  ",
+        "  xxxxxxxx  ",
+        "            ",
+        "            ",
+    ];
+    assert_eq!(trimmed(&drawing), expected, "only what nothing closes in goes");
+}
+
+#[test]
+fn neighbours_that_take_strides_agree() {
+    // Every other pixel of this row would meet the core at the left end, were lines to begin wherever they do.
+    let empty = "                    ";
+    let mut drawing = vec![empty; 40];
+    drawing[20] = "  *# ***********##  ";
+    drawing[21] = "  ################  ";
+    let row = &trimmed(&drawing)[20][5..16];
+    assert!(row.bytes().all(|pixel| pixel == row.as_bytes()[0]), "all or none: {row}");
+}
+
+/// What is known of points, given in pixels, of which those drawn have discs of 1.6 pixels, with cores as coarse; and which
+/// pixels stay, by column and row.
+fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(usize, usize) -> bool {
+    let mut centers = vec![0; TILE_AREA];
+    for &[x, y] in drawn {
+        centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
+    }
+    let rim = |pixel: usize| {
+        let [x, y] = [pixel % TILE, pixel / TILE].map(|at| at as f32 + 0.5);
+        let nearest = drawn.iter().map(|point| (point[0] - x).hypot(point[1] - y)).fold(f32::INFINITY, f32::min);
+        if nearest > 1.6 {
+            EMPTY
+        } else if nearest > 1.0 {
+            1.5
+        } else {
+            -1.5
+        }
+    };
+    let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
+    let view = view(size.map(|side| side as u32));
+    let sixteenths = Sixteenths::with(size, points.iter().copied());
+    move |x, y| {
+        let outline = Outline { rims: &rims, centers: &centers, sixteenths: &sixteenths, view: &view };
+        let border = outline.border([0, 0]);
+        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, border[y] >> x & 1 == 1)
+    }
+}
+
+#[test]
+fn dense_points_end_where_they_end() {
+    // Evenly strewn points below a slanted line, so many a pixel. Two of each pixel are drawn.
+    let size = [TILE, 40];
+    let below = |x: f32, y: f32| y - (12.0 + 0.27 * x);
+    for (density, most) in [(1.5, 24), (4.0, 18), (40.0, 5)] {
+        let mut random = Random::new(51);
+        let strewn =
+            (0..(density * (size[0] * size[1]) as f32) as usize).map(|_| size.map(|side| random.unit() * side as f32));
+        let points: Vec<_> = strewn.filter(|&[x, y]| below(x, y) > 0.0).collect();
+        let mut of_pixel = vec![0; TILE_AREA];
+        let is_drawn = |point: &&[f32; 2]| {
+            let count = &mut of_pixel[point[1] as usize * TILE + point[0] as usize];
+            *count += 1;
+            *count <= 2
+        };
+        let drawn: Vec<_> = points.iter().filter(is_drawn).copied().collect();
+        let wrong = |points: &[[f32; 2]]| {
+            let stays = stays(size, points, &drawn);
+            let pixels = (3..size[0] - 3).flat_map(|x| (3..size[1] - 3).map(move |y| (x, y)));
+            let is_wrong = |&(x, y): &(usize, usize)| {
+                let depth = below(x as f32 + 0.5, y as f32 + 0.5);
+                let is_wrong = stays(x, y) != (depth > 0.0);
+                assert!(!is_wrong || depth.abs() < 2.0, "{x}, {y}: {depth} below the line");
+                is_wrong
+            };
+            pixels.filter(is_wrong).count()
+        };
+        let (all, some) = (wrong(&points), wrong(&drawn));
+        assert!(all <= most, "{density} points a pixel: {all} wrong over {} columns", size[0]);
+        // Where there are many, the outermost are seldom drawn.
+        assert!(
+            density < 10.0 || some > 2 * all,
+            "{density} points a pixel: {some} wrong by those drawn, {all} by all"
+        );
+    }
+}
+
+/// Of the pixels within two of a slanted line, below which points lie at depths that `depth` makes of numbers from 0 to 1, in
+/// pixels: the share where points tell whether it is beside the surface, and of those the share that are right.
+fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
+    let size = [TILE, TILE];
+    let line = |x: f32| 12.0 + 0.27 * x;
+    let mut random = Random::new(54);
+    let point = |at: usize| {
+        let x = (at / per_column) as f32 + random.unit();
+        [x, line(x) + depth(random.unit())]
+    };
+    let points: Vec<_> = (0..size[0] * per_column).map(point).filter(|point| point[1] < TILE as f32).collect();
+    let mut centers = vec![0; TILE_AREA];
+    for &[x, y] in &points {
+        centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
+    }
+    let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
+    let outline = Outline { rims: &[4.0; TILE_AREA], centers: &centers, sixteenths: &sixteenths, view: &view };
+    let mut counts = [0, 0, 0];
+    for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
+        let below = y as f32 + 0.5 - line(x as f32 + 0.5);
+        if below.abs() < 2.0 {
+            let is_beside = outline.is_beside([x, y], wide);
+            let is_right = is_beside == Some(below < 0.0);
+            counts = [counts[0] + 1, counts[1] + usize::from(is_beside.is_some()), counts[2] + usize::from(is_right)];
+        }
+    }
+    [counts[1] as f64 / counts[0] as f64, counts[2] as f64 / counts[1] as f64]
+}
+
+#[test]
+fn wide_splats_end_by_points_where_these_lie_close() {
+    // A surface that curves away: of the points of 30 pixels nearly a fifth lie in the last one before it ends.
+    let [share, right] = told(true, 20, |part| 30.0 * part * part);
+    assert!(share > 0.9 && right > 0.85, "of a curved surface {share} told, {right} of them right");
+    // The border of a gap among points three pixels apart.
+    let sparse = |wide: bool| told(wide, 3, |part| 30.0 * part)[0];
+    let [narrow, wide] = [false, true].map(sparse);
+    assert!(narrow > 0.1 && wide < 0.02, "of a gap's border {wide} told, {narrow} if splats were narrow");
+}
+
+#[test]
+fn what_is_thin_stays() {
+    // A wire a fifth of a pixel thick, which passes by the middles of most pixels; and a point alone.
+    let size = [TILE, 40];
+    let mut random = Random::new(53);
+    let wire = |_| {
+        let x = 5.0 + 45.0 * random.unit();
+        [x, 12.2 + 0.05 * x + 0.2 * random.unit()]
+    };
+    let mut points: Vec<_> = (0..1000).map(wire).collect();
+    points.push([30.1, 30.1]);
+    let stays = stays(size, &points, &points);
+    for x in 6..49 {
+        let height = (5..25).filter(|&y| stays(x, y)).count();
+        assert!((1..=2).contains(&height), "{height} pixels in column {x}");
+    }
+    assert!(stays(30, 30), "that of a point alone");
+}
+
+#[test]
+fn borders_are_pixels_close_to_an_empty_square() {
+    let [width, height] = [TILE + 37, TILE + 5];
+    let view = view([width as u32, height as u32]);
+    let mut random = Random::new(52);
+    // What lies in tiles beyond the picture is of no account.
+    let rims: Vec<_> = (0..4 * TILE_AREA).map(|_| if random.below(5) > 1 { EMPTY } else { 1.0 }).collect();
+    let outline = Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view };
+    let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
+    let mut all = [0, 0];
+    for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {
+        let border = outline.border(tile);
+        for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
+            let [column, row] = [tile[0] + x, tile[1] + y];
+            if column >= width || row >= height {
+                continue;
+            }
+            let around = (0..7).flat_map(|dy| (0..7).map(move |dx| (dx, dy)));
+            let mut around = around.filter(|&(dx, dy)| dx % 6 != 0 || dy % 6 != 0);
+            // The upper left pixel of the square.
+            let is_square = |(x, y): (usize, usize)| (0..9).all(|at| is_empty(x + at % 3, y + at / 3));
+            let near = around
+                .any(|(dx, dy)| (column + dx).checked_sub(4).zip((row + dy).checked_sub(4)).is_some_and(is_square));
+            assert_eq!(border[y] >> x & 1 == 1, near, "{column}, {row}");
+            all[usize::from(near)] += 1;
+        }
+    }
+    assert!(all[0] > 1000 && all[1] > 1000, "there are both: {all:?}");
+}
+
+#[test]
+fn thin_lines_and_the_border_of_the_picture_stay() {
+    let drawing = [
+        "            ", //
+        " #++#+#+++# ",
+        "            ",
+        "###         ",
+        "++#         ",
+        "###         ",
+        "            ",
+        "            ",
+    ];
+    assert_eq!(trimmed(&drawing), drawing, "nothing sticks out here");
+    let alone = ["      ", "      ", "  ++  ", "  +   ", "      ", "      "];
+    assert_eq!(trimmed(&alone), alone, "nor here");
+}
