@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
-use super::noise::{Usual, measure};
+use super::noise::{Noise, Usual, measure};
 use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
 use super::rows::{is_row, turn};
 use super::sheets::{Blend, Sheets, Surface};
@@ -107,6 +107,11 @@ impl Adapter {
         self.cells.fill(screen, view, k);
         self.sheets.clear(&self.cells);
         self.usual = None;
+    }
+
+    /// The noise of this frame's points, known once surfels were adapted.
+    pub(crate) fn noise(&self) -> Noise {
+        self.usual.map_or(Noise::NONE, |usual| usual.noise)
     }
 
     /// Fits each of `surfels` anew at the scale that the frame's noise calls for, and what are rows. The fit has left their

@@ -96,6 +96,11 @@ impl AdaptBuffers {
             depth_noise: known.runs.clone(),
         })
     }
+
+    /// The noise that was measured, as `shared/noise.wgsl` has it.
+    pub(crate) fn noise(&self) -> &wgpu::Buffer {
+        &self.measured
+    }
 }
 
 /// What is known of the noise of a cloud's depths, on the device.

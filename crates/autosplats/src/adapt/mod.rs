@@ -44,6 +44,7 @@ pub(crate) use cpu::{AdaptRules, Adapter};
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]
 pub(crate) use depth::DepthRun;
+pub(crate) use noise::Noise;
 
 /// Balls tried around each point, beside the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;

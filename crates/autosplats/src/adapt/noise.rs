@@ -88,6 +88,9 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
+    /// Of points that have none.
+    pub(crate) const NONE: Self = Self { level: 0.0, power: 0.0, most: 0.0 };
+
     /// Of points with a k-radius above 0.
     #[inline(always)]
     pub(crate) fn at(&self, k_radius: f32) -> f32 {

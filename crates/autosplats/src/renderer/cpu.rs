@@ -10,7 +10,7 @@ use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
 use crate::Error;
-use crate::adapt::{AdaptRules, Adapter, DepthNoise};
+use crate::adapt::{AdaptRules, Adapter, DepthNoise, Noise};
 use crate::camera::{Camera, Seen, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
@@ -181,13 +181,15 @@ impl CpuRenderer {
             search_counts = search_counts + reconstruct.run(recovered, &mut buffers, &mut clock)?;
         }
 
-        let Buffers { surfels, over_time, splatter, .. } = buffers;
+        let Buffers { surfels, adapter, over_time, splatter, .. } = buffers;
         if settings_splat.depth_refinement {
             splatter.refine(surfels, &view);
             splatter.refine(surfels, &view);
         }
         splatter.attributes(surfels, &view, &attributes);
-        let (layers, covered) = splatter.trim(&view, &screen.sixteenths);
+        let adapts = settings_splat.adaptive && given.is_none();
+        let noise = if adapts { adapter.noise() } else { Noise::NONE };
+        let (layers, covered) = splatter.trim(&view, &screen.sixteenths, (noise, settings_splat.k));
         if smooths {
             over_time.end(now, cloud.identity(), settings_splat.clone(), surfels, screen);
         }

@@ -1,5 +1,6 @@
-// Noise, and which surfels it calls to be turned. Imports: frame, surfel. The including pass binds `measured`.
+// Which surfels noise calls to be turned. Imports: frame, noise, surfel. The including pass binds `measured`.
 
+#import noise
 #import surfel
 
 override ENOUGH: f32;
@@ -10,12 +11,6 @@ override MOST_TINY: f32;
 override ROW: f32;
 override SCATTER: f32;
 override SCATTER_KNOWN: f32;
-
-// Standard deviation of points from their surface, of points with a k-radius above 0.
-fn noise_at(k_radius: f32) -> f32 {
-    let power = measured[1];
-    return measured[0] * select(pow(min(k_radius / measured[4], 1.0), power), 1.0, power == 0.0);
-}
 
 // Level of the cells that have sheets.
 fn sheet_level() -> u32 {

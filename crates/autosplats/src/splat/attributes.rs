@@ -141,6 +141,11 @@ impl TileLayers<'_> {
         self.weight[at] > 0.0
     }
 
+    /// Depth at pixel `at` of the tile.
+    pub(super) fn depth_at(&self, at: usize) -> f32 {
+        self.depth[at]
+    }
+
     /// Leaves nothing at pixel `at` of the tile.
     pub(super) fn clear(&mut self, at: usize) {
         self.weight[at] = 0.0;

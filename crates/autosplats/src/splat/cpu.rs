@@ -7,8 +7,10 @@ use super::bins::Run;
 use super::centers::add_centers;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_REACH;
+use super::trim::blurred::Blurred;
 use super::trim::{Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
+use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::project::Sixteenths;
@@ -112,10 +114,12 @@ impl Splatter {
         layers
     }
 
-    /// Trims the attributes just drawn: silhouettes end where the surface does, of whose points `sixteenths` tell. Returns the number of covered pixels too.
-    pub(crate) fn trim(&mut self, view: &View, sixteenths: &Sixteenths) -> (&GBuffer, usize) {
+    /// Trims the attributes just drawn: silhouettes end where the surface does, of whose points `sixteenths` tell, and where they
+    /// have `noise`, as told for the k-radii of so many neighbours, their density. Returns the number of covered pixels too.
+    pub(crate) fn trim(&mut self, view: &View, sixteenths: &Sixteenths, (noise, k): (Noise, u32)) -> (&GBuffer, usize) {
         let Self { rims, centers, layers, .. } = self;
-        let outline = Outline { rims, centers, sixteenths, view };
+        let blurred = Blurred::new(noise, k, rims, sixteenths, view);
+        let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;
@@ -124,7 +128,7 @@ impl Splatter {
             for y in y0..(y0 + TILE).min(view.height as usize) {
                 for x in x0..(x0 + TILE).min(view.width as usize) {
                     let at = (y - y0) * TILE + x - x0;
-                    if outline.sticks_out(x, y, border[y - y0] >> (x - x0) & 1 == 1) {
+                    if outline.sticks_out(x, y, layers.depth_at(at), border[y - y0] >> (x - x0) & 1 == 1) {
                         layers.clear(at);
                     }
                     covered += usize::from(layers.covers(at));

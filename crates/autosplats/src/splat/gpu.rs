@@ -13,6 +13,10 @@ use super::centers::STEPS;
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
+use super::trim::blurred::{
+    BLOCK_PX, FEWEST_BLURRED, FINE_PX, FRINGE_NOISES, LEAST_NOISE_PX, OFF_BLURRED, SURE_NOISE_PX, WIDEST_PX,
+    WINDOW_NOISES,
+};
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
     LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
@@ -37,6 +41,7 @@ pub(crate) const PASSES: &[PassSource] = &[
     REDRAW,
     ATTRIBUTES,
     ADD_CENTERS,
+    SUM_BLOCKS,
     TRIM,
 ];
 const SET_UP: PassSource = PassSource::new("splat/set_up", include_str!("set_up.wgsl"));
@@ -53,6 +58,7 @@ const ERASE_LARGE: PassSource = PassSource::new("splat/erase_large", include_str
 const REDRAW: PassSource = PassSource::new("splat/redraw", include_str!("redraw.wgsl"));
 const ATTRIBUTES: PassSource = PassSource::new("splat/attributes", include_str!("attributes.wgsl"));
 const ADD_CENTERS: PassSource = PassSource::new("splat/add_centers", include_str!("add_centers.wgsl"));
+const SUM_BLOCKS: PassSource = PassSource::new("splat/sum_blocks", include_str!("sum_blocks.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
 /// Pixels of the bounds of a splat that one invocation draws into the depth map.
@@ -84,6 +90,10 @@ pub(crate) struct SplatBuffers {
     cells: wgpu::Buffer,
     /// Centres of splats in each pixel, row by row.
     centers: wgpu::Buffer,
+    /// `shared/blocks.wgsl`, row by row.
+    blocks: wgpu::Buffer,
+    /// That of frames whose noise is not measured.
+    no_noise: wgpu::Buffer,
 }
 
 impl SplatBuffers {
@@ -102,6 +112,8 @@ impl SplatBuffers {
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
             centers: gpu.storage::<u32>("centres of splats", pixels)?,
+            blocks: gpu.storage::<u32>("blocks of pixels", blocks(size) as usize)?,
+            no_noise: gpu.storage::<f32>("no noise", 5)?,
         })
     }
 }
@@ -128,6 +140,7 @@ pub(crate) struct SplatPasses {
     redraw: Pass,
     attributes: Pass,
     add_centers: Pass,
+    sum_blocks: Pass,
     trim: Pass,
     /// Linear value of each step of a colour.
     linear: wgpu::Buffer,
@@ -191,6 +204,16 @@ impl SplatPasses {
             ("FEWEST_SPLATS_WIDE", FEWEST_SPLATS[1].into()),
             ("NARROW_PX", NARROW_PX.into()),
             ("STEPS", STEPS.into()),
+            ("LEAST_NOISE_PX", LEAST_NOISE_PX.into()),
+            ("WINDOW_NOISES", WINDOW_NOISES.into()),
+            ("WIDEST_PX", WIDEST_PX.into()),
+            ("FINE_PX", FINE_PX.into()),
+            ("OFF_UNSURE", OFF_BLURRED[0].into()),
+            ("OFF_SURE", OFF_BLURRED[1].into()),
+            ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
+            ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
+            ("FRINGE_NOISES", FRINGE_NOISES.into()),
+            ("SUPPORT", SUPPORT.into()),
         ];
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
@@ -213,6 +236,7 @@ impl SplatPasses {
             redraw: Pass::new(gpu, &REDRAW, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             add_centers: Pass::new(gpu, &ADD_CENTERS, &[("STEPS", STEPS.into())])?,
+            sum_blocks: pass(&SUM_BLOCKS)?,
             trim: Pass::new(gpu, &TRIM, &trim)?,
             linear: steps,
         })
@@ -290,8 +314,8 @@ impl SplatPasses {
         ]
     }
 
-    /// Draws the attributes of all rounds' surfels and trims them, after two refinements of the depth map if
-    /// `depth_refinement` [Paper, §7].
+    /// Draws the attributes of all rounds' surfels and trims them, by the `noise` that was measured as well if it was, after two
+    /// refinements of the depth map if `depth_refinement` [Paper, §7].
     #[allow(clippy::too_many_arguments, reason = "each is a buffer or a set of them")]
     pub(crate) fn steps_layers(
         &self,
@@ -301,9 +325,10 @@ impl SplatPasses {
         surfels: &wgpu::Buffer,
         splats: &SplatBuffers,
         layers: &LayerBuffers,
+        noise: Option<&wgpu::Buffer>,
         depth_refinement: bool,
     ) -> Vec<Step> {
-        let SplatBuffers { splats: list, tree, depth, centers, .. } = splats;
+        let SplatBuffers { splats: list, tree, depth, centers, blocks: summed, no_noise, .. } = splats;
         let ScreenBuffers { counters, values, sixteenths, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
@@ -316,7 +341,10 @@ impl SplatPasses {
         steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
         let all = screen.groups(Work::Queries256);
         steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
-        let trim = [frame, surface, cover, extras, counters, centers, sixteenths];
+        let noise = noise.unwrap_or(no_noise);
+        let blocks = [frame, cover, sixteenths, noise, summed];
+        steps.push(self.sum_blocks.step(gpu, &blocks, self::blocks(screen.size).div_ceil(64)));
+        let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, summed];
         steps.push(self.trim.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
@@ -330,6 +358,11 @@ fn tops(screen: &ScreenBuffers) -> u32 {
 /// Cells of pixels in a picture of this size, and room for one more column and row.
 fn cells([columns, rows]: [u32; 2]) -> u32 {
     (columns / CELL + 1) * (rows / CELL + 1)
+}
+
+/// Blocks of pixels in a picture of this size.
+fn blocks(size: [u32; 2]) -> u32 {
+    size.map(|side| side.div_ceil(BLOCK_PX as u32)).iter().product()
 }
 
 /// Workgroups with an invocation per pixel.

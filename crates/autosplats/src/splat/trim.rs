@@ -12,11 +12,15 @@
 //! as well: noise strews points past the border, and splats are back on the surface. Lines between cores kept a row of tails
 //! wherever two cores stood out of a border. A surface that curves away has its points close together at its border, however wide
 //! its splats are where it faces the eye: so wide splats are asked as well, but more points have to say it.
+//!
+//! Where there is noise, the density of points tells in place of all this (`blurred`).
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
 
+pub(super) mod blurred;
 #[cfg(test)]
 mod tests;
 
+use self::blurred::Blurred;
 use super::centers::mean;
 use super::{TILE, TILE_AREA, tiled_index};
 use crate::camera::View;
@@ -106,6 +110,8 @@ pub(super) struct Outline<'a> {
     pub(super) centers: &'a [u32],
     pub(super) sixteenths: &'a Sixteenths,
     pub(super) view: &'a View,
+    /// If there is noise.
+    pub(super) blurred: Option<&'a Blurred>,
 }
 
 impl Outline<'_> {
@@ -150,14 +156,16 @@ impl Outline<'_> {
         })
     }
 
-    /// Whether a splat covers pixel (x, y) but no surface does; `border` says whether the pixel is close to an empty square.
-    pub(super) fn sticks_out(&self, x: usize, y: usize, border: bool) -> bool {
+    /// Whether a splat covers pixel (x, y), at `depth`, but no surface does; `border` says whether the pixel is close to an empty
+    /// square.
+    pub(super) fn sticks_out(&self, x: usize, y: usize, depth: f32, border: bool) -> bool {
         let own = self.rims[self.index([x, y])];
         if own == EMPTY {
             return false;
         }
-        let by_points = if border { self.is_beside([x, y], own.abs() > NARROW_PX) } else { None };
-        by_points.unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
+        let by_density = self.is_beside_blurred([x, y], depth, own.abs());
+        let beside = || if border { self.is_beside([x, y], own.abs() > NARROW_PX) } else { None };
+        by_density.or_else(beside).unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }
 
     /// Whether pixel (x, y) is beside the surface, by the points around, if they tell; `wide` says whether its splat is.

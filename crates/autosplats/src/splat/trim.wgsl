@@ -1,11 +1,12 @@
 // Trim: takes off the tails that splats leave around a silhouette. The CPU form, `trim.rs`, says how.
 //
-// Reads: centers, sixteenths. Reads and writes: surface, cover, extras. What is read of them, the rims, is not written. Writes: counters.
+// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. What is read of them, the rims, is not written. Writes: counters.
 
 #import frame
 #import groups
 #import counters
 #import layers
+#import blurred
 
 @group(0) @binding(1) var<storage, read_write> surface: array<vec4f>;
 @group(0) @binding(2) var<storage, read_write> cover: array<Cover>;
@@ -13,6 +14,8 @@
 @group(0) @binding(4) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read> centers: array<u32>;
 @group(0) @binding(6) var<storage, read> sixteenths: array<u32>;
+@group(0) @binding(7) var<storage, read> measured: array<f32>;
+@group(0) @binding(8) var<storage, read> blocks: array<u32>;
 
 // How far lines go, in reaches of the splat; strides in a reach; pixels added to how far they go.
 override FURTHEST: f32;
@@ -42,6 +45,10 @@ const GROUP = 64u;
 // Pixels on each side of the workgroup's square that tell of its border: `MARGIN` of the CPU form; and that square.
 const MARGIN = 4u;
 const WIDE = 40u;
+// Blocks on each side of the square's that tell whether something is empty within a fringe, one more than that is wide, and those
+// of that square in a row.
+const BLOCK_MARGIN = FRINGE_BLOCKS + 1u;
+const WIDE_BLOCKS = SQUARE / BLOCK_PX + 2u * BLOCK_MARGIN;
 
 // Pixels of the workgroup that stay.
 var<workgroup> covered: atomic<u32>;
@@ -53,6 +60,8 @@ var<workgroup> tail_count: atomic<u32>;
 var<workgroup> empties: array<atomic<u32>, 80>;
 // The same of pixels in the middle of an empty square.
 var<workgroup> middles: array<vec2u, 40>;
+// For each row of blocks, a bit for each that is empty, likewise.
+var<workgroup> empty_blocks: array<atomic<u32>, 84>;
 // For each line, the sixteenths around a pixel that lie ahead, then for each those behind: two words of four rows each.
 var<workgroup> sides: array<vec2u, 16>;
 
@@ -71,6 +80,9 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     for (var word = local; word < 2u * WIDE; word += GROUP) {
         atomicStore(&empties[word], 0u);
     }
+    for (var word = local; word < 2u * WIDE_BLOCKS; word += GROUP) {
+        atomicStore(&empty_blocks[word], 0u);
+    }
     if local < 16u {
         sides[local] = side(local);
     }
@@ -84,6 +96,16 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         let pixel = corner + at - MARGIN;
         if all(pixel < frame.size) && cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM {
             atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
+        }
+    }
+    if measured[0] > 0.0 {
+        for (var place = local; place < WIDE_BLOCKS * WIDE_BLOCKS; place += GROUP) {
+            let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
+            // Blocks before the first are far beyond the last.
+            let block = corner / BLOCK_PX + at - BLOCK_MARGIN;
+            if all(block < block_counts()) && (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u {
+                atomicOr(&empty_blocks[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
+            }
         }
     }
     workgroupBarrier();
@@ -101,7 +123,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         if all(pixel < frame.size) {
             let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
             stay += select(1u, 0u, rim == EMPTY_RIM);
-            if rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at)) {
+            if rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
                 tails[atomicAdd(&tail_count, 1u)] = place;
             }
         }
@@ -111,7 +133,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         let place = vec2u(tails[tail] % SQUARE, tails[tail] / SQUARE);
         let pixel = corner + place;
         let at = pixel.y * frame.size.x + pixel.x;
-        if sticks_out(pixel, cover[at].rim, is_border(place)) {
+        if sticks_out(place, pixel, cover[at].rim) {
             clear(at);
             stay -= 1u;
         }
@@ -170,9 +192,40 @@ fn side(which: u32) -> vec2u {
     return bits;
 }
 
-fn sticks_out(pixel: vec2u, own: f32, border: bool) -> bool {
+// Noise in pixels where it may have blurred the border beside a pixel, which a splat of this reach covers; 0 if not, or if nothing
+// is empty within a fringe.
+fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
+    if !(measured[0] > 0.0) {
+        return 0.0;
+    }
+    let noise = noise_px(surface[pixel.y * frame.size.x + pixel.x].w, reach_px);
+    if !(noise >= LEAST_NOISE_PX) {
+        return 0.0;
+    }
+    let margin = u32(ceil(fringe_px(reach_px, noise) / f32(BLOCK_PX))) + 1u;
+    let middle = place / BLOCK_PX + BLOCK_MARGIN;
+    let columns = bits_below(middle.x + margin + 1u) & ~bits_below(middle.x - margin);
+    var found = vec2u(0u);
+    for (var row = middle.y - margin; row <= middle.y + margin; row++) {
+        let empty = vec2u(atomicLoad(&empty_blocks[2u * row]), atomicLoad(&empty_blocks[2u * row + 1u]));
+        found |= empty & columns;
+    }
+    return select(noise, 0.0, all(found == vec2u(0u)));
+}
+
+// The bits of two words below one, which is less than 64.
+fn bits_below(bit: u32) -> vec2u {
+    let part = (1u << (bit % 32u)) - 1u;
+    return select(vec2u(part, 0u), vec2u(0xffffffffu, part), bit >= 32u);
+}
+
+fn sticks_out(place: vec2u, pixel: vec2u, own: f32) -> bool {
     var answer = SILENT;
-    if border {
+    let noise = blurred_by(place, pixel, abs(own));
+    if noise > 0.0 {
+        answer = is_beside_blurred(pixel, abs(own), noise);
+    }
+    if answer == SILENT && is_border(place) {
         answer = is_beside(pixel, abs(own) > NARROW_PX);
     }
     if answer == SILENT {

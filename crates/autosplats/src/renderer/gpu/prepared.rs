@@ -217,7 +217,8 @@ impl Prepared {
                 steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
             }
             let refine = shape.depth_refinement;
-            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, refine));
+            let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
+            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, noise, refine));
             steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
             Ok::<_, Error>((steps, convergence))
         })??;

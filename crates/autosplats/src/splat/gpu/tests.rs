@@ -1,11 +1,13 @@
 //! Splatting on the GPU against that on the CPU, fed with the same surfels.
 
 use autosplats_cloud::FieldValues;
+use glam::Vec3;
 
 use super::super::layers::COVER_BYTES;
 use super::super::tests::{ALL_DISCS, Data, Discs, sixteenths, surfels, views};
 use super::super::{Attributes, GBuffer, PointColors, Splatter, TILE_AREA};
 use super::*;
+use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
@@ -26,6 +28,8 @@ struct Scene<'a> {
     view: &'a View,
     refinement: bool,
     data: &'a Data,
+    /// Of points with no neighbours but one.
+    noise: Noise,
 }
 
 /// Depth maps after visibility and after refinement, row by row, and the layers.
@@ -89,7 +93,9 @@ impl Scene<'_> {
         set_counter(gpu, screen, Counter::Recovered, self.surfels.len() - self.active);
         visibility(Round::Recovered);
         let before = depth();
-        run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, self.refinement));
+        let Noise { level, power, most } = self.noise;
+        let noise = gpu.storage_with("noise", &[level, power, 0.0, 0.0, most]).expect("room");
+        run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, Some(&noise), self.refinement));
         Drawn { depth: [before, depth()], layers: read_layers(gpu, layers) }
     }
 
@@ -111,7 +117,7 @@ impl Scene<'_> {
             backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
-        let layers = splatter.trim(view, &sixteenths(surfels, view)).0.clone();
+        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 1)).0.clone();
         (splatter, layers)
     }
 }
@@ -205,11 +211,58 @@ fn the_device_draws_what_the_host_draws() {
                         view: &view,
                         refinement,
                         data: &data,
+                        noise: Noise::NONE,
                     };
                     let case = format!("{discs:?}, {size:?}, perspective {}, {refinement}", view.perspective);
                     assert_same(&gpu, &passes, &scene, &case);
                 }
             }
+        }
+    }
+}
+
+#[test]
+fn the_device_ends_blurred_borders_where_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let data = Data::new(20_000);
+    let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
+    for (noise_px, power) in [(0.1, 0.0), (1.0, 0.0), (2.5, 1.5), (6.0, 0.0)] {
+        for view in views([233, 190]) {
+            // A disc of points, and of splats, whose border is blurred.
+            let depth = 4.0;
+            let pixel = view.pixel_size(depth);
+            let mut random = Random::new(47);
+            let mut surfel = |source: u32| {
+                let (angle, away) = (6.3 * random.unit(), 70.0 * random.unit().sqrt());
+                let place = [angle.cos(), angle.sin()].map(|along| away * along + noise_px * random.gaussian());
+                let [x, y] = place.map(|along| along * pixel);
+                let facing = Surfel {
+                    radius: 2.5 * pixel,
+                    normal: [0.0, 0.0, -1.0],
+                    k_radius: 1.25 * pixel,
+                    major_axis: [1.0, 0.0, 0.0],
+                    major_ratio: 1.0,
+                    source,
+                    screen: source,
+                    ..Surfel::default()
+                };
+                let mut surfel = facing;
+                surfel.move_to(Vec3::new(x, y, depth), &view);
+                surfel
+            };
+            let mut surfels: Vec<_> = (0..16_000).map(&mut surfel).collect();
+            surfels.retain(|surfel| surfel.center[2] > 0.0);
+            let noise = Noise { level: noise_px * pixel, power, most: 1.3 * pixel };
+            let active = surfels.len();
+            let blurred = Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data, noise };
+            assert_same(&gpu, &passes, &blurred, &format!("{noise_px} pixels, perspective {}", view.perspective));
+            let covered = |noise: Noise| {
+                let (_, layers) = Scene { noise, ..blurred }.host(ALL);
+                layers.weight.iter().filter(|&&weight| weight > 0.0).count()
+            };
+            let [with, without] = [noise, Noise::NONE].map(covered);
+            let fewer = 1.0 - with as f64 / without as f64;
+            assert!((fewer > 0.01) == (noise_px > 0.5), "noise of {noise_px} pixels takes off {fewer}");
         }
     }
 }
@@ -224,7 +277,8 @@ fn many_splats_and_none() {
     for (count, discs) in [(0, Discs::Small), (64, Discs::Surface), (270_000, Discs::Small)] {
         let surfels = surfels(42, count, discs, &view);
         for active in [0, count / 3, count] {
-            let scene = Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data };
+            let scene =
+                Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data, noise: Noise::NONE };
             assert_same(&gpu, &passes, &scene, &format!("{active} of {count}"));
         }
     }
@@ -233,7 +287,8 @@ fn many_splats_and_none() {
         let view = views(size)[0];
         let mut surfels = surfels(43, count, Discs::Circles, &view);
         surfels.iter_mut().for_each(|surfel| surfel.radius *= 100.0);
-        let scene = Scene { surfels: &surfels, active: count, view: &view, refinement: true, data: &data };
+        let scene =
+            Scene { surfels: &surfels, active: count, view: &view, refinement: true, data: &data, noise: Noise::NONE };
         assert_same(&gpu, &passes, &scene, &format!("{count} huge splats"));
     }
 }
@@ -244,7 +299,8 @@ fn layers_that_are_not_wanted_change_no_other() {
     let data = Data::new(1000);
     let view = views([71, 50])[0];
     let surfels = surfels(44, 300, Discs::Ellipses, &view);
-    let scene = Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data };
+    let scene =
+        Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data, noise: Noise::NONE };
     for bits in 0..16 {
         let [color, scalar, measures, backs] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
         let channels = Channels { color, scalar, measures, backs };
@@ -289,7 +345,8 @@ fn hidden_points_are_not_recovered() {
     let passes = SplatPasses::new(&gpu, Channels::default(), &data.linear).expect("passes");
     let view = views([133, 90])[0];
     let surfels = surfels(45, 500, Discs::Circles, &view);
-    let scene = Scene { surfels: &surfels, active: 500, view: &view, refinement: false, data: &data };
+    let scene =
+        Scene { surfels: &surfels, active: 500, view: &view, refinement: false, data: &data, noise: Noise::NONE };
     let mut buffers = scene.upload(&gpu, Channels::default());
     let mut random = Random::new(46);
     let points: Vec<ScreenPoint> = (0..4500)
@@ -338,7 +395,8 @@ fn comparisons_see_each_kind_of_error() {
     let data = Data::new(1000);
     let view = views([70, 50])[0];
     let surfels = surfels(47, 200, Discs::Circles, &view);
-    let scene = Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data };
+    let scene =
+        Scene { surfels: &surfels, active: 200, view: &view, refinement: true, data: &data, noise: Noise::NONE };
     let (_, right) = scene.host(ALL);
     assert_eq!(other_layers(&right, &right), 0, "nothing is wrong yet");
     let (splatter, other) = Scene { refinement: false, ..scene }.host(ALL);

@@ -1,7 +1,11 @@
 //! Trimming drawings, and borders of points strewn below lines.
 
+use std::collections::BTreeSet;
+
 use super::super::centers::one;
+use super::blurred::{BLOCK_PX, FRINGE_BLOCKS};
 use super::*;
+use crate::adapt::Noise;
 use crate::camera::{Camera, Projection};
 use crate::test_clouds::Random;
 use autosplats_cloud::glam::DVec3;
@@ -29,10 +33,11 @@ fn trimmed(drawing: &[&str]) -> Vec<String> {
         }
     }
     let sixteenths = Sixteenths::with(size.map(|side| side as usize), []);
-    let outline = Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view };
+    let outline =
+        Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
     let border = outline.border([0, 0]);
     let row = |(y, row): (usize, &&str)| {
-        let goes = |x: usize| outline.sticks_out(x, y, border[y] >> x & 1 == 1);
+        let goes = |x: usize| outline.sticks_out(x, y, 1.0, border[y] >> x & 1 == 1);
         let pixel = |(x, pixel): (usize, char)| if goes(x) { 'x' } else { pixel };
         row.chars().enumerate().map(pixel).collect()
     };
@@ -101,9 +106,9 @@ fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(u
     let view = view(size.map(|side| side as u32));
     let sixteenths = Sixteenths::with(size, points.iter().copied());
     move |x, y| {
-        let outline = Outline { rims: &rims, centers: &centers, sixteenths: &sixteenths, view: &view };
+        let outline = Outline { rims: &rims, centers: &centers, sixteenths: &sixteenths, view: &view, blurred: None };
         let border = outline.border([0, 0]);
-        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, border[y] >> x & 1 == 1)
+        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, 1.0, border[y] >> x & 1 == 1)
     }
 }
 
@@ -161,7 +166,8 @@ fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
         centers[y as usize * TILE + x as usize] += one([x as usize, y as usize], [x, y]);
     }
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
-    let outline = Outline { rims: &[4.0; TILE_AREA], centers: &centers, sixteenths: &sixteenths, view: &view };
+    let outline =
+        Outline { rims: &[4.0; TILE_AREA], centers: &centers, sixteenths: &sixteenths, view: &view, blurred: None };
     let mut counts = [0, 0, 0];
     for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
         let below = y as f32 + 0.5 - line(x as f32 + 0.5);
@@ -183,6 +189,89 @@ fn wide_splats_end_by_points_where_these_lie_close() {
     let sparse = |wide: bool| told(wide, 3, |part| 30.0 * part)[0];
     let [narrow, wide] = [false, true].map(sparse);
     assert!(narrow > 0.1 && wide < 0.02, "of a gap's border {wide} told, {narrow} if splats were narrow");
+}
+
+/// Whether pixels of a picture stay in which points lie below a line, strewn evenly, moved by noise of so many pixels, and drawn with
+/// discs of two pixels; by how many pixels they do so above the line, in the columns of the middle. Noise is `known` or not.
+fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
+    let size = [TILE, TILE];
+    let line = |x: f32| 28.0 + 0.1 * x;
+    let mut random = Random::new(55);
+    let mut strewn = (0..3 * TILE_AREA).map(|_| size.map(|side| random.unit() * side as f32)).collect::<Vec<_>>();
+    strewn.retain(|&[x, y]| y > line(x));
+    let mut points: Vec<_> =
+        strewn.into_iter().map(|point| point.map(|along| along + noise_px * random.gaussian())).collect();
+    points.retain(|point| point.iter().zip(size).all(|(&at, side)| at >= 0.0 && at < side as f32));
+    let rim = |pixel: usize| {
+        let [x, y] = [pixel % TILE, pixel / TILE].map(|at| at as f32 + 0.5);
+        if points.iter().any(|point| (point[0] - x).hypot(point[1] - y) < 2.0) { -2.0 } else { EMPTY }
+    };
+    let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
+    let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
+    let level = if known { noise_px * view.pixel_size(1.0) } else { 0.0 };
+    let blurred = Blurred::new(Noise { level, ..Noise::NONE }, 10, &rims, &sixteenths, &view);
+    assert_eq!(blurred.is_some(), known, "nothing is blurred without noise");
+    let outline = Outline {
+        rims: &rims,
+        centers: &[0; TILE_AREA],
+        sixteenths: &sixteenths,
+        view: &view,
+        blurred: blurred.as_ref(),
+    };
+    if known {
+        let told = |reach_px: f32| outline.is_beside_blurred([32, 28], 1.0, reach_px);
+        assert!(told(2.0).is_some() && told(60.0).is_none(), "where splats are wide, windows tell of rows");
+    }
+    let border = outline.border([0, 0]);
+    let stays =
+        |x: usize, y: usize| rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, 1.0, border[y] >> x & 1 == 1);
+    let above = |x: usize| Some(line(x as f32 + 0.5) - (0..TILE).find(|&y| stays(x, y))? as f32);
+    (24..40).map(|x| above(x).expect("what is below stays")).collect()
+}
+
+#[test]
+fn what_noise_has_blurred_ends_about_where_the_surface_does() {
+    // In pixels, and in blocks.
+    for noise_px in [1.5, 4.0] {
+        let [with, without] = [true, false].map(|known| above_the_line(noise_px, known));
+        let mean = |above: &[f32]| above.iter().sum::<f32>() / above.len() as f32;
+        assert!(mean(&with).abs() < 0.9 * noise_px, "noise of {noise_px} pixels: {with:?}");
+        assert!(mean(&without) > 1.5 * noise_px, "noise of {noise_px} pixels that is not known: {without:?}");
+    }
+}
+
+#[test]
+fn blocks_know_how_far_an_empty_one_is() {
+    let [width, height] = [TILE + 37, TILE + 5];
+    let view = view([width as u32, height as u32]);
+    let mut random = Random::new(56);
+    let mut seen = BTreeSet::new();
+    for holes in [0, 1, 60] {
+        let mut rims = vec![2.0; 4 * TILE_AREA];
+        for _ in 0..holes {
+            let [x0, y0] = [random.below(width - 7), random.below(height - 7)];
+            for (x, y) in (x0..x0 + 7).flat_map(|x| (y0..y0 + 7).map(move |y| (x, y))) {
+                rims[tiled_index(width, x, y)] = EMPTY;
+            }
+        }
+        let noise = Noise { level: 1.0, ..Noise::NONE };
+        let blurred = Blurred::new(noise, 10, &rims, &Sixteenths::with([width, height], []), &view).expect("noise");
+        let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
+        let is_empty = |bx: usize, by: usize| {
+            let pixels =
+                (0..BLOCK_PX * BLOCK_PX).map(|at| [BLOCK_PX * bx + at % BLOCK_PX, BLOCK_PX * by + at / BLOCK_PX]);
+            pixels.filter(|&[x, y]| x < width && y < height).all(|[x, y]| rims[tiled_index(width, x, y)] == EMPTY)
+        };
+        let empty: Vec<_> =
+            (0..columns).flat_map(|x| (0..rows).map(move |y| (x, y))).filter(|&(x, y)| is_empty(x, y)).collect();
+        for (x, y) in (0..columns).flat_map(|x| (0..rows).map(move |y| (x, y))) {
+            let ways = empty.iter().map(|&(ex, ey)| ex.abs_diff(x).max(ey.abs_diff(y)));
+            let expected = ways.min().map_or(FRINGE_BLOCKS + 2, |way| way.min(FRINGE_BLOCKS + 2));
+            assert_eq!(usize::from(blurred.blocks_to_empty(x, y)), expected, "{holes} holes, block {x}, {y}");
+            seen.insert(expected);
+        }
+    }
+    assert!((0..8).chain([FRINGE_BLOCKS + 2]).all(|way| seen.contains(&way)), "all ways there are: {seen:?}");
 }
 
 #[test]
@@ -211,7 +300,7 @@ fn borders_are_pixels_close_to_an_empty_square() {
     let mut random = Random::new(52);
     // What lies in tiles beyond the picture is of no account.
     let rims: Vec<_> = (0..4 * TILE_AREA).map(|_| if random.below(5) > 1 { EMPTY } else { 1.0 }).collect();
-    let outline = Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view };
+    let outline = Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view, blurred: None };
     let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
     let mut all = [0, 0];
     for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {

@@ -1,0 +1,102 @@
+// Borders that noise has blurred. The CPU form, `trim/blurred.rs`, says how. Imports: frame, layers, blocks, noise. The including
+// pass binds `measured`, `blocks`, `cover` and `sixteenths`.
+
+#import blocks
+#import noise
+
+override LEAST_NOISE_PX: f32;
+override WINDOW_NOISES: f32;
+override WIDEST_PX: f32;
+// Windows wider than this are summed up in blocks.
+override FINE_PX: f32;
+// How far the mean may be off with hardly any noise, and with so much in pixels and more.
+override OFF_UNSURE: f32;
+override OFF_SURE: f32;
+override SURE_NOISE_PX: f32;
+override FEWEST_BLURRED: u32;
+override FRINGE_NOISES: f32;
+// Reach of a splat in splat radii.
+override SUPPORT: f32;
+
+// Widest fringe in blocks.
+const FRINGE_BLOCKS = 16u;
+
+// Noise in pixels, where a splat with this reach covers a pixel at a depth.
+fn noise_px(depth: f32, reach_px: f32) -> f32 {
+    let pixel = pixel_size(depth);
+    // As the splat radius comes from it.
+    let k_radius = reach_px / SUPPORT * pixel * (0.5 * sqrt(f32(frame.k)));
+    return noise_at(k_radius) / pixel;
+}
+
+// How far a fringe reaches, in pixels.
+fn fringe_px(reach_px: f32, noise: f32) -> f32 {
+    return min(reach_px + FRINGE_NOISES * noise, f32(BLOCK_PX * FRINGE_BLOCKS));
+}
+
+// Whether a pixel is beside a surface whose border such a noise has blurred, if points tell.
+fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
+    // Of points beyond the picture nothing is known.
+    let to_edge = min(pixel, frame.size - 1u - pixel);
+    let widest = min(WIDEST_PX, f32(min(to_edge.x, to_edge.y)));
+    let window = min(sqrt(AROUND_PX * AROUND_PX + WINDOW_NOISES * noise * noise), widest);
+    // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
+    if window < max(AROUND_PX, reach_px / SUPPORT) {
+        return SILENT;
+    }
+    let offset = points_offset(pixel, window);
+    if offset.z < f32(FEWEST_BLURRED) {
+        return SILENT;
+    }
+    let deviation = window * window / WINDOW_NOISES;
+    let off = length(offset.xy);
+    let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / SURE_NOISE_PX, 0.0);
+    if off <= may_be * deviation / sqrt(deviation + noise * noise) {
+        return NO;
+    }
+    let steps = u32(fringe_px(reach_px, noise));
+    for (var step = 1u; step <= steps; step++) {
+        let at = floor(vec2f(pixel) + 0.5 - offset.xy / off * f32(step));
+        if any(at < vec2f(0.0)) || any(at >= vec2f(frame.size)) {
+            // Beyond the picture the surface goes on.
+            return NO;
+        }
+        let there = vec2u(at);
+        if cover[there.y * frame.size.x + there.x].rim == EMPTY_RIM {
+            return YES;
+        }
+    }
+    return NO;
+}
+
+// The mean offset, in pixels, of the sixteenths with points from the middle of a pixel, in a window of such a radius that lies
+// within the picture, and how many they are.
+fn points_offset(pixel: vec2u, window: f32) -> vec3f {
+    var sums = vec3f(0.0);
+    var count = 0.0;
+    let is_fine = window <= FINE_PX;
+    let side = select(BLOCK_PX, 1u, is_fine);
+    let columns = select(block_counts().x, frame.size.x, is_fine);
+    let reach = u32(window);
+    let first = (pixel - reach) / side;
+    let last = min((pixel + reach) / side, select(block_counts(), frame.size, is_fine) - 1u);
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            let offset = vec2f(side * vec2u(x, y)) - vec2f(pixel) + 0.5 * f32(side) - 0.5;
+            let near = 1.0 - dot(offset, offset) / (window * window);
+            if near > 0.0 {
+                let at = y * columns + x;
+                var held = 0u;
+                if is_fine {
+                    held = countOneBits(of_pixel_at(at));
+                } else {
+                    held = blocks[at] & ~EMPTY_BLOCK;
+                }
+                let weight = f32(held) * (near * near * near);
+                sums += weight * vec3f(1.0, offset);
+                count += f32(held);
+            }
+        }
+    }
+    return vec3f(sums.yz / sums.x, count);
+}

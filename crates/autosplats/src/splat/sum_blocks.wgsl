@@ -1,0 +1,34 @@
+// Sums up what points a block of pixels holds, and notes which blocks are empty, where there is noise: an invocation per block.
+//
+// Reads: cover, sixteenths, measured. Writes: blocks.
+
+#import frame
+#import groups
+#import layers
+#import blocks
+
+@group(0) @binding(1) var<storage, read> cover: array<Cover>;
+@group(0) @binding(2) var<storage, read> sixteenths: array<u32>;
+@group(0) @binding(3) var<storage, read> measured: array<f32>;
+@group(0) @binding(4) var<storage, read_write> blocks: array<u32>;
+
+@compute @workgroup_size(64)
+fn sum_blocks(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let at = group_index(workgroup) * 64u + local;
+    let all = block_counts();
+    if !(measured[0] > 0.0) || at >= all.x * all.y {
+        return;
+    }
+    let first = BLOCK_PX * vec2u(at % all.x, at / all.x);
+    let end = min(first + BLOCK_PX, frame.size);
+    var held = 0u;
+    var is_empty = true;
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            let pixel = y * frame.size.x + x;
+            held += countOneBits((sixteenths[pixel / 2u] >> (16u * (pixel % 2u))) & 0xffffu);
+            is_empty &= cover[pixel].rim == EMPTY_RIM;
+        }
+    }
+    blocks[at] = held | select(0u, EMPTY_BLOCK, is_empty);
+}

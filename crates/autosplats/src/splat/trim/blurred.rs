@@ -1,0 +1,216 @@
+//! Borders that noise has blurred: surfaces end by the density of points there.
+//!
+//! # How it works
+//! Noise strews points past the end of a surface, and what splats draw there, though most are moved back, is a fringe as wide as
+//! the noise. Around a place in it points are the fewer the further out they are, and their mean in a window lies on the side of
+//! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of σ, at the straight end of
+//! points strewn evenly it is 0.80 w²/√(w² + σ²), and 0.48 of that where a surface curves away, so that they lie ever closer up to
+//! its end, the more so the wider both are. What is off by more, and has something empty ahead on the other side, is beside the
+//! surface. All points tell, hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they
+//! are dense, and the same as there are in the fringe.
+
+use rayon::prelude::*;
+
+use super::{AROUND_PX, EMPTY, Outline, Rim};
+use crate::adapt::Noise;
+use crate::camera::View;
+use crate::project::Sixteenths;
+use crate::splat::setup::SUPPORT;
+use crate::splat::tiled_index;
+
+/// Least noise, in pixels, that blurs a border: with less, detail of far views that was taken for noise would be cut.
+pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
+/// The window is so many times as wide as a square of pixels' kernel is with that of the noise.
+pub(in crate::splat) const WINDOW_NOISES: f32 = 10.0;
+/// Widest window in pixels.
+pub(in crate::splat) const WIDEST_PX: f32 = 48.0;
+/// Windows wider than this, in pixels, are summed up in blocks.
+pub(in crate::splat) const FINE_PX: f32 = 8.0;
+/// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
+/// borders, and with so much in pixels and more.
+pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.55];
+pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
+/// From how many sixteenths with points on they tell.
+pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
+/// A fringe is no wider than the reach of its splats and this many times the noise,
+pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
+/// nor than so many blocks.
+pub(in crate::splat) const FRINGE_BLOCKS: usize = 16;
+/// Side of a block in pixels.
+pub(in crate::splat) const BLOCK_PX: usize = 4;
+
+/// Squares that are summed up at a time; their sums are added up in this many parts on any machine.
+const LANES: usize = 8;
+
+/// How many sixteenths hold points in each square of a picture, row by row.
+#[derive(Debug)]
+struct Held {
+    /// Side of a square in pixels.
+    side: usize,
+    columns: usize,
+    rows: usize,
+    /// And nothing after the last, so that the last lanes may be read.
+    count: Vec<u16>,
+}
+
+/// The noise of a frame's points, as the splats of `k` neighbours tell where it differs, and what is known of its picture.
+#[derive(Debug)]
+pub(in crate::splat) struct Blurred {
+    noise: Noise,
+    k: u32,
+    pixels: Held,
+    blocks: Held,
+    /// Of each block, how many blocks away the nearest is that is empty, along either axis.
+    to_empty: Vec<u8>,
+}
+
+impl Blurred {
+    /// Of a picture; `None` if there is no noise.
+    pub(in crate::splat) fn new(
+        noise: Noise,
+        k: u32,
+        rims: &[Rim],
+        sixteenths: &Sixteenths,
+        view: &View,
+    ) -> Option<Self> {
+        if noise.level <= 0.0 {
+            return None;
+        }
+        let [width, height] = [view.width as usize, view.height as usize];
+        let pixels = Held::new([1, width, height], |x, y| sixteenths.of(y * width + x).count_ones() as u16);
+        let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
+        // Rows of a block's pixels, each one piece of a picture's row and of a tile's.
+        let rows_of = |x: usize, y: usize| {
+            let [x0, y0] = [x, y].map(|at| at * BLOCK_PX);
+            (y0..(y0 + BLOCK_PX).min(height)).map(move |y| (x0, y, BLOCK_PX.min(width - x0)))
+        };
+        let held = |(x, y, len): (usize, usize, usize)| pixels.count[y * width + x..][..len].iter().sum::<u16>();
+        let blocks = Held::new([BLOCK_PX, columns, rows], |x, y| rows_of(x, y).map(held).sum());
+        let is_empty = |(x, y, len): (usize, usize, usize)| {
+            rims[tiled_index(width, x, y)..][..len].iter().all(|&rim| rim == EMPTY)
+        };
+        let to_empty = |block: usize| match rows_of(block % columns, block / columns).all(is_empty) {
+            true => 0,
+            false => FRINGE_BLOCKS as u8 + 2,
+        };
+        let mut to_empty: Vec<u8> = (0..columns * rows).into_par_iter().map(to_empty).collect();
+        // From block to block, those across corners as well, down and to the right, then back.
+        let mut step = |x: usize, y: usize, from: [[isize; 2]; 4]| {
+            for [dx, dy] in from {
+                let [bx, by] = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy)];
+                if bx < columns && by < rows {
+                    to_empty[y * columns + x] = to_empty[y * columns + x].min(to_empty[by * columns + bx] + 1);
+                }
+            }
+        };
+        let before = [[-1, -1], [0, -1], [1, -1], [-1, 0]];
+        let after = before.map(|from| from.map(|along| -along));
+        (0..rows).for_each(|y| (0..columns).for_each(|x| step(x, y, before)));
+        (0..rows).rev().for_each(|y| (0..columns).rev().for_each(|x| step(x, y, after)));
+        Some(Self { noise, k, pixels, blocks, to_empty })
+    }
+
+    /// How many blocks the nearest empty one is from a block, at most two more than a fringe has.
+    pub(super) fn blocks_to_empty(&self, column: usize, row: usize) -> u8 {
+        self.to_empty[row * self.blocks.columns + column]
+    }
+}
+
+impl Outline<'_> {
+    /// Whether pixel (x, y), which a splat with this `reach_px` covers at `depth`, is beside a surface whose border noise has
+    /// blurred. `None` if there is too little noise or too few points, or nothing empty within a fringe.
+    pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], depth: f32, reach_px: f32) -> Option<bool> {
+        let blurred = self.blurred?;
+        let Blurred { noise, k, .. } = blurred;
+        let pixel = self.view.pixel_size(depth);
+        let radius_px = reach_px / SUPPORT;
+        // As the splat radius comes from it.
+        let k_radius = radius_px * pixel * (0.5 * (*k as f32).sqrt());
+        let noise_px = noise.at(k_radius) / pixel;
+        if noise_px < LEAST_NOISE_PX {
+            return None;
+        }
+        let fringe = (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
+        // One more, as blocks that a border crosses are not empty.
+        let blocks = (fringe / BLOCK_PX as f32).ceil() as u8 + 1;
+        if blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX) > blocks {
+            return None;
+        }
+        let [width, height] = self.size();
+        // Of points beyond the picture nothing is known.
+        let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
+        let widest = WIDEST_PX.min(to_edge);
+        let window = (AROUND_PX * AROUND_PX + WINDOW_NOISES * noise_px * noise_px).sqrt().min(widest);
+        // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
+        if window < AROUND_PX.max(radius_px) {
+            return None;
+        }
+        let held = if window <= FINE_PX { &blurred.pixels } else { &blurred.blocks };
+        let [ox, oy] = pulp::Arch::new().dispatch(|| held.offset([x, y], window))?;
+        let deviation = window * window / WINDOW_NOISES;
+        let off = (ox * ox + oy * oy).sqrt();
+        let [unsure, sure] = OFF_BLURRED;
+        let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
+        if off <= may_be * deviation / (deviation + noise_px * noise_px).sqrt() {
+            return Some(false);
+        }
+        let ahead = |step: usize| {
+            let at = [(x, ox), (y, oy)].map(|(at, offset)| at as f32 + 0.5 - offset / off * step as f32);
+            let [x, y] = at.map(|at| at.floor() as isize);
+            let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
+            // Beyond the picture the surface goes on.
+            inside.then(|| self.rims[self.index([x as usize, y as usize])])
+        };
+        let met = (1..=fringe as usize).map_while(ahead).any(|rim| rim == EMPTY);
+        Some(met)
+    }
+}
+
+impl Held {
+    fn new([side, columns, rows]: [usize; 3], count: impl Fn(usize, usize) -> u16 + Sync) -> Self {
+        let mut counts = vec![0; columns * rows + LANES];
+        counts.par_chunks_mut(columns).take(rows).enumerate().for_each(|(y, row)| {
+            row.iter_mut().enumerate().for_each(|(x, held)| *held = count(x, y));
+        });
+        Self { side, columns, rows, count: counts }
+    }
+
+    /// The mean offset, in pixels, of the sixteenths with points from the middle of pixel (x, y), in a window of such a radius
+    /// that lies within the picture; `None` if there are too few.
+    #[inline(always)]
+    fn offset(&self, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
+        let reach = window as usize;
+        // The first square's middle from the pixel's, in pixels, and the squares.
+        let along = |at: usize, most: usize| {
+            let first = (at - reach) / self.side;
+            let middle = (self.side * first) as f32 - at as f32 + 0.5 * (self.side as f32 - 1.0);
+            (middle, first, ((at + reach) / self.side).min(most - 1) + 1)
+        };
+        let ((left, x0, x1), (top, y0, y1)) = (along(x, self.columns), along(y, self.rows));
+        let side = self.side as f32;
+        let per_window = 1.0 / (window * window);
+        let lanes: [f32; LANES] = std::array::from_fn(|lane| side * lane as f32);
+        let [mut count, mut weight, mut right, mut down] = [[0f32; LANES]; 4];
+        for row in y0..y1 {
+            let oy = top + side * (row - y0) as f32;
+            for (first, column) in (x0..x1).step_by(LANES).enumerate() {
+                let first = left + side * (LANES * first) as f32;
+                let held: &[u16; LANES] =
+                    self.count[row * self.columns + column..].first_chunk().expect("some after the last");
+                for lane in 0..LANES {
+                    // Beyond the window, and beyond the row, nothing counts.
+                    let ox = first + lanes[lane];
+                    let near = (1.0 - (ox * ox + oy * oy) * per_window).max(0.0);
+                    let held = f32::from(held[lane]);
+                    let of_lane = held * (near * near * near);
+                    count[lane] += if near > 0.0 { held } else { 0.0 };
+                    weight[lane] += of_lane;
+                    right[lane] += of_lane * ox;
+                    down[lane] += of_lane * oy;
+                }
+            }
+        }
+        let [count, weight, right, down] = [count, weight, right, down].map(|lanes| lanes.iter().sum::<f32>());
+        (count >= FEWEST_BLURRED as f32).then(|| [right / weight, down / weight])
+    }
+}
