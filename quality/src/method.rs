@@ -28,7 +28,8 @@ pub enum Method {
     Paper,
     /// Squares of a fixed size in pixels, the nearest in front.
     Dots,
-    /// The paper's splats with normals of plane fits to the exact nearest neighbours in the whole cloud, so many of them.
+    /// The paper's splats, but trimmed, with normals of plane fits to the exact nearest neighbours in the whole cloud, so many of
+    /// them.
     Fit(usize),
 }
 
@@ -61,6 +62,7 @@ pub fn paper() -> Reconstruction {
         ellipses: false,
         grid_culling: true,
         depth_refinement: true,
+        trim: false,
         coherent: false,
         steady: false,
         frames_averaged: 1,
@@ -97,12 +99,14 @@ impl<'a> Painter<'a> {
             Method::Paper => self.render(paper(), camera, size),
             Method::Dots => Ok(dots(self.subject, &Rays::new(camera, size)?, size)),
             Method::Fit(k) => {
+                // They are compared by their normals: what whole splats draw past silhouettes would be no fault of these.
+                let trimmed = Reconstruction { trim: true, ..paper() };
                 // Without culling every visible point has a surfel, and its radius.
-                let all = plain(Reconstruction { grid_culling: false, ..paper() });
+                let all = plain(Reconstruction { grid_culling: false, ..trimmed.clone() });
                 self.renderer.render(&self.subject.cloud, camera, size, &all)?;
                 let normals = self.fits.normals(self.subject, &self.renderer.surfels()?, k);
                 let cloud = &self.subject.cloud;
-                let frame = self.renderer.render_with_normals(cloud, &normals, camera, size, &plain(paper()))?;
+                let frame = self.renderer.render_with_normals(cloud, &normals, camera, size, &plain(trimmed))?;
                 Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
             }
         }

@@ -117,6 +117,9 @@ pub(crate) struct SurfaceArgs {
     /// Let the splats of hidden points take part in the depth of the visible surface
     #[arg(long)]
     pub(crate) no_depth_refinement: bool,
+    /// Leave splats whole at silhouettes, which are as much too wide then
+    #[arg(long)]
+    pub(crate) no_trim: bool,
 }
 
 #[derive(Args, Debug)]

@@ -223,6 +223,7 @@ fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings
         ellipses: surface.ellipses,
         grid_culling: !surface.no_grid_culling,
         depth_refinement: !surface.no_depth_refinement,
+        trim: !surface.no_trim,
         frames_averaged: surface.frames_averaged,
         ..Reconstruction::default()
     };

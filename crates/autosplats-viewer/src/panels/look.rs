@@ -214,6 +214,7 @@ fn search(app: &mut App, ui: &mut egui::Ui) {
     ui.checkbox(&mut reconstruction.grid_culling, "Grid culling").on_hover_text("Skip what is hidden for sure");
     ui.checkbox(&mut reconstruction.depth_refinement, "Depth refinement")
         .on_hover_text("Keep splats of hidden points out of the surface");
+    ui.checkbox(&mut reconstruction.trim, "Trim").on_hover_text("End silhouettes where points do");
 }
 
 /// A radius that holds some ten points of a cloud, were they a sphere.

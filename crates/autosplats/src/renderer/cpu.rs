@@ -189,7 +189,11 @@ impl CpuRenderer {
         splatter.attributes(surfels, &view, &attributes);
         let adapts = settings_splat.adaptive && given.is_none();
         let noise = if adapts { adapter.noise() } else { Noise::NONE };
-        let (layers, covered) = splatter.trim(&view, &screen.sixteenths, (noise, settings_splat.k));
+        let (layers, covered) = if settings_splat.trim {
+            splatter.trim(&view, &screen.sixteenths, (noise, settings_splat.k_radius_per_radius()))
+        } else {
+            splatter.whole(&view)
+        };
         if smooths {
             over_time.end(now, cloud.identity(), settings_splat.clone(), surfels, screen);
         }

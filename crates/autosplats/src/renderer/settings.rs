@@ -19,7 +19,7 @@ pub struct Settings {
 }
 
 /// How points become splats. The default goes beyond [the paper's](Self::paper) in
-/// [`points_per_pixel`](Self::points_per_pixel) and [`adaptive`](Self::adaptive).
+/// [`points_per_pixel`](Self::points_per_pixel), [`adaptive`](Self::adaptive) and [`trim`](Self::trim).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Reconstruction {
@@ -53,6 +53,9 @@ pub struct Reconstruction {
     pub grid_culling: bool,
     /// Redraw the depth map twice without the splats of hidden points [Paper, §7].
     pub depth_refinement: bool,
+    /// End silhouettes where points do, or, where noise has blurred them, where these become few. Without, silhouettes are as much
+    /// too wide as splats are.
+    pub trim: bool,
     /// Temporal coherence: start the search of each point from the k-radius that the last frame of the same [`Renderer`] found
     /// where the point was then. It saves time and changes no picture. Of [`SearchEngine::ScreenGrid`]; the paper's and its rival
     /// take each frame by itself.
@@ -89,6 +92,7 @@ impl Default for Reconstruction {
             ellipses: false,
             grid_culling: true,
             depth_refinement: true,
+            trim: true,
             coherent: true,
             steady: false,
             frames_averaged: 1,
@@ -97,9 +101,9 @@ impl Default for Reconstruction {
 }
 
 impl Reconstruction {
-    /// What the paper does: one point a pixel, k = 10 for all, and each frame by itself.
+    /// What the paper does: one point a pixel, k = 10 for all, whole splats, and each frame by itself.
     pub fn paper() -> Self {
-        Self { points_per_pixel: 1, adaptive: false, coherent: false, ..Self::default() }
+        Self { points_per_pixel: 1, adaptive: false, trim: false, coherent: false, ..Self::default() }
     }
 
     /// Over how many frames surfels are averaged: of the same points, and of others.
@@ -115,6 +119,11 @@ impl Reconstruction {
     /// Longest ellipse, semi-major over semi-minor axis.
     pub(super) fn longest(&self) -> f32 {
         if self.ellipses { LONGEST } else { 1.0 }
+    }
+
+    /// K-radius of k neighbours over their splat's radius.
+    pub(super) fn k_radius_per_radius(&self) -> f32 {
+        0.5 * (self.k as f32).sqrt() / self.splat_scale
     }
 
     /// Whether the search of a frame starts from what the last one found.

@@ -1,11 +1,14 @@
 // Borders that noise has blurred. The CPU form, `trim/blurred.rs`, says how. Imports: frame, layers, blocks, noise. The including
-// pass binds `measured`, `blocks`, `cover` and `sixteenths`.
+// pass binds `measured`, `blocks` and `cover`, and has `AROUND_PX`, `of_pixel_at`, and `SILENT`, `YES` and `NO`.
 
 #import blocks
 #import noise
 
 override LEAST_NOISE_PX: f32;
-override WINDOW_NOISES: f32;
+// Squared radius of a window over the variance of its kernel.
+override PER_VARIANCE: f32;
+// How far a surface is tilted of which all noise counts.
+override TILTED: f32;
 override WIDEST_PX: f32;
 // Windows wider than this are summed up in blocks.
 override FINE_PX: f32;
@@ -21,12 +24,15 @@ override SUPPORT: f32;
 // Widest fringe in blocks.
 const FRINGE_BLOCKS = 16u;
 
-// Noise in pixels, where a splat with this reach covers a pixel at a depth.
-fn noise_px(depth: f32, reach_px: f32) -> f32 {
-    let pixel = pixel_size(depth);
+// Noise in pixels, where a splat with this reach covers a pixel that shows such a normal and depth.
+fn noise_px(pixel: vec2u, shown: vec4f, reach_px: f32) -> f32 {
+    let eye = to_eye(unproject(vec2f(pixel) + 0.5, shown.w));
+    let facing = dot(shown.xyz, eye) / length(eye);
+    let aside = min(sqrt(max(1.0 - facing * facing, 0.0)) / TILTED, 1.0);
+    let size = pixel_size(shown.w);
     // As the splat radius comes from it.
-    let k_radius = reach_px / SUPPORT * pixel * (0.5 * sqrt(f32(frame.k)));
-    return noise_at(k_radius) / pixel;
+    let k_radius = reach_px / SUPPORT * size * (0.5 * sqrt(f32(frame.k)) / frame.splat_scale);
+    return aside * noise_at(k_radius) / size;
 }
 
 // How far a fringe reaches, in pixels.
@@ -39,7 +45,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     // Of points beyond the picture nothing is known.
     let to_edge = min(pixel, frame.size - 1u - pixel);
     let widest = min(WIDEST_PX, f32(min(to_edge.x, to_edge.y)));
-    let window = min(sqrt(AROUND_PX * AROUND_PX + WINDOW_NOISES * noise * noise), widest);
+    let window = min(sqrt(AROUND_PX * AROUND_PX + PER_VARIANCE * noise * noise), widest);
     // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
     if window < max(AROUND_PX, reach_px / SUPPORT) {
         return SILENT;
@@ -48,10 +54,10 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     if offset.z < f32(FEWEST_BLURRED) {
         return SILENT;
     }
-    let deviation = window * window / WINDOW_NOISES;
+    let variance = window * window / PER_VARIANCE;
     let off = length(offset.xy);
     let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / SURE_NOISE_PX, 0.0);
-    if off <= may_be * deviation / sqrt(deviation + noise * noise) {
+    if off <= may_be * variance / sqrt(variance + noise * noise) {
         return NO;
     }
     let steps = u32(fringe_px(reach_px, noise));

@@ -2,6 +2,7 @@
 
 use autosplats_cloud::FieldValues;
 
+use super::trim::Shown;
 use super::{GBuffer, TILE_AREA};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -141,9 +142,9 @@ impl TileLayers<'_> {
         self.weight[at] > 0.0
     }
 
-    /// Depth at pixel `at` of the tile.
-    pub(super) fn depth_at(&self, at: usize) -> f32 {
-        self.depth[at]
+    /// What pixel `at` of the tile shows.
+    pub(super) fn shown(&self, at: usize) -> Shown {
+        Shown { depth: self.depth[at], normal: self.normal[at] }
     }
 
     /// Leaves nothing at pixel `at` of the tile.

@@ -115,10 +115,15 @@ impl Splatter {
     }
 
     /// Trims the attributes just drawn: silhouettes end where the surface does, of whose points `sixteenths` tell, and where they
-    /// have `noise`, as told for the k-radii of so many neighbours, their density. Returns the number of covered pixels too.
-    pub(crate) fn trim(&mut self, view: &View, sixteenths: &Sixteenths, (noise, k): (Noise, u32)) -> (&GBuffer, usize) {
+    /// have `noise`, their density; k-radii are `per_radius` splat radii. Returns the number of covered pixels too.
+    pub(crate) fn trim(
+        &mut self,
+        view: &View,
+        sixteenths: &Sixteenths,
+        (noise, per_radius): (Noise, f32),
+    ) -> (&GBuffer, usize) {
         let Self { rims, centers, layers, .. } = self;
-        let blurred = Blurred::new(noise, k, rims, sixteenths, view);
+        let blurred = Blurred::new(noise, per_radius, rims, sixteenths, view);
         let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {
@@ -128,7 +133,7 @@ impl Splatter {
             for y in y0..(y0 + TILE).min(view.height as usize) {
                 for x in x0..(x0 + TILE).min(view.width as usize) {
                     let at = (y - y0) * TILE + x - x0;
-                    if outline.sticks_out(x, y, layers.depth_at(at), border[y - y0] >> (x - x0) & 1 == 1) {
+                    if outline.sticks_out(x, y, layers.shown(at), border[y - y0] >> (x - x0) & 1 == 1) {
                         layers.clear(at);
                     }
                     covered += usize::from(layers.covers(at));
@@ -138,6 +143,14 @@ impl Splatter {
         });
         let covered = covered.sum();
         (layers, covered)
+    }
+
+    /// The attributes just drawn, as they are, and the number of covered pixels.
+    pub(crate) fn whole(&self, view: &View) -> (&GBuffer, usize) {
+        let layers = &self.layers;
+        let covers = |x: usize, y: usize| layers.weight[layers.index(x, y)] > 0.0;
+        let row = |y: u32| (0..view.width as usize).filter(|&x| covers(x, y as usize)).count();
+        (layers, (0..view.height).into_par_iter().map(row).sum())
     }
 }
 

@@ -14,8 +14,8 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
-    BLOCK_PX, FEWEST_BLURRED, FINE_PX, FRINGE_NOISES, LEAST_NOISE_PX, OFF_BLURRED, SURE_NOISE_PX, WIDEST_PX,
-    WINDOW_NOISES,
+    BLOCK_PX, FEWEST_BLURRED, FINE_PX, FRINGE_NOISES, LEAST_NOISE_PX, OFF_BLURRED, PER_VARIANCE, SURE_NOISE_PX, TILTED,
+    WIDEST_PX,
 };
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
@@ -76,6 +76,17 @@ const TOP_NODES: u32 = 1 + 16 + 256 + 4096;
 /// Bytes of a splat.
 const SPLAT_BYTES: usize = 48;
 
+/// How layers are drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LayerRules<'a> {
+    /// Refine the depth map twice before [Paper, §7].
+    pub(crate) depth_refinement: bool,
+    /// Take tails off after.
+    pub(crate) trim: bool,
+    /// The noise of the frame as `shared/noise.wgsl` has it, if it was measured.
+    pub(crate) noise: Option<&'a wgpu::Buffer>,
+}
+
 /// Splats on the device, and the depth maps.
 #[derive(Debug)]
 pub(crate) struct SplatBuffers {
@@ -92,7 +103,7 @@ pub(crate) struct SplatBuffers {
     centers: wgpu::Buffer,
     /// `shared/blocks.wgsl`, row by row.
     blocks: wgpu::Buffer,
-    /// That of frames whose noise is not measured.
+    /// The noise of frames that it is not measured in.
     no_noise: wgpu::Buffer,
 }
 
@@ -112,7 +123,7 @@ impl SplatBuffers {
             changes: gpu.storage::<u32>("changes of splats", screen_capacity as usize)?,
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
             centers: gpu.storage::<u32>("centres of splats", pixels)?,
-            blocks: gpu.storage::<u32>("blocks of pixels", blocks(size) as usize)?,
+            blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
             no_noise: gpu.storage::<f32>("no noise", 5)?,
         })
     }
@@ -141,7 +152,8 @@ pub(crate) struct SplatPasses {
     attributes: Pass,
     add_centers: Pass,
     sum_blocks: Pass,
-    trim: Pass,
+    /// Which takes nothing off, and only counts, and which does.
+    trim: [Pass; 2],
     /// Linear value of each step of a colour.
     linear: wgpu::Buffer,
 }
@@ -189,32 +201,37 @@ impl SplatPasses {
             ("CORE_WEIGHT", CORE_WEIGHT.into()),
             ("INNER_WEIGHT", INNER_WEIGHT.into()),
         ];
-        let trim = [
-            ("FURTHEST", FURTHEST.into()),
-            ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
-            ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
-            ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
-            ("LEAST_SHARE", LEAST_SHARE.into()),
-            ("FEWEST_POINTS_NARROW", FEWEST_POINTS[0].into()),
-            ("FEWEST_POINTS_WIDE", FEWEST_POINTS[1].into()),
-            ("MANY_POINTS", MANY_POINTS.into()),
-            ("AROUND_PX", AROUND_PX.into()),
-            ("OFF_PX", OFF_PX.into()),
-            ("FEWEST_SPLATS_NARROW", FEWEST_SPLATS[0].into()),
-            ("FEWEST_SPLATS_WIDE", FEWEST_SPLATS[1].into()),
-            ("NARROW_PX", NARROW_PX.into()),
-            ("STEPS", STEPS.into()),
-            ("LEAST_NOISE_PX", LEAST_NOISE_PX.into()),
-            ("WINDOW_NOISES", WINDOW_NOISES.into()),
-            ("WIDEST_PX", WIDEST_PX.into()),
-            ("FINE_PX", FINE_PX.into()),
-            ("OFF_UNSURE", OFF_BLURRED[0].into()),
-            ("OFF_SURE", OFF_BLURRED[1].into()),
-            ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
-            ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
-            ("FRINGE_NOISES", FRINGE_NOISES.into()),
-            ("SUPPORT", SUPPORT.into()),
-        ];
+        let trim = |trims: f64| {
+            let constants = [
+                ("TRIMS", trims),
+                ("FURTHEST", FURTHEST.into()),
+                ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
+                ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
+                ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
+                ("LEAST_SHARE", LEAST_SHARE.into()),
+                ("FEWEST_POINTS_NARROW", FEWEST_POINTS[0].into()),
+                ("FEWEST_POINTS_WIDE", FEWEST_POINTS[1].into()),
+                ("MANY_POINTS", MANY_POINTS.into()),
+                ("AROUND_PX", AROUND_PX.into()),
+                ("OFF_PX", OFF_PX.into()),
+                ("FEWEST_SPLATS_NARROW", FEWEST_SPLATS[0].into()),
+                ("FEWEST_SPLATS_WIDE", FEWEST_SPLATS[1].into()),
+                ("NARROW_PX", NARROW_PX.into()),
+                ("STEPS", STEPS.into()),
+                ("LEAST_NOISE_PX", LEAST_NOISE_PX.into()),
+                ("PER_VARIANCE", PER_VARIANCE.into()),
+                ("TILTED", TILTED.into()),
+                ("WIDEST_PX", WIDEST_PX.into()),
+                ("FINE_PX", FINE_PX.into()),
+                ("OFF_UNSURE", OFF_BLURRED[0].into()),
+                ("OFF_SURE", OFF_BLURRED[1].into()),
+                ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
+                ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
+                ("FRINGE_NOISES", FRINGE_NOISES.into()),
+                ("SUPPORT", SUPPORT.into()),
+            ];
+            Pass::new(gpu, &TRIM, &constants)
+        };
         let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
@@ -237,7 +254,7 @@ impl SplatPasses {
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             add_centers: Pass::new(gpu, &ADD_CENTERS, &[("STEPS", STEPS.into())])?,
             sum_blocks: pass(&SUM_BLOCKS)?,
-            trim: Pass::new(gpu, &TRIM, &trim)?,
+            trim: [trim(0.0)?, trim(1.0)?],
             linear: steps,
         })
     }
@@ -314,8 +331,7 @@ impl SplatPasses {
         ]
     }
 
-    /// Draws the attributes of all rounds' surfels and trims them, by the `noise` that was measured as well if it was, after two
-    /// refinements of the depth map if `depth_refinement` [Paper, §7].
+    /// Draws the attributes of all rounds' surfels.
     #[allow(clippy::too_many_arguments, reason = "each is a buffer or a set of them")]
     pub(crate) fn steps_layers(
         &self,
@@ -325,14 +341,13 @@ impl SplatPasses {
         surfels: &wgpu::Buffer,
         splats: &SplatBuffers,
         layers: &LayerBuffers,
-        noise: Option<&wgpu::Buffer>,
-        depth_refinement: bool,
+        rules: LayerRules<'_>,
     ) -> Vec<Step> {
         let SplatBuffers { splats: list, tree, depth, centers, blocks: summed, no_noise, .. } = splats;
         let ScreenBuffers { counters, values, sixteenths, .. } = screen;
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let mut steps = Vec::new();
-        for _ in 0..if depth_refinement { 2 } else { 0 } {
+        for _ in 0..if rules.depth_refinement { 2 } else { 0 } {
             steps.extend(self.steps_refine(gpu, frame, screen, splats));
         }
         steps.push(self.boxes.step(gpu, &[frame, counters, tree], tops(screen)));
@@ -341,11 +356,12 @@ impl SplatPasses {
         steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
         let all = screen.groups(Work::Queries256);
         steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
-        let noise = noise.unwrap_or(no_noise);
+        let noise = rules.noise.unwrap_or(no_noise);
         let blocks = [frame, cover, sixteenths, noise, summed];
-        steps.push(self.sum_blocks.step(gpu, &blocks, self::blocks(screen.size).div_ceil(64)));
+        steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(64)));
         let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, summed];
-        steps.push(self.trim.step(gpu, &trim, patches(screen, [SQUARE; 2])));
+        let pass = &self.trim[usize::from(rules.trim)];
+        steps.push(pass.step(gpu, &trim, patches(screen, [SQUARE; 2])));
         steps
     }
 }
@@ -361,7 +377,7 @@ fn cells([columns, rows]: [u32; 2]) -> u32 {
 }
 
 /// Blocks of pixels in a picture of this size.
-fn blocks(size: [u32; 2]) -> u32 {
+fn block_count(size: [u32; 2]) -> u32 {
     size.map(|side| side.div_ceil(BLOCK_PX as u32)).iter().product()
 }
 

@@ -6,7 +6,8 @@
 //! neighbourhoods cut short by occlusion; twice the map is drawn again without them (*refinement*). Then the splats left
 //! add their weighted attributes wherever they lie in front of the map, that is within ε of the surface (*attributes*),
 //! and the sums are divided by the weights (*normalize*). Last, tails that stick out of a silhouette are cut off (*trim*),
-//! by the cores of splats around them and, where points are dense, by the places of those in each pixel (`centers`).
+//! by the cores of splats around them and, where points are dense, by the places of those in each pixel (`centers`), or by
+//! where these become fewer, if noise has blurred the silhouette.
 //!
 //! Splats are sorted into tiles of [`TILE`]² pixels. A tile is drawn by one thread, in its cache, splat after splat in the
 //! order of the list, so that sums come out the same for any number of threads.
@@ -30,6 +31,8 @@ pub(crate) use layers::{Channels, LayerBuffers};
 #[cfg(test)]
 pub(crate) use layers::{Cover, upload_layers};
 pub(crate) use over_time::{OverTime, STEADY_FRAMES};
+#[cfg(test)]
+pub(crate) use trim::blurred::{BLOCK_PX, FRINGE_BLOCKS};
 
 /// Side of a screen tile in pixels: the unit of splatting, and the layout of every screen-sized layer.
 pub const TILE: usize = 64;

@@ -102,6 +102,14 @@ pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
     }
 }
 
+/// What a pixel shows, before anything is taken off.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shown {
+    pub(super) depth: f32,
+    /// View space.
+    pub(super) normal: [f32; 3],
+}
+
 /// What trimming knows of a picture, tile by tile.
 #[derive(Clone, Copy)]
 pub(super) struct Outline<'a> {
@@ -156,14 +164,14 @@ impl Outline<'_> {
         })
     }
 
-    /// Whether a splat covers pixel (x, y), at `depth`, but no surface does; `border` says whether the pixel is close to an empty
+    /// Whether a splat covers pixel (x, y), of which this is shown, but no surface does; `border` says whether the pixel is close to an empty
     /// square.
-    pub(super) fn sticks_out(&self, x: usize, y: usize, depth: f32, border: bool) -> bool {
+    pub(super) fn sticks_out(&self, x: usize, y: usize, shown: Shown, border: bool) -> bool {
         let own = self.rims[self.index([x, y])];
         if own == EMPTY {
             return false;
         }
-        let by_density = self.is_beside_blurred([x, y], depth, own.abs());
+        let by_density = self.is_beside_blurred([x, y], shown, own.abs());
         let beside = || if border { self.is_beside([x, y], own.abs() > NARROW_PX) } else { None };
         by_density.or_else(beside).unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }

@@ -1,6 +1,7 @@
 // Trim: takes off the tails that splats leave around a silhouette. The CPU form, `trim.rs`, says how.
 //
-// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. What is read of them, the rims, is not written. Writes: counters.
+// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Of other pixels it reads the rims, which are not
+// written. Writes: counters.
 
 #import frame
 #import groups
@@ -17,6 +18,8 @@
 @group(0) @binding(7) var<storage, read> measured: array<f32>;
 @group(0) @binding(8) var<storage, read> blocks: array<u32>;
 
+// 1 to take off what sticks out, 0 only to count what is covered.
+override TRIMS: u32;
 // How far lines go, in reaches of the splat; strides in a reach; pixels added to how far they go.
 override FURTHEST: f32;
 override STRIDES_PER_REACH: f32;
@@ -61,7 +64,8 @@ var<workgroup> empties: array<atomic<u32>, 80>;
 // The same of pixels in the middle of an empty square.
 var<workgroup> middles: array<vec2u, 40>;
 // For each row of blocks, a bit for each that is empty, likewise.
-var<workgroup> empty_blocks: array<atomic<u32>, 84>;
+var<workgroup> empty_blocks: array<atomic<u32>, 2u * WIDE_BLOCKS>;
+var<workgroup> is_any_empty: atomic<u32>;
 // For each line, the sixteenths around a pixel that lie ahead, then for each those behind: two words of four rows each.
 var<workgroup> sides: array<vec2u, 16>;
 
@@ -76,6 +80,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     if local == 0u {
         atomicStore(&covered, 0u);
         atomicStore(&tail_count, 0u);
+        atomicStore(&is_any_empty, 0u);
     }
     for (var word = local; word < 2u * WIDE; word += GROUP) {
         atomicStore(&empties[word], 0u);
@@ -105,6 +110,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             let block = corner / BLOCK_PX + at - BLOCK_MARGIN;
             if all(block < block_counts()) && (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u {
                 atomicOr(&empty_blocks[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
+                atomicStore(&is_any_empty, 1u);
             }
         }
     }
@@ -123,11 +129,13 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         if all(pixel < frame.size) {
             let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
             stay += select(1u, 0u, rim == EMPTY_RIM);
-            if rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
+            if TRIMS == 1u && rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
                 tails[atomicAdd(&tail_count, 1u)] = place;
             }
         }
     }
+    // What one invocation has read of a pixel another may take off.
+    storageBarrier();
     workgroupBarrier();
     for (var tail = local; tail < atomicLoad(&tail_count); tail += GROUP) {
         let place = vec2u(tails[tail] % SQUARE, tails[tail] / SQUARE);
@@ -195,10 +203,10 @@ fn side(which: u32) -> vec2u {
 // Noise in pixels where it may have blurred the border beside a pixel, which a splat of this reach covers; 0 if not, or if nothing
 // is empty within a fringe.
 fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
-    if !(measured[0] > 0.0) {
+    if atomicLoad(&is_any_empty) == 0u {
         return 0.0;
     }
-    let noise = noise_px(surface[pixel.y * frame.size.x + pixel.x].w, reach_px);
+    let noise = noise_px(pixel, surface[pixel.y * frame.size.x + pixel.x], reach_px);
     if !(noise >= LEAST_NOISE_PX) {
         return 0.0;
     }

@@ -205,6 +205,7 @@ fn every_setting() {
         ("ellipses", Reconstruction { ellipses: true, ..usual() }),
         ("one point a pixel", Reconstruction { points_per_pixel: 1, ..usual() }),
         ("no culling", Reconstruction { grid_culling: false, ..usual() }),
+        ("whole splats", Reconstruction { trim: false, ..usual() }),
         ("no refinement", Reconstruction { depth_refinement: false, ..usual() }),
     ];
     for (name, reconstruction) in cases {

@@ -18,7 +18,7 @@ use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
 use crate::shade::{ColorMode, linear_steps};
-use crate::splat::gpu::{SplatBuffers, SplatPasses};
+use crate::splat::gpu::{LayerRules, SplatBuffers, SplatPasses};
 use crate::splat::over_time::gpu::{OverTimeBuffers, OverTimePasses};
 use crate::splat::{Channels, LayerBuffers};
 
@@ -89,6 +89,7 @@ pub(super) struct Shape {
     smooth: bool,
     adaptive: bool,
     depth_refinement: bool,
+    trim: bool,
     channels: Channels,
     /// Runs of points by their sensors.
     sensors: Option<usize>,
@@ -115,6 +116,7 @@ impl Shape {
             smooth: reconstruction.smooths(),
             adaptive: reconstruction.adaptive,
             depth_refinement: reconstruction.depth_refinement,
+            trim: reconstruction.trim,
             channels: Channels {
                 color: wanted.colors.is_some(),
                 scalar: wanted.scalar.is_some(),
@@ -216,9 +218,9 @@ impl Prepared {
             if let Some((passes, buffers)) = &over_time {
                 steps.extend(passes.steps_keep(gpu, frame, &screen, &surfels, buffers));
             }
-            let refine = shape.depth_refinement;
             let noise = adapt.as_ref().map(|(_, buffers)| buffers.noise());
-            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, noise, refine));
+            let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
+            steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
             steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
             Ok::<_, Error>((steps, convergence))
         })??;

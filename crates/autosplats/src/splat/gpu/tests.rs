@@ -28,7 +28,6 @@ struct Scene<'a> {
     view: &'a View,
     refinement: bool,
     data: &'a Data,
-    /// Of points with no neighbours but one.
     noise: Noise,
 }
 
@@ -95,7 +94,8 @@ impl Scene<'_> {
         let before = depth();
         let Noise { level, power, most } = self.noise;
         let noise = gpu.storage_with("noise", &[level, power, 0.0, 0.0, most]).expect("room");
-        run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, Some(&noise), self.refinement));
+        let rules = LayerRules { depth_refinement: self.refinement, trim: true, noise: Some(&noise) };
+        run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, rules));
         Drawn { depth: [before, depth()], layers: read_layers(gpu, layers) }
     }
 
@@ -117,7 +117,7 @@ impl Scene<'_> {
             backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
-        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 1)).0.clone();
+        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 0.5)).0.clone();
         (splatter, layers)
     }
 }
@@ -221,49 +221,70 @@ fn the_device_draws_what_the_host_draws() {
     }
 }
 
+/// A disc of points, tilted from the eye by an angle with such a sine, whose border is blurred by noise of so many pixels.
+fn blurred_disc(count: u32, away_px: f32, noise_px: f32, tilt: f32, view: &View) -> Vec<Surfel> {
+    let depth = 4.0;
+    let pixel = view.pixel_size(depth);
+    let mut random = Random::new(47);
+    let mut surfel = || {
+        let (angle, away) = (6.3 * random.unit(), away_px * random.unit().sqrt());
+        let place = [angle.cos(), angle.sin()].map(|along| away * along + noise_px * random.gaussian());
+        let mut surfel = Surfel {
+            radius: 2.5 * pixel,
+            normal: [tilt, 0.0, -(1.0 - tilt * tilt).sqrt()],
+            k_radius: 1.25 * pixel,
+            major_axis: [0.0, 1.0, 0.0],
+            major_ratio: 1.0,
+            ..Surfel::default()
+        };
+        surfel.move_to(Vec3::new(place[0] * pixel, place[1] * pixel, depth), view);
+        surfel
+    };
+    let seen = (0..count).map(|_| surfel()).filter(|surfel| surfel.center[2] > 0.0);
+    seen.zip(0..).map(|(surfel, source)| Surfel { source, screen: source, ..surfel }).collect()
+}
+
 #[test]
 fn the_device_ends_blurred_borders_where_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
-    let data = Data::new(20_000);
+    let data = Data::new(40_000);
     let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
-    for (noise_px, power) in [(0.1, 0.0), (1.0, 0.0), (2.5, 1.5), (6.0, 0.0)] {
-        for view in views([233, 190]) {
-            // A disc of points, and of splats, whose border is blurred.
-            let depth = 4.0;
-            let pixel = view.pixel_size(depth);
-            let mut random = Random::new(47);
-            let mut surfel = |source: u32| {
-                let (angle, away) = (6.3 * random.unit(), 70.0 * random.unit().sqrt());
-                let place = [angle.cos(), angle.sin()].map(|along| away * along + noise_px * random.gaussian());
-                let [x, y] = place.map(|along| along * pixel);
-                let facing = Surfel {
-                    radius: 2.5 * pixel,
-                    normal: [0.0, 0.0, -1.0],
-                    k_radius: 1.25 * pixel,
-                    major_axis: [1.0, 0.0, 0.0],
-                    major_ratio: 1.0,
-                    source,
-                    screen: source,
-                    ..Surfel::default()
-                };
-                let mut surfel = facing;
-                surfel.move_to(Vec3::new(x, y, depth), &view);
-                surfel
-            };
-            let mut surfels: Vec<_> = (0..16_000).map(&mut surfel).collect();
-            surfels.retain(|surfel| surfel.center[2] > 0.0);
-            let noise = Noise { level: noise_px * pixel, power, most: 1.3 * pixel };
+    let (small, large) = (([233, 190], 16_000, 70.0), ([411, 390], 40_000, 120.0));
+    for ((size, count, away_px), noise_px, power, tilt) in [
+        (small, 0.1, 0.0, 0.8),
+        (small, 1.0, 0.0, 0.8),
+        (small, 2.5, 1.5, 0.6),
+        (small, 6.0, 0.0, 0.8),
+        (small, 6.0, 0.0, 0.0),
+        (large, 20.0, 0.0, 0.9),
+    ] {
+        // In perspective, what faces the eye in the middle is tilted beside it.
+        for view in views(size).into_iter().filter(|view| tilt > 0.0 || !view.perspective) {
+            let surfels = blurred_disc(count, away_px, noise_px, tilt, &view);
+            let pixel = view.pixel_size(4.0);
+            let noise = Noise { level: noise_px * pixel, power, most: 2.0 * pixel };
             let active = surfels.len();
             let blurred = Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data, noise };
-            assert_same(&gpu, &passes, &blurred, &format!("{noise_px} pixels, perspective {}", view.perspective));
+            let case = format!("noise of {noise_px} pixels, tilt {tilt}, perspective {}", view.perspective);
+            assert_same(&gpu, &passes, &blurred, &case);
             let covered = |noise: Noise| {
                 let (_, layers) = Scene { noise, ..blurred }.host(ALL);
                 layers.weight.iter().filter(|&&weight| weight > 0.0).count()
             };
             let [with, without] = [noise, Noise::NONE].map(covered);
             let fewer = 1.0 - with as f64 / without as f64;
-            assert!((fewer > 0.01) == (noise_px > 0.5), "noise of {noise_px} pixels takes off {fewer}");
+            // Where a surface faces the eye its border is as sharp as it is seen.
+            assert!((fewer > 0.01) == (noise_px > 0.5 && tilt > 0.5), "{case}: takes off {fewer}");
         }
+    }
+    // Next to nothing fits into these.
+    for size in SIZES {
+        let view = views(size)[0];
+        let surfels = blurred_disc(5 + size[0] * size[1] / 4, 20.0, 3.0, 0.3, &view);
+        let noise = Noise { level: 3.0 * view.pixel_size(4.0), ..Noise::NONE };
+        let active = surfels.len();
+        let scene = Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data, noise };
+        assert_same(&gpu, &passes, &scene, &format!("{size:?}"));
     }
 }
 

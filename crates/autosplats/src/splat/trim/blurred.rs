@@ -3,15 +3,20 @@
 //! # How it works
 //! Noise strews points past the end of a surface, and what splats draw there, though most are moved back, is a fringe as wide as
 //! the noise. Around a place in it points are the fewer the further out they are, and their mean in a window lies on the side of
-//! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of σ, at the straight end of
-//! points strewn evenly it is 0.80 w²/√(w² + σ²), and 0.48 of that where a surface curves away, so that they lie ever closer up to
-//! its end, the more so the wider both are. What is off by more, and has something empty ahead on the other side, is beside the
-//! surface. All points tell, hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they
-//! are dense, and the same as there are in the fringe.
+//! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of deviation σ, it is
+//! 0.80 w²/√(w² + σ²) at the straight end of points strewn evenly, and 0.48 w²/√(w² + σ²) where a surface curves away, so that
+//! points lie ever closer up to its end. Silhouettes are nearly always of the second kind; straight ends are cut off by half of
+//! the noise too much. What is off by more, and has something empty ahead on the other side, is beside the surface. All points tell,
+//! hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they are dense, and all there
+//! are in the fringe.
+//!
+//! Scanners err along their rays, and what is left over of fits is across surfaces. So the border of a surface that faces the eye,
+//! where scans end, is taken for as sharp as it is seen, and all of the noise counts only where a surface is seen from the side.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{AROUND_PX, EMPTY, Outline, Rim};
+use super::{AROUND_PX, EMPTY, Outline, Rim, Shown};
 use crate::adapt::Noise;
 use crate::camera::View;
 use crate::project::Sixteenths;
@@ -20,24 +25,28 @@ use crate::splat::tiled_index;
 
 /// Least noise, in pixels, that blurs a border: with less, detail of far views that was taken for noise would be cut.
 pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
-/// The window is so many times as wide as a square of pixels' kernel is with that of the noise.
-pub(in crate::splat) const WINDOW_NOISES: f32 = 10.0;
+/// Squared radius of a window over the variance of its kernel, along one axis.
+pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
+/// All of the noise counts where a surface is tilted from the eye by this part of a right angle's sine: in a fringe normals lean
+/// towards the eye.
+pub(in crate::splat) const TILTED: f32 = 0.8;
 /// Widest window in pixels.
 pub(in crate::splat) const WIDEST_PX: f32 = 48.0;
 /// Windows wider than this, in pixels, are summed up in blocks.
 pub(in crate::splat) const FINE_PX: f32 = 8.0;
 /// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
-/// borders, and with so much in pixels and more.
+/// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more.
 pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.55];
+/// In pixels.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
 /// From how many sixteenths with points on they tell.
 pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
 /// A fringe is no wider than the reach of its splats and this many times the noise,
 pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
 /// nor than so many blocks.
-pub(in crate::splat) const FRINGE_BLOCKS: usize = 16;
+pub(crate) const FRINGE_BLOCKS: usize = 16;
 /// Side of a block in pixels.
-pub(in crate::splat) const BLOCK_PX: usize = 4;
+pub(crate) const BLOCK_PX: usize = 4;
 
 /// Squares that are summed up at a time; their sums are added up in this many parts on any machine.
 const LANES: usize = 8;
@@ -53,11 +62,12 @@ struct Held {
     count: Vec<u16>,
 }
 
-/// The noise of a frame's points, as the splats of `k` neighbours tell where it differs, and what is known of its picture.
+/// The noise of a frame's points, and what is known of its picture.
 #[derive(Debug)]
 pub(in crate::splat) struct Blurred {
     noise: Noise,
-    k: u32,
+    /// K-radii in splat radii.
+    per_radius: f32,
     pixels: Held,
     blocks: Held,
     /// Of each block, how many blocks away the nearest is that is empty, along either axis.
@@ -65,15 +75,15 @@ pub(in crate::splat) struct Blurred {
 }
 
 impl Blurred {
-    /// Of a picture; `None` if there is no noise.
+    /// Of a picture of points whose k-radii are `per_radius` splat radii; `None` if there is no noise.
     pub(in crate::splat) fn new(
         noise: Noise,
-        k: u32,
+        per_radius: f32,
         rims: &[Rim],
         sixteenths: &Sixteenths,
         view: &View,
     ) -> Option<Self> {
-        if noise.level <= 0.0 {
+        if !(noise.level > 0.0) {
             return None;
         }
         let [width, height] = [view.width as usize, view.height as usize];
@@ -107,7 +117,7 @@ impl Blurred {
         let after = before.map(|from| from.map(|along| -along));
         (0..rows).for_each(|y| (0..columns).for_each(|x| step(x, y, before)));
         (0..rows).rev().for_each(|y| (0..columns).rev().for_each(|x| step(x, y, after)));
-        Some(Self { noise, k, pixels, blocks, to_empty })
+        Some(Self { noise, per_radius, pixels, blocks, to_empty })
     }
 
     /// How many blocks the nearest empty one is from a block, at most two more than a fringe has.
@@ -117,17 +127,18 @@ impl Blurred {
 }
 
 impl Outline<'_> {
-    /// Whether pixel (x, y), which a splat with this `reach_px` covers at `depth`, is beside a surface whose border noise has
-    /// blurred. `None` if there is too little noise or too few points, or nothing empty within a fringe.
-    pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], depth: f32, reach_px: f32) -> Option<bool> {
+    /// Whether pixel (x, y), which a splat with this `reach_px` covers, is beside a surface whose border noise has blurred. `None` if there is too little noise or too few points, or nothing empty within a fringe.
+    pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], shown: Shown, reach_px: f32) -> Option<bool> {
         let blurred = self.blurred?;
-        let Blurred { noise, k, .. } = blurred;
+        let Blurred { noise, per_radius, .. } = blurred;
+        let Shown { depth, normal } = shown;
         let pixel = self.view.pixel_size(depth);
         let radius_px = reach_px / SUPPORT;
-        // As the splat radius comes from it.
-        let k_radius = radius_px * pixel * (0.5 * (*k as f32).sqrt());
-        let noise_px = noise.at(k_radius) / pixel;
-        if noise_px < LEAST_NOISE_PX {
+        let to_eye = self.view.to_eye(self.view.unproject([x as f32 + 0.5, y as f32 + 0.5], depth));
+        let facing = Vec3::from(normal).dot(to_eye) / to_eye.length();
+        let aside = ((1.0 - facing * facing).max(0.0).sqrt() / TILTED).min(1.0);
+        let noise_px = aside * noise.at(per_radius * radius_px * pixel) / pixel;
+        if !(noise_px >= LEAST_NOISE_PX) {
             return None;
         }
         let fringe = (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
@@ -140,18 +151,18 @@ impl Outline<'_> {
         // Of points beyond the picture nothing is known.
         let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
         let widest = WIDEST_PX.min(to_edge);
-        let window = (AROUND_PX * AROUND_PX + WINDOW_NOISES * noise_px * noise_px).sqrt().min(widest);
+        let window = (AROUND_PX * AROUND_PX + PER_VARIANCE * noise_px * noise_px).sqrt().min(widest);
         // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
         if window < AROUND_PX.max(radius_px) {
             return None;
         }
         let held = if window <= FINE_PX { &blurred.pixels } else { &blurred.blocks };
         let [ox, oy] = pulp::Arch::new().dispatch(|| held.offset([x, y], window))?;
-        let deviation = window * window / WINDOW_NOISES;
+        let variance = window * window / PER_VARIANCE;
         let off = (ox * ox + oy * oy).sqrt();
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
-        if off <= may_be * deviation / (deviation + noise_px * noise_px).sqrt() {
+        if off <= may_be * variance / (variance + noise_px * noise_px).sqrt() {
             return Some(false);
         }
         let ahead = |step: usize| {

@@ -10,6 +10,9 @@ use crate::camera::{Camera, Projection};
 use crate::test_clouds::Random;
 use autosplats_cloud::glam::DVec3;
 
+/// At the very edge of a surface that curves away.
+const SHOWN: Shown = Shown { depth: 1.0, normal: [1.0, 0.0, 0.0] };
+
 fn view(size: [u32; 2]) -> View {
     let camera =
         Camera { eye: DVec3::ZERO, look_at: DVec3::X, up: DVec3::Z, projection: Projection::OrthographicHeight(1.0) };
@@ -37,7 +40,7 @@ fn trimmed(drawing: &[&str]) -> Vec<String> {
         Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
     let border = outline.border([0, 0]);
     let row = |(y, row): (usize, &&str)| {
-        let goes = |x: usize| outline.sticks_out(x, y, 1.0, border[y] >> x & 1 == 1);
+        let goes = |x: usize| outline.sticks_out(x, y, SHOWN, border[y] >> x & 1 == 1);
         let pixel = |(x, pixel): (usize, char)| if goes(x) { 'x' } else { pixel };
         row.chars().enumerate().map(pixel).collect()
     };
@@ -108,7 +111,7 @@ fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(u
     move |x, y| {
         let outline = Outline { rims: &rims, centers: &centers, sixteenths: &sixteenths, view: &view, blurred: None };
         let border = outline.border([0, 0]);
-        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, 1.0, border[y] >> x & 1 == 1)
+        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, border[y] >> x & 1 == 1)
     }
 }
 
@@ -209,7 +212,7 @@ fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let level = if known { noise_px * view.pixel_size(1.0) } else { 0.0 };
-    let blurred = Blurred::new(Noise { level, ..Noise::NONE }, 10, &rims, &sixteenths, &view);
+    let blurred = Blurred::new(Noise { level, ..Noise::NONE }, 1.6, &rims, &sixteenths, &view);
     assert_eq!(blurred.is_some(), known, "nothing is blurred without noise");
     let outline = Outline {
         rims: &rims,
@@ -219,12 +222,14 @@ fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
         blurred: blurred.as_ref(),
     };
     if known {
-        let told = |reach_px: f32| outline.is_beside_blurred([32, 28], 1.0, reach_px);
+        let told = |reach_px: f32| outline.is_beside_blurred([32, 28], SHOWN, reach_px);
         assert!(told(2.0).is_some() && told(60.0).is_none(), "where splats are wide, windows tell of rows");
+        let facing = Shown { normal: [0.0, 0.0, -1.0], ..SHOWN };
+        assert!(outline.is_beside_blurred([32, 28], facing, 2.0).is_none(), "what faces the eye is not blurred");
     }
     let border = outline.border([0, 0]);
     let stays =
-        |x: usize, y: usize| rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, 1.0, border[y] >> x & 1 == 1);
+        |x: usize, y: usize| rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, border[y] >> x & 1 == 1);
     let above = |x: usize| Some(line(x as f32 + 0.5) - (0..TILE).find(|&y| stays(x, y))? as f32);
     (24..40).map(|x| above(x).expect("what is below stays")).collect()
 }
@@ -234,9 +239,15 @@ fn what_noise_has_blurred_ends_about_where_the_surface_does() {
     // In pixels, and in blocks.
     for noise_px in [1.5, 4.0] {
         let [with, without] = [true, false].map(|known| above_the_line(noise_px, known));
-        let mean = |above: &[f32]| above.iter().sum::<f32>() / above.len() as f32;
-        assert!(mean(&with).abs() < 0.9 * noise_px, "noise of {noise_px} pixels: {with:?}");
-        assert!(mean(&without) > 1.5 * noise_px, "noise of {noise_px} pixels that is not known: {without:?}");
+        // In some columns there is a point far out, alone, which nothing tells of.
+        let median = |above: &[f32]| {
+            let mut above = above.to_vec();
+            above.sort_by(f32::total_cmp);
+            above[above.len() / 2]
+        };
+        // Half of the noise too far in, as ends are straight.
+        assert!((-0.9..0.0).contains(&(median(&with) / noise_px)), "noise of {noise_px} pixels: {with:?}");
+        assert!(median(&without) > 1.5 * noise_px, "noise of {noise_px} pixels that is not known: {without:?}");
     }
 }
 
@@ -255,7 +266,7 @@ fn blocks_know_how_far_an_empty_one_is() {
             }
         }
         let noise = Noise { level: 1.0, ..Noise::NONE };
-        let blurred = Blurred::new(noise, 10, &rims, &Sixteenths::with([width, height], []), &view).expect("noise");
+        let blurred = Blurred::new(noise, 1.6, &rims, &Sixteenths::with([width, height], []), &view).expect("noise");
         let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
         let is_empty = |bx: usize, by: usize| {
             let pixels =

@@ -13,8 +13,8 @@ use crate::project::gpu::{BLOCK, COUNTERS, Counter, Work};
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::search::splat_communication::gpu::Arguments;
 use crate::shade::gpu::{ShadeUniform, Shown};
-use crate::splat::Cover;
 use crate::splat::over_time::Fitted;
+use crate::splat::{BLOCK_PX, Cover, FRINGE_BLOCKS};
 
 /// Name, offset and size of a field.
 type Field = (String, usize, usize);
@@ -247,6 +247,9 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let in_wgsl: Vec<_> = constants(&pass).into_iter().filter(|entry| works.contains(entry)).collect();
     assert_eq!(in_wgsl, works, "work in WGSL, and in Rust");
 
+    assert_eq!(constant("#import frame\n#import blocks\n", "BLOCK_PX"), BLOCK_PX as u32, "side of a block");
+    let trim = passes().find(|pass| pass.path == "splat/trim").expect("a pass");
+    assert_eq!(constant(trim.source, "FRINGE_BLOCKS"), FRINGE_BLOCKS as u32, "blocks of a fringe");
     assert_eq!(constant("#import levels\n", "SLABS"), SLABS as u32, "slabs of a cell");
     let adapt = passes().find(|pass| pass.path == "adapt/adapt").expect("a pass");
     assert_eq!(constant(adapt.source, "SCALES"), SCALES as u32, "balls around a point");
