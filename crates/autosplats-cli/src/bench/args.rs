@@ -48,6 +48,9 @@ pub(crate) struct BenchArgs {
         allow_negative_numbers = true
     )]
     pub(crate) points_per_pixel: u32,
+    /// Leave splats whole at silhouettes: with '-k 10 --points-per-pixel 1' the paper's settings
+    #[arg(long)]
+    pub(crate) no_trim: bool,
     /// Shake the points by normally distributed noise with this standard deviation along each axis, in the scene's units
     #[arg(long, value_name = "SIZE", value_parser = values::above_zero, allow_negative_numbers = true)]
     pub(crate) noise: Option<f64>,

@@ -34,6 +34,8 @@ struct Bench<'a> {
     size: [u32; 2],
     k: Neighbors,
     points_per_pixel: u32,
+    /// Whether silhouettes were trimmed.
+    trim: bool,
     /// Standard deviation of what the points were shaken by.
     #[serde(skip_serializing_if = "Option::is_none")]
     noise: Option<f64>,
@@ -70,6 +72,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         backends,
         k,
         points_per_pixel,
+        no_trim,
         noise,
         size,
         frames,
@@ -84,6 +87,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
     let mut settings = Settings::default();
     (settings.reconstruction.k, settings.reconstruction.adaptive) = k.settings();
     settings.reconstruction.points_per_pixel = *points_per_pixel;
+    settings.reconstruction.trim = !no_trim;
     settings.reconstruction.engine = engine.with_first_radius(*first_radius);
     settings.check().map_err(render_failure)?;
     let name = scene.strip_prefix("scene:").unwrap_or(scene);
@@ -106,6 +110,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         size: *size,
         k: *k,
         points_per_pixel: *points_per_pixel,
+        trim: !no_trim,
         noise: *noise,
         engine: engine.name(),
         frames: *frames,
@@ -206,10 +211,11 @@ fn summed(passes: &[PassTime]) -> Vec<(&'static str, usize, f64)> {
 
 impl Bench<'_> {
     fn table(&self, cloud: &PointCloud) -> String {
-        let Self { scene, size: [width, height], k, points_per_pixel, noise, engine, frames, runs, .. } = self;
+        let Self { scene, size: [width, height], k, points_per_pixel, trim, noise, engine, frames, runs, .. } = self;
+        let whole = if *trim { "" } else { ", whole splats" };
         let noise = noise.map(|noise| format!("noise {noise}, ")).unwrap_or_default();
         let mut lines = vec![format!(
-            "{scene}: {} points, {noise}{width}x{height}, k {k}, {points_per_pixel} a pixel, {engine}; milliseconds, medians \
+            "{scene}: {} points, {noise}{width}x{height}, k {k}, {points_per_pixel} a pixel{whole}, {engine}; milliseconds, medians \
              of {frames} frames",
             cloud.len()
         )];
