@@ -30,8 +30,8 @@ One ray through the centre of each pixel tells what is truly there. These ways t
 - **paper**: the paper's, k = 10, one point a pixel, splats whole at silhouettes.
 - **dots**: squares of 3×3 pixels, the nearest in front, without normals; shaded as if they faced the eye, with \
 occlusion to show the shape.
-- **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours in the whole cloud, \
-outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
+- **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours in \
+the whole cloud, outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
 
 Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \
 pixels of a silhouette, *flipped* the share above 90° to all that is truly seen at the pixel and the eight around it, at an edge \

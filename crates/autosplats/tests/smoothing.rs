@@ -162,10 +162,11 @@ fn what_is_not_alike_begins_anew() {
     };
     let usual = with(&|_| ());
     let parallel = Camera { projection: Projection::OrthographicHeight(2.0), ..view(3) };
-    let others: [(&str, Settings, Camera); 4] = [
+    let others: [(&str, Settings, Camera); 5] = [
         ("k", with(&|reconstruction| reconstruction.k = 14), view(3)),
         ("one point a pixel", with(&|reconstruction| reconstruction.points_per_pixel = 1), view(3)),
         ("larger splats", with(&|reconstruction| reconstruction.splat_scale = 1.3), view(3)),
+        ("whole splats", with(&|reconstruction| reconstruction.trim = false), view(3)),
         ("projection", usual.clone(), parallel),
     ];
     for mut renderer in renderers() {

@@ -117,7 +117,7 @@ pub(crate) struct SurfaceArgs {
     /// Let the splats of hidden points take part in the depth of the visible surface
     #[arg(long)]
     pub(crate) no_depth_refinement: bool,
-    /// Leave splats whole at silhouettes, which are as much too wide then
+    /// Leave splats whole at silhouettes, which makes these too wide by as much as splats are
     #[arg(long)]
     pub(crate) no_trim: bool,
 }

@@ -340,6 +340,7 @@ fn settings(wish: &Wish, cloud: &PointCloud, gpu: bool) -> (Settings, Option<Str
             outlier_expansions: None,
             gap_factor: None,
             depth_refinement: false,
+            trim: true,
             engine: SearchEngine::ScreenGrid,
             ..Reconstruction::paper()
         };

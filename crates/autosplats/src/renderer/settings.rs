@@ -53,8 +53,8 @@ pub struct Reconstruction {
     pub grid_culling: bool,
     /// Redraw the depth map twice without the splats of hidden points [Paper, §7].
     pub depth_refinement: bool,
-    /// End silhouettes where points do, or, where noise has blurred them, where these become few. Without, silhouettes are as much
-    /// too wide as splats are.
+    /// End silhouettes where points do, or, if noise has blurred them and the setting is [`adaptive`](Self::adaptive), where points
+    /// become few. Without, silhouettes are too wide by as much as splats are.
     pub trim: bool,
     /// Temporal coherence: start the search of each point from the k-radius that the last frame of the same [`Renderer`] found
     /// where the point was then. It saves time and changes no picture. Of [`SearchEngine::ScreenGrid`]; the paper's and its rival

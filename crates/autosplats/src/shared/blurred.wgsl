@@ -9,9 +9,11 @@ override LEAST_NOISE_PX: f32;
 override PER_VARIANCE: f32;
 // How far a surface is tilted of which all noise counts.
 override TILTED: f32;
-override WIDEST_PX: f32;
-// Windows wider than this are summed up in blocks.
-override FINE_PX: f32;
+// Radius of the window without noise, and of the widest, in pixels.
+override LEAST_RADIUS_PX: f32;
+override WIDEST_RADIUS_PX: f32;
+// Windows with a larger radius than this are summed up in blocks.
+override FINE_RADIUS_PX: f32;
 // How far the mean may be off with hardly any noise, and with so much in pixels and more.
 override OFF_UNSURE: f32;
 override OFF_SURE: f32;
@@ -44,8 +46,8 @@ fn fringe_px(reach_px: f32, noise: f32) -> f32 {
 fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     // Of points beyond the picture nothing is known.
     let to_edge = min(pixel, frame.size - 1u - pixel);
-    let widest = min(WIDEST_PX, f32(min(to_edge.x, to_edge.y)));
-    let window = min(sqrt(AROUND_PX * AROUND_PX + PER_VARIANCE * noise * noise), widest);
+    let widest = min(WIDEST_RADIUS_PX, f32(min(to_edge.x, to_edge.y)));
+    let window = min(sqrt(LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_VARIANCE * noise * noise), widest);
     // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
     if window < max(AROUND_PX, reach_px / SUPPORT) {
         return SILENT;
@@ -80,7 +82,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
 fn points_offset(pixel: vec2u, window: f32) -> vec3f {
     var sums = vec3f(0.0);
     var count = 0.0;
-    let is_fine = window <= FINE_PX;
+    let is_fine = window <= FINE_RADIUS_PX;
     let side = select(BLOCK_PX, 1u, is_fine);
     let columns = select(block_counts().x, frame.size.x, is_fine);
     let reach = u32(window);

@@ -14,8 +14,8 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
-    BLOCK_PX, FEWEST_BLURRED, FINE_PX, FRINGE_NOISES, LEAST_NOISE_PX, OFF_BLURRED, PER_VARIANCE, SURE_NOISE_PX, TILTED,
-    WIDEST_PX,
+    BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX, OFF_BLURRED,
+    PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
 };
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
@@ -219,10 +219,11 @@ impl SplatPasses {
                 ("NARROW_PX", NARROW_PX.into()),
                 ("STEPS", STEPS.into()),
                 ("LEAST_NOISE_PX", LEAST_NOISE_PX.into()),
+                ("LEAST_RADIUS_PX", LEAST_RADIUS_PX.into()),
                 ("PER_VARIANCE", PER_VARIANCE.into()),
                 ("TILTED", TILTED.into()),
-                ("WIDEST_PX", WIDEST_PX.into()),
-                ("FINE_PX", FINE_PX.into()),
+                ("WIDEST_RADIUS_PX", WIDEST_RADIUS_PX.into()),
+                ("FINE_RADIUS_PX", FINE_RADIUS_PX.into()),
                 ("OFF_UNSURE", OFF_BLURRED[0].into()),
                 ("OFF_SURE", OFF_BLURRED[1].into()),
                 ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
@@ -331,7 +332,7 @@ impl SplatPasses {
         ]
     }
 
-    /// Draws the attributes of all rounds' surfels.
+    /// Draws the attributes of all rounds' surfels, and trims them, by the `rules`.
     #[allow(clippy::too_many_arguments, reason = "each is a buffer or a set of them")]
     pub(crate) fn steps_layers(
         &self,
@@ -353,12 +354,14 @@ impl SplatPasses {
         steps.push(self.boxes.step(gpu, &[frame, counters, tree], tops(screen)));
         let attributes = [frame, &self.linear, list, tree, surfels, values, depth, surface, cover, extras];
         steps.push(self.attributes.step(gpu, &attributes, patches(screen, PATCH)));
-        steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
-        let all = screen.groups(Work::Queries256);
-        steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
         let noise = rules.noise.unwrap_or(no_noise);
-        let blocks = [frame, cover, sixteenths, noise, summed];
-        steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(64)));
+        if rules.trim {
+            steps.push(self.clear_words.step(gpu, &[frame, centers], pixel_groups(screen)));
+            let all = screen.groups(Work::Queries256);
+            steps.push(self.add_centers.step(gpu, &[frame, counters, list, tree, centers], all));
+            let blocks = [frame, cover, sixteenths, noise, summed];
+            steps.push(self.sum_blocks.step(gpu, &blocks, block_count(screen.size).div_ceil(64)));
+        }
         let trim = [frame, surface, cover, extras, counters, centers, sixteenths, noise, summed];
         let pass = &self.trim[usize::from(rules.trim)];
         steps.push(pass.step(gpu, &trim, patches(screen, [SQUARE; 2])));

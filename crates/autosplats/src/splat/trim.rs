@@ -164,8 +164,8 @@ impl Outline<'_> {
         })
     }
 
-    /// Whether a splat covers pixel (x, y), of which this is shown, but no surface does; `border` says whether the pixel is close to an empty
-    /// square.
+    /// Whether a splat covers pixel (x, y), of which this is shown, but no surface does; `border` says whether the pixel is close
+    /// to an empty square.
     pub(super) fn sticks_out(&self, x: usize, y: usize, shown: Shown, border: bool) -> bool {
         let own = self.rims[self.index([x, y])];
         if own == EMPTY {

@@ -1,7 +1,7 @@
 // Trim: takes off the tails that splats leave around a silhouette. The CPU form, `trim.rs`, says how.
 //
-// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Of other pixels it reads the rims, which are not
-// written. Writes: counters.
+// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Of other pixels it reads the rims, which
+// are not written. Writes: counters.
 
 #import frame
 #import groups

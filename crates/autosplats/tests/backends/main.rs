@@ -205,13 +205,26 @@ fn every_setting() {
         ("ellipses", Reconstruction { ellipses: true, ..usual() }),
         ("one point a pixel", Reconstruction { points_per_pixel: 1, ..usual() }),
         ("no culling", Reconstruction { grid_culling: false, ..usual() }),
-        ("whole splats", Reconstruction { trim: false, ..usual() }),
         ("no refinement", Reconstruction { depth_refinement: false, ..usual() }),
     ];
     for (name, reconstruction) in cases {
         let settings = Settings { reconstruction, ..Settings::default() };
         compare(&mut gpu, &cloud, &camera, SIZE, &settings, name);
     }
+}
+
+#[test]
+fn whole_splats() {
+    let Some(mut gpu) = gpu() else { return };
+    let (cloud, camera) = scene("statue", 60_000);
+    let mut covered = |trim: bool| {
+        let reconstruction = Reconstruction { trim, ..Reconstruction::default() };
+        let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
+        compare(&mut gpu, &cloud, &camera, SIZE, &settings, &format!("trim {trim}"));
+        gpu.render(&cloud, &camera, SIZE, &settings).expect("a picture").counts.covered
+    };
+    let [trimmed, whole] = [true, false].map(&mut covered);
+    assert!(1.01 * trimmed as f64 <= whole as f64, "whole splats cover {whole} pixels, trimmed ones {trimmed}");
 }
 
 /// A scene whose points are off by `sigma` in the mean square along each axis.

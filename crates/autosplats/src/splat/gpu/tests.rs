@@ -18,6 +18,8 @@ use crate::test_clouds::Random;
 
 /// One pixel, patches and tiles that are cut off, several tiles.
 const SIZES: [[u32; 2]; 4] = [[1, 1], [71, 50], [64, 65], [133, 9]];
+/// It is of account for the noise of points, which may differ with their k-radii.
+const SPLAT_SCALE: f32 = 1.5;
 const ALL: Channels = Channels { color: true, scalar: true, measures: true, backs: true };
 
 /// What is drawn, and in how many rounds.
@@ -66,7 +68,8 @@ impl Scene<'_> {
         let words = sixteenths(self.surfels, self.view).words();
         gpu.queue.write_buffer(&screen.sixteenths, 0, bytemuck::cast_slice(&words));
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
-        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&FrameUniform::new(self.view, 1)));
+        let uniform = FrameUniform { splat_scale: SPLAT_SCALE, ..FrameUniform::new(self.view, 1) };
+        gpu.queue.write_buffer(&frame, 0, bytemuck::bytes_of(&uniform));
         Buffers {
             frame,
             surfels: gpu.storage_with("surfels", self.surfels).expect("room"),
@@ -117,7 +120,7 @@ impl Scene<'_> {
             backs: channels.backs,
         };
         splatter.attributes(surfels, view, &attributes);
-        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 0.5)).0.clone();
+        let layers = splatter.trim(view, &sixteenths(surfels, view), (self.noise, 0.5 / SPLAT_SCALE)).0.clone();
         (splatter, layers)
     }
 }

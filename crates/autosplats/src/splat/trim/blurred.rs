@@ -27,13 +27,15 @@ use crate::splat::tiled_index;
 pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
 /// Squared radius of a window over the variance of its kernel, along one axis.
 pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
-/// All of the noise counts where a surface is tilted from the eye by this part of a right angle's sine: in a fringe normals lean
-/// towards the eye.
+/// All of the noise counts where the sine of a surface's tilt from the eye is at least this: in a fringe normals lean towards the
+/// eye.
 pub(in crate::splat) const TILTED: f32 = 0.8;
-/// Widest window in pixels.
-pub(in crate::splat) const WIDEST_PX: f32 = 48.0;
-/// Windows wider than this, in pixels, are summed up in blocks.
-pub(in crate::splat) const FINE_PX: f32 = 8.0;
+/// Radius of the window without noise, in pixels: smaller ones hold so few points that borders come out ragged.
+pub(in crate::splat) const LEAST_RADIUS_PX: f32 = 4.0;
+/// And of the widest one.
+pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
+/// Windows with a larger radius than this, in pixels, are summed up in blocks.
+pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
 /// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
 /// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more.
 pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.55];
@@ -127,7 +129,8 @@ impl Blurred {
 }
 
 impl Outline<'_> {
-    /// Whether pixel (x, y), which a splat with this `reach_px` covers, is beside a surface whose border noise has blurred. `None` if there is too little noise or too few points, or nothing empty within a fringe.
+    /// Whether pixel (x, y), which a splat with this `reach_px` covers, is beside a surface whose border noise has blurred.
+    /// `None` if there is too little noise or too few points, or nothing empty within a fringe.
     pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], shown: Shown, reach_px: f32) -> Option<bool> {
         let blurred = self.blurred?;
         let Blurred { noise, per_radius, .. } = blurred;
@@ -150,13 +153,13 @@ impl Outline<'_> {
         let [width, height] = self.size();
         // Of points beyond the picture nothing is known.
         let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
-        let widest = WIDEST_PX.min(to_edge);
-        let window = (AROUND_PX * AROUND_PX + PER_VARIANCE * noise_px * noise_px).sqrt().min(widest);
+        let widest = WIDEST_RADIUS_PX.min(to_edge);
+        let window = (LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_VARIANCE * noise_px * noise_px).sqrt().min(widest);
         // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
         if window < AROUND_PX.max(radius_px) {
             return None;
         }
-        let held = if window <= FINE_PX { &blurred.pixels } else { &blurred.blocks };
+        let held = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
         let [ox, oy] = pulp::Arch::new().dispatch(|| held.offset([x, y], window))?;
         let variance = window * window / PER_VARIANCE;
         let off = (ox * ox + oy * oy).sqrt();
