@@ -181,3 +181,37 @@ impl Settings {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use autosplats_cloud::PointCloud;
+    use autosplats_cloud::glam::DVec3;
+
+    use super::*;
+    use crate::{Camera, Projection, Renderer, test_clouds};
+
+    #[test]
+    fn k_radii_come_back_from_splat_radii() {
+        let cloud = PointCloud::new(DVec3::ZERO, test_clouds::plane(2000));
+        let camera = Camera {
+            eye: DVec3::new(0.0, 0.0, 3.0),
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            projection: Projection::PerspectiveFovDeg(50.0),
+        };
+        for (k, splat_scale) in [(10, 1.0), (16, 0.7)] {
+            let reconstruction = Reconstruction { k, splat_scale, ..Reconstruction::paper() };
+            let per_radius = reconstruction.k_radius_per_radius();
+            let mut renderer = Renderer::new();
+            let settings = Settings { reconstruction, ..Settings::default() };
+            renderer.render(&cloud, &camera, [300, 200], &settings).expect("a picture");
+            let surfels = renderer.surfels().expect("surfels");
+            let drawn: Vec<_> = surfels.iter().filter(|surfel| surfel.radius > 0.0).collect();
+            let is_right =
+                |surfel: &&&crate::PointSurfel| (per_radius * surfel.radius / surfel.k_radius - 1.0).abs() < 1e-4;
+            let right = drawn.iter().filter(is_right).count();
+            // All but those with fewer neighbours than k, or more at the same distance.
+            assert!(10 * right > 9 * drawn.len() && right > 500, "k {k}: {right} of {}", drawn.len());
+        }
+    }
+}
