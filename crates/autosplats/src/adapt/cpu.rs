@@ -41,7 +41,7 @@ pub(super) const LEAST_TRACE: f32 = 8.0;
 pub(super) const SCATTER: f32 = 1.9;
 /// or that of depth cameras, which is known for what it does to normals: neighbours err alike.
 pub(super) const SCATTER_KNOWN: f32 = 0.8;
-/// Normals agree within this many standard errors.
+/// Normals agree within this many standard errors: not at all beyond, and in full where they are the same.
 pub(super) const AGREE: f32 = 3.0;
 
 /// The k-radius of a point that lies between surfaces counts as at most this many first search radii.
@@ -246,8 +246,8 @@ fn adapt_all_with<'a, S: Simd>(
         let mut alone = || {
             let radius = first_radius(surfel, density, view, k);
             let quadric = choose(simd, surfel.center, radius, first, &goal, (cells, view), gathered)?;
-            let Quadric { normal, height, axis, curvature, .. } = quadric;
-            Some(Surface { offset: axis * height, normal, curvature })
+            let Quadric { normal, height, curvature, .. } = quadric;
+            Some(Surface { offset: normal * height, normal, curvature })
         };
         let surface = match sheets.blend(surfel.center, first, &goal, cells, view) {
             Blend::Surface(surface) => Some(surface),
@@ -277,8 +277,11 @@ pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) ->
     ENOUGH + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
 }
 
-/// The quadric of the largest ball around `center` that agrees with the smaller ones and with the `first` normal, where its
+/// The upright quadric around `center` of balls as large as agree with the smaller ones and with the `first` normal, where its
 /// standard error is known; `None` if none is better than the first neighbours. Radii are multiples of `radius`.
+///
+/// A ball that agrees counts the less, the less it does (stagewise aggregation, Belomestny and Spokoiny 2007): where one or the
+/// other is taken, chance decides, another way in each picture.
 #[inline(always)]
 pub(super) fn choose<S: Simd>(
     simd: S,
@@ -289,14 +292,9 @@ pub(super) fn choose<S: Simd>(
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<Quadric> {
-    // Normals to agree with, and their errors.
-    let mut reliable = [(Vec3::ZERO, 0.0); SCALES + 1];
-    let mut count = 0;
-    if let Some(first) = first {
-        reliable[0] = first;
-        count = 1;
-    }
-    let mut best = None;
+    // A normal to agree with, and its error.
+    let mut reliable = first;
+    let mut best: Option<Quadric> = None;
     // Where nothing is reliable, the least error.
     let mut fallback: Option<Quadric> = None;
     // Heights of the first ball are along its plane's normal, those of larger ones along the normal found before.
@@ -329,22 +327,24 @@ pub(super) fn choose<S: Simd>(
             }
             continue;
         }
-        let agrees = |&(normal, other): &(Vec3, f32)| {
-            quadric.normal.cross(normal).length_squared() <= AGREE * AGREE * (error * error + other * other)
-        };
-        let agrees = reliable[..count].iter().all(agrees) & ((count == 0) | (quadric.scatter <= scatter));
-        if !agrees {
-            break;
+        let mut share = 1.0;
+        if let Some((normal, other)) = reliable {
+            let across = quadric.normal.cross(normal).length_squared();
+            share = 1.0 - across / (AGREE * AGREE * (error * error + other * other));
+            if !((share > 0.0) & (quadric.scatter <= scatter)) {
+                break;
+            }
         }
-        reliable[count] = (quadric.normal, error);
-        count += 1;
-        axis = Some((quadric.normal, curvature));
-        best = Some(quadric);
+        let found = best.map_or(quadric, |smaller| smaller.towards(&quadric, share)).upright();
+        let error = found.error * noise;
+        reliable = Some((found.normal, error));
+        axis = Some((found.normal, curvature));
+        best = Some(found);
         if error < enough {
             break;
         }
     }
-    let quadric = if count == 0 { fallback } else { best };
+    let quadric = if reliable.is_none() { fallback.map(|quadric| quadric.upright()) } else { best };
     quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
 }
 

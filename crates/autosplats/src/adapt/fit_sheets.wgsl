@@ -92,7 +92,6 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             quadric.height / quadric.radius,
             quadric.bend,
             quadric.error * noise,
-            quadric.slope,
             quadric.curvature,
             quadric.scatter,
         );

@@ -118,10 +118,58 @@ pub(super) struct Quadric {
     pub(super) curvature: f32,
     /// Of the ball.
     pub(super) radius: f32,
-    /// Slopes at the point along `any_orthonormal_vector` of the axis, and at right angles to both.
+    /// Slopes at the point along the [`tangents`] of the axis; 0 if it is upright.
     pub(super) slope: [f32; 2],
     /// Coefficients of the squares and the product of the two, xx, xy and yy, in radii.
     pub(super) bend: [f32; 3],
+}
+
+impl Quadric {
+    /// The same surface with heights along its normal at the point, to second order.
+    #[inline(always)]
+    pub(super) fn upright(&self) -> Self {
+        let &Self { normal, axis, bend: [xx, xy, yy], .. } = self;
+        let (u, v) = tangents(axis);
+        let (p, q) = tangents(normal);
+        let [(px, py), (qx, qy)] = [p, q].map(|tangent| (tangent.dot(u), tangent.dot(v)));
+        let cos = axis.dot(normal);
+        let bend = [
+            cos * (xx * px * px + xy * px * py + yy * py * py),
+            cos * (2.0 * xx * px * qx + xy * (px * qy + qx * py) + 2.0 * yy * py * qy),
+            cos * (xx * qx * qx + xy * qx * qy + yy * qy * qy),
+        ];
+        Self { height: self.height * cos, axis: normal, slope: [0.0; 2], bend, ..*self }
+    }
+
+    /// Between this upright one and a larger ball's `other`, whose axis is this one's: that itself at a `share` of 1.
+    #[inline(always)]
+    pub(super) fn towards(&self, other: &Self, share: f32) -> Self {
+        let between = |from: f32, to: f32| from + share * (to - from);
+        let radius = between(self.radius, other.radius);
+        let slope = other.slope.map(|slope| share * slope);
+        // Curvatures, world units, do not depend on the ball.
+        let bend =
+            std::array::from_fn(|at| radius * between(self.bend[at] / self.radius, other.bend[at] / other.radius));
+        let (u, v) = tangents(self.axis);
+        Self {
+            normal: (self.axis - u * slope[0] - v * slope[1]).normalize(),
+            height: between(self.height, other.height),
+            axis: self.axis,
+            scatter: between(self.scatter, other.scatter),
+            error: between(self.error, other.error),
+            curvature: other.curvature,
+            radius,
+            slope,
+            bend,
+        }
+    }
+}
+
+/// Two unit vectors at right angles to a third and each other: the axes of slopes.
+#[inline(always)]
+pub(super) fn tangents(axis: Vec3) -> (Vec3, Vec3) {
+    let u = axis.any_orthonormal_vector();
+    (u, axis.cross(u))
 }
 
 impl Gathered {
@@ -222,8 +270,7 @@ impl Gathered {
     /// Fits heights along `axis`.
     #[inline(always)]
     pub(super) fn quadric<S: Simd>(&self, simd: S, radius: f32, axis: Vec3, curvature: f32) -> Quadric {
-        let u = axis.any_orthonormal_vector();
-        let v = axis.cross(u);
+        let (u, v) = tangents(axis);
         let splat = |value: f32| F32s::splat(simd, value);
         let (ux, uy, uz) = (splat(u.x), splat(u.y), splat(u.z));
         let (vx, vy, vz) = (splat(v.x), splat(v.y), splat(v.z));
@@ -339,3 +386,6 @@ fn add_lanes<const N: usize>(lanes: &mut [Lanes; N]) -> [f32; N] {
     }
     std::array::from_fn(|index| lanes[index].0[0])
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::cells::{Cell, Cells, Level, SLABS};
 use super::cpu::{AGREE, FARTHEST, Goal, choose};
-use super::quadric::Gathered;
+use super::quadric::{Gathered, tangents};
 use crate::camera::View;
 use crate::fit::Surfel;
 
@@ -27,16 +27,16 @@ pub(super) const PARTS: f32 = 64.0;
 /// that is below 2³².
 pub(super) const MOST_PX: f32 = 2048.0;
 
-/// A quadric over the ball that it was fitted to.
+/// An upright quadric over the ball that it was fitted to.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sheet {
     center: Vec3,
     /// Of the ball.
     radius: f32,
+    /// Unit normal at the centre, and direction of the heights.
     axis: Vec3,
-    /// Along the axis, at the centre; radii, as those that follow.
+    /// At the centre; radii, as what follows.
     height: f32,
-    slope: [f32; 2],
     bend: [f32; 3],
     /// Standard error of its normal, radians.
     error: f32,
@@ -61,12 +61,11 @@ struct Over {
 impl Sheet {
     #[inline(always)]
     fn under(&self, place: Vec3) -> Over {
-        let u = self.axis.any_orthonormal_vector();
-        let v = self.axis.cross(u);
+        let (u, v) = tangents(self.axis);
         let offset = (place - self.center) * (1.0 / self.radius);
         let (x, y) = (u.dot(offset), v.dot(offset));
         let [xx, xy, yy] = self.bend;
-        let height = self.height + x * (self.slope[0] + xx * x + xy * y) + y * (self.slope[1] + yy * y);
+        let height = self.height + x * (xx * x + xy * y) + y * (yy * y);
         let height = (height - self.axis.dot(offset)) * self.radius;
         Over { u, v, x, y, height, near: 1.0 - (x * x + y * y) }
     }
@@ -76,8 +75,8 @@ impl Sheet {
     fn normal(&self, over: &Over) -> Vec3 {
         let &Over { u, v, x, y, .. } = over;
         let [xx, xy, yy] = self.bend;
-        let slope_x = self.slope[0] + 2.0 * xx * x + xy * y;
-        let slope_y = self.slope[1] + 2.0 * yy * y + xy * x;
+        let slope_x = 2.0 * xx * x + xy * y;
+        let slope_y = 2.0 * yy * y + xy * x;
         (self.axis - u * slope_x - v * slope_y).normalize()
     }
 }
@@ -335,7 +334,6 @@ fn fit_cell<S: Simd>(
             radius: quadric.radius,
             axis: quadric.axis,
             height: quadric.height / quadric.radius,
-            slope: quadric.slope,
             bend: quadric.bend,
             error: quadric.error * noise,
             curvature: quadric.curvature,

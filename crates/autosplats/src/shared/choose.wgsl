@@ -10,18 +10,51 @@ override THICKEST: f32;
 override AGREE: f32;
 override FARTHEST: f32;
 
-// The quadric of the largest ball around `center` that agrees with the smaller ones and with the `first` normal, whose
-// standard error follows it, negative if it is not known; of no clusters if none is better than the first neighbours. Radii
-// are multiples of `least_radius`.
+// The same surface with heights along its normal at the point, to second order.
+fn upright(quadric: Quadric) -> Quadric {
+    let u = any_orthonormal(quadric.axis);
+    let v = cross(quadric.axis, u);
+    let p = any_orthonormal(quadric.normal);
+    let q = cross(quadric.normal, p);
+    let at_p = vec2f(dot(p, u), dot(p, v));
+    let at_q = vec2f(dot(q, u), dot(q, v));
+    let cosine = dot(quadric.axis, quadric.normal);
+    let bend = quadric.bend;
+    var found = quadric;
+    found.bend = cosine * vec3f(
+        dot(bend, vec3f(at_p.x * at_p.x, at_p.x * at_p.y, at_p.y * at_p.y)),
+        dot(bend, vec3f(2.0 * at_p.x * at_q.x, at_p.x * at_q.y + at_q.x * at_p.y, 2.0 * at_p.y * at_q.y)),
+        dot(bend, vec3f(at_q.x * at_q.x, at_q.x * at_q.y, at_q.y * at_q.y)),
+    );
+    found.height *= cosine;
+    found.axis = quadric.normal;
+    found.slope = vec2f(0.0);
+    return found;
+}
+
+// Between an upright quadric and that of a larger ball along the same axis: the larger one's itself at a share of 1.
+fn towards(smaller: Quadric, larger: Quadric, share: f32) -> Quadric {
+    var found = larger;
+    found.radius = mix(smaller.radius, larger.radius, share);
+    found.slope = share * larger.slope;
+    // Curvatures, world units, do not depend on the ball.
+    found.bend = found.radius * mix(smaller.bend / smaller.radius, larger.bend / larger.radius, vec3f(share));
+    let u = any_orthonormal(larger.axis);
+    let v = cross(larger.axis, u);
+    found.normal = normalize(larger.axis - u * found.slope.x - v * found.slope.y);
+    found.height = mix(smaller.height, larger.height, share);
+    found.scatter = mix(smaller.scatter, larger.scatter, share);
+    found.error = mix(smaller.error, larger.error, share);
+    return found;
+}
+
+// The upright quadric around `center` of balls as large as agree with the smaller ones and with the `first` normal, whose standard error
+// follows it, negative if it is not known; of no clusters if none is better than the first neighbours. Radii are multiples
+// of `least_radius`. A ball that agrees counts the less, the less it does.
 fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f32, scatter: f32) -> Quadric {
     var radius = least_radius;
-    // Normals to agree with, and their errors.
-    var reliable: array<vec4f, SCALES + 1u>;
-    var count = 0u;
-    if first.w >= 0.0 {
-        reliable[0] = first;
-        count = 1u;
-    }
+    // A normal to agree with, and its error; negative if there is none yet.
+    var reliable = first;
     var best = Quadric();
     // Where nothing is reliable, the least error.
     var fallback = Quadric();
@@ -55,26 +88,28 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
             }
             continue;
         }
-        var agrees = count == 0u || quadric.scatter <= scatter;
-        for (var index = 0u; index < count; index++) {
-            let other = reliable[index];
-            let across = cross(quadric.normal, other.xyz);
-            agrees &= dot(across, across) <= AGREE * AGREE * (error * error + other.w * other.w);
+        var share = 1.0;
+        if reliable.w >= 0.0 {
+            let across = cross(quadric.normal, reliable.xyz);
+            share = 1.0 - dot(across, across) / (AGREE * AGREE * (error * error + reliable.w * reliable.w));
+            if !(share > 0.0 && quadric.scatter <= scatter) {
+                break;
+            }
         }
-        if !agrees {
-            break;
+        if best.len == 0u {
+            best = upright(quadric);
+        } else {
+            best = upright(towards(best, quadric, share));
         }
-        reliable[count] = vec4f(quadric.normal, error);
-        count++;
-        plane.axis = quadric.normal;
+        reliable = vec4f(best.normal, best.error * noise);
+        plane.axis = best.normal;
         has_axis = true;
-        best = quadric;
-        if error < enough {
+        if reliable.w < enough {
             break;
         }
     }
-    if count == 0u {
-        best = fallback;
+    if reliable.w < 0.0 {
+        best = upright(fallback);
     }
     // A quadric further away is another surface.
     if !(abs(best.height) <= FARTHEST * noise) {

@@ -6,18 +6,18 @@
 const UNKNOWN = 0.0;
 const NONE = -1.0;
 
-// A quadric over the ball that it was fitted to.
+// An upright quadric over the ball that it was fitted to.
 struct Sheet {
     center: vec3f,
     // Of the ball.
     radius: f32,
+    // Unit normal at the centre, and direction of the heights.
     axis: vec3f,
-    // Along the axis, at the centre; radii, as those that follow.
+    // At the centre; radii, as what follows.
     height: f32,
     bend: vec3f,
     // Standard error of its normal, radians.
     error: f32,
-    slope: vec2f,
     curvature: f32,
     // Standard deviation of points from it, world units.
     scatter: f32,
@@ -41,15 +41,15 @@ fn under(sheet: Sheet, place: vec3f) -> Over {
     let offset = (place - sheet.center) * (1.0 / sheet.radius);
     let x = dot(u, offset);
     let y = dot(v, offset);
-    let along_x = x * (sheet.slope.x + sheet.bend.x * x + sheet.bend.y * y);
-    let along_y = y * (sheet.slope.y + sheet.bend.z * y);
+    let along_x = x * (sheet.bend.x * x + sheet.bend.y * y);
+    let along_y = y * (sheet.bend.z * y);
     let height = (sheet.height + along_x + along_y - dot(sheet.axis, offset)) * sheet.radius;
     return Over(u, v, vec2f(x, y), height, 1.0 - (x * x + y * y));
 }
 
 // Unit normal.
 fn sheet_normal(sheet: Sheet, over: Over) -> vec3f {
-    let slope_x = sheet.slope.x + 2.0 * sheet.bend.x * over.at.x + sheet.bend.y * over.at.y;
-    let slope_y = sheet.slope.y + 2.0 * sheet.bend.z * over.at.y + sheet.bend.y * over.at.x;
+    let slope_x = 2.0 * sheet.bend.x * over.at.x + sheet.bend.y * over.at.y;
+    let slope_y = 2.0 * sheet.bend.z * over.at.y + sheet.bend.y * over.at.x;
     return normalize(sheet.axis - over.u * slope_x - over.v * slope_y);
 }

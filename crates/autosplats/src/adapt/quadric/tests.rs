@@ -1,0 +1,121 @@
+//! Quadrics against surfaces that are known.
+
+use autosplats_cloud::glam::DVec3;
+use glam::Vec3;
+
+use super::{Gathered, Quadric, tangents};
+use crate::adapt::cells::{Cells, Cluster, Level};
+use crate::adapt::tests::angle;
+use crate::camera::{Camera, Projection};
+
+/// The quadric fitted about a point `above` the surface z = `depth`(x, y), a cluster in each of its cells.
+fn quadric_on(depth: impl Fn(f32, f32) -> f32, at: [f32; 2], above: f32, radius: f32) -> Quadric {
+    let projection = Projection::OrthographicHeight(2.0);
+    let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
+    let view = camera.view(DVec3::ZERO, [200, 200]).expect("a view");
+    let mut level = Level { side_px: 4, columns: 50, rows: 50, ..Level::default() };
+    for cell in 0..level.columns * level.rows {
+        let pixel = [cell % level.columns, cell / level.columns].map(|at| (4 * at + 2) as f32);
+        let [x, y, _] = view.unproject(pixel, 1.0).to_array();
+        let cluster = Cluster { mean: [x, y, depth(x, y)], count: 1.0 };
+        level.cells.push([cluster, Cluster::default(), Cluster::default(), Cluster::default()]);
+    }
+    let center = [at[0], at[1], depth(at[0], at[1]) - above];
+    let mut gathered = Gathered::default();
+    assert!(gathered.read(&Cells { levels: vec![level] }, center, radius, &view) > 100, "clusters in the ball");
+    let curvature = gathered.plane(pulp::Scalar).curvature();
+    gathered.quadric(pulp::Scalar, radius, Vec3::Z, curvature)
+}
+
+#[test]
+fn a_quadric_is_found_again() {
+    let radius = 0.4;
+    for at in [[0.0, 0.0], [0.113, -0.237]] {
+        for above in [0.0, 0.05] {
+            for bend in [0.0, 0.3] {
+                let depth = |x: f32, y: f32| 4.0 + 0.1 * x - 0.05 * y + bend * (x * x - 0.7 * x * y + 0.3 * y * y);
+                let [x, y] = at;
+                let slope = [0.1 + bend * (2.0 * x - 0.7 * y), -0.05 + bend * (0.6 * y - 0.7 * x)];
+                let found = quadric_on(depth, at, above, radius);
+                let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
+                let case = format!("{at:?} {above} {bend}: {found:?}");
+                // Curvatures are pulled towards 0 by some hundredths, which moves a bent surface.
+                let bent = bend * radius;
+                assert!(angle(found.normal.into(), normal.into()) < 0.05 + 4.0 * bent, "{case}");
+                assert!((found.height - above).abs() < radius * (1e-4 + 0.05 * bent), "{case}");
+                assert!(found.scatter < radius * (1e-3 + 0.1 * bent), "{case}");
+            }
+        }
+    }
+}
+
+/// A bent surface, along an axis that its normal is 24° from: the tangents turn much further from one to the other.
+fn leaning() -> Quadric {
+    let axis = Vec3::new(0.7, -0.5, 0.05).normalize();
+    let (u, v) = tangents(axis);
+    let slope = [-0.33, 0.3];
+    Quadric {
+        normal: (axis - u * slope[0] - v * slope[1]).normalize(),
+        height: 0.008,
+        axis,
+        scatter: 0.01,
+        error: 2.0,
+        curvature: 0.01,
+        radius: 0.4,
+        slope,
+        bend: [0.2, -0.14, 0.06],
+    }
+}
+
+/// How far a place on the first quadric is above the second, in radii of the second.
+fn above(from: &Quadric, at: [f32; 2], to: &Quadric) -> f32 {
+    let height = |quadric: &Quadric, [x, y]: [f32; 2]| {
+        let ([sx, sy], [xx, xy, yy]) = (quadric.slope, quadric.bend);
+        quadric.height / quadric.radius + x * (sx + xx * x + xy * y) + y * (sy + yy * y)
+    };
+    let (u, v) = tangents(from.axis);
+    let place = (u * at[0] + v * at[1] + from.axis * height(from, at)) * (from.radius / to.radius);
+    let (u, v) = tangents(to.axis);
+    to.axis.dot(place) - height(to, [u.dot(place), v.dot(place)])
+}
+
+#[test]
+fn upright_quadrics_are_the_same_surface() {
+    let leaning = leaning();
+    let upright = leaning.upright();
+    assert_eq!((upright.axis, upright.slope), (leaning.normal, [0.0; 2]));
+    let places = [[0.3, 0.0], [0.0, 0.3], [-0.3, 0.0], [0.0, -0.3], [0.2, 0.2], [-0.2, 0.2]];
+    let most_off = |other: &Quadric| places.map(|at| above(&leaning, at, other).abs()).into_iter().fold(0.0, f32::max);
+    assert!(above(&leaning, [0.0, 0.0], &upright).abs() < 1e-3, "{upright:?}");
+    // What is left is of third order.
+    let (off, flat_off) = (most_off(&upright), most_off(&Quadric { bend: [0.0; 3], ..upright }));
+    assert!(off < 0.12 * flat_off, "{off}, and {flat_off} without curvature");
+}
+
+#[test]
+fn between_quadrics_of_two_balls() {
+    let smaller = leaning().upright();
+    let larger = Quadric {
+        height: smaller.height + 0.01,
+        radius: 1.6 * smaller.radius,
+        slope: [0.2, -0.1],
+        error: 0.5 * smaller.error,
+        bend: smaller.bend.map(|bend| 1.6 * bend),
+        ..smaller
+    };
+    let own = smaller.towards(&larger, 0.0);
+    assert_eq!(
+        (own.height, own.radius, own.slope, own.error),
+        (smaller.height, smaller.radius, [0.0; 2], smaller.error)
+    );
+    let whole = smaller.towards(&larger, 1.0);
+    assert!(angle(whole.normal.into(), own.normal.into()) > 10.0, "{whole:?}");
+    let half = smaller.towards(&larger, 0.5);
+    let [before, after] = [&own, &whole].map(|end| angle(half.normal.into(), end.normal.into()));
+    assert!((before - after).abs() < 0.1 * before, "{before}° and {after}°");
+    // Two balls that see the same curvature agree on it.
+    for at in 0..3 {
+        let [found, expected] = [&half, &smaller].map(|quadric| quadric.bend[at] / quadric.radius);
+        assert!((found - expected).abs() < 1e-5, "{found} and {expected}");
+    }
+}
