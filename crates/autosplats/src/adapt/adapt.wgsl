@@ -34,6 +34,7 @@ override SPARSE: f32;
 override LONE: f32;
 override AROUND_SPARSE: f32;
 override ASIDE: f32;
+override OFF_MIDDLE: f32;
 override CROWD: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
@@ -178,8 +179,10 @@ fn shrink(place: u32, surfel: Surfel) {
             stray = max(stray, STRAY_DOT);
         }
         let is_crowd = around.weight > CROWD * f32(frame.k);
-        let stands_alone = is_crowd || around.len < LEAST_CLUSTERS;
-        if around.len >= LEAST_OF_PLANE && stands_alone && abs(around.height) * AROUND_SPARSE > ASIDE {
+        let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
+        let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
+        let stands_alone = (is_crowd || around.len < LEAST_CLUSTERS) && is_aside || is_crowd && is_outside;
+        if around.len >= LEAST_OF_PLANE && stands_alone {
             stray = max(stray, STRAY_DOT);
         }
     }

@@ -62,9 +62,11 @@ pub(super) const LONE: f32 = 0.5;
 /// Radius of the ball in k-radii. With less weight of points in it than there are neighbours to be, it is no surface.
 pub(super) const AROUND_SPARSE: f32 = 2.0;
 /// Nor is a point that is this far from the plane through the ball, in k-radii: it stands by itself, and its disc would hide what
-/// its neighbours are. On a ridge it is about as far, at a corner further,
-pub(super) const ASIDE: f32 = 0.5;
-/// but there the ball holds no more than so many times the neighbours: this is 1.4 times what it does where points are even.
+/// its neighbours are. On a ridge it may be twice as far, at a corner further,
+pub(super) const ASIDE: f32 = 0.4;
+/// or this far from the middle of what the ball holds, as beside the border of a surface; at a border it is 0.75 at most.
+pub(super) const OFF_MIDDLE: f32 = 1.0;
+/// But there the ball holds no more than so many times the neighbours: this is 1.4 times what it does where points are even.
 pub(super) const CROWD: f32 = 1.4 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
@@ -379,7 +381,9 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
         }
         let is_aside = |plane: Plane| {
             let is_crowd = plane.weight > CROWD * task.rules.k as f32;
-            is_crowd | (len < LEAST_CLUSTERS) && plane.height.abs() * AROUND_SPARSE > ASIDE
+            let aside = plane.axis.dot(plane.mean).abs() * AROUND_SPARSE;
+            let outside = plane.mean.length() * AROUND_SPARSE;
+            (is_crowd | (len < LEAST_CLUSTERS)) & (aside > ASIDE) | is_crowd & (outside > OFF_MIDDLE)
         };
         if plane.is_some_and(is_aside) {
             stray = stray.max(STRAY_DOT);

@@ -2,9 +2,9 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, AROUND_SPARSE, ASIDE, CROWD, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, RELIABLE, SCATTER,
-    SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE,
-    WIDEST,
+    AGREE, AROUND_SPARSE, ASIDE, CROWD, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, OFF_MIDDLE, RELIABLE,
+    SCATTER, SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, THICKEST, THICKEST_FIRST, TINY_PX, TINY_REACH_PX,
+    TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
@@ -244,6 +244,7 @@ impl AdaptPasses {
                 ("LONE", LONE.into()),
                 ("AROUND_SPARSE", AROUND_SPARSE.into()),
                 ("ASIDE", ASIDE.into()),
+                ("OFF_MIDDLE", OFF_MIDDLE.into()),
                 ("CROWD", CROWD.into()),
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),

@@ -85,8 +85,8 @@ pub(super) struct Plane {
     pub(super) axis: Vec3,
     /// Along it, between, and where the spread is largest; squared radii.
     pub(super) variances: [f32; 3],
-    /// How far the plane is from the ball's centre along the axis, radii.
-    pub(super) height: f32,
+    /// Of the clusters, from the ball's centre; radii.
+    pub(super) mean: Vec3,
     /// Sum of the clusters' weights.
     pub(super) weight: f32,
 }
@@ -259,12 +259,7 @@ impl Gathered {
         let (values, axes) =
             eigenvectors([second[0], second[1], second[2], second[3], yz * share - y * z, zz * share - z * z]);
         let axis = Vec3::from(axes[0]);
-        Plane {
-            axis,
-            variances: [values[0].max(0.0), values[1], values[2]],
-            height: axis.dot(Vec3::new(x, y, z)),
-            weight: w,
-        }
+        Plane { axis, variances: [values[0].max(0.0), values[1], values[2]], mean: Vec3::new(x, y, z), weight: w }
     }
 
     /// Fits heights along `axis`.

@@ -109,7 +109,9 @@ fn area<S: Simd>(
     let is_area = |plane: &Plane, least: f32| plane.variances[1] > least * plane.variances[2];
     let is_flat = |plane: &Plane| {
         let [least, middle, _] = plane.variances;
-        (least <= FLAT * middle) & (plane.axis.dot(row).abs() <= ROW_TILT) & (plane.height.abs() <= OFF_ROW)
+        (least <= FLAT * middle)
+            & (plane.axis.dot(row).abs() <= ROW_TILT)
+            & (plane.axis.dot(plane.mean).abs() <= OFF_ROW)
     };
     let first = (0..SCALES).find_map(|_| {
         radius *= STEP;

@@ -1,5 +1,7 @@
 //! Adapted surfels against surfaces that are known.
 
+use std::ops::Range;
+
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{PointCloud, Scan};
 use glam::Vec3;
@@ -347,6 +349,29 @@ fn points_just_before_a_surface_are_dots() {
         let of_sphere = fitted.iter().zip(&adapted).filter(|(before, _)| before.source < surface);
         let shrunk = of_sphere.filter(|(before, after)| after.radius < before.radius).count();
         assert!(shrunk * 1000 < fitted.len(), "{shrunk} of the sphere's");
+    }
+}
+
+/// In the plane of the surface, so that only how one-sided their neighbours are tells of them.
+#[test]
+fn points_beyond_a_border_are_dots() {
+    for projection in PROJECTIONS {
+        let mut random = Random::new(5);
+        let mut positions: Positions =
+            (0..40_000).map(|_| [0.5 * random.signed(), 0.5 * random.signed(), 0.0]).collect();
+        let surface = positions.len() as u32;
+        // Points of the surface are 0.005 apart, those beyond its border about 0.1 from each other.
+        positions.extend((0..60).map(|_| [0.53 + 0.07 * random.unit(), 0.5 * random.signed(), 0.0]));
+        let case = Case::new(&positions, projection, [400, 300]);
+        let is_disc = |surfel: &&Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
+        let discs = |surfels: &[Surfel], of: Range<u32>| {
+            surfels.iter().filter(|surfel| of.contains(&surfel.source)).filter(is_disc).count()
+        };
+        let (fitted, adapted) = (case.fitted.concat(), case.adapted());
+        let [before, after] = [&fitted, &adapted].map(|surfels| discs(surfels, surface..u32::MAX));
+        assert!(before > 40 && after * 3 < before, "{before} discs, then {after}");
+        let [before, after] = [&fitted, &adapted].map(|surfels| discs(surfels, 0..surface));
+        assert!((before - after) * 1000 < before, "{before} of the surface, then {after}");
     }
 }
 

@@ -28,8 +28,8 @@ struct Ball {
 struct Plane {
     // Unit axis of least spread of the clusters; of either sign.
     axis: vec3f,
-    // How far the plane is from the ball's centre along the axis, radii.
-    height: f32,
+    // Of the clusters, from the ball's centre; radii.
+    mean: vec3f,
     // Along the axis, between, and where the spread is largest; squared radii.
     variances: vec3f,
     // Sum of the clusters' weights.
@@ -125,13 +125,13 @@ fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
         }
     }
     if len < LEAST_OF_PLANE {
-        return Plane(vec3f(0.0, 0.0, 1.0), 0.0, vec3f(0.0), first.w, len);
+        return Plane(vec3f(0.0, 0.0, 1.0), vec3f(0.0), vec3f(0.0), first.w, len);
     }
     let share = 1.0 / first.w;
     let mean = first.xyz * share;
     let found = eigen(squares * share - mean * mean, products * share - mean.yxx * mean.zzy);
     let variances = vec3f(max(found.values.x, 0.0), found.values.yz);
-    return Plane(found.least, dot(found.least, mean), variances, first.w, len);
+    return Plane(found.least, mean, variances, first.w, len);
 }
 
 // A row of the equations: four columns, the two of the slopes, and the right-hand side.

@@ -31,7 +31,7 @@ struct Area {
 // Whether what a plane was fitted to is an area with the `row` in it.
 fn is_flat(plane: Plane, row: vec3f) -> bool {
     let is_thin = plane.variances.x <= FLAT * plane.variances.y;
-    return is_thin && abs(dot(plane.axis, row)) <= ROW_TILT && abs(plane.height) <= OFF_ROW;
+    return is_thin && abs(dot(plane.axis, row)) <= ROW_TILT && abs(dot(plane.axis, plane.mean)) <= OFF_ROW;
 }
 
 // Whether a plane was fitted to something as wide as this part of its length, by variances.
