@@ -78,6 +78,16 @@ pub(crate) fn plane(count: usize) -> Positions {
     patch(1, count, |x, y| [x, y, 0.3 * x - 0.2 * y])
 }
 
+/// A dense square, and a few points in its plane beyond one of its borders, further away from it than its points are from each
+/// other; with the number of the first of those.
+pub(crate) fn beyond_a_border() -> (Positions, u32) {
+    let mut random = Random::new(5);
+    let mut positions: Positions = (0..40_000).map(|_| [0.5 * random.signed(), 0.5 * random.signed(), 0.0]).collect();
+    let surface = positions.len() as u32;
+    positions.extend((0..60).map(|_| [0.53 + 0.07 * random.unit(), 0.5 * random.signed(), 0.0]));
+    (positions, surface)
+}
+
 pub(crate) fn sphere(count: usize) -> Positions {
     let mut random = Random::new(2);
     (0..count).map(|_| random.direction()).collect()

@@ -135,7 +135,7 @@ fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> 
     return otherwise;
 }
 
-// Turns and moves a surfel onto a surface: along its axis, or the ray along which its noise was made.
+// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known.
 fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
     var offset = surface.offset;
     if known.noise > 0.0 {
@@ -181,7 +181,7 @@ fn shrink(place: u32, surfel: Surfel) {
         let is_crowd = around.weight > CROWD * f32(frame.k);
         let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
         let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
-        let stands_alone = (is_crowd || around.len < LEAST_CLUSTERS) && is_aside || is_crowd && is_outside;
+        let stands_alone = ((is_crowd || around.len < LEAST_CLUSTERS) && is_aside) || (is_crowd && is_outside);
         if around.len >= LEAST_OF_PLANE && stands_alone {
             stray = max(stray, STRAY_DOT);
         }

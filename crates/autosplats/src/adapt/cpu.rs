@@ -61,12 +61,13 @@ pub(super) const SPARSE: f32 = 2.5;
 pub(super) const LONE: f32 = 0.5;
 /// Radius of the ball in k-radii. With less weight of points in it than there are neighbours to be, it is no surface.
 pub(super) const AROUND_SPARSE: f32 = 2.0;
-/// Nor is a point that is this far from the plane through the ball, in k-radii: it stands by itself, and its disc would hide what
-/// its neighbours are. On a ridge it may be twice as far, at a corner further,
+/// Nor is a point this far from the plane through a ball that is a crowd or holds hardly anything, in k-radii: it stands by itself,
+/// and its disc would hide what its neighbours are. On ridges and at corners it may be as far, but there is no crowd.
 pub(super) const ASIDE: f32 = 0.4;
-/// or this far from the middle of what the ball holds, as beside the border of a surface; at a border it is 0.75 at most.
+/// Nor one this far from the middle of a crowd, as it is beside the border of a surface. On a straight border it is 0.75, at a
+/// square corner 1.05, but there is no crowd either.
 pub(super) const OFF_MIDDLE: f32 = 1.0;
-/// But there the ball holds no more than so many times the neighbours: this is 1.4 times what it does where points are even.
+/// A ball is a crowd if it holds more than so many times the neighbours, 1.4 times what it does where points are even.
 pub(super) const CROWD: f32 = 1.4 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
 /// Radius of such a dot in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
@@ -279,11 +280,13 @@ pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) ->
     ENOUGH + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
 }
 
-/// The upright quadric around `center` of balls as large as agree with the smaller ones and with the `first` normal, where its
-/// standard error is known; `None` if none is better than the first neighbours. Radii are multiples of `radius`.
+/// The upright quadric around `center` from balls that grow until its error is small enough; `None` if none is better than the
+/// first neighbours. Radii are multiples of `radius`. The smallest ball has to agree with the `first` normal, where its standard
+/// error is known.
 ///
-/// A ball that agrees counts the less, the less it does (stagewise aggregation, Belomestny and Spokoiny 2007): where one or the
-/// other is taken, chance decides, another way in each picture.
+/// Each ball counts as far as it agrees with what the smaller ones gave, and one that does not, or scatters more, is the last
+/// (stagewise aggregation, Belomestny and Spokoiny 2007): if one or the other were taken, chance would decide, differently in
+/// each picture.
 #[inline(always)]
 pub(super) fn choose<S: Simd>(
     simd: S,
@@ -379,13 +382,13 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
         } else if is_sparse && gathered.weight() < task.rules.k as f32 {
             stray = stray.max(STRAY_DOT);
         }
-        let is_aside = |plane: Plane| {
+        let stands_alone = |plane: Plane| {
             let is_crowd = plane.weight > CROWD * task.rules.k as f32;
-            let aside = plane.axis.dot(plane.mean).abs() * AROUND_SPARSE;
-            let outside = plane.mean.length() * AROUND_SPARSE;
-            (is_crowd | (len < LEAST_CLUSTERS)) & (aside > ASIDE) | is_crowd & (outside > OFF_MIDDLE)
+            let is_aside = plane.axis.dot(plane.mean).abs() * AROUND_SPARSE > ASIDE;
+            let is_outside = plane.mean.length() * AROUND_SPARSE > OFF_MIDDLE;
+            ((is_crowd | (len < LEAST_CLUSTERS)) & is_aside) | (is_crowd & is_outside)
         };
-        if plane.is_some_and(is_aside) {
+        if plane.is_some_and(stands_alone) {
             stray = stray.max(STRAY_DOT);
         }
     }

@@ -49,7 +49,7 @@ const WORK_BYTES: u64 = 12;
 type Level = [u32; 4];
 /// Mean and count.
 type Cluster = [f32; 4];
-/// `Sheet` of `shared/sheet.wgsl`.
+/// `Sheet` of `shared/sheet.wgsl`, padded.
 type Sheet = [f32; 16];
 
 /// What the stage keeps on the device from pass to pass.

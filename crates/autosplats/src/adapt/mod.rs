@@ -10,8 +10,8 @@
 //!
 //! How far points scatter is one number for the whole frame (`noise`): it is what is left of the quadrics at the first scale
 //! where many of a sample of points find a surface thinner than their ball is wide. With that number the error of each fit is
-//! known beforehand; the first scale is taken whose error is small enough. Larger ones count only as far as they agree
-//! with the smaller ones within their errors, and scatter no more, which they do on smooth surfaces and do not at edges.
+//! known beforehand. Balls grow until it is small enough; each counts as far as it agrees with what the smaller ones gave
+//! within their errors, and one that does not, or scatters more, is the last: on smooth surfaces they agree, at edges not.
 //! Where the first ten neighbours are good enough, the fit stays as it was; nearly everything does in a scan without noise.
 //!
 //! Where they are not, balls are not tried around each surfel, which would cost more than all else in a frame, but around

@@ -116,7 +116,7 @@ pub(super) struct Quadric {
     pub(super) error: f32,
     /// Surface variation λ0/(λ0+λ1+λ2) of the clusters, 0 to 1/3.
     pub(super) curvature: f32,
-    /// Of the ball.
+    /// Of the ball, or between those of several.
     pub(super) radius: f32,
     /// Slopes at the point along the [`tangents`] of the axis; 0 if it is upright.
     pub(super) slope: [f32; 2],
@@ -125,7 +125,7 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
-    /// The same surface with heights along its normal at the point, to second order.
+    /// The same surface with heights along its normal at the point, to second order, if it is near to the point.
     #[inline(always)]
     pub(super) fn upright(&self) -> Self {
         let &Self { normal, axis, bend: [xx, xy, yy], .. } = self;
@@ -141,13 +141,13 @@ impl Quadric {
         Self { height: self.height * cos, axis: normal, slope: [0.0; 2], bend, ..*self }
     }
 
-    /// Between this upright one and a larger ball's `other`, whose axis is this one's: that itself at a `share` of 1.
+    /// Between this upright one and a larger ball's `other` with the same axis: this one at a `share` of 0, `other` at 1.
     #[inline(always)]
     pub(super) fn towards(&self, other: &Self, share: f32) -> Self {
         let between = |from: f32, to: f32| from + share * (to - from);
         let radius = between(self.radius, other.radius);
         let slope = other.slope.map(|slope| share * slope);
-        // Curvatures, world units, do not depend on the ball.
+        // In radii of their own balls; as curvatures in world units they compare.
         let bend =
             std::array::from_fn(|at| radius * between(self.bend[at] / self.radius, other.bend[at] / other.radius));
         let (u, v) = tangents(self.axis);

@@ -27,15 +27,15 @@ pub(super) const PARTS: f32 = 64.0;
 /// that is below 2³².
 pub(super) const MOST_PX: f32 = 2048.0;
 
-/// An upright quadric over the ball that it was fitted to.
+/// An upright quadric over the balls that it was fitted to.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sheet {
     center: Vec3,
-    /// Of the ball.
+    /// Of the quadric.
     radius: f32,
     /// Unit normal at the centre, and direction of the heights.
     axis: Vec3,
-    /// At the centre; radii, as what follows.
+    /// At the centre; radii, as `bend`.
     height: f32,
     bend: [f32; 3],
     /// Standard error of its normal, radians.

@@ -10,7 +10,7 @@ override THICKEST: f32;
 override AGREE: f32;
 override FARTHEST: f32;
 
-// The same surface with heights along its normal at the point, to second order.
+// The same surface with heights along its normal at the point, to second order, if it is near to the point.
 fn upright(quadric: Quadric) -> Quadric {
     let u = any_orthonormal(quadric.axis);
     let v = cross(quadric.axis, u);
@@ -32,12 +32,12 @@ fn upright(quadric: Quadric) -> Quadric {
     return found;
 }
 
-// Between an upright quadric and that of a larger ball along the same axis: the larger one's itself at a share of 1.
+// Between an upright quadric and that of a larger ball with the same axis: the smaller one at a share of 0, the larger at 1.
 fn towards(smaller: Quadric, larger: Quadric, share: f32) -> Quadric {
     var found = larger;
     found.radius = mix(smaller.radius, larger.radius, share);
     found.slope = share * larger.slope;
-    // Curvatures, world units, do not depend on the ball.
+    // In radii of their own balls; as curvatures in world units they compare.
     found.bend = found.radius * mix(smaller.bend / smaller.radius, larger.bend / larger.radius, vec3f(share));
     let u = any_orthonormal(larger.axis);
     let v = cross(larger.axis, u);
@@ -48,9 +48,10 @@ fn towards(smaller: Quadric, larger: Quadric, share: f32) -> Quadric {
     return found;
 }
 
-// The upright quadric around `center` of balls as large as agree with the smaller ones and with the `first` normal, whose standard error
-// follows it, negative if it is not known; of no clusters if none is better than the first neighbours. Radii are multiples
-// of `least_radius`. A ball that agrees counts the less, the less it does.
+// The upright quadric around `center` from balls that grow until its error is small enough; of no clusters if none is better than
+// the first neighbours. Radii are multiples of `least_radius`. The smallest ball has to agree with the `first` normal, whose
+// standard error follows it, negative if it is not known. Each ball counts as far as it agrees with what the smaller ones gave,
+// and one that does not, or scatters more, is the last.
 fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f32, scatter: f32) -> Quadric {
     var radius = least_radius;
     // A normal to agree with, and its error; negative if there is none yet.

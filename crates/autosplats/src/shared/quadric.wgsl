@@ -52,9 +52,9 @@ struct Quadric {
     curvature: f32,
     // Clusters in the ball.
     len: u32,
-    // Of the ball.
+    // Of the ball, or between those of several.
     radius: f32,
-    // Slopes at the point along `any_orthonormal` of the axis, and at right angles to both.
+    // Slopes at the point along `any_orthonormal` of the axis, and at right angles to both; 0 if it is upright.
     slope: vec2f,
     // Coefficients of the squares and the product of the two, xx, xy and yy, in radii.
     bend: vec3f,

@@ -6,14 +6,14 @@
 const UNKNOWN = 0.0;
 const NONE = -1.0;
 
-// An upright quadric over the ball that it was fitted to.
+// An upright quadric over the balls that it was fitted to.
 struct Sheet {
     center: vec3f,
-    // Of the ball.
+    // Of the quadric.
     radius: f32,
     // Unit normal at the centre, and direction of the heights.
     axis: vec3f,
-    // At the centre; radii, as what follows.
+    // At the centre; radii, as `bend`.
     height: f32,
     bend: vec3f,
     // Standard error of its normal, radians.

@@ -12,7 +12,7 @@ use crate::test_clouds::{self, noisy};
 
 /// Cells that may differ: rounding puts a few means into the next slab.
 const UNLIKE_CELLS: f64 = 1e-3;
-/// Surfels that may differ: rounding decides which of two balls is taken.
+/// Surfels that may differ: rounding decides whether a ball is the last.
 const UNLIKE_SURFELS: f64 = 1e-2;
 
 /// What the device makes of a case.
@@ -174,6 +174,32 @@ fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
         ("clean sphere", false, test_clouds::sphere(20_000)),
         ("clean bumps", false, test_clouds::bumpy(20_000)),
     ]
+}
+
+/// They are few, so that they are compared by themselves.
+#[test]
+fn the_device_draws_as_dots_what_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = AdaptPasses::new(&gpu).expect("passes");
+    for projection in PROJECTIONS {
+        let (positions, surface) = test_clouds::beyond_a_border();
+        let case = Case::new(&positions, projection, [400, 300]);
+        let of = |surfels: Surfels| -> Surfels { surfels.into_iter().filter(|s| s.source >= surface).collect() };
+        let [device, host, fitted] =
+            [on_device(&gpu, &passes, &case).surfels, case.adapted(), case.fitted.concat()].map(of);
+        let shrunk = host.iter().zip(&fitted).filter(|(host, fitted)| host.radius < fitted.radius).count();
+        assert!(3 * shrunk > 2 * host.len(), "{shrunk} of {}", host.len());
+        compare_surfels(&device, &host).unwrap_or_else(|error| panic!("{projection:?}: {error}"));
+    }
+}
+
+#[test]
+fn sheets_are_as_large_as_the_host_takes_them_for() {
+    let source = crate::gpu::link("#import sheet\n");
+    let module = wgpu::naga::front::wgsl::parse_str(&source).expect("WGSL");
+    let is_sheet = |ty: &wgpu::naga::Type| ty.name.as_deref() == Some("Sheet");
+    let sheet = module.types.iter().find(|(_, ty)| is_sheet(ty)).expect("a sheet").1;
+    assert_eq!(sheet.inner.size(module.to_ctx()) as usize, size_of::<Sheet>());
 }
 
 #[test]

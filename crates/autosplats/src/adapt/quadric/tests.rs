@@ -4,12 +4,14 @@ use autosplats_cloud::glam::DVec3;
 use glam::Vec3;
 
 use super::{Gathered, Quadric, tangents};
+use crate::adapt::STEP;
 use crate::adapt::cells::{Cells, Cluster, Level};
+use crate::adapt::cpu::{Goal, choose};
 use crate::adapt::tests::angle;
-use crate::camera::{Camera, Projection};
+use crate::camera::{Camera, Projection, View};
 
-/// The quadric fitted about a point `above` the surface z = `depth`(x, y), a cluster in each of its cells.
-fn quadric_on(depth: impl Fn(f32, f32) -> f32, at: [f32; 2], above: f32, radius: f32) -> Quadric {
+/// A cluster in each cell of the surface z = `depth`(x, y).
+fn cells_on(depth: impl Fn(f32, f32) -> f32) -> (Cells, View) {
     let projection = Projection::OrthographicHeight(2.0);
     let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
     let view = camera.view(DVec3::ZERO, [200, 200]).expect("a view");
@@ -20,9 +22,15 @@ fn quadric_on(depth: impl Fn(f32, f32) -> f32, at: [f32; 2], above: f32, radius:
         let cluster = Cluster { mean: [x, y, depth(x, y)], count: 1.0 };
         level.cells.push([cluster, Cluster::default(), Cluster::default(), Cluster::default()]);
     }
+    (Cells { levels: vec![level] }, view)
+}
+
+/// The quadric fitted about a point `above` the surface z = `depth`(x, y).
+fn quadric_on(depth: impl Fn(f32, f32) -> f32, at: [f32; 2], above: f32, radius: f32) -> Quadric {
+    let (cells, view) = cells_on(&depth);
     let center = [at[0], at[1], depth(at[0], at[1]) - above];
     let mut gathered = Gathered::default();
-    assert!(gathered.read(&Cells { levels: vec![level] }, center, radius, &view) > 100, "clusters in the ball");
+    assert!(gathered.read(&cells, center, radius, &view) > 100, "clusters in the ball");
     let curvature = gathered.plane(pulp::Scalar).curvature();
     gathered.quadric(pulp::Scalar, radius, Vec3::Z, curvature)
 }
@@ -95,27 +103,51 @@ fn upright_quadrics_are_the_same_surface() {
 #[test]
 fn between_quadrics_of_two_balls() {
     let smaller = leaning().upright();
+    let slope = [0.2, -0.1];
+    let (u, v) = tangents(smaller.axis);
     let larger = Quadric {
+        normal: (smaller.axis - u * slope[0] - v * slope[1]).normalize(),
         height: smaller.height + 0.01,
+        scatter: 2.0 * smaller.scatter,
         radius: 1.6 * smaller.radius,
-        slope: [0.2, -0.1],
+        slope,
         error: 0.5 * smaller.error,
-        bend: smaller.bend.map(|bend| 1.6 * bend),
+        bend: smaller.bend.map(|bend| 2.0 * bend),
         ..smaller
     };
-    let own = smaller.towards(&larger, 0.0);
-    assert_eq!(
-        (own.height, own.radius, own.slope, own.error),
-        (smaller.height, smaller.radius, [0.0; 2], smaller.error)
-    );
-    let whole = smaller.towards(&larger, 1.0);
-    assert!(angle(whole.normal.into(), own.normal.into()) > 10.0, "{whole:?}");
-    let half = smaller.towards(&larger, 0.5);
-    let [before, after] = [&own, &whole].map(|end| angle(half.normal.into(), end.normal.into()));
-    assert!((before - after).abs() < 0.1 * before, "{before}° and {after}°");
-    // Two balls that see the same curvature agree on it.
-    for at in 0..3 {
-        let [found, expected] = [&half, &smaller].map(|quadric| quadric.bend[at] / quadric.radius);
-        assert!((found - expected).abs() < 1e-5, "{found} and {expected}");
-    }
+    let numbers = |quadric: &Quadric| {
+        let Quadric { normal, height, scatter, error, radius, slope, bend, .. } = *quadric;
+        let curvatures = bend.map(|bend| bend / radius);
+        [&normal.to_array()[..], &[height, scatter, error, radius], &slope, &curvatures].concat()
+    };
+    let off = |share: f32, expected: &[f32]| {
+        let found = numbers(&smaller.towards(&larger, share));
+        found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    let ends = [&smaller, &larger].map(numbers);
+    let half: Vec<f32> = ends[0].iter().zip(&ends[1]).map(|(a, b)| 0.5 * (a + b)).collect();
+    assert!(off(0.0, &ends[0]) < 1e-6 && off(1.0, &ends[1]) < 1e-6);
+    // Slopes are in the middle, normals nearly.
+    assert!(off(0.5, &half) < 0.01, "{}", off(0.5, &half));
+    assert!(off(0.5, &ends[0]) > 0.1 && off(0.5, &ends[1]) > 0.1);
+}
+
+/// A surface that bends by more than a quadric can the further away it is: larger balls agree less and less with the smaller ones.
+#[test]
+fn a_ball_that_agrees_by_half_counts_by_half() {
+    let radius = 0.2;
+    let goal = Goal { noise: 0.003, enough: 1e-4, scatter: 0.1 };
+    let found = |bend: f32| {
+        let (cells, view) = cells_on(|x, y| 4.0 + bend * x * (x * x + y * y));
+        choose(pulp::Scalar, [0.0, 0.0, 4.0], radius, None, &goal, (&cells, &view), &mut Gathered::default())
+            .expect("one")
+    };
+    let is_ball = |found: f32| {
+        let scale = (found / radius).ln() / STEP.ln();
+        (scale - scale.round()).abs() < 0.01
+    };
+    let radii: Vec<f32> = (0..40).map(|bend| found(0.002 * bend as f32).radius).collect();
+    assert!(is_ball(radii[0]) && radii.is_sorted_by(|less, more| less >= more), "{radii:?}");
+    let between = radii.iter().filter(|&&radius| !is_ball(radius)).count();
+    assert!(between > 30, "{between} of 40 are between two balls");
 }
