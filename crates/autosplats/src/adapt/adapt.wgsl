@@ -90,7 +90,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
                 // To the eighth: about as likely as noise puts a point there.
                 let second = rest * rest;
                 let fourth = second * second;
-                let weight = apart.x * apart.y * (over.near * over.near * over.near) * (fourth * fourth) / sheet.error;
+                let weight = apart.x * apart.y * (over.near * over.near) * (fourth * fourth) * sheet.trust;
                 sum.normal += normal * select(weight, -weight, dot(normal, sum.normal) < 0.0);
                 sum.offset += sheet.axis * (over.height * weight);
                 sum.curvature += sheet.curvature * weight;

@@ -85,15 +85,18 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         if quadric.len == 0u {
             continue;
         }
+        let error = quadric.error * noise;
         let sheet = Sheet(
             center,
             quadric.radius,
             quadric.axis,
             quadric.height / quadric.radius,
             quadric.bend,
-            quadric.error * noise,
+            error,
             quadric.curvature,
             quadric.scatter,
+            // One over its power of three quarters.
+            1.0 / (sqrt(error) * sqrt(sqrt(error))),
         );
         for (var index = 0u; index < SLABS; index++) {
             if left[index] > 0.0 {

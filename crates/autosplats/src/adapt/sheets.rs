@@ -18,9 +18,8 @@ pub(super) const SHEET_LEVELS: [usize; 2] = [1, 2];
 /// A cluster within this many times the noise of a sheet needs none of its own,
 pub(super) const COVERED: f32 = 2.0;
 /// if it is no further from the centre of the sheet's ball than this part of the squared radius: at a grazing angle a cell
-/// is a long strip of surface. With twice that, normals in the band of silhouettes were 3 % worse, and a tenth of the
-/// fits was saved.
-pub(super) const COVERED_REACH: f32 = 0.25;
+/// is a long strip of surface. The wider, the worse normals are along silhouettes.
+pub(super) const COVERED_REACH: f32 = 0.12;
 /// K-radii are summed up in these parts of a pixel, as integers, so that their order does not matter.
 pub(super) const PARTS: f32 = 64.0;
 /// Larger k-radii, in pixels, count as this: of the nine cells of 32 pixels that are summed up, with two points in each pixel,
@@ -43,6 +42,8 @@ struct Sheet {
     curvature: f32,
     /// Standard deviation of points from it, world units.
     scatter: f32,
+    /// How much it counts beside others, by its error.
+    trust: f32,
 }
 
 /// Where a place is over a sheet.
@@ -228,7 +229,7 @@ impl Sheets {
                     let likely = likely * likely;
                     let likely = likely * likely;
                     let likely = likely * likely;
-                    let weight = share * (over.near * over.near * over.near) * likely / sheet.error;
+                    let weight = share * (over.near * over.near) * likely * sheet.trust;
                     sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
                     sum.offset += sheet.axis * (over.height * weight);
                     sum.curvature += sheet.curvature * weight;
@@ -329,15 +330,18 @@ fn fit_cell<S: Simd>(
         let Some(quadric) = choose(simd, center, radius, None, &goal, (cells, view), gathered) else {
             continue;
         };
+        let error = quadric.error * noise;
         let sheet = Sheet {
             center: center.into(),
             radius: quadric.radius,
             axis: quadric.axis,
             height: quadric.height / quadric.radius,
             bend: quadric.bend,
-            error: quadric.error * noise,
+            error,
             curvature: quadric.curvature,
             scatter: quadric.scatter,
+            // One over its power of three quarters.
+            trust: 1.0 / (error.sqrt() * error.sqrt().sqrt()),
         };
         for (left, cluster) in left.iter_mut().zip(cell) {
             if *left > 0.0 {

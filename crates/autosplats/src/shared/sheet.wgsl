@@ -21,6 +21,8 @@ struct Sheet {
     curvature: f32,
     // Standard deviation of points from it, world units.
     scatter: f32,
+    // How much it counts beside others, by its error.
+    trust: f32,
 }
 
 // Where a place is over a sheet.
