@@ -88,7 +88,8 @@ fn run(command_line: CommandLine) -> Result<(), Failure> {
 /// Inputs without a command are to be viewed; a word that is neither an input nor a command is explained.
 fn without_command(typed: Vec<String>) -> Result<(), Failure> {
     let first = typed.first().map_or("", String::as_str);
-    if first.starts_with('-') || first.starts_with("scene:") || first.contains('.') || Path::new(first).exists() {
+    let is_address = first.starts_with("scene:") || first.contains("://");
+    if first.starts_with('-') || is_address || first.contains('.') || Path::new(first).exists() {
         let words = ["autosplats".into(), "view".into()].into_iter().chain(typed);
         return CommandLine::try_parse_from(words).map_err(|error| Failure::usage(one_line(&error))).and_then(run);
     }

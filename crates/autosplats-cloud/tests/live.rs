@@ -104,6 +104,11 @@ fn what_is_refused_is_said_and_the_next_frame_read() {
     refused(&mut live, "");
     assert_eq!(update(&mut live).cloud.len(), 10, "after a frame whose numbers are none");
     assert_eq!(live.statistics().refused, 3, "each once: {:?}", live.statistics().last_refusal);
+    for what in ["filled up with zeros", "after zeros"] {
+        sender.send([&good[..], &[0; 512]].concat()).unwrap();
+        assert_eq!(update(&mut live).cloud.len(), 10, "{what}");
+    }
+    assert_eq!(live.statistics().refused, 3, "zeros are nothing to refuse: {:?}", live.statistics().last_refusal);
     sender.send(good[..good.len() - 5].to_vec()).unwrap();
     drop(sender);
     refused(&mut live, "cut off");

@@ -49,7 +49,7 @@ pub(crate) struct RenderArgs {
     /// Leave out frames whose picture is there already
     #[arg(long, help_heading = "Points that move")]
     pub(crate) resume: bool,
-    /// Render files, or the newest file of a folder, again each time they change, until Ctrl-C
+    /// Render files, or the newest file of a folder, again each time they change, until Ctrl-C; each picture gets a number
     #[arg(long, help_heading = "Points that move")]
     pub(crate) watch: bool,
     #[command(flatten)]

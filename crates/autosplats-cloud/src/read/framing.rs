@@ -87,7 +87,8 @@ impl Framing {
         loop {
             match &mut self.state {
                 State::Between => {
-                    let blank = |byte: &u8| byte.is_ascii_whitespace();
+                    // Some programs fill files up with zeros.
+                    let blank = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
                     let start = self.bytes.iter().position(|byte| !blank(byte)).unwrap_or(self.bytes.len());
                     self.skip(start);
                     match begins(&self.bytes, BEGINNINGS)? {

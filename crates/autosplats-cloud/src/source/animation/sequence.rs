@@ -27,7 +27,8 @@ impl Sequence {
         let files = clouds(name, found, options)?;
         if files.len() < all {
             let (left_out, frames) = (all - files.len(), files.len());
-            progress.note(&format!("left out {left_out} of {all} files, which are no clouds; {frames} are the frames"));
+            let what = format!("left out {left_out} of {all} files, which are no clouds or have no number");
+            progress.note(&format!("{what}; {frames} are the frames"));
         }
         let timeline = Timeline::even(files.len(), fps)?;
         Ok(Self { files, timeline, options: options.clone(), first: OnceLock::new() })
