@@ -101,8 +101,8 @@ fn a_stream_cut_anywhere_gives_the_files_before_the_cut() {
 #[test]
 fn what_is_no_file_is_told_once_and_skipped() {
     let files = files();
-    let binary: Vec<u8> = (0..2000_u32).flat_map(|i| i.wrapping_mul(0x9E37_79B9).to_be_bytes()).collect();
-    for garbage in [&b"x"[..], b"hello\nply or not\n", b"pl", b"VERSIO", &[0; 40], &binary] {
+    let binary: Vec<u8> = (1..2000_u32).flat_map(|i| i.wrapping_mul(0x9E37_79B9).to_be_bytes()).collect();
+    for garbage in [&b"x"[..], b"hello\nply or not\n", b"pl", b"VERSIO", &[1; 40], &binary] {
         for file in &files[..7] {
             let stream = [file, garbage, &files[3], &files[0]].concat();
             for piece in [1, 17, stream.len()] {
@@ -111,6 +111,18 @@ fn what_is_no_file_is_told_once_and_skipped() {
                 let refused = refused(&found);
                 assert_eq!((refused.len(), refused[0].0), (1, file.len() as u64), "once, with its byte");
             }
+        }
+    }
+}
+
+#[test]
+fn zeros_between_files_are_nothing() {
+    let files = files();
+    for file in &files[..7] {
+        let stream = [&[0; 5][..], file, &[0; 3906], &files[3], &[0; 40]].concat();
+        for piece in [1, 17, stream.len()] {
+            let found = found(&stream, piece);
+            assert_eq!((whole(&found), refused(&found).len()), (vec![&file[..], &files[3]], 0), "in pieces of {piece}");
         }
     }
 }
