@@ -87,8 +87,9 @@ impl Framing {
         loop {
             match &mut self.state {
                 State::Between => {
-                    // Some programs fill files up with zeros.
-                    let blank = |byte: &u8| byte.is_ascii_whitespace() || *byte == 0;
+                    // Some programs fill files up with zeros; what begins with them is no file.
+                    let filled = self.before > 0;
+                    let blank = |byte: &u8| byte.is_ascii_whitespace() || (filled && *byte == 0);
                     let start = self.bytes.iter().position(|byte| !blank(byte)).unwrap_or(self.bytes.len());
                     self.skip(start);
                     match begins(&self.bytes, BEGINNINGS)? {

@@ -17,7 +17,7 @@ use crate::fit::Surfel;
 pub(super) const SHEET_LEVELS: [usize; 2] = [1, 2];
 /// A cluster within this many times the noise of a sheet needs none of its own,
 pub(super) const COVERED: f32 = 2.0;
-/// if it is no further from the centre of the sheet's ball than this part of the squared radius: at a grazing angle a cell
+/// if it is no further from the sheet's centre than this part of its squared radius: at a grazing angle a cell
 /// is a long strip of surface. The wider, the worse normals are along silhouettes.
 pub(super) const COVERED_REACH: f32 = 0.12;
 /// K-radii are summed up in these parts of a pixel, as integers, so that their order does not matter.

@@ -119,12 +119,14 @@ fn what_is_no_file_is_told_once_and_skipped() {
 fn zeros_between_files_are_nothing() {
     let files = files();
     for file in &files[..7] {
-        let stream = [&[0; 5][..], file, &[0; 3906], &files[3], &[0; 40]].concat();
+        let stream = [&file[..], &[0; 3906], &files[3], &[0; 40]].concat();
         for piece in [1, 17, stream.len()] {
             let found = found(&stream, piece);
             assert_eq!((whole(&found), refused(&found).len()), (vec![&file[..], &files[3]], 0), "in pieces of {piece}");
         }
     }
+    let found = found(&[0; 4000], 1000);
+    assert_eq!(refused(&found).len(), 1, "a stream of nothing else is refused");
 }
 
 #[test]
