@@ -153,7 +153,7 @@ impl Sheets {
     #[inline(always)]
     pub(super) fn ask(&self, surfel: &Surfel, cells: &Cells, view: &View) {
         let Some(level) = cells.levels.get(self.level) else { return };
-        let [column, row] = [surfel.pixel & 0xffff, surfel.pixel >> 16].map(|at| at as usize / level.side_px);
+        let [column, row] = surfel.pixel_xy().map(|at| at / level.side_px);
         let asked = &self.asked[row * level.columns + column];
         let k_radius_px = surfel.k_radius / view.pixel_size(surfel.center[2]);
         let parts = (k_radius_px.min(MOST_PX) * PARTS) as u64;

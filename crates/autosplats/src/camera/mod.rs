@@ -45,10 +45,12 @@ pub enum Projection {
 /// A [`Camera`] made ready for one picture of one cloud: rotations and focal lengths in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
-    /// Image size in pixels.
+    /// Size of the screen in pixels: the picture, and a margin around it.
     pub(crate) width: u32,
-    /// Image size in pixels.
+    /// Size of the screen in pixels.
     pub(crate) height: u32,
+    /// Pixels of the screen on every side that are not in the picture.
+    pub(crate) margin: u32,
     /// Rotation from world to view space.
     pub(crate) view_from_world: Mat3,
     /// The eye relative to the cloud's origin, world orientation.
@@ -90,12 +92,13 @@ impl Camera {
         self.lens([1, 1]).map(|_| ())
     }
 
-    /// Makes the camera ready for a picture of `size` pixels of a cloud about `origin`.
+    /// Makes the camera ready for a picture of `size` pixels, without a margin, of a cloud about `origin`.
     pub(crate) fn view(&self, origin: DVec3, size: [u32; 2]) -> Result<View, Error> {
         let Lens { axes: [right, down, forward], focal_px, perspective, near, .. } = self.lens(size)?;
         Ok(View {
             width: size[0],
             height: size[1],
+            margin: 0,
             view_from_world: Mat3::from_cols(right.as_vec3(), down.as_vec3(), forward.as_vec3()).transpose(),
             eye_local: (self.eye - origin).as_vec3(),
             focal_px: focal_px as f32,
@@ -107,6 +110,26 @@ impl Camera {
 
 #[allow(clippy::wrong_self_convention, reason = "a view is too large to be handed over for every point")]
 impl View {
+    /// The same picture with a margin of so many pixels on every side of it.
+    pub(crate) fn with_margin(self, margin: u32) -> Self {
+        let [width, height] = self.picture_size().map(|side| side + 2 * margin);
+        Self { width, height, margin, ..self }
+    }
+
+    /// Width and height of the picture, without the margin.
+    pub(crate) fn picture_size(&self) -> [u32; 2] {
+        [self.width, self.height].map(|side| side - 2 * self.margin)
+    }
+
+    /// How many pixels a pixel of the screen is away from the picture, along the axis where it is more; 0 in the picture.
+    #[inline(always)]
+    pub(crate) fn beside_picture(&self, [x, y]: [usize; 2]) -> usize {
+        let margin = self.margin as usize;
+        let beside =
+            |at: usize, side: u32| margin.saturating_sub(at).max((at + margin + 1).saturating_sub(side as usize));
+        beside(x, self.width).max(beside(y, self.height))
+    }
+
     /// View-space position of a point given relative to the cloud's origin.
     #[inline(always)]
     pub(crate) fn to_view(&self, position: [f32; 3]) -> Vec3 {

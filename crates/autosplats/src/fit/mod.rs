@@ -50,7 +50,7 @@ pub(crate) struct Surfel {
 }
 
 impl Surfel {
-    /// Beyond all indices of screen points, of which there are no more than two a pixel: 2²⁹.
+    /// Beyond all indices of screen points, of which there are no more than two a pixel: 2³⁰.
     pub(crate) const BACK: u32 = 1 << 31;
 
     /// Whether the eye sees the side that the point's sensor did not see.
@@ -59,7 +59,13 @@ impl Surfel {
         self.screen & Self::BACK != 0
     }
 
-    /// Moves the centre, unless that is out of the picture: it would have no pixel to be hidden at.
+    /// Pixel column and row of the centre.
+    #[inline(always)]
+    pub(crate) fn pixel_xy(&self) -> [usize; 2] {
+        [(self.pixel & 0xffff) as usize, (self.pixel >> 16) as usize]
+    }
+
+    /// Moves the centre, unless that is off the screen: it would have no pixel to be hidden at.
     #[inline(always)]
     pub(crate) fn move_to(&mut self, center: Vec3, view: &View) {
         let [x, y] = view.to_pixel(center);

@@ -34,6 +34,9 @@ pub(crate) struct FrameUniform {
     pub(crate) frames_averaged: f32,
     /// 1 if the last frame was one of the same points.
     pub(crate) same_points: u32,
+    pub(crate) picture: [u32; 2],
+    pub(crate) margin: u32,
+    pub(crate) padding: u32,
     /// Columns, each padded to four numbers.
     pub(crate) past_rotation: [[f32; 4]; 3],
     pub(crate) past_shift: [f32; 3],
@@ -63,6 +66,9 @@ impl FrameUniform {
             longest: 1.0,
             frames_averaged: 1.0,
             same_points: 0,
+            picture: view.picture_size(),
+            margin: view.margin,
+            padding: 0,
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],
             past_focal_px: 0.0,

@@ -3,6 +3,7 @@
 /// What several passes share, by name; a file may import only files that stand before it.
 const SHARED: &[(&str, &str)] = &[
     ("frame", include_str!("../shared/frame.wgsl")),
+    ("picture", include_str!("../shared/picture.wgsl")),
     ("gaps", include_str!("../shared/gaps.wgsl")),
     ("groups", include_str!("../shared/groups.wgsl")),
     ("counters", include_str!("../shared/counters.wgsl")),
@@ -17,6 +18,7 @@ const SHARED: &[(&str, &str)] = &[
     ("density", include_str!("../shared/density.wgsl")),
     ("cell_order", include_str!("../shared/cell_order.wgsl")),
     ("screen", include_str!("../shared/screen.wgsl")),
+    ("matters", include_str!("../shared/matters.wgsl")),
     ("culled", include_str!("../shared/culled.wgsl")),
     ("depth_noise", include_str!("../shared/depth_noise.wgsl")),
     ("surfel", include_str!("../shared/surfel.wgsl")),

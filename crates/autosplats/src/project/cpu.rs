@@ -38,14 +38,14 @@ pub(crate) struct Projector {
 impl Projector {
     /// Projects `cloud`, which has fewer than 2³² points, for `view`.
     pub(crate) fn project(&mut self, cloud: &PointCloud, view: &View, rules: &ProjectRules) -> &ScreenPoints {
-        let ProjectRules { k, halves, grid_culling } = *rules;
+        let ProjectRules { k, halves, .. } = *rules;
         let Self { keys, screen } = self;
         screen.dropped = nearest_per_pixel(cloud.positions(), view, halves, keys, &mut screen.sixteenths);
         let keys = Keys::settle(keys, view, halves);
         let spacing_px = keys.mean_spacing();
         compact(cloud.positions(), view, &keys, spacing_px, screen);
         measure_density(screen, view, spacing_px, k);
-        split_by_depth(grid_culling, screen);
+        split(rules, view, screen);
         screen
     }
 }
@@ -326,13 +326,14 @@ fn measure_density(screen: &mut ScreenPoints, view: &View, spacing_px: f32, k: u
     density.culling.extend(density.nearest.iter().map(|&depth| depth + cell_px * view.pixel_size(depth)));
 }
 
-/// Puts back the points behind the culling plane of their cell [Paper, §7, Grid Culling].
-fn split_by_depth(grid_culling: bool, screen: &mut ScreenPoints) {
+/// Puts back the points behind the culling plane of their cell [Paper, §7, Grid Culling], and those that do not matter.
+fn split(&ProjectRules { k, grid_culling, .. }: &ProjectRules, view: &View, screen: &mut ScreenPoints) {
     let ScreenPoints { points, density, active, passive, .. } = screen;
     active.clear();
     passive.clear();
     for (index, point) in (0..).zip(&*points) {
-        let list = if grid_culling & density.culls(point) { &mut *passive } else { &mut *active };
+        let is_passive = grid_culling & density.culls(point) || !density.matters(point, k, view);
+        let list = if is_passive { &mut *passive } else { &mut *active };
         list.push(index);
     }
 }

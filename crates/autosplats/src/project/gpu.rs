@@ -1,8 +1,8 @@
 //! Projection on the GPU: the CPU form's steps, a pass each.
 
-use super::ScreenPoint;
 use super::cpu::{GATE_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
+use super::{MARGIN_REACH, ScreenPoint};
 use crate::Error;
 use crate::gpu::{Gpu, Groups, INT64_ATOMICS, Pass, PassSource, Step};
 
@@ -140,12 +140,13 @@ pub(crate) struct ScreenBuffers {
 }
 
 impl ScreenBuffers {
-    /// Whether the device binds the keys of two halves a pixel, and a `T` for each screen point that there can be then.
-    pub(crate) fn has_room_for_halves<T>(gpu: &Gpu, size: [u32; 2], points: usize) -> bool {
-        gpu.binds::<[u32; 2]>(capacity(size, true, usize::MAX)) && gpu.binds::<T>(capacity(size, true, points))
+    /// Whether the device binds the keys of a screen's pixels, or of two halves of each, and a `T` for each screen point that there
+    /// can be then.
+    pub(crate) fn has_room<T>(gpu: &Gpu, size: [u32; 2], halves: bool, points: usize) -> bool {
+        gpu.binds::<[u32; 2]>(capacity(size, halves, usize::MAX)) && gpu.binds::<T>(capacity(size, halves, points))
     }
 
-    /// Room for a picture of `size` of a cloud of `points` points with `values` values each.
+    /// Room for a screen of `size` and a cloud of `points` points with `values` values each.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -186,7 +187,7 @@ impl ScreenBuffers {
     }
 }
 
-/// Most screen points that a picture of a cloud can have.
+/// Most screen points that a screen of this size can have.
 fn capacity([width, height]: [u32; 2], halves: bool, points: usize) -> usize {
     points.min((width as usize * height as usize) << u32::from(halves))
 }
@@ -280,6 +281,7 @@ impl ProjectPasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, int64: bool) -> Result<Self, Error> {
         let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
+        let reach = [("MARGIN_REACH", MARGIN_REACH.into())];
         Ok(Self {
             clear: pass(&CLEAR)?,
             nearest: NearestPass::new(gpu, int64)?,
@@ -289,9 +291,9 @@ impl ProjectPasses {
             scan_visible: scan_pass(gpu, Counter::Visible, None)?,
             compact: pass(&COMPACT)?,
             gather: pass(&GATHER)?,
-            split_count: pass(&SPLIT_COUNT)?,
+            split_count: Pass::new(gpu, &SPLIT_COUNT, &reach)?,
             scan_active: scan_pass(gpu, Counter::Active, Some(Counter::Visible))?,
-            split: pass(&SPLIT)?,
+            split: Pass::new(gpu, &SPLIT, &reach)?,
             work: WorkPass::new(gpu)?,
         })
     }

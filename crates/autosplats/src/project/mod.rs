@@ -34,6 +34,10 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::camera::View;
 
+/// How far beside the picture points get splats, in first search radii. Those further out are neighbours, and no more.
+// Differs from the paper: it ends with the picture.
+pub(crate) const MARGIN_REACH: f32 = 1.5;
+
 /// What projection keeps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProjectRules {
@@ -81,7 +85,7 @@ pub(crate) struct ScreenPoints {
     pub(crate) density: DensityGrid,
     /// Screen points to reconstruct first, ascending.
     pub(crate) active: Vec<u32>,
-    /// Screen points probably hidden, ascending; empty without grid culling.
+    /// The others, ascending: probably hidden, if there is grid culling, or too far beside the picture to matter to it.
     pub(crate) passive: Vec<u32>,
     pub(crate) sixteenths: Sixteenths,
     pub(crate) dropped: Dropped,
@@ -140,6 +144,13 @@ impl DensityGrid {
     #[inline(always)]
     pub(crate) fn culls(&self, point: &ScreenPoint) -> bool {
         point.position_view[2] > self.culling[self.cell(point.pixel_xy())]
+    }
+
+    /// Whether a point's splat may matter to the picture: it lies in it, or not far beside for how dense points are there.
+    #[inline(always)]
+    pub(crate) fn matters(&self, point: &ScreenPoint, k: u32, view: &View) -> bool {
+        let beside_px = view.beside_picture(point.pixel_xy());
+        beside_px == 0 || beside_px as f32 <= MARGIN_REACH * self.initial_radius_px(point, k)
     }
 
     /// First search radius of a point in world units: that of the circle which holds k points at the density of the

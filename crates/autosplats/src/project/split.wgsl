@@ -3,11 +3,13 @@
 // Reads: points, density, block_sums. Writes: queries, passive, counters.
 
 #import frame
+#import picture
 #import groups
 #import counters
 #import rank
 #import density
 #import screen
+#import matters
 #import culled
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
@@ -26,7 +28,7 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let index = block * 2048u + flag;
-        if index < visible && !(frame.grid_culling == 1u && is_culled(points[index])) {
+        if index < visible && matters(points[index]) && !is_culled(points[index]) {
             rank_set(flag);
             is_active |= 1u << step;
         }

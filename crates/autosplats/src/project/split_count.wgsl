@@ -1,12 +1,14 @@
-// Counts the active points of each block of 2048 screen points: those that grid culling does not put back.
+// Counts the active points of each block of 2048 screen points: those that matter and grid culling does not put back.
 //
 // Reads: points, density, counters. Writes: block_sums.
 
 #import frame
+#import picture
 #import groups
 #import counters
 #import density
 #import screen
+#import matters
 #import culled
 
 @group(0) @binding(1) var<storage, read> points: array<ScreenPoint>;
@@ -27,7 +29,7 @@ fn split_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     var own = 0u;
     for (var step = 0u; step < 8u; step++) {
         let index = block * 2048u + step * 256u + local;
-        if index < visible && !(frame.grid_culling == 1u && is_culled(points[index])) {
+        if index < visible && matters(points[index]) && !is_culled(points[index]) {
             own += 1u;
         }
     }

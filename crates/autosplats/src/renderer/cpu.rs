@@ -96,7 +96,9 @@ impl CpuRenderer {
         given: Option<GivenPlanes<'_>>,
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
-        let view = check(cloud, camera, size, settings)?;
+        let picture = check(cloud, camera, size, settings)?;
+        let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };
+        let view = picture.with_margin(margin);
         if given.is_none() {
             check_engine(settings.reconstruction.engine)?;
         }
@@ -175,7 +177,8 @@ impl CpuRenderer {
             let radius_px = screen.density.initial_radius_px(point, settings_splat.k);
             buffers.splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
         };
-        recovered.extend(screen.passive.iter().filter(|index| !hidden(index)));
+        let matters = |&index: &u32| screen.density.matters(&screen.points[index as usize], settings_splat.k, &view);
+        recovered.extend(screen.passive.iter().filter(|index| matters(index) && !hidden(index)));
         clock.lap(|timings| &mut timings.splat)?;
         if !recovered.is_empty() {
             search_counts = search_counts + reconstruct.run(recovered, &mut buffers, &mut clock)?;
@@ -192,7 +195,7 @@ impl CpuRenderer {
         let (layers, covered) = if settings_splat.trim {
             splatter.trim(&view, &screen.sixteenths, (noise, settings_splat.k_radius_per_radius()))
         } else {
-            splatter.whole(&view)
+            splatter.whole()
         };
         if smooths {
             over_time.end(now, cloud.identity(), settings_splat.clone(), surfels, screen);
@@ -200,7 +203,7 @@ impl CpuRenderer {
         clock.lap(|timings| &mut timings.splat)?;
 
         let exposure = exposure.of(cloud, &settings.shading);
-        let scene = Scene { view: &view, up: upward.of(cloud), origin: cloud.origin(), exposure };
+        let scene = Scene { view: &picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);

@@ -222,7 +222,7 @@ impl GpuRenderer {
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
-        self.prepare(size, &wanted, settings)?;
+        let screen = &view.with_margin(self.prepare(size, &wanted, settings)?);
         let Self {
             gpu, clock, prepared, upward, exposure, view: last_view, readback, image, layers, times, frame, ..
         } = self;
@@ -230,7 +230,7 @@ impl GpuRenderer {
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (Seen { view: *view, origin: cloud.origin() }, cloud.identity());
+        let now = (Seen { view: *screen, origin: cloud.origin() }, cloud.identity());
         prepared.tell(gpu, frame, now, settings, &uniform);
 
         let waited = Instant::now();
@@ -244,7 +244,7 @@ impl GpuRenderer {
         readback.copy(gpu, &mut recorder.encoder, &wants)?;
         *times = recorder.finish();
         // What was not submitted left the surfels as they were.
-        *last_view = Some(*view);
+        *last_view = Some(*screen);
         prepared.seen = Some((now.0, now.1, settings.reconstruction.clone()));
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
@@ -253,7 +253,7 @@ impl GpuRenderer {
             let read = ReadPicture { size, image: parts[1], linear, range };
             let value_range = finish(&read, &scene, &settings.shading, image);
             *layers = match parts {
-                [_, _, _, surface, cover, extras] => prepared.layers.to_host(surface, cover, extras),
+                [_, _, _, surface, cover, extras] => prepared.layers.to_host(screen.margin, surface, cover, extras),
                 _ => GBuffer::default(),
             };
             (counters, value_range)
@@ -302,30 +302,38 @@ impl GpuRenderer {
     ) -> Result<(), Error> {
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
-        self.prepare([texture.width(), texture.height()], &wanted, settings)?;
+        let screen = view.with_margin(self.prepare([texture.width(), texture.height()], &wanted, settings)?);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (Seen { view: *view, origin: cloud.origin() }, cloud.identity());
+        let now = (Seen { view: screen, origin: cloud.origin() }, cloud.identity());
         prepared.tell(gpu, frame, now, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
         recorder.finish();
-        *last_view = Some(*view);
+        *last_view = Some(screen);
         prepared.seen = Some((now.0, now.1, settings.reconstruction.clone()));
         gpu.check_lost()
     }
 
-    /// Makes buffers and steps for a frame unless the last frame's will do.
-    fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<(), Error> {
+    /// Makes buffers and steps for a frame unless the last frame's will do. Returns the margin around the picture.
+    fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<u32, Error> {
         // A screen point has nothing larger than its surfel.
-        let halves = settings.reconstruction.halves()
-            && ScreenBuffers::has_room_for_halves::<Surfel>(&self.gpu, size, self.cloud.capacity());
+        let has_room = |margin: u32, halves| {
+            let screen = size.map(|side| side + 2 * margin);
+            ScreenBuffers::has_room::<Surfel>(&self.gpu, screen, halves, self.cloud.capacity())
+        };
+        // Halves matter everywhere, a margin along the edges.
+        let (margin, halves) = (settings.reconstruction.margin(size), settings.reconstruction.halves());
+        let (margin, halves) = [(margin, halves), (0, halves), (margin, false)]
+            .into_iter()
+            .find(|&(margin, halves)| has_room(margin, halves))
+            .unwrap_or((0, false));
         let sensors = self.sensors.as_ref().map(|(_, len)| *len);
-        let shape = Shape::new(size, halves, sensors, wanted, settings);
+        let shape = Shape::new(size, margin, halves, sensors, wanted, settings);
         if self.prepared.as_ref().is_none_or(|prepared| !prepared.is_for(&shape)) {
             // The old buffers go before the new ones come.
             self.prepared = None;
@@ -333,7 +341,7 @@ impl GpuRenderer {
             let resident = OnDevice { cloud, sensors: sensors.as_ref().map(|(buffer, _)| buffer), depth_noise, frame };
             self.prepared = Some(Prepared::new(gpu, shape, passes, resident, settings)?);
         }
-        Ok(())
+        Ok(margin)
     }
 }
 

@@ -6,6 +6,9 @@ use crate::search::SearchEngine;
 use crate::shade::Shading;
 use crate::splat::STEADY_FRAMES;
 
+/// A margin is one part in so many of the picture's shorter side.
+const MARGIN_PART: u32 = 12;
+
 /// Everything about a picture but the cloud, the camera and the size.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
@@ -124,6 +127,14 @@ impl Reconstruction {
     /// K-radius of k neighbours over their splat's radius.
     pub(super) fn k_radius_per_radius(&self) -> f32 {
         0.5 * (self.k as f32).sqrt() / self.splat_scale
+    }
+
+    /// Pixels around a picture of this size whose points are neighbours to those within. What fits large neighbourhoods would fit
+    /// one-sided ones along its edges, and see borders of noisy surfaces there. The paper's search ends with the picture: of the
+    /// thousandth of the points that it leaves unfinished few are seen, and more of those around a picture hide much of it.
+    pub(super) fn margin(&self, size: [u32; 2]) -> u32 {
+        let wants = self.adaptive && self.engine != SearchEngine::SplatCommunication;
+        if wants { size[0].min(size[1]).div_ceil(MARGIN_PART) } else { 0 }
     }
 
     /// Whether the search of a frame starts from what the last one found.

@@ -22,9 +22,10 @@ pub struct PointSurfel {
     pub curvature: f32,
 }
 
-/// The surfels of a frame as they are handed out.
+/// The surfels in the picture of a frame as they are handed out.
 pub(super) fn point_surfels(surfels: &[Surfel], view: &View) -> Vec<PointSurfel> {
     let world_from_view = Mat3A::from(view.view_from_world).transpose();
+    let is_seen = |surfel: &&Surfel| view.beside_picture(surfel.pixel_xy()) == 0;
     let surfel = |surfel: &Surfel| PointSurfel {
         point: surfel.source,
         normal: {
@@ -35,5 +36,5 @@ pub(super) fn point_surfels(surfels: &[Surfel], view: &View) -> Vec<PointSurfel>
         k_radius: surfel.k_radius,
         curvature: surfel.curvature,
     };
-    surfels.iter().map(surfel).collect()
+    surfels.iter().filter(is_seen).map(surfel).collect()
 }

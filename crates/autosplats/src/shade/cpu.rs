@@ -30,6 +30,7 @@ const RANGE_SAMPLES: usize = 50_000;
 /// What shading knows about a frame beside its layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scene<'a> {
+    /// Of the picture, without a margin.
     pub(crate) view: &'a View,
     /// Direction of rising height, world space.
     pub(crate) up: DVec3,

@@ -1,6 +1,6 @@
 //! Depths of a band of rows, side by side: layers are stored tile by tile, which reading across would have to undo.
 
-use crate::splat::{GBuffer, TILE};
+use crate::splat::GBuffer;
 
 /// The widest vector, in lanes: rows are as long as a whole number of them.
 pub(super) const LANES: usize = 16;
@@ -29,9 +29,11 @@ impl Depths {
             if y >= height {
                 break;
             }
-            for x in (0..width).step_by(TILE) {
-                let run = TILE.min(width - x);
+            let mut x = 0;
+            while x < width {
+                let run = layers.run(x).min(width - x);
                 values[margin + x..][..run].copy_from_slice(&layers.depth[layers.index(x, y)..][..run]);
+                x += run;
             }
         }
     }

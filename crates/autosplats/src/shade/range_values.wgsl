@@ -3,6 +3,7 @@
 // Reads: surface, cover, extras. Writes: keys.
 
 #import frame
+#import picture
 #import groups
 #import range_keys
 #import layers
@@ -21,9 +22,11 @@ fn range_values(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocati
     }
     var key = NO_KEY;
     if sample < shading.samples {
-        let index = sample * shading.sample_step;
+        let at = sample * shading.sample_step;
+        let pixel = vec2u(at % frame.picture.x, at / frame.picture.x);
+        let index = screen_index(pixel);
         let depth = surface[index].w;
-        let value = shown_value(vec2u(index % frame.size.x, index / frame.size.x), index, depth);
+        let value = shown_value(pixel, index, depth);
         if is_covered(depth) && is_finite(value) {
             key = value_key(value);
         }

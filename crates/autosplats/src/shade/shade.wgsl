@@ -4,6 +4,7 @@
 // Reads: surface, cover, extras, counters, color_map, tables. Writes: image, linear.
 
 #import frame
+#import picture
 #import groups
 #import divide
 #import counters
@@ -97,13 +98,13 @@ const NOTHING = 1e30;
 fn is_inside(pixel: vec2i) -> bool {
     // Beyond the left and upper edges it wraps around, to beyond the others.
     let at = vec2u(pixel);
-    return at.x < frame.size.x && at.y < frame.size.y;
+    return all(at < frame.picture);
 }
 
 // The depth at a pixel, which may lie beyond the picture.
 fn depth_at(pixel: vec2i) -> f32 {
     let inside = is_inside(pixel);
-    let depth = surface[select(0u, u32(pixel.y) * frame.size.x + u32(pixel.x), inside)].w;
+    let depth = surface[select(0u, screen_index(vec2u(pixel)), inside)].w;
     return select(NOTHING, min(depth, NOTHING), inside);
 }
 
@@ -168,14 +169,14 @@ fn outward_normal(pixel: vec2i, surface_here: vec4f, at_edge: bool) -> vec3f {
     if !(depth_at(inner_pixel) < surface_here.w) {
         return surface_here.xyz;
     }
-    let inner = surface[u32(inner_pixel.y) * frame.size.x + u32(inner_pixel.x)].xyz;
+    let inner = surface[screen_index(vec2u(inner_pixel))].xyz;
     let tilts = vec2f(outward) * mat2x2f(surface_here.xy, inner.xy);
     return select(surface_here.xyz, inner, tilts.x < tilts.y - shading.less_tilted);
 }
 
 // The colour of the surface at a pixel.
 fn surface_color(pixel: vec2u, at_edge: bool) -> vec3f {
-    let index = pixel.y * frame.size.x + pixel.x;
+    let index = screen_index(pixel);
     let surface_here = surface[index];
     var color = tone_back(base_color(pixel, index, surface_here), index);
     if shading.darkening > 0.0 {
@@ -254,7 +255,7 @@ fn put(pixel: vec2u, color: vec3f, rgba: u32) {
     }
     image[pixel.y * shading.pitch + pixel.x] = word;
     if shading.keep_linear == 1u {
-        linear[pixel.y * frame.size.x + pixel.x] = vec4f(color, 0.0);
+        linear[pixel.y * frame.picture.x + pixel.x] = vec4f(color, 0.0);
     }
 }
 
@@ -262,7 +263,7 @@ fn put(pixel: vec2u, color: vec3f, rgba: u32) {
 // rows apart.
 @compute @workgroup_size(32, 2)
 fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
-    let columns = (frame.size.x + 31u) / 32u;
+    let columns = (frame.picture.x + 31u) / 32u;
     let group = divide(group_index(workgroup), columns);
     let first = group.yx * vec2u(32u, 8u) + local.xy;
     // Background first; which of the pixels show more become bits. A software device runs both sides of a branch but a
@@ -271,7 +272,7 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
     var edges = 0u;
     for (var step = 0u; step < 4u; step++) {
         let pixel = first + vec2u(0u, 2u * step);
-        if pixel.x < frame.size.x && pixel.y < frame.size.y {
+        if all(pixel < frame.picture) {
             let depth = depth_at(vec2i(pixel));
             var has_edge = false;
             for (var side = 0u; side < 4u; side++) {

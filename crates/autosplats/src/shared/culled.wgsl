@@ -1,8 +1,8 @@
-// Whether grid culling puts a screen point back [Paper, §7, Grid Culling]. Imports: density, screen, counters. The including
-// pass binds `points`, `density` and `counters`.
+// Whether grid culling puts a screen point back [Paper, §7, Grid Culling]. Imports: frame, density, screen, counters. The
+// including pass binds `density` and `counters`.
 
 fn is_culled(point: ScreenPoint) -> bool {
     let cell_px = counters[CELL_PX];
     let cell = density[density_cell(pixel_xy(point.pixel), cell_px, counters[CELL_COLUMNS])];
-    return point.position_view.z > culling_depth(bitcast<f32>(cell.y), cell_px);
+    return frame.grid_culling == 1u && point.position_view.z > culling_depth(bitcast<f32>(cell.y), cell_px);
 }

@@ -7,6 +7,7 @@ struct Frame {
     eye_local: vec3f,
     // Pixels per unit of x/z (perspective) or of x (orthographic).
     focal_px: f32,
+    // Of the screen in pixels: the picture, and a margin around it.
     size: vec2u,
     // Points at this depth or nearer are dropped.
     near: f32,
@@ -31,6 +32,10 @@ struct Frame {
     frames_averaged: f32,
     // 1 if the last frame was one of the same points.
     same_points: u32,
+    // Size of the picture in pixels, and the pixels of the screen on every side of it.
+    picture: vec2u,
+    margin: u32,
+    padding: u32,
     // Of the last frame, which had the same size and kind of projection: how its view space comes from this one, and its focal
     // length, 0 if nothing is known of it.
     past_rotation: mat3x3f,

@@ -1,6 +1,6 @@
 // Surfels that move. Imports: frame, surfel.
 
-// A surfel with another centre, unless that is out of the picture: it would have no pixel to be hidden at.
+// A surfel with another centre, unless that is off the screen: it would have no pixel to be hidden at.
 fn moved(surfel: Surfel, center: vec3f) -> Surfel {
     var out = surfel;
     let at = to_pixel(center);

@@ -83,11 +83,11 @@ fn to_world(direction: vec3f) -> vec3f {
     return vec3f(dot(m[0], direction), dot(m[1], direction), dot(m[2], direction));
 }
 
-// The value shown at a pixel. Heights are told from the cloud's origin.
+// The value shown at a pixel of the picture, `index` on the screen. Heights are told from the cloud's origin.
 fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
     switch SHOWN {
         case SHOW_HEIGHT: {
-            let position_view = unproject(vec2f(pixel) + 0.5, depth);
+            let position_view = unproject(vec2f(pixel + frame.margin) + 0.5, depth);
             return dot(to_world(position_view) + frame.eye_local, shading.up);
         }
         case SHOW_RADIUS: {

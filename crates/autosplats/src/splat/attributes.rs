@@ -186,8 +186,8 @@ impl GBuffer {
     /// Makes room for a frame of this size with these layers.
     pub(super) fn resize(&mut self, view: &View, area: usize, attributes: &Attributes<'_>) {
         let wanted = |wanted: bool| if wanted { area } else { 0 };
-        self.width = view.width;
-        self.height = view.height;
+        [self.width, self.height] = view.picture_size();
+        self.margin = view.margin;
         self.weight.resize(area, 0.0);
         self.depth.resize(area, 0.0);
         self.normal.resize(area, [0.0; 3]);

@@ -38,8 +38,7 @@ pub(super) fn add_centers(runs: &[Run], surfels: &[Surfel], tile: Tile, centers:
     let [x0, y0] = tile.origin;
     for run in runs {
         for index in run.tile(tile.index).iter().map(|&index| index as usize) {
-            let pixel = surfels[run.first + index].pixel;
-            let [x, y] = [pixel & 0xffff, pixel >> 16].map(|pixel| pixel as usize);
+            let [x, y] = surfels[run.first + index].pixel_xy();
             if x / TILE == x0 / TILE && y / TILE == y0 / TILE {
                 let at = (y - y0) * TILE + x - x0;
                 centers[at] = centers[at].wrapping_add(one([x, y], run.splats[index].center_px));

@@ -83,7 +83,7 @@ impl Splatter {
         runs.par_iter_mut().for_each(|run| {
             let splats = run.splats.iter().zip(&surfels[run.first..]);
             for (alive, (splat, surfel)) in run.alive.iter_mut().zip(splats) {
-                let [x, y] = [surfel.pixel & 0xffff, surfel.pixel >> 16].map(|pixel| pixel as usize);
+                let [x, y] = surfel.pixel_xy();
                 let hidden = surfel.center[2] > depth[tiled_index(view.width as usize, x, y)];
                 *alive = !splat.covers_nothing() & !hidden;
             }
@@ -115,7 +115,7 @@ impl Splatter {
     }
 
     /// Trims the attributes just drawn: silhouettes end where the surface does, of whose points `sixteenths` tell, and where they
-    /// have `noise`, their density; k-radii are `per_radius` splat radii. Returns the number of covered pixels too.
+    /// have `noise`, their density; k-radii are `per_radius` splat radii. Returns the number of the picture's covered pixels too.
     pub(crate) fn trim(
         &mut self,
         view: &View,
@@ -136,7 +136,7 @@ impl Splatter {
                     if outline.sticks_out(x, y, layers.shown(at), border[y - y0] >> (x - x0) & 1 == 1) {
                         layers.clear(at);
                     }
-                    covered += usize::from(layers.covers(at));
+                    covered += usize::from(layers.covers(at) && view.beside_picture([x, y]) == 0);
                 }
             }
             covered
@@ -145,12 +145,12 @@ impl Splatter {
         (layers, covered)
     }
 
-    /// The attributes just drawn, as they are, and the number of covered pixels.
-    pub(crate) fn whole(&self, view: &View) -> (&GBuffer, usize) {
+    /// The attributes just drawn, as they are, and the number of the picture's covered pixels.
+    pub(crate) fn whole(&self) -> (&GBuffer, usize) {
         let layers = &self.layers;
         let covers = |x: usize, y: usize| layers.weight[layers.index(x, y)] > 0.0;
-        let row = |y: u32| (0..view.width as usize).filter(|&x| covers(x, y as usize)).count();
-        (layers, (0..view.height).into_par_iter().map(row).sum())
+        let row = |y: u32| (0..layers.width as usize).filter(|&x| covers(x, y as usize)).count();
+        (layers, (0..layers.height).into_par_iter().map(row).sum())
     }
 }
 

@@ -23,6 +23,7 @@ use super::trim::{
 };
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
+use crate::project::MARGIN_REACH;
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
 
 #[cfg(test)]
@@ -233,7 +234,7 @@ impl SplatPasses {
             ];
             Pass::new(gpu, &TRIM, &constants)
         };
-        let reach = [("RECOVER_REACH", RECOVER_REACH.into())];
+        let reach = [("RECOVER_REACH", RECOVER_REACH.into()), ("MARGIN_REACH", MARGIN_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {

@@ -18,6 +18,7 @@ pub(crate) struct Channels {
 /// [`GBuffer`] on the device, row by row.
 #[derive(Debug)]
 pub(crate) struct LayerBuffers {
+    /// Of the screen.
     pub(crate) size: [u32; 2],
     pub(crate) channels: Channels,
     /// Normal and depth, four `f32` per pixel.
@@ -45,7 +46,7 @@ pub(crate) struct Cover {
 pub(super) const COVER_BYTES: usize = size_of::<Cover>();
 
 impl LayerBuffers {
-    /// Room for a picture of `size`.
+    /// Room for a screen of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -62,15 +63,17 @@ impl LayerBuffers {
         })
     }
 
-    /// The host's form of the layers: what was read back of `surface`, `cover` and `extras`.
-    pub(crate) fn to_host(&self, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
-        let [width, height] = self.size.map(|side| side as usize);
+    /// The host's form of the picture's layers, within a margin: what was read back of `surface`, `cover` and `extras`.
+    pub(crate) fn to_host(&self, margin: u32, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
+        let [columns, rows] = self.size.map(|side| side as usize);
+        let margin = margin as usize;
+        let [width, height] = [columns, rows].map(|side| side - 2 * margin);
         let Channels { color, scalar, measures, backs } = self.channels;
         let area = tile_columns(width) * tile_columns(height) * TILE_AREA;
         let wanted = |wanted: bool| if wanted { area } else { 0 };
         let mut layers = GBuffer {
-            width: self.size[0],
-            height: self.size[1],
+            width: width as u32,
+            height: height as u32,
             weight: vec![0.0; area],
             depth: vec![f32::INFINITY; area],
             normal: vec![[0.0; 3]; area],
@@ -81,14 +84,16 @@ impl LayerBuffers {
             k_radius: vec![0.0; wanted(measures)],
             curvature: vec![0.0; wanted(measures)],
             back: vec![0.0; wanted(backs)],
+            margin: 0,
         };
         let surface: &[[f32; 4]] = bytemuck::cast_slice(surface);
         let cover: &[Cover] = bytemuck::cast_slice(cover);
         let extras: &[[f32; 4]] = bytemuck::cast_slice(extras);
-        let pixels = width * height;
-        let (colors, measured) = extras.split_at(if color { pixels } else { 0 });
-        for (pixel, (&[x, y, z, depth], cover)) in surface[..pixels].iter().zip(cover).enumerate() {
-            let at = tiled_index(width, pixel % width, pixel / width);
+        let (colors, measured) = extras.split_at(if color { columns * rows } else { 0 });
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let at = tiled_index(width, x, y);
+            let pixel = (y + margin) * columns + x + margin;
+            let ([x, y, z, depth], cover) = (surface[pixel], cover[pixel]);
             layers.weight[at] = cover.weight;
             layers.depth[at] = depth;
             layers.normal[at] = [x, y, z];

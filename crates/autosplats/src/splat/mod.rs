@@ -42,7 +42,8 @@ pub(crate) const TILE_AREA: usize = TILE * TILE;
 /// The visible surface, a value per pixel and layer.
 ///
 /// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work;
-/// [`index`](Self::index) finds a pixel. A layer that was not asked for is empty.
+/// [`index`](Self::index) finds a pixel. There may be pixels beside those of the picture. A layer that was not asked for is
+/// empty.
 #[derive(Clone, Debug, Default)]
 pub struct GBuffer {
     /// Image width in pixels.
@@ -71,6 +72,8 @@ pub struct GBuffer {
     /// How much of what is seen is the back of a surface, the side that the sensor did not see, 0 to 1. Empty if the cloud
     /// does not say where its sensors stood.
     pub back: Vec<f32>,
+    /// Pixels on every side that layers have beside those of the picture.
+    pub(crate) margin: u32,
 }
 
 impl GBuffer {
@@ -87,22 +90,29 @@ impl GBuffer {
 
     /// Values in a layer that is not empty.
     pub(crate) fn area(&self) -> usize {
-        tile_columns(self.width as usize) * tile_columns(self.height as usize) * TILE_AREA
+        let [columns, rows] = [self.width, self.height].map(|side| tile_columns((side + 2 * self.margin) as usize));
+        columns * rows * TILE_AREA
     }
 
     /// Where pixel (x, y) lies in each layer.
     #[inline(always)]
     pub fn index(&self, x: usize, y: usize) -> usize {
-        tiled_index(self.width as usize, x, y)
+        let margin = self.margin as usize;
+        tiled_index(self.width as usize + 2 * margin, x + margin, y + margin)
+    }
+
+    /// How many pixels of a row, from column `x` on, lie side by side, if the row is so long.
+    pub(crate) fn run(&self, x: usize) -> usize {
+        TILE - (x + self.margin as usize) % TILE
     }
 }
 
-/// Tiles in a row of an image `width` pixels wide.
+/// Tiles in a row of a screen `width` pixels wide.
 pub(crate) const fn tile_columns(width: usize) -> usize {
     width.div_ceil(TILE)
 }
 
-/// Where pixel (x, y) of an image `width` pixels wide lies in a layer stored tile by tile.
+/// Where pixel (x, y) of a screen `width` pixels wide lies in a layer stored tile by tile.
 #[inline(always)]
 pub(crate) const fn tiled_index(width: usize, x: usize, y: usize) -> usize {
     (y / TILE * tile_columns(width) + x / TILE) * TILE_AREA + (y % TILE) * TILE + x % TILE

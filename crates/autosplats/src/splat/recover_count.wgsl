@@ -1,12 +1,15 @@
-// Marks and counts, of each block of 2048 passive points, those that the depth map does not hide for sure [Paper, §7, Grid Culling].
+// Marks and counts, of each block of 2048 passive points, those that matter and that the depth map does not hide for sure [Paper,
+// §7, Grid Culling].
 //
 // Reads: points, counters, density, depth_map. Reads and writes: passive. Writes: block_sums.
 
 #import frame
+#import picture
 #import groups
 #import counters
 #import density
 #import screen
+#import matters
 #import depth_map
 #import hidden
 #import recovered
@@ -35,7 +38,7 @@ fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
         let index = block * 2048u + step * 256u + local;
         if index < counters[PASSIVE] {
             let passive_point = passive[index];
-            if is_back(points[passive_point]) {
+            if matters(points[passive_point]) && is_back(points[passive_point]) {
                 passive[index] = passive_point | BACK;
                 own += 1u;
             }

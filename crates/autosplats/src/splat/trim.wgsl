@@ -4,6 +4,7 @@
 // are not written. Writes: counters.
 
 #import frame
+#import picture
 #import groups
 #import counters
 #import layers
@@ -128,7 +129,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         let pixel = corner + at;
         if all(pixel < frame.size) {
             let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
-            stay += select(1u, 0u, rim == EMPTY_RIM);
+            stay += select(1u, 0u, rim == EMPTY_RIM || beside_picture(pixel) > 0u);
             if TRIMS == 1u && rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
                 tails[atomicAdd(&tail_count, 1u)] = place;
             }
@@ -143,7 +144,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         let at = pixel.y * frame.size.x + pixel.x;
         if sticks_out(place, pixel, cover[at].rim) {
             clear(at);
-            stay -= 1u;
+            stay -= select(0u, 1u, beside_picture(pixel) == 0u);
         }
     }
     // It may have found more to take off than to stay: the sum over the workgroup is right all the same.

@@ -96,17 +96,18 @@ fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 
 fn compare_layers(a: &GBuffer, b: &GBuffer, case: &str) {
     let [width, height] = [a.width as usize, a.height as usize];
     let near = |a: f32, b: f32| a.to_bits() == b.to_bits() || (a - b).abs() <= 1e-3 * a.abs().max(1e-2);
-    let pixels = (0..width * height).map(|pixel| a.index(pixel % width, pixel / width));
-    let differing = pixels.filter(|&i| {
-        let normals = (0..3).all(|axis| (a.normal[i][axis] - b.normal[i][axis]).abs() < 1e-2);
-        let colors = a.color.is_empty() || (0..3).all(|axis| (a.color[i][axis] - b.color[i][axis]).abs() < 1e-2);
-        let scalars = a.scalar.is_empty() || near(a.scalar[i], b.scalar[i]);
+    assert_eq!([a.width, a.height], [b.width, b.height], "{case}: sizes");
+    let pixels = (0..width * height).map(|pixel| [a, b].map(|layers| layers.index(pixel % width, pixel / width)));
+    let differing = pixels.filter(|&[i, j]| {
+        let normals = (0..3).all(|axis| (a.normal[i][axis] - b.normal[j][axis]).abs() < 1e-2);
+        let colors = a.color.is_empty() || (0..3).all(|axis| (a.color[i][axis] - b.color[j][axis]).abs() < 1e-2);
+        let scalars = a.scalar.is_empty() || near(a.scalar[i], b.scalar[j]);
         // Curvature is a difference of sums, in units of its own size.
-        let measures = near(a.radius[i], b.radius[i])
-            && near(a.k_radius[i], b.k_radius[i])
-            && (a.curvature[i] - b.curvature[i]).abs() < 1e-3
-            && a.point[i] == b.point[i];
-        !(near(a.weight[i], b.weight[i]) && near(a.depth[i], b.depth[i]) && normals && colors && scalars && measures)
+        let measures = near(a.radius[i], b.radius[j])
+            && near(a.k_radius[i], b.k_radius[j])
+            && (a.curvature[i] - b.curvature[j]).abs() < 1e-3
+            && a.point[i] == b.point[j];
+        !(near(a.weight[i], b.weight[j]) && near(a.depth[i], b.depth[j]) && normals && colors && scalars && measures)
     });
     let differing = differing.count();
     assert!(

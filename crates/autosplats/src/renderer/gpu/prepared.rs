@@ -82,7 +82,10 @@ impl Passes {
 /// What a frame's buffers and steps were made for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shape {
+    /// Of the picture.
     size: [u32; 2],
+    /// Around it.
+    margin: u32,
     halves: bool,
     search: SearchKind,
     coherent: bool,
@@ -100,9 +103,10 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// Of a picture of points that `sensors` runs of them were seen by.
+    /// Of a picture, within a margin, of points that `sensors` runs of them were seen by.
     pub(super) fn new(
         size: [u32; 2],
+        margin: u32,
         halves: bool,
         sensors: Option<usize>,
         wanted: &Wanted,
@@ -110,6 +114,7 @@ impl Shape {
     ) -> Self {
         Self {
             size,
+            margin,
             halves,
             search: (discriminant(&reconstruction.engine), reconstruction.k),
             coherent: reconstruction.remembers(),
@@ -171,7 +176,8 @@ impl Prepared {
         let Passes { project, search, past, fit, orient, adapt, over_time, splat, shade } = passes;
         let (Some((_, search)), Some((_, splat))) = (search, splat) else { unreachable!("they were just compiled") };
         let adapt = adapt.as_ref().filter(|_| shape.adaptive);
-        let Shape { size, halves, .. } = shape;
+        let Shape { size: picture_size, margin, halves, .. } = shape;
+        let size = picture_size.map(|side| side + 2 * margin);
         let screen = ScreenBuffers::new(gpu, size, halves, cloud.capacity(), cloud.words())?;
         let neighborhoods = neighborhood_buffer(gpu, screen.capacity)?;
         let past_radii = past_buffer(gpu, shape.coherent.then_some(size))?;
@@ -186,7 +192,7 @@ impl Prepared {
         };
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
         let layers = LayerBuffers::new(gpu, size, shape.channels)?;
-        let picture = ShadeBuffers::new(gpu, size, shape.keep_linear)?;
+        let picture = ShadeBuffers::new(gpu, picture_size, shape.keep_linear)?;
         let (steps, convergence) = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
             if let Some((passes, buffers)) = &adapt {

@@ -86,7 +86,7 @@ pub(crate) fn finds_range(shading: &Shading) -> bool {
 impl ShadeUniform {
     /// For a picture from `layers`; also in linear light if `keep_linear`.
     pub(crate) fn new(scene: &Scene<'_>, shading: &Shading, layers: &LayerBuffers, keep_linear: bool) -> Self {
-        let [width, height] = layers.size;
+        let [width, height] = [scene.view.width, scene.view.height];
         let pixels = width as usize * height as usize;
         let step = sample_step(pixels);
         let colored = Shown::new(&shading.color, layers.channels) == Shown::Color;
@@ -119,7 +119,7 @@ impl ShadeUniform {
             samples: pixels.div_ceil(step) as u32,
             encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
-            measures: if layers.channels.color { pixels as u32 } else { 0 },
+            measures: if layers.channels.color { layers.size.iter().product() } else { 0 },
             edge_search: SEARCH as i32,
             less_tilted: LESS_TILTED,
             pairs: pairs(height).map(|pair| {

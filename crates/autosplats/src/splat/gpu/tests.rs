@@ -139,7 +139,7 @@ fn set_counter(gpu: &Gpu, screen: &ScreenBuffers, counter: Counter, value: usize
 
 pub(crate) fn read_layers(gpu: &Gpu, layers: &LayerBuffers) -> GBuffer {
     let read = |buffer: &wgpu::Buffer| read_back::<u8>(gpu, buffer, buffer.size() as usize).expect("a layer");
-    layers.to_host(&read(&layers.surface), &read(&layers.cover), &read(&layers.extras))
+    layers.to_host(0, &read(&layers.surface), &read(&layers.cover), &read(&layers.extras))
 }
 
 /// Pixels at which the splatter does not hide what is in front of `depth`, or does not what is behind. Rounding of

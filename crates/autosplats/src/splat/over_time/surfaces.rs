@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::points::ALIKE;
 use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
-use crate::splat::GBuffer;
+use crate::splat::{GBuffer, tiled_index};
 
 /// How far away the same surface may have been in the last frame, in k-radii of the surfel.
 pub(super) const NEAR: f32 = 0.5;
@@ -28,7 +28,7 @@ pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) 
     let pixel = past.pixel(surfel.center)?;
     let width = past.view.width as usize;
     let [x, y] = [pixel % width, pixel / width];
-    let at = last.index(x, y);
+    let at = tiled_index(width, x, y);
     if last.weight[at] == 0.0 {
         return None;
     }
