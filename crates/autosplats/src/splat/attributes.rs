@@ -147,6 +147,19 @@ impl TileLayers<'_> {
         Shown { depth: self.depth[at], normal: self.normal[at] }
     }
 
+    /// Leaves nothing in the tile.
+    pub(super) fn clear_all(&mut self) {
+        self.weight.fill(0.0);
+        self.depth.fill(f32::INFINITY);
+        self.normal.fill([0.0; 3]);
+        self.point.fill(u32::MAX);
+        self.color.fill([0.0; 3]);
+        self.scalar.fill(f32::NAN);
+        for measure in [&mut self.radius, &mut self.k_radius, &mut self.curvature, &mut self.back] {
+            measure.fill(0.0);
+        }
+    }
+
     /// Leaves nothing at pixel `at` of the tile.
     pub(super) fn clear(&mut self, at: usize) {
         self.weight[at] = 0.0;

@@ -8,7 +8,7 @@ use super::centers::add_centers;
 use super::raster::{Tile, draw_attributes, draw_depth};
 use super::setup::RECOVER_REACH;
 use super::trim::blurred::Blurred;
-use super::trim::{Outline, Rim, rim};
+use super::trim::{EMPTY, Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::adapt::Noise;
 use crate::camera::View;
@@ -100,6 +100,13 @@ impl Splatter {
         let known = rims.par_chunks_mut(TILE_AREA).zip(centers.par_chunks_mut(TILE_AREA));
         let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(known);
         tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), (rims, centers)))| {
+            if runs[..*used].iter().all(|run| run.tile(index).is_empty()) {
+                // Much of many pictures.
+                layers.clear_all();
+                rims.fill(EMPTY);
+                centers.fill(0);
+                return;
+            }
             sums.clear(attributes);
             add_centers(&runs[..*used], surfels, tile(index, view), centers);
             for run in &runs[..*used] {
@@ -128,6 +135,9 @@ impl Splatter {
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {
             let [x0, y0] = tile(index, view).origin;
+            if rims[index * TILE_AREA..][..TILE_AREA].iter().all(|&rim| rim == EMPTY) {
+                return 0;
+            }
             let border = outline.border([x0, y0]);
             let mut covered = 0;
             for y in y0..(y0 + TILE).min(view.height as usize) {

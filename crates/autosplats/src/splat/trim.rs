@@ -89,7 +89,7 @@ const OWN: u64 = 0x3c3c_3c3c << 16;
 
 /// What trimming knows of a pixel: [`EMPTY`], or how far its heaviest splat reaches in pixels, below 0 in a core.
 pub(super) type Rim = f32;
-const EMPTY: Rim = 0.0;
+pub(super) const EMPTY: Rim = 0.0;
 
 /// The rim of a pixel by its sum of weights, and the weight and the reach of its heaviest splat.
 pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
