@@ -383,6 +383,33 @@ fn extreme_clouds_and_sizes() {
     }
 }
 
+/// A noisy surface that goes on beyond the picture is the same along its edges as in a larger picture's middle.
+#[test]
+fn edges_are_as_if_the_picture_were_larger() {
+    const MORE: u32 = 60;
+    const STRIP: usize = 8;
+    let settings = settings();
+    let cloud = cloud(&test_clouds::noisy(test_clouds::sphere(60_000), 0.01));
+    let tangent = 15f64.to_radians().tan() / 2.0;
+    let larger = SIZE.map(|side| side + 2 * MORE);
+    let fov = |tangent: f64| Projection::PerspectiveFovDeg(2.0 * tangent.atan().to_degrees());
+    let grown = tangent * f64::from(larger[1]) / f64::from(SIZE[1]);
+    let [camera, larger_camera] = [tangent, grown].map(|tangent| Camera { projection: fov(tangent), ..cameras()[0] });
+    let picture = render(&cloud, &camera, SIZE, &settings).layers;
+    let larger = render(&cloud, &larger_camera, larger, &settings).layers;
+    let [width, height] = SIZE.map(|side| side as usize);
+    let (mut along, mut within) = (Vec::new(), Vec::new());
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let (a, b) = (picture.index(x, y), larger.index(x + MORE as usize, y + MORE as usize));
+        let cosine: f32 = picture.normal[a].iter().zip(larger.normal[b]).map(|(a, b)| a * b).sum();
+        let is_within = (STRIP..width - STRIP).contains(&x) && (STRIP..height - STRIP).contains(&y);
+        // Of a pixel that only one of them covers it is 0.
+        if is_within { &mut within } else { &mut along }.push(cosine.min(1.0).acos().to_degrees());
+    }
+    let [along, within] = [along, within].map(|angles| angles.iter().sum::<f32>() / angles.len() as f32);
+    assert!(along < 1.5 * within + 0.1, "normals differ by {along}° along edges, and by {within}° elsewhere");
+}
+
 /// What cannot be rendered says so.
 #[test]
 fn settings_out_of_range_are_errors() {

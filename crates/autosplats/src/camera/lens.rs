@@ -144,6 +144,24 @@ mod tests {
     }
 
     #[test]
+    fn a_margin_leaves_the_picture_where_it_is() {
+        for camera in cameras() {
+            let picture = camera.view(FAR, SIZE).expect("a view");
+            let screen = picture.with_margin(30);
+            assert_eq!([screen.width, screen.height], [700, 420]);
+            assert_eq!([screen.picture_size(), picture.picture_size()], [SIZE; 2]);
+            assert_eq!(screen.with_margin(0), picture, "and back");
+            for place in places() {
+                let position_view = picture.to_view(place.as_vec3().to_array());
+                let [a, b] = [picture, screen].map(|view| view.to_pixel(position_view));
+                assert!((0..2).all(|axis| (b[axis] - a[axis] - 30.0).abs() < 1e-3), "{a:?} and {b:?}");
+            }
+            let beside = [[30, 30], [669, 389], [29, 30], [670, 100], [3, 20], [699, 419], [300, 395]];
+            assert_eq!(beside.map(|pixel| screen.beside_picture(pixel)), [0, 0, 1, 1, 27, 30, 6]);
+        }
+    }
+
+    #[test]
     fn there_and_back() {
         for camera in cameras() {
             let lens = camera.lens(SIZE).expect("a lens");

@@ -371,6 +371,40 @@ fn halves_keep_a_point_each_of_one_surface() {
 
 /// The density grid is as coarse as promised: about k points to a cell where there are points.
 #[test]
+fn a_margin_adds_neighbours_and_few_queries() {
+    const SIZE: [u32; 2] = [121, 90];
+    const MARGIN: usize = 30;
+    let cloud = cloud(&test_clouds::sphere(40_000));
+    let [camera, _] = cameras();
+    let camera = Camera { projection: Projection::PerspectiveFovDeg(10.0), ..camera };
+    for grid_culling in [true, false] {
+        let rules = ProjectRules { k: 10, halves: true, grid_culling };
+        let picture = camera.view(DVec3::ZERO, SIZE).expect("a view");
+        let alone = Projector::default().project(&cloud, &picture, &rules).clone();
+        let view = picture.with_margin(MARGIN as u32);
+        let mut projector = Projector::default();
+        let screen = projector.project(&cloud, &view, &rules);
+        let beside_px = |&index: &u32| view.beside_picture(screen.points[index as usize].pixel_xy());
+        let all: Vec<u32> = (0..screen.points.len() as u32).collect();
+        let mut seen: Vec<u32> =
+            all.iter().filter(|index| beside_px(index) == 0).map(|&i| screen.source[i as usize]).collect();
+        let mut seen_alone = alone.source.clone();
+        seen.sort_unstable();
+        seen_alone.sort_unstable();
+        assert_eq!(seen, seen_alone, "what the picture itself has stays");
+        let mut listed = [&screen.active[..], &screen.passive].concat();
+        listed.sort_unstable();
+        assert_eq!(listed, all, "each once");
+        let furthest = screen.active.iter().map(beside_px).max().expect("some");
+        assert!((2..MARGIN / 2).contains(&furthest), "queries up to {furthest} pixels beside the picture");
+        let least = |index: &u32| beside_px(index) == 0 && !grid_culling;
+        assert!(!screen.passive.iter().any(least), "without culling all in the picture are active");
+        let far = screen.passive.iter().filter(|index| beside_px(index) > MARGIN / 2).count();
+        assert!(far > 1000, "{far} points are neighbours only");
+    }
+}
+
+#[test]
 fn density_cells_hold_about_k_points() {
     let camera = straight(Projection::OrthographicHeight(1.8));
     let view = camera.view(DVec3::ZERO, [200, 200]).expect("a view");

@@ -42,13 +42,14 @@ pub struct Counts {
     pub not_finite: usize,
     /// Points at or behind the eye.
     pub behind: usize,
-    /// Points outside the picture.
+    /// Points outside the picture and, where there is one, the margin around it.
     pub outside: usize,
-    /// Points that own a pixel or half of one, the nearest ones there; the rest are hidden behind them.
+    /// Points that own a pixel or half of one, the nearest ones there, in the picture or its margin; the rest are hidden behind
+    /// them.
     pub visible: usize,
     /// Visible points reconstructed in the first pass.
     pub active: usize,
-    /// Visible points that grid culling put back.
+    /// Visible points that grid culling put back, or that lie so far out in the margin that they are but neighbours to others.
     pub passive: usize,
     /// Passive points that turned out not to be hidden and were reconstructed in the second pass.
     pub recovered: usize,

@@ -129,15 +129,16 @@ fn the_device_finds_what_the_host_finds() {
         let cloud = PointCloud::new(DVec3::ZERO, positions);
         for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
             let camera = Camera { eye: EYE, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
-            for (size, [halves, grid_culling]) in [
-                ([1, 1], [true, true]),
-                ([300, 2], [true, false]),
-                ([121, 90], [true, true]),
-                ([121, 90], [false, true]),
-                ([97, 250], [false, false]),
+            for (size, margin, [halves, grid_culling]) in [
+                ([1, 1], 0, [true, true]),
+                ([300, 2], 1, [true, false]),
+                ([121, 90], 0, [true, true]),
+                ([121, 90], 20, [false, true]),
+                ([97, 250], 0, [false, false]),
+                ([60, 41], 31, [true, false]),
             ] {
                 let rules = ProjectRules { k: K, halves, grid_culling };
-                let view = camera.view(DVec3::ZERO, size).expect("a view");
+                let view = camera.view(DVec3::ZERO, size).expect("a view").with_margin(margin);
                 let mut projector = Projector::default();
                 let host = projector.project(&cloud, &view, &rules);
                 for (int64, passes) in &forms {
