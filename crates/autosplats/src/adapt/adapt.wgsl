@@ -172,7 +172,7 @@ fn shrink(place: u32, surfel: Surfel) {
     let is_sparse = ratio > SPARSE;
     let local = surfel.k_radius / own_initial_radius(surfel);
     if is_sparse || surfel.curvature * local * local > LONE {
-        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius));
+        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius, COARSE));
         if is_sparse && around.len >= LEAST_CLUSTERS {
             stray = max(stray, curvature_of(around) * ratio * ratio);
         } else if is_sparse && around.weight < f32(frame.k) {

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::cpu::first_radius;
-use super::quadric::{Gathered, LEAST_CLUSTERS};
+use super::quadric::{COARSE, Gathered, LEAST_CLUSTERS};
 use super::sheets::SHEET_LEVELS;
 use super::{SCALES, STEP};
 use crate::camera::View;
@@ -193,7 +193,7 @@ fn measure_scatter_with<'a, S: Simd>(
 ) {
     for Sampled { surfel, radius, scatter, .. } in sample {
         *radius *= STEP;
-        if gathered.read(task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
+        if gathered.read(task.cells, surfel.center, *radius, COARSE, task.view) >= LEAST_CLUSTERS {
             let plane = gathered.plane(simd);
             let distance = gathered.quadric(simd, *radius, plane.axis, plane.curvature()).scatter;
             let distance = if distance < ROUNDING * *radius { 0.0 } else { distance };

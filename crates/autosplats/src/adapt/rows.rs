@@ -12,7 +12,7 @@ use glam::Vec3;
 use pulp::Simd;
 
 use super::cells::{Cells, Cluster};
-use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane, Window};
+use super::quadric::{COARSE, EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane, Window};
 use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::{LONGEST, Surfel};
@@ -100,7 +100,7 @@ fn area<S: Simd>(
 ) -> Option<(Plane, f32)> {
     // What is within a radius, on the side if one is given.
     let mut plane = |radius: f32, side: Option<Vec3>| {
-        let mut len = gathered.read(cells, center, radius, view);
+        let mut len = gathered.read(cells, center, radius, COARSE, view);
         if let Some(side) = side {
             len = gathered.keep_beside(side, -BESIDE);
         }
@@ -143,7 +143,7 @@ fn is_seen_through(cells: &Cells, center: [f32; 3], radius: f32, axis: Vec3, vie
     let center = Vec3::from(center);
     let of_plane = axis.dot(center);
     let mut counts = [0u32; 2];
-    let Some(window) = Window::around(cells, center, radius, view) else { return false };
+    let Some(window) = Window::around(cells, center, radius, COARSE, view) else { return false };
     for cell in window.rows().flatten() {
         let (mut is_on, mut is_behind) = (false, false);
         for &Cluster { mean, .. } in cell.iter().take_while(|cluster| cluster.count > 0.0) {

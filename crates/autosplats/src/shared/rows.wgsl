@@ -41,7 +41,7 @@ fn is_area(plane: Plane, least: f32) -> bool {
 
 // Of the areas on the two sides of a `row`, the flatter.
 fn area_beside(ball: Ball, row: vec3f) -> Area {
-    let beyond = ball_around(ball.center, BEYOND * ball.radius);
+    let beyond = ball_around(ball.center, BEYOND * ball.radius, COARSE);
     let across_eye = cross(row, select(vec3f(0.0, 0.0, 1.0), ball.center, frame.perspective == 1u));
     let length_squared = dot(across_eye, across_eye);
     var side = select(vec3f(0.0), across_eye * inverseSqrt(length_squared), length_squared > 0.0);
@@ -100,12 +100,12 @@ fn area(center: vec3f, row: vec3f, least_radius: f32) -> Area {
     var found = Area(Plane(), 0.0);
     for (var scale = 0u; scale < SCALES; scale++) {
         radius *= STEP;
-        let ball = ball_around(center, radius);
+        let ball = ball_around(center, radius, COARSE);
         let plane = plane_of(ball);
         if !is_area(plane, AREA) {
             continue;
         }
-        if is_flat(plane, row) && is_area(plane_of(ball_around(center, BEYOND * radius)), AREA_BEYOND) {
+        if is_flat(plane, row) && is_area(plane_of(ball_around(center, BEYOND * radius, COARSE)), AREA_BEYOND) {
             found = Area(plane, radius);
         } else {
             found = area_beside(ball, row);
