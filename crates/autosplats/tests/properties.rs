@@ -384,6 +384,31 @@ fn extreme_clouds_and_sizes() {
 }
 
 /// A noisy surface that goes on beyond the picture is the same along its edges as in a larger picture's middle.
+/// So is where it ends, where points become few towards the edges: nothing ends there.
+#[test]
+fn what_becomes_sparse_does_not_end_at_the_edges() {
+    let mut random = Random::new(51);
+    // Three times as dense every 0.3 to the left.
+    let positions: Positions = (0..150_000)
+        .map(|_| {
+            let x = 1.2 + 0.27 * (1e-6 + 0.5 + 0.5 * random.signed()).max(1e-6).ln();
+            [x, 1.2 * random.signed(), 0.3 * x]
+        })
+        .collect();
+    let cloud = cloud(&test_clouds::noisy(positions, 0.03));
+    for up in [DVec3::Y, DVec3::X, DVec3::NEG_Y, DVec3::NEG_X] {
+        let camera = Camera {
+            eye: DVec3::new(0.1, 0.0, -4.0),
+            look_at: DVec3::new(0.1, 0.0, 0.0),
+            up,
+            projection: Projection::PerspectiveFovDeg(17.0),
+        };
+        let picture = render(&cloud, &camera, [200, 200], &settings());
+        let open = 1.0 - picture.counts.covered as f64 / 40_000.0;
+        assert!(open < 5e-5, "{open} of the picture is open, upward is {up}");
+    }
+}
+
 #[test]
 fn edges_are_as_if_the_picture_were_larger() {
     const MORE: u32 = 60;

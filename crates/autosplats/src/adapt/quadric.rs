@@ -37,7 +37,8 @@ pub(super) struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// Of the ball of `radius`, `per_radius` cells, around `center` (view space); `None` if there are no cells.
+    /// Of the ball of `radius` around `center` (view space), in the coarsest cells of which that is at least `per_radius`, or the
+    /// finest; `None` if there are no cells.
     #[inline(always)]
     pub(super) fn around(cells: &'a Cells, center: Vec3, radius: f32, per_radius: f32, view: &View) -> Option<Self> {
         let [px, py] = view.to_pixel(center);
@@ -175,8 +176,8 @@ pub(super) fn tangents(axis: Vec3) -> (Vec3, Vec3) {
 }
 
 impl Gathered {
-    /// Reads the clusters in the ball of `radius`, at least `cells_per_radius` wide, around `center` (view space) and returns their
-    /// number.
+    /// Reads the clusters in the ball of `radius` around `center` (view space), from cells of which that is at least
+    /// `cells_per_radius` unless they are the finest, and returns their number.
     #[inline(always)]
     pub(super) fn read(
         &mut self,

@@ -44,7 +44,7 @@ impl Reprojection {
         self.rotation * Vec3::from(position_view) + self.shift
     }
 
-    /// Where in the earlier frame's picture a view-space position was, in pixels; `None` if it was not in it.
+    /// Where on the earlier frame's screen a view-space position was, in pixels; `None` if it was not on it.
     #[inline(always)]
     pub(crate) fn place(&self, position_view: Vec3) -> Option<[f32; 2]> {
         let position = self.position(position_view.to_array());

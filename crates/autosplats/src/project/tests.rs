@@ -369,7 +369,7 @@ fn halves_keep_a_point_each_of_one_surface() {
     assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 4.9 + GATE_PX]]), [0, 1], "steep surfaces are one");
 }
 
-/// The density grid is as coarse as promised: about k points to a cell where there are points.
+/// What is around the picture is there for those in it, and changes nothing of what is in it.
 #[test]
 fn a_margin_adds_neighbours_and_few_queries() {
     const SIZE: [u32; 2] = [121, 90];
@@ -404,6 +404,7 @@ fn a_margin_adds_neighbours_and_few_queries() {
     }
 }
 
+/// The density grid is as coarse as promised: about k points to a cell where there are points.
 #[test]
 fn density_cells_hold_about_k_points() {
     let camera = straight(Projection::OrthographicHeight(1.8));

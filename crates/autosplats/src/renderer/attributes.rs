@@ -6,6 +6,7 @@ use super::Settings;
 use crate::Error;
 use crate::fit::orient::has_sensors;
 use crate::shade::{ColorMode, class_colors};
+use crate::splat::Channels;
 
 /// Where the colours of points come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +51,12 @@ impl Wanted {
         let measured = matches!(mode, ColorMode::Curvature | ColorMode::Radius | ColorMode::KRadius);
         let backs = (settings.all_layers || settings.shading.tones_backs()) && has_sensors(cloud);
         Ok(Self { colors, scalar, measures: settings.all_layers || measured, backs })
+    }
+
+    /// What pixels have then.
+    pub(super) fn channels(&self) -> Channels {
+        let Self { colors, scalar, measures, backs } = self;
+        Channels { color: colors.is_some(), scalar: scalar.is_some(), measures: *measures, backs: *backs }
     }
 
     /// The colours of the points, made where they are not the cloud's own.

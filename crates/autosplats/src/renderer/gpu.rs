@@ -325,6 +325,7 @@ impl GpuRenderer {
         let has_room = |margin: u32, halves| {
             let screen = size.map(|side| side + 2 * margin);
             ScreenBuffers::has_room::<Surfel>(&self.gpu, screen, halves, self.cloud.capacity())
+                && LayerBuffers::has_room(&self.gpu, screen, wanted.channels())
         };
         // Halves matter everywhere, a margin along the edges.
         let (margin, halves) = (settings.reconstruction.margin(size), settings.reconstruction.halves());

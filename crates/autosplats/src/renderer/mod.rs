@@ -31,7 +31,7 @@ pub use surfels::PointSurfel;
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// What became of the points of one frame, in numbers.
+/// What became of the points of one frame, in numbers. But for the last two, points in the margin that a picture may have count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Counts {
     /// Points in the cloud.
@@ -256,8 +256,8 @@ impl Renderer {
         }
     }
 
-    /// The surfels of the last frame: what the search and the fit found for each visible point that they took up, in no
-    /// order to rely on. Empty before the first frame.
+    /// The surfels of the last frame: what the search and the fit found for each visible point that they took up and whose
+    /// surfel's centre is in the picture, in no order to rely on. Empty before the first frame.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`], [`Error::DeviceLimit`] and [`Error::DeviceLost`] on a GPU, which they are read back from.

@@ -22,7 +22,7 @@ pub struct PointSurfel {
     pub curvature: f32,
 }
 
-/// The surfels in the picture of a frame as they are handed out.
+/// The surfels of a frame as they are handed out: those whose centres are in the picture.
 pub(super) fn point_surfels(surfels: &[Surfel], view: &View) -> Vec<PointSurfel> {
     let world_from_view = Mat3A::from(view.view_from_world).transpose();
     let is_seen = |surfel: &&Surfel| view.beside_picture(surfel.pixel_xy()) == 0;

@@ -44,7 +44,7 @@ fn fringe_px(reach_px: f32, noise: f32) -> f32 {
 
 // Whether a pixel is beside a surface whose border such a noise has blurred, if points tell.
 fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
-    // Of points beyond the picture nothing is known.
+    // Of points beyond the screen nothing is known.
     let to_edge = min(pixel, frame.size - 1u - pixel);
     let widest = min(WIDEST_RADIUS_PX, f32(min(to_edge.x, to_edge.y)));
     let window = min(sqrt(LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_VARIANCE * noise * noise), widest);
@@ -66,11 +66,13 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     for (var step = 1u; step <= steps; step++) {
         let at = floor(vec2f(pixel) + 0.5 - offset.xy / off * f32(step));
         if any(at < vec2f(0.0)) || any(at >= vec2f(frame.size)) {
-            // Beyond the picture the surface goes on.
+            // Beyond the screen the surface goes on.
             return NO;
         }
         let there = vec2u(at);
-        if cover[there.y * frame.size.x + there.x].rim == EMPTY_RIM {
+        let block = there / BLOCK_PX;
+        let is_known = beside_picture(there) == 0u || (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u;
+        if is_known && cover[there.y * frame.size.x + there.x].rim == EMPTY_RIM {
             return YES;
         }
     }
@@ -78,7 +80,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
 }
 
 // The mean offset, in pixels, of the sixteenths with points from the middle of a pixel, in a window of such a radius that lies
-// within the picture, and how many they are.
+// within the screen, and how many they are.
 fn points_offset(pixel: vec2u, window: f32) -> vec3f {
     var sums = vec3f(0.0);
     var count = 0.0;

@@ -15,6 +15,13 @@ pub(crate) struct Channels {
     pub(crate) backs: bool,
 }
 
+impl Channels {
+    /// Of [`LayerBuffers::extras`].
+    fn planes(self) -> usize {
+        (usize::from(self.color) + usize::from(self.measures)).max(self.backs.into())
+    }
+}
+
 /// [`GBuffer`] on the device, row by row.
 #[derive(Debug)]
 pub(crate) struct LayerBuffers {
@@ -46,20 +53,24 @@ pub(crate) struct Cover {
 pub(super) const COVER_BYTES: usize = size_of::<Cover>();
 
 impl LayerBuffers {
+    /// Whether the device binds what [`new`](Self::new) makes.
+    pub(crate) fn has_room(gpu: &Gpu, size: [u32; 2], channels: Channels) -> bool {
+        let pixels = size[0] as usize * size[1] as usize;
+        gpu.binds::<[f32; 4]>(channels.planes().max(1) * pixels)
+    }
+
     /// Room for a screen of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], channels: Channels) -> Result<Self, Error> {
         let pixels = size[0] as usize * size[1] as usize;
-        let planes = usize::from(channels.color) + usize::from(channels.measures);
-        let planes = planes.max(channels.backs.into());
         Ok(Self {
             size,
             channels,
             surface: gpu.storage::<[f32; 4]>("normals and depths", pixels)?,
             cover: gpu.storage::<Cover>("cover of pixels", pixels)?,
-            extras: gpu.storage::<[f32; 4]>("colours and measures", planes * pixels)?,
+            extras: gpu.storage::<[f32; 4]>("colours and measures", channels.planes() * pixels)?,
         })
     }
 

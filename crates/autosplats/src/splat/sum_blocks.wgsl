@@ -1,8 +1,10 @@
-// Sums up what points a block of pixels holds, and notes which blocks are empty, where there is noise: an invocation per block.
+// Sums up what points a block of pixels holds, and notes which blocks are empty, beside the picture of points too, where there is
+// noise: an invocation per block.
 //
 // Reads: cover, sixteenths, measured. Writes: blocks.
 
 #import frame
+#import picture
 #import groups
 #import layers
 #import blocks
@@ -30,5 +32,7 @@ fn sum_blocks(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             is_empty &= cover[pixel].rim == EMPTY_RIM;
         }
     }
-    blocks[at] = held | select(0u, EMPTY_BLOCK, is_empty);
+    // Most of the margin has no splats, and may hold a surface.
+    let goes_on = held > 0u && beside_picture(first) > 0u && beside_picture(first + BLOCK_PX - 1u) > 0u;
+    blocks[at] = held | select(0u, EMPTY_BLOCK, is_empty && !goes_on);
 }

@@ -180,7 +180,7 @@ impl Outline<'_> {
     fn is_beside(&self, [x, y]: [usize; 2], wide: bool) -> Option<bool> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
-        // Of points beyond the picture nothing is known.
+        // Of points beyond the screen nothing is known.
         if x < window || y < window || x + window >= width || y + window >= height {
             return None;
         }

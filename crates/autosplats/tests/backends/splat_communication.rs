@@ -4,7 +4,7 @@ use super::devices::{own_device, own_device_with};
 use super::*;
 
 fn by(engine: SearchEngine) -> Settings {
-    // Without what this search ends with the picture's edges for.
+    // The exact search would have a margin around the picture otherwise, which this one has not.
     let reconstruction = Reconstruction { points_per_pixel: 1, adaptive: false, engine, ..Reconstruction::default() };
     Settings { reconstruction, ..Settings::default() }
 }

@@ -322,9 +322,18 @@ fn comparison_sees_what_is_wrong() {
 
 #[test]
 fn cells_of_any_picture_fit_into_what_every_device_binds() {
-    for size in
-        [[1, 1], [1760, 900], [3200, 1800], [3840, 2160], [16_384, 16_384], [16_384, 1], [1, 16_384], [16_384, 700]]
-    {
+    for size in [
+        [1, 1],
+        [1760, 900],
+        [3200, 1800],
+        [3840, 2160],
+        [16_384, 16_384],
+        [16_384, 1],
+        [1, 16_384],
+        [16_384, 700],
+        [19_116, 19_116],
+        [16_502, 818],
+    ] {
         let clusters = most_cells(size) * size_of::<[Cluster; SLABS]>();
         let sheets = most_sheet_cells(size) * size_of::<[Sheet; SLABS]>();
         assert!(clusters.max(sheets) <= 128 << 20, "{size:?} takes {clusters} and {sheets} bytes");

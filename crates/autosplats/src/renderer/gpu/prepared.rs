@@ -122,12 +122,7 @@ impl Shape {
             adaptive: reconstruction.adaptive,
             depth_refinement: reconstruction.depth_refinement,
             trim: reconstruction.trim,
-            channels: Channels {
-                color: wanted.colors.is_some(),
-                scalar: wanted.scalar.is_some(),
-                measures: wanted.measures,
-                backs: wanted.backs,
-            },
+            channels: wanted.channels(),
             sensors,
             tone_backs: wanted.backs && shading.tones_backs(),
             find_range: finds_range(shading),

@@ -72,7 +72,8 @@ pub(in crate::splat) struct Blurred {
     per_radius: f32,
     pixels: Held,
     blocks: Held,
-    /// Of each block, how many blocks away the nearest is that is empty, along either axis.
+    /// Of each block, how many blocks away the nearest is that is empty, along either axis: without splats and, beside the
+    /// picture, without points.
     to_empty: Vec<u8>,
 }
 
@@ -101,9 +102,15 @@ impl Blurred {
         let is_empty = |(x, y, len): (usize, usize, usize)| {
             rims[tiled_index(width, x, y)..][..len].iter().all(|&rim| rim == EMPTY)
         };
-        let to_empty = |block: usize| match rows_of(block % columns, block / columns).all(is_empty) {
-            true => 0,
-            false => FRINGE_BLOCKS as u8 + 2,
+        // Most of the margin has no splats, and may hold a surface.
+        let goes_on = |[x, y]: [usize; 2]| {
+            let [first, last] = [0, BLOCK_PX - 1].map(|more| [x, y].map(|at| at * BLOCK_PX + more));
+            let is_beside = view.beside_picture(first) > 0 && view.beside_picture(last) > 0;
+            is_beside && blocks.count[y * columns + x] > 0
+        };
+        let to_empty = |block: usize| {
+            let [x, y] = [block % columns, block / columns];
+            if rows_of(x, y).all(is_empty) && !goes_on([x, y]) { 0 } else { FRINGE_BLOCKS as u8 + 2 }
         };
         let mut to_empty: Vec<u8> = (0..columns * rows).into_par_iter().map(to_empty).collect();
         // From block to block, those across corners as well, down and to the right, then back.
@@ -151,7 +158,7 @@ impl Outline<'_> {
             return None;
         }
         let [width, height] = self.size();
-        // Of points beyond the picture nothing is known.
+        // Of points beyond the screen nothing is known.
         let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
         let widest = WIDEST_RADIUS_PX.min(to_edge);
         let window = (LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_VARIANCE * noise_px * noise_px).sqrt().min(widest);
@@ -172,10 +179,14 @@ impl Outline<'_> {
             let at = [(x, ox), (y, oy)].map(|(at, offset)| at as f32 + 0.5 - offset / off * step as f32);
             let [x, y] = at.map(|at| at.floor() as isize);
             let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
-            // Beyond the picture the surface goes on.
-            inside.then(|| self.rims[self.index([x as usize, y as usize])])
+            // Beyond the screen the surface goes on.
+            inside.then_some([x as usize, y as usize])
         };
-        let met = (1..=fringe as usize).map_while(ahead).any(|rim| rim == EMPTY);
+        let is_empty = |[x, y]: [usize; 2]| {
+            self.rims[self.index([x, y])] == EMPTY
+                && (self.view.beside_picture([x, y]) == 0 || blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX) == 0)
+        };
+        let met = (1..=fringe as usize).map_while(ahead).any(is_empty);
         Some(met)
     }
 }
@@ -190,7 +201,7 @@ impl Held {
     }
 
     /// The mean offset, in pixels, of the sixteenths with points from the middle of pixel (x, y), in a window of such a radius
-    /// that lies within the picture; `None` if there are too few.
+    /// that lies within the screen; `None` if there are too few.
     #[inline(always)]
     fn offset(&self, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
         let reach = window as usize;
