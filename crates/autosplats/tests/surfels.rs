@@ -32,6 +32,23 @@ fn normals(cloud: &PointCloud) -> Normals {
 }
 
 #[test]
+fn surfels_of_a_close_up_are_those_of_the_picture() {
+    let cloud = sphere();
+    let camera = Camera { projection: Projection::PerspectiveFovDeg(12.0), ..camera() };
+    let mut renderer = Renderer::new();
+    let counts = renderer.render(&cloud, &camera, SIZE, &Settings::default()).expect("a picture").counts;
+    let surfels = renderer.surfels().expect("surfels");
+    let points = cloud.positions();
+    let is_seen = |point: usize| {
+        let position = DVec3::from(points[point].map(f64::from));
+        let (pixel, _) = camera.to_pixel(position, SIZE).expect("a camera").expect("before the eye");
+        (0..2).all(|axis| (-0.01..f64::from(SIZE[axis]) + 0.01).contains(&pixel[axis]))
+    };
+    assert!(surfels.iter().all(|surfel| is_seen(surfel.point as usize)), "all are in the picture");
+    assert!(surfels.len() > 300 && surfels.len() < counts.active + counts.recovered, "some are beside it: {counts:?}");
+}
+
+#[test]
 fn surfels_of_a_sphere_lie_on_it_and_face_the_eye() {
     let cloud = sphere();
     let mut renderer = Renderer::new();

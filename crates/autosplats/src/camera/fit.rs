@@ -16,7 +16,7 @@ const KEEP: f64 = 0.2;
 const BORDER: f64 = 0.04;
 
 /// Free space around the points in mean distances between them, so that the discs at the rim of a sparse cloud end within
-/// the picture. One that is cut by the picture's edge cannot be told from a surface that goes on.
+/// the picture. Without a margin one that is cut by its edge cannot be told from a surface that goes on.
 const RIM: f64 = 2.5;
 
 /// A sensor stands among its points if they reach so many times as far from it, on the ground, as half of them do: seen from

@@ -42,8 +42,8 @@ pub(crate) const TILE_AREA: usize = TILE * TILE;
 /// The visible surface, a value per pixel and layer.
 ///
 /// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work;
-/// [`index`](Self::index) finds a pixel. There may be pixels beside those of the picture. A layer that was not asked for is
-/// empty.
+/// [`index`](Self::index) finds a pixel of the picture. There may be others around these, covered ones too. A layer that was not
+/// asked for is empty.
 #[derive(Clone, Debug, Default)]
 pub struct GBuffer {
     /// Image width in pixels.
