@@ -74,17 +74,15 @@ impl LayerBuffers {
         })
     }
 
-    /// The host's form of the picture's layers, within a margin: what was read back of `surface`, `cover` and `extras`.
+    /// The host's form of the layers of a picture with a margin: what was read back of `surface`, `cover` and `extras`.
     pub(crate) fn to_host(&self, margin: u32, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
-        let [columns, rows] = self.size.map(|side| side as usize);
-        let margin = margin as usize;
-        let [width, height] = [columns, rows].map(|side| side - 2 * margin);
+        let [width, height] = self.size.map(|side| side as usize);
         let Channels { color, scalar, measures, backs } = self.channels;
         let area = tile_columns(width) * tile_columns(height) * TILE_AREA;
         let wanted = |wanted: bool| if wanted { area } else { 0 };
         let mut layers = GBuffer {
-            width: width as u32,
-            height: height as u32,
+            width: self.size[0] - 2 * margin,
+            height: self.size[1] - 2 * margin,
             weight: vec![0.0; area],
             depth: vec![f32::INFINITY; area],
             normal: vec![[0.0; 3]; area],
@@ -95,16 +93,15 @@ impl LayerBuffers {
             k_radius: vec![0.0; wanted(measures)],
             curvature: vec![0.0; wanted(measures)],
             back: vec![0.0; wanted(backs)],
-            margin: 0,
+            margin,
         };
         let surface: &[[f32; 4]] = bytemuck::cast_slice(surface);
         let cover: &[Cover] = bytemuck::cast_slice(cover);
         let extras: &[[f32; 4]] = bytemuck::cast_slice(extras);
-        let (colors, measured) = extras.split_at(if color { columns * rows } else { 0 });
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let at = tiled_index(width, x, y);
-            let pixel = (y + margin) * columns + x + margin;
-            let ([x, y, z, depth], cover) = (surface[pixel], cover[pixel]);
+        let pixels = width * height;
+        let (colors, measured) = extras.split_at(if color { pixels } else { 0 });
+        for (pixel, (&[x, y, z, depth], cover)) in surface[..pixels].iter().zip(cover).enumerate() {
+            let at = tiled_index(width, pixel % width, pixel / width);
             layers.weight[at] = cover.weight;
             layers.depth[at] = depth;
             layers.normal[at] = [x, y, z];
