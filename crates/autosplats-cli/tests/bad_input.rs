@@ -33,6 +33,7 @@ fn more_neighbours_than_points() {
     let front = ["--size", "64x64", "--view", "front"];
     let fewer = folder.succeed(&[&render("four.ply")[..], &front].concat());
     assert!(fewer.stderr.contains("4 points cannot have 10 neighbours"), "it is told: {}", fewer.stderr);
+    folder.succeed(&[&render("four.ply")[..], &front, &["-k", "10"]].concat());
     let picture = folder.read("out.png");
     folder.succeed(&[&render("four.ply")[..], &front, &["-k", "3"]].concat());
     assert_eq!(folder.read("out.png"), picture, "as many neighbours as there are");
