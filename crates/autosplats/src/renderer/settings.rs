@@ -35,8 +35,9 @@ pub struct Reconstruction {
     /// Fit larger neighbourhoods, of up to thousands of points, where points scatter too much for k neighbours to tell the
     /// surface, and move splats onto what is fitted, as circles. Points in rows, as a spinning lidar leaves them, get ellipses
     /// that reach the next row, where rows make a surface. Points far from their neighbours and on no surface become dots or,
-    /// unless outliers are kept, are discarded. A neighbourhood of one ends at wider gaps ([`gap_factor`](Self::gap_factor)). Else a surface
-    /// without noise or rows is left as it is.
+    /// unless outliers are kept, are discarded. A neighbourhood of one ends at wider gaps ([`gap_factor`](Self::gap_factor)). Points in
+    /// a margin around the picture count as neighbours, a twelfth of its shorter side wide, where a device has room for it and
+    /// the engine is not [`SearchEngine::SplatCommunication`]. Else a surface without noise or rows is left as it is.
     pub adaptive: bool,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
