@@ -172,7 +172,7 @@ fn shrink(place: u32, surfel: Surfel) {
     let is_sparse = ratio > SPARSE;
     let local = surfel.k_radius / own_initial_radius(surfel);
     if is_sparse || surfel.curvature * local * local > LONE {
-        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius, COARSE));
+        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius));
         if is_sparse && around.len >= LEAST_CLUSTERS {
             stray = max(stray, curvature_of(around) * ratio * ratio);
         } else if is_sparse && around.weight < f32(frame.k) {
@@ -208,7 +208,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let noise = max(known.noise, noise_at(surfel.k_radius));
     if is_row(surfel, known.noise) {
         let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
-        let area = area(surfel.center, surfel.major_axis, radius);
+        let area = area(surfel, radius);
         let out = turned(surfel, area);
         surfels[first_of_round + index] = out;
         if area.radius == 0.0 {

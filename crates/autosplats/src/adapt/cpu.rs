@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
 use super::noise::{Noise, Usual, measure};
-use super::quadric::{COARSE, EVEN_WEIGHT, FINE, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
+use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
 use super::rows::{is_row, turn};
 use super::sheets::{Blend, Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
@@ -311,7 +311,7 @@ pub(super) fn choose<S: Simd>(
         if !thin & (scale + 1 < SCALES) {
             continue;
         }
-        if gathered.read(cells, center, radius, FINE, view) < LEAST_CLUSTERS {
+        if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
             continue;
         }
         if axis.is_none() && scale + 1 < SCALES {
@@ -372,7 +372,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
     let is_sparse = ratio > SPARSE;
     let local = surfel.k_radius / initial_radius(surfel, task.density, task.view, task.rules.k);
     if is_sparse | (surfel.curvature * local * local > LONE) {
-        let len = gathered.read(task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, COARSE, task.view);
+        let len = gathered.read(task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
         let plane = (len >= LEAST_OF_PLANE).then(|| gathered.plane(simd));
         if let Some(plane) = plane
             && is_sparse

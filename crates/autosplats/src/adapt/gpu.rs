@@ -11,10 +11,10 @@ use super::noise::{
     APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES,
     QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
 };
-use super::quadric::{COARSE, EVEN_WEIGHT, FINE, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
+use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
-    AREA, AREA_BESIDE, AREA_BEYOND, AREA_NEAR, BESIDE, BEYOND, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH,
-    ROW, ROW_TILT, SEEN_THROUGH, THIN_ROW,
+    AREA, AREA_NEAR, BESIDE, BEYOND, BEYOND_RADII, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH, ROW,
+    ROW_TILT, SEEN_THROUGH, THIN_ROW,
 };
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
 use super::{LEAST_REACH, SCALES, STEP, noise};
@@ -181,8 +181,7 @@ impl AdaptPasses {
         let quadric = [
             ("SWEEPS", SWEEPS as f64),
             ("MOST_LEVELS", MOST_LEVELS as f64),
-            ("COARSE", COARSE.into()),
-            ("FINE", FINE.into()),
+            ("CELLS_PER_RADIUS", CELLS_PER_RADIUS.into()),
             ("LEAST_CLUSTERS", LEAST_CLUSTERS as f64),
             ("LEAST_OF_PLANE", LEAST_OF_PLANE as f64),
             ("FULL", FULL.into()),
@@ -211,10 +210,10 @@ impl AdaptPasses {
         ];
         let rows = [
             ("AREA", AREA.into()),
-            ("AREA_BEYOND", AREA_BEYOND.into()),
-            ("AREA_BESIDE", AREA_BESIDE.into()),
             ("AREA_NEAR", AREA_NEAR.into()),
             ("BEYOND", BEYOND.into()),
+            ("LEAST_BEYOND", BEYOND_RADII[0].into()),
+            ("MOST_BEYOND", BEYOND_RADII[1].into()),
             ("BESIDE", BESIDE.into()),
             ("HALVES", HALVES.into()),
             ("FLAT", FLAT.into()),

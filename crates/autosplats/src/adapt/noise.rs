@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::cpu::first_radius;
-use super::quadric::{COARSE, Gathered, LEAST_CLUSTERS};
+use super::quadric::{Gathered, LEAST_CLUSTERS};
 use super::sheets::SHEET_LEVELS;
 use super::{SCALES, STEP};
 use crate::camera::View;
@@ -41,7 +41,7 @@ pub(super) const ROUNDING: f32 = 1e-3;
 pub(super) const THIN_SHARE: f32 = 0.3;
 /// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance. Where it
 /// could not be larger by more, or there is no next scale, that does not count.
-pub(super) const RISE: f32 = 0.3;
+pub(super) const RISE: f32 = 0.19;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
 /// But scatter of structure grows from ball to ball, and noise's does not: it is *steady* where the next ball scatters less than so
@@ -193,7 +193,7 @@ fn measure_scatter_with<'a, S: Simd>(
 ) {
     for Sampled { surfel, radius, scatter, .. } in sample {
         *radius *= STEP;
-        if gathered.read(task.cells, surfel.center, *radius, COARSE, task.view) >= LEAST_CLUSTERS {
+        if gathered.read(task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
             let plane = gathered.plane(simd);
             let distance = gathered.quadric(simd, *radius, plane.axis, plane.curvature()).scatter;
             let distance = if distance < ROUNDING * *radius { 0.0 } else { distance };

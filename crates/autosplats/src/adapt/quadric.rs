@@ -11,10 +11,9 @@ use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
-/// A ball's radius is at least so many cells, unless they are the finest.
-pub(super) const COARSE: f32 = 2.0;
-/// The same of balls that surfaces are moved onto: these depend less on how cells happen to lie.
-pub(super) const FINE: f32 = 4.0;
+/// A ball's radius is at least so many cells, unless they are the finest. The more, the less it depends on how cells happen to
+/// lie.
+pub(super) const CELLS_PER_RADIUS: f32 = 4.0;
 /// Fewer clusters than this tell too little of six coefficients.
 pub(super) const LEAST_CLUSTERS: usize = 12;
 /// And fewer than this of no plane: through three there always is one.
@@ -37,15 +36,15 @@ pub(super) struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// Of the ball of `radius` around `center` (view space), in the coarsest cells of which that is at least `per_radius`, or the
-    /// finest; `None` if there are no cells.
+    /// Of the ball of `radius` around `center` (view space), in the coarsest cells of which that is at least
+    /// [`CELLS_PER_RADIUS`], or the finest; `None` if there are no cells.
     #[inline(always)]
-    pub(super) fn around(cells: &'a Cells, center: Vec3, radius: f32, per_radius: f32, view: &View) -> Option<Self> {
+    pub(super) fn around(cells: &'a Cells, center: Vec3, radius: f32, view: &View) -> Option<Self> {
         let [px, py] = view.to_pixel(center);
         let radius_px = radius / view.pixel_size(center.z);
         let mut level = cells.levels.first()?;
         for coarser in &cells.levels[1..] {
-            if coarser.side_px as f32 * per_radius <= radius_px {
+            if coarser.side_px as f32 * CELLS_PER_RADIUS <= radius_px {
                 level = coarser;
             }
         }
@@ -176,19 +175,11 @@ pub(super) fn tangents(axis: Vec3) -> (Vec3, Vec3) {
 }
 
 impl Gathered {
-    /// Reads the clusters in the ball of `radius` around `center` (view space), from cells of which that is at least
-    /// `cells_per_radius` unless they are the finest, and returns their number.
+    /// Reads the clusters in the ball of `radius` around `center` (view space), and returns their number.
     #[inline(always)]
-    pub(super) fn read(
-        &mut self,
-        cells: &Cells,
-        center: [f32; 3],
-        radius: f32,
-        cells_per_radius: f32,
-        view: &View,
-    ) -> usize {
+    pub(super) fn read(&mut self, cells: &Cells, center: [f32; 3], radius: f32, view: &View) -> usize {
         self.len = 0;
-        let Some(window) = Window::around(cells, center.into(), radius, cells_per_radius, view) else { return 0 };
+        let Some(window) = Window::around(cells, center.into(), radius, view) else { return 0 };
         let [cx, cy, cz] = center;
         let per_radius = 1.0 / radius;
         self.side = window.level.side_px as f32 * view.pixel_size(cz) * per_radius;

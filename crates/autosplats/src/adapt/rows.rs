@@ -12,7 +12,7 @@ use glam::Vec3;
 use pulp::Simd;
 
 use super::cells::{Cells, Cluster};
-use super::quadric::{COARSE, EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane, Window};
+use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane, Window};
 use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::{LONGEST, Surfel};
@@ -22,13 +22,11 @@ use crate::fit::{LONGEST, Surfel};
 pub(super) const ROW: f32 = 12.0;
 /// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
 pub(super) const AREA: f32 = 0.25;
-/// and if there is more of it: of a ball so many times as wide
-pub(super) const BEYOND: f32 = STEP * STEP;
-/// this part, which three wires side by side do not reach,
-pub(super) const AREA_BEYOND: f32 = 0.3;
-/// or, of what is on one side of the row, this;
-pub(super) const AREA_BESIDE: f32 = 0.2;
-/// and of the ball itself this, or it would be the row alone.
+/// and so does one of this many distances between rows: of three wires it is 0.18, of four rows or the border of many 0.33.
+pub(super) const BEYOND: f32 = 4.0;
+/// That ball's radius over the first one's, at least and at most.
+pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];
+/// Of what is on one side of the row, it is at least this part in the first ball, or it would be the row alone.
 pub(super) const AREA_NEAR: f32 = 0.05;
 /// Of the points on one side, those of the row itself count, to this distance on the other side; radii.
 pub(super) const BESIDE: f32 = 0.1;
@@ -57,6 +55,12 @@ pub(super) fn is_row(surfel: &Surfel) -> bool {
     surfel.major_ratio > ROW
 }
 
+/// How far apart rows of points k-radius / (k/2) apart are, k-radii, if a ball of so many k-radii holds points of this `weight`.
+#[inline(always)]
+fn apart(in_k_radii: f32, k: f32, weight: f32) -> f32 {
+    EVEN_WEIGHT * in_k_radii * in_k_radii * k / (2.0 * weight)
+}
+
 /// Turns a surfel whose `k` neighbours are a row to the area that balls around it find; `radius` is that of the ball before
 /// the first, world units. Without an area it becomes thin; returns whether there is one.
 #[inline(always)]
@@ -67,8 +71,9 @@ pub(super) fn turn<S: Simd>(
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> bool {
+    let k = k as f32;
     let row = Vec3::from(surfel.major_axis);
-    let Some((plane, radius)) = area(simd, surfel.center, row, radius, (cells, view), gathered) else {
+    let Some((plane, radius)) = area(simd, surfel, (radius, k), (cells, view), gathered) else {
         surfel.radius *= THIN_ROW;
         surfel.major_ratio = 1.0 / THIN_ROW;
         return false;
@@ -78,29 +83,29 @@ pub(super) fn turn<S: Simd>(
     // Not zero: the row is nearly in the plane.
     surfel.major_axis = normal.cross(row).normalize().to_array();
     surfel.curvature = plane.curvature();
-    // Rows are as far apart as the density says of points k-radius / (k/2) apart; the splat radius is 2/√k k-radii.
-    let k = k as f32;
+    // The splat radius is 2/√k k-radii.
     let in_k_radii = radius / surfel.k_radius;
-    let apart = EVEN_WEIGHT * in_k_radii * in_k_radii * k / (2.0 * plane.weight);
-    let ratio = (REACH * apart).min(FARTHEST_REACH * in_k_radii) * (0.5 * k.sqrt());
+    let reach = (REACH * apart(in_k_radii, k, plane.weight)).min(FARTHEST_REACH * in_k_radii);
+    let ratio = reach * (0.5 * k.sqrt());
     surfel.radius *= (ratio / LONGEST).max(1.0);
     surfel.major_ratio = ratio.clamp(1.0, LONGEST);
     true
 }
 
-/// Plane of the first ball around `center` that holds an area with the `row` in it, and the ball's radius.
+/// Plane of the first ball around a `surfel` of a row that holds an area with the row in it, and the ball's radius.
 #[inline(always)]
 fn area<S: Simd>(
     simd: S,
-    center: [f32; 3],
-    row: Vec3,
-    mut radius: f32,
+    surfel: &Surfel,
+    (mut radius, k): (f32, f32),
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<(Plane, f32)> {
+    let &Surfel { center, k_radius, .. } = surfel;
+    let row = Vec3::from(surfel.major_axis);
     // What is within a radius, on the side if one is given.
     let mut plane = |radius: f32, side: Option<Vec3>| {
-        let mut len = gathered.read(cells, center, radius, COARSE, view);
+        let mut len = gathered.read(cells, center, radius, view);
         if let Some(side) = side {
             len = gathered.keep_beside(side, -BESIDE);
         }
@@ -117,8 +122,10 @@ fn area<S: Simd>(
         radius *= STEP;
         plane(radius, None).filter(|plane| is_area(plane, AREA))
     })?;
-    let goes_on = plane(BEYOND * radius, None).is_some_and(|plane| is_area(&plane, AREA_BEYOND));
-    let mut found = (is_flat(&first) & goes_on).then_some(first);
+    let [least, most] = BEYOND_RADII.map(|radii| radii * radius);
+    let beyond = (BEYOND * k_radius * apart(radius / k_radius, k, first.weight)).clamp(least, most);
+    let goes_on = |plane: Option<Plane>| plane.is_some_and(|plane| is_area(&plane, AREA));
+    let mut found = (is_flat(&first) && goes_on(plane(beyond, None))).then_some(first);
     if found.is_none() {
         let eye = if view.perspective { Vec3::from(center) } else { Vec3::Z };
         let across = row.cross(eye).normalize_or_zero();
@@ -127,8 +134,7 @@ fn area<S: Simd>(
             let beside = plane(radius, side).filter(|plane| is_area(plane, AREA_NEAR) & is_flat(plane));
             let Some(beside) = beside else { continue };
             let bend = beside.variances[0] / beside.variances[1];
-            let goes_on = plane(BEYOND * radius, side).is_some_and(|plane| is_area(&plane, AREA_BESIDE));
-            if (bend < least_bend) & goes_on {
+            if (bend < least_bend) && goes_on(plane(beyond, side)) {
                 // As if the other side were as full.
                 found = Some(Plane { weight: HALVES * beside.weight, ..beside });
                 least_bend = bend;
@@ -143,7 +149,7 @@ fn is_seen_through(cells: &Cells, center: [f32; 3], radius: f32, axis: Vec3, vie
     let center = Vec3::from(center);
     let of_plane = axis.dot(center);
     let mut counts = [0u32; 2];
-    let Some(window) = Window::around(cells, center, radius, COARSE, view) else { return false };
+    let Some(window) = Window::around(cells, center, radius, view) else { return false };
     for cell in window.rows().flatten() {
         let (mut is_on, mut is_behind) = (false, false);
         for &Cluster { mean, .. } in cell.iter().take_while(|cluster| cluster.count > 0.0) {

@@ -306,15 +306,18 @@ fn share_of_areas(case: &Case) -> f32 {
 
 #[test]
 fn wires_are_no_area_and_nor_is_what_is_seen_through() {
-    let many: Vec<f32> = (0..20).map(|line| 0.08 * line as f32 - 0.76).collect();
-    let surface = share_of_areas(&lines(&many, Vec::new()));
-    assert!(surface > 0.99, "of lines side by side {surface} find an area");
-    let wires = share_of_areas(&lines(&[-0.08, 0.0, 0.08], Vec::new()));
-    assert!(wires < 0.01, "of three wires {wires} do");
-    let mut random = Random::new(41);
-    let wall = (0..200_000).map(|_| [1.2 * random.signed(), 1.2 * random.signed(), 1.0]).collect();
-    let before_wall = share_of_areas(&lines(&many, wall));
-    assert!(before_wall < 0.01, "of lines before a wall {before_wall} do");
+    // However far apart they are against the radii of balls, which grow in steps.
+    for apart in [0.05, 0.06, 0.07, 0.08, 0.1, 0.12] {
+        let many: Vec<f32> = (0..20).map(|line| apart * (line as f32 - 9.5)).collect();
+        let surface = share_of_areas(&lines(&many, Vec::new()));
+        assert!(surface > 0.99, "of lines {apart} apart {surface} find an area");
+        let wires = share_of_areas(&lines(&[-apart, 0.0, apart], Vec::new()));
+        assert!(wires < 0.01, "of three wires {apart} apart {wires} do");
+        let mut random = Random::new(41);
+        let wall = (0..200_000).map(|_| [1.2 * random.signed(), 1.2 * random.signed(), 1.0]).collect();
+        let before_wall = share_of_areas(&lines(&many, wall));
+        assert!(before_wall < 0.01, "of lines {apart} apart before a wall {before_wall} do");
+    }
 }
 
 #[test]

@@ -9,8 +9,7 @@
 const SCALES = 6u;
 
 override MOST_LEVELS: u32;
-override COARSE: f32;
-override FINE: f32;
+override CELLS_PER_RADIUS: f32;
 override LEAST_CLUSTERS: u32;
 override LEAST_OF_PLANE: u32;
 override FULL: f32;
@@ -61,13 +60,13 @@ struct Quadric {
     bend: vec3f,
 }
 
-fn ball_around(center: vec3f, radius: f32, cells_per_radius: f32) -> Ball {
+fn ball_around(center: vec3f, radius: f32) -> Ball {
     let at = to_pixel(center);
     let radius_px = radius / pixel_size(center.z);
     var level = levels[0];
     for (var index = 1u; index < MOST_LEVELS; index++) {
         let coarser = levels[index];
-        if coarser.side_px == 0u || !(f32(coarser.side_px) * cells_per_radius <= radius_px) {
+        if coarser.side_px == 0u || !(f32(coarser.side_px) * CELLS_PER_RADIUS <= radius_px) {
             break;
         }
         level = coarser;

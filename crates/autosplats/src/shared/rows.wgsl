@@ -5,10 +5,10 @@
 #import surfel
 
 override AREA: f32;
-override AREA_BEYOND: f32;
-override AREA_BESIDE: f32;
 override AREA_NEAR: f32;
 override BEYOND: f32;
+override LEAST_BEYOND: f32;
+override MOST_BEYOND: f32;
 override BESIDE: f32;
 override HALVES: f32;
 override FLAT: f32;
@@ -39,9 +39,13 @@ fn is_area(plane: Plane, least: f32) -> bool {
     return plane.len >= LEAST_CLUSTERS && plane.variances.y > least * plane.variances.z;
 }
 
-// Of the areas on the two sides of a `row`, the flatter.
-fn area_beside(ball: Ball, row: vec3f) -> Area {
-    let beyond = ball_around(ball.center, BEYOND * ball.radius, COARSE);
+// How far apart rows of points k-radius / (k/2) apart are, k-radii, if a ball of so many k-radii holds points of this `weight`.
+fn rows_apart(in_k_radii: f32, weight: f32) -> f32 {
+    return EVEN_WEIGHT * in_k_radii * in_k_radii * f32(frame.k) / (2.0 * weight);
+}
+
+// Of the areas on the two sides of a `row`, the flatter, of those that go on in the ball `beyond`.
+fn area_beside(ball: Ball, beyond: Ball, row: vec3f) -> Area {
     let across_eye = cross(row, select(vec3f(0.0, 0.0, 1.0), ball.center, frame.perspective == 1u));
     let length_squared = dot(across_eye, across_eye);
     var side = select(vec3f(0.0), across_eye * inverseSqrt(length_squared), length_squared > 0.0);
@@ -51,7 +55,7 @@ fn area_beside(ball: Ball, row: vec3f) -> Area {
         let bend = plane.variances.x * found.plane.variances.y;
         let is_flatter = found.radius == 0.0 || bend < found.plane.variances.x * plane.variances.y;
         if is_area(plane, AREA_NEAR) && is_flat(plane, row) && is_flatter {
-            if is_area(plane_beside(beyond, side, -BESIDE), AREA_BESIDE) {
+            if is_area(plane_beside(beyond, side, -BESIDE), AREA) {
                 found = Area(plane, ball.radius);
             }
         }
@@ -94,21 +98,25 @@ fn is_seen_through(ball: Ball, axis: vec3f) -> bool {
     return f32(through) > SEEN_THROUGH * f32(through + on);
 }
 
-// The first ball around `center` that holds an area with the `row` in it.
-fn area(center: vec3f, row: vec3f, least_radius: f32) -> Area {
+// The first ball around a surfel of a row that holds an area with the row in it.
+fn area(surfel: Surfel, least_radius: f32) -> Area {
+    let center = surfel.center;
+    let row = surfel.major_axis;
     var radius = least_radius;
     var found = Area(Plane(), 0.0);
     for (var scale = 0u; scale < SCALES; scale++) {
         radius *= STEP;
-        let ball = ball_around(center, radius, COARSE);
+        let ball = ball_around(center, radius);
         let plane = plane_of(ball);
         if !is_area(plane, AREA) {
             continue;
         }
-        if is_flat(plane, row) && is_area(plane_of(ball_around(center, BEYOND * radius, COARSE)), AREA_BEYOND) {
+        let apart = surfel.k_radius * rows_apart(radius / surfel.k_radius, plane.weight);
+        let beyond = ball_around(center, clamp(BEYOND * apart, LEAST_BEYOND * radius, MOST_BEYOND * radius));
+        if is_flat(plane, row) && is_area(plane_of(beyond), AREA) {
             found = Area(plane, radius);
         } else {
-            found = area_beside(ball, row);
+            found = area_beside(ball, beyond, row);
         }
         if found.radius > 0.0 && is_seen_through(ball, found.plane.axis) {
             found.radius = 0.0;
@@ -130,11 +138,10 @@ fn turned(surfel: Surfel, found: Area) -> Surfel {
     out.normal = turned_to_eye(plane.axis, surfel.center);
     out.major_axis = normalize(cross(out.normal, surfel.major_axis));
     out.curvature = curvature_of(plane);
-    // Rows are as far apart as the density says of points k-radius / (k/2) apart; the splat radius is 2/√k k-radii.
-    let k = f32(frame.k);
+    // The splat radius is 2/√k k-radii.
     let in_k_radii = found.radius / surfel.k_radius;
-    let apart = EVEN_WEIGHT * in_k_radii * in_k_radii * k / (2.0 * plane.weight);
-    let ratio = min(REACH * apart, FARTHEST_REACH * in_k_radii) * (0.5 * sqrt(k));
+    let reach = min(REACH * rows_apart(in_k_radii, plane.weight), FARTHEST_REACH * in_k_radii);
+    let ratio = reach * (0.5 * sqrt(f32(frame.k)));
     out.radius = surfel.radius * max(ratio / LONGEST, 1.0);
     out.major_ratio = clamp(ratio, 1.0, LONGEST);
     return out;
