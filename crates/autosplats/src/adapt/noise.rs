@@ -41,7 +41,7 @@ pub(super) const ROUNDING: f32 = 1e-3;
 pub(super) const THIN_SHARE: f32 = 0.3;
 /// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance. Where it
 /// could not be larger by more, or there is no next scale, that does not count.
-pub(super) const RISE: f32 = 0.19;
+pub(super) const RISE: f32 = 0.27;
 /// The noise is this quantile of what is found: more scatter is structure too small for the ball.
 pub(super) const QUANTILE: f32 = 0.33;
 /// But scatter of structure grows from ball to ball, and noise's does not: it is *steady* where the next ball scatters less than so
@@ -51,7 +51,7 @@ pub(super) const STEADY: f32 = 1.3;
 pub(super) const LEAST_PAIRS: usize = 32;
 /// Up to the first of these shares of steady balls there is structure and no noise, from the second on there is. Where the first
 /// scales tell nothing of noise, larger ones are not asked this.
-pub(super) const NOISE_SHARES: [f32; 2] = [0.05, 0.15];
+pub(super) const NOISE_SHARES: [f32; 2] = [0.1, 0.2];
 /// Above the first of these, noise begins to differ from place to place, as where two scans do not fit and the way from one to the
 /// other is across the surface in one place and along it in the next,
 pub(super) const DIFFERS_SHARES: [f32; 2] = [0.55, 0.7];

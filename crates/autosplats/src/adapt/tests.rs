@@ -156,8 +156,8 @@ fn noise_that_grows_with_distance_is_measured() {
         let mut k_radii: Vec<f32> = near.map(|surfel| surfel.k_radius).collect();
         k_radii.sort_by(f32::total_cmp);
         let ratio = noise.at(k_radii[k_radii.len() / 2]) / (sigma * depth * depth);
-        // Noise makes k-radii larger too, which hides some of its growth.
-        assert!((0.45..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
+        // Noise makes k-radii larger too, which hides some of its growth; at the far end it is half of them, and slabs cut it.
+        assert!((0.42..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
     }
 }
 
