@@ -1,5 +1,6 @@
 //! Adapted surfels against surfaces that are known.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use autosplats_cloud::glam::{DMat4, DVec3};
@@ -56,15 +57,21 @@ impl Case {
 
     /// Rings that a lidar with some noise leaves on the ground and a wall, seen from above and behind.
     pub(crate) fn swept() -> Self {
+        Self::swept_with_border(0)
+    }
+
+    /// The same in a picture that is larger by so many pixels on each side, so that cells lie elsewhere.
+    fn swept_with_border(border: u32) -> Self {
         let mut random = Random::new(31);
         let positions = test_clouds::swept(|distance| distance + 0.002 * random.gaussian());
+        let (height, tan) = (540 + 2 * border, 25f64.to_radians().tan());
         let camera = Camera {
             eye: DVec3::new(1.0, -3.0, -6.0),
             look_at: DVec3::new(0.0, 1.0, 1.0),
             up: DVec3::NEG_Y,
-            projection: Projection::PerspectiveFovDeg(50.0),
+            projection: Projection::PerspectiveFovDeg(2.0 * (tan * f64::from(height) / 540.0).atan().to_degrees()),
         };
-        Self::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [960, 540])
+        Self::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [960 + 2 * border, height])
     }
 
     fn of(cloud: &PointCloud, camera: &Camera, size: [u32; 2]) -> Self {
@@ -283,6 +290,29 @@ fn rings_of_a_lidar_are_ground() {
     let share = |surfels: &[Surfel]| rows.iter().filter(|&&at| closes(&surfels[at])).count() as f32 / rows.len() as f32;
     let [before, after] = [share(&fitted), share(&adapted)];
     assert!(before < 0.1 && after > 0.9, "{before} of the splats reach the next ring, then {after}");
+}
+
+#[test]
+fn where_cells_lie_decides_little_of_what_rings_become() {
+    let adapted = |border| {
+        let case = Case::swept_with_border(border);
+        let of_source = |surfel: Surfel| (surfel.source, surfel);
+        case.adapted().into_iter().map(of_source).collect::<HashMap<u32, Surfel>>()
+    };
+    let of_picture = adapted(0);
+    for border in [5, 11, 23] {
+        let larger = adapted(border);
+        let pairs: Vec<_> = of_picture.iter().filter_map(|(source, own)| Some((own, larger.get(source)?))).collect();
+        assert!(pairs.len() > 10_000, "{} points are in both", pairs.len());
+        let differs = |(a, b): &&(&Surfel, &Surfel)| {
+            let reach = |surfel: &Surfel| surfel.radius * surfel.major_ratio.max(1.0);
+            let is_as_wide = reach(a) == reach(b) || (0.7..1.4).contains(&(reach(a) / reach(b)));
+            !is_as_wide || angle(a.normal, b.normal) > 5.0
+        };
+        let share = pairs.iter().filter(differs).count() as f32 / pairs.len() as f32;
+        // With half as many cells in a radius it is 0.06.
+        assert!(share < 0.045, "{share} differ if the picture is {border} pixels larger");
+    }
 }
 
 /// Points half a hundredth apart along lines at these heights, before what else there is.
