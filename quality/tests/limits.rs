@@ -55,7 +55,7 @@ const LIMITS: [Limits; 9] = [
     Limits { case: "bumpy:200K-uneven front", normals: [0.70, 1.57], ratios: [1.08, 1.15], flipped: [0.04, 0.02], holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.998, depth_px: 0.138, psnr: 41.0, flip: 0.017, swept: [NONE; 3], motion: [NONE; 2] },
     Limits { case: "bumpy:200K-noise0.3% front", normals: [4.0, 6.25], ratios: [0.77, 0.64], flipped: [0.03, 0.03], holes: 0.03, leaks: 0.02, before: 0.30, iou: 0.991, depth_px: 1.02, psnr: 30.3, flip: 0.082, swept: [NONE; 3], motion: [1.02, 1.33] },
     Limits { case: "bumpy:200K-outliers2% front", normals: [0.84, 2.23], ratios: [1.43, 1.52], flipped: [0.2, 0.1], holes: 0.02, leaks: 0.02, before: 0.35, iou: 0.992, depth_px: 0.26, psnr: 30.0, flip: 0.024, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.96], flipped: [2.75, 1.6], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NONE; 2] },
+    Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.95], flipped: [2.75, 1.6], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NONE; 2] },
 ];
 
 /// What of a picture is beyond its limits.

@@ -6,7 +6,7 @@
 //! height field with six coefficients, whose slope at the point is free of the bias that curved or one-sided surroundings give
 //! to a plane. A ball of a thousand points costs what one of thirty does, because it is summed up in *cells* (`cells`):
 //! squares of pixels cut into slabs of depth, each level twice as coarse as the one before, of which only the mean and the
-//! count are kept. A ball reads cells of between a quarter and half of its radius, where there are so fine ones.
+//! count are kept. A ball reads cells of between an eighth and a quarter of its radius, where there are so fine ones.
 //!
 //! How far points scatter is one number for the whole frame (`noise`): it is what is left of the quadrics at the first scale
 //! where many of a sample of points find a surface thinner than their ball is wide. With that number the error of each fit is

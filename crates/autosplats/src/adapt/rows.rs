@@ -22,9 +22,10 @@ use crate::fit::{LONGEST, Surfel};
 pub(super) const ROW: f32 = 12.0;
 /// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
 pub(super) const AREA: f32 = 0.25;
-/// and so does one of this many distances between rows: of three wires it is 0.18, of four rows or the border of many 0.33.
+/// and has to be that part too in a ball whose radius is this many distances between rows: of three wires it is 0.18 there, of
+/// four rows or the border of many 0.33.
 pub(super) const BEYOND: f32 = 4.0;
-/// That ball's radius over the first one's, at least and at most.
+/// That radius over the first ball's, at least and at most.
 pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];
 /// Of what is on one side of the row, it is at least this part in the first ball, or it would be the row alone.
 pub(super) const AREA_NEAR: f32 = 0.05;
