@@ -15,15 +15,38 @@ pub(crate) const MOST_FINEST: usize = 1_500_000;
 pub(super) const MOST_LEVELS: usize = 9;
 
 /// The mean of some screen points near each other, view space, and their number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cluster {
     pub(crate) mean: [f32; 3],
-    /// 0 if there are none.
+    /// Not 0.
     pub(crate) count: f32,
 }
 
-/// The clusters of a cell by slabs of depth, those that hold points first.
-pub(crate) type Cell = [Cluster; SLABS];
+/// The clusters of a cell by slabs of depth, those that hold points first: a coordinate of all of them side by side, for SIMD.
+/// A cache line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
+pub(crate) struct Cell {
+    /// X, y and z of the means.
+    pub(crate) mean: [[f32; SLABS]; 3],
+    /// 0 where there is no cluster.
+    pub(crate) count: [f32; SLABS],
+}
+
+impl Cell {
+    pub(crate) fn put(&mut self, at: usize, Cluster { mean, count }: Cluster) {
+        for axis in 0..3 {
+            self.mean[axis][at] = mean[axis];
+        }
+        self.count[at] = count;
+    }
+
+    pub(crate) fn clusters(&self) -> impl Iterator<Item = Cluster> {
+        let Self { mean: [x, y, z], count } = *self;
+        let all = (0..SLABS).map(move |at| Cluster { mean: [x[at], y[at], z[at]], count: count[at] });
+        all.take_while(|cluster| cluster.count > 0.0)
+    }
+}
 
 /// Cells of one size.
 #[derive(Clone, Debug, Default)]
@@ -92,11 +115,12 @@ impl Filling {
     }
 
     fn finish(&self) -> Cell {
-        std::array::from_fn(|index| {
-            let count = self.count[index];
-            let mean = if count > 0.0 { self.sum[index].map(|sum| sum / count) } else { [0.0; 3] };
-            Cluster { mean, count }
-        })
+        let mut cell = Cell::default();
+        for at in 0..self.used {
+            let count = self.count[at];
+            cell.put(at, Cluster { mean: self.sum[at].map(|sum| sum / count), count });
+        }
+        cell
     }
 }
 
@@ -197,10 +221,8 @@ fn merge(below: &Level, view: &View, level: &mut Level) {
             let mut filling = Filling::EMPTY;
             for y in 2 * row..(2 * row + 2).min(below.rows) {
                 for x in 2 * column..(2 * column + 2).min(below.columns) {
-                    for cluster in &below.cells[y * below.columns + x] {
-                        if cluster.count > 0.0 {
-                            filling.add(cluster.mean, cluster.count, slabs.of(cluster.mean[2]));
-                        }
+                    for Cluster { mean, count } in below.cells[y * below.columns + x].clusters() {
+                        filling.add(mean, count, slabs.of(mean[2]));
                     }
                 }
             }

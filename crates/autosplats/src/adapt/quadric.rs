@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{Cell, Cells, Cluster, Level, SLABS};
+use super::cells::{Cell, Cells, Level, SLABS};
 use crate::camera::View;
 use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
@@ -75,6 +75,9 @@ impl<'a> Window<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
     lanes: Vec<[Lanes; 4]>,
+    /// How many of `lanes` are filled.
+    filled: usize,
+    /// Clusters.
     len: usize,
     /// Side of the cells that they are of, radii: clusters are slabs about as thick.
     side: f32,
@@ -178,38 +181,52 @@ impl Gathered {
     /// Reads the clusters in the ball of `radius` around `center` (view space), and returns their number.
     #[inline(always)]
     pub(super) fn read(&mut self, cells: &Cells, center: [f32; 3], radius: f32, view: &View) -> usize {
-        self.len = 0;
+        (self.filled, self.len) = (0, 0);
         let Some(window) = Window::around(cells, center.into(), radius, view) else { return 0 };
-        let [cx, cy, cz] = center;
         let per_radius = 1.0 / radius;
-        self.side = window.level.side_px as f32 * view.pixel_size(cz) * per_radius;
+        self.side = window.level.side_px as f32 * view.pixel_size(center[2]) * per_radius;
         let most = window.len() * SLABS;
         // One more, that the last cluster is written to if it is outside.
-        self.lanes.resize((most + 1).div_ceil(LANES), [Lanes::default(); 4]);
+        let room = (most + 1).div_ceil(LANES);
+        if self.lanes.len() < room {
+            self.lanes.resize(room, [Lanes::default(); 4]);
+        }
         let mut len = 0;
         for row in window.rows() {
             for cell in row {
-                for &Cluster { mean: [x, y, z], count } in cell {
-                    if count == 0.0 {
-                        break;
+                let Cell { mean, count } = cell;
+                // Loops and no closures: not inlined, those would be compiled without the vectors of this machine.
+                let mut offset = [[0f32; SLABS]; 3];
+                let mut weight = [0f32; SLABS];
+                let mut is_empty = true;
+                for axis in 0..3 {
+                    for at in 0..SLABS {
+                        offset[axis][at] = (mean[axis][at] - center[axis]) * per_radius;
                     }
-                    let [x, y, z] = [(x - cx) * per_radius, (y - cy) * per_radius, (z - cz) * per_radius];
-                    let rest = 1.0 - (x * x + y * y + z * z);
-                    let weight = (rest * (1.0 / (1.0 - FULL))).min(1.0) * count;
+                }
+                let [x, y, z] = offset;
+                for at in 0..SLABS {
+                    let rest = 1.0 - (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]);
+                    // A slab without points weighs nothing.
+                    weight[at] = (rest * (1.0 / (1.0 - FULL))).min(1.0) * count[at];
+                    is_empty &= !(weight[at] > 0.0);
+                }
+                if is_empty {
+                    continue;
+                }
+                for at in 0..SLABS {
                     // Written in any case, and written over if it is outside: a branch would be guessed wrong too often.
                     let [xs, ys, zs, weights] = &mut self.lanes[len / LANES];
                     let lane = len % LANES;
-                    (xs.0[lane], ys.0[lane], zs.0[lane], weights.0[lane]) = (x, y, z, weight);
-                    len += usize::from(rest > 0.0);
+                    (xs.0[lane], ys.0[lane], zs.0[lane], weights.0[lane]) = (x[at], y[at], z[at], weight[at]);
+                    len += usize::from(weight[at] > 0.0);
                 }
             }
         }
-        self.lanes.truncate(len.div_ceil(LANES));
-        if let Some([.., weights]) = self.lanes.last_mut() {
-            // Lanes without a cluster weigh nothing.
-            weights.0[(len - 1) % LANES + 1..].fill(0.0);
-        }
-        self.len = len;
+        // Lanes without a cluster weigh nothing.
+        let [.., weights] = &mut self.lanes[len / LANES];
+        weights.0[len % LANES..].fill(0.0);
+        (self.filled, self.len) = (len.div_ceil(LANES), len);
         len
     }
 
@@ -217,7 +234,7 @@ impl Gathered {
     #[inline(always)]
     pub(super) fn weight(&self) -> f32 {
         let mut sums = Lanes::default();
-        for [.., weights] in &self.lanes {
+        for [.., weights] in &self.lanes[..self.filled] {
             for lane in 0..LANES {
                 sums.0[lane] += weights.0[lane];
             }
@@ -244,7 +261,7 @@ impl Gathered {
         let mut lanes = [Lanes::default(); 10];
         for vector in 0..LANES / S::F32_LANES {
             let mut sums = [F32s::splat(simd, 0.0); 10];
-            for clusters in &self.lanes {
+            for clusters in &self.lanes[..self.filled] {
                 let [x, y, z, w] = load(simd, clusters, vector);
                 let (wx, wy, wz) = (w * x, w * y, w * z);
                 let terms = [w, wx, wy, wz, wx * x, wx * y, wx * z, wy * y, wy * z, wz * z];
@@ -275,7 +292,7 @@ impl Gathered {
         let mut lanes = [Lanes::default(); 22];
         for vector in 0..LANES / S::F32_LANES {
             let mut sums = [splat(0.0); 22];
-            for clusters in &self.lanes {
+            for clusters in &self.lanes[..self.filled] {
                 let [px, py, pz, w] = load(simd, clusters, vector);
                 let x = ux * px + uy * py + uz * pz;
                 let y = vx * px + vy * py + vz * pz;

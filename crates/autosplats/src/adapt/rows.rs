@@ -153,7 +153,7 @@ fn is_seen_through(cells: &Cells, center: [f32; 3], radius: f32, axis: Vec3, vie
     let Some(window) = Window::around(cells, center, radius, view) else { return false };
     for cell in window.rows().flatten() {
         let (mut is_on, mut is_behind) = (false, false);
-        for &Cluster { mean, .. } in cell.iter().take_while(|cluster| cluster.count > 0.0) {
+        for Cluster { mean, .. } in cell.clusters() {
             let place = Vec3::from(mean);
             let off = of_plane - axis.dot(place);
             // Where the line of sight meets the plane.

@@ -291,7 +291,7 @@ fn fit_row_with<'a, S: Simd>(
     let level = task.level;
     for (column, cell) in level.cells[row * level.columns..][..level.columns].iter().enumerate() {
         if len[column] == UNKNOWN
-            && cell[0].count > 0.0
+            && cell.count[0] > 0.0
             && let Some(asked) = task.asked_around(row, column)
         {
             len[column] = fit_cell(simd, &mut stacks[column], cell, asked, task, gathered);
@@ -310,7 +310,7 @@ fn fit_cell<S: Simd>(
     gathered: &mut Gathered,
 ) -> u8 {
     let Task { cells, noise, view, .. } = *task;
-    let mut left = cell.map(|cluster| cluster.count);
+    let mut left = cell.count;
     let mut len = 0;
     loop {
         let mut largest = 0;
@@ -323,7 +323,7 @@ fn fit_cell<S: Simd>(
             return len;
         }
         left[largest] = 0.0;
-        let center = cell[largest].mean;
+        let center = cell.mean.map(|of| of[largest]);
         let radius = k_radius_px * view.pixel_size(center[2]);
         let (noise, known) = noise(center.into(), radius, point);
         let goal = Goal::new(noise, known, radius, center[2], view);
@@ -343,7 +343,7 @@ fn fit_cell<S: Simd>(
             // One over its power of three quarters.
             trust: 1.0 / (error.sqrt() * error.sqrt().sqrt()),
         };
-        for (left, cluster) in left.iter_mut().zip(cell) {
+        for (left, cluster) in left.iter_mut().zip(cell.clusters()) {
             if *left > 0.0 {
                 let over = sheet.under(cluster.mean.into());
                 if over.height.abs() < COVERED * noise && over.near > 1.0 - COVERED_REACH {

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::{Gathered, Quadric, tangents};
 use crate::adapt::STEP;
-use crate::adapt::cells::{Cells, Cluster, Level};
+use crate::adapt::cells::{Cell, Cells, Cluster, Level};
 use crate::adapt::cpu::{Goal, choose};
 use crate::adapt::tests::angle;
 use crate::camera::{Camera, Projection, View};
@@ -19,8 +19,9 @@ fn cells_on(depth: impl Fn(f32, f32) -> f32) -> (Cells, View) {
     for cell in 0..level.columns * level.rows {
         let pixel = [cell % level.columns, cell / level.columns].map(|at| (4 * at + 2) as f32);
         let [x, y, _] = view.unproject(pixel, 1.0).to_array();
-        let cluster = Cluster { mean: [x, y, depth(x, y)], count: 1.0 };
-        level.cells.push([cluster, Cluster::default(), Cluster::default(), Cluster::default()]);
+        let mut cell = Cell::default();
+        cell.put(0, Cluster { mean: [x, y, depth(x, y)], count: 1.0 });
+        level.cells.push(cell);
     }
     (Cells { levels: vec![level] }, view)
 }
