@@ -195,7 +195,7 @@ impl Gathered {
         for row in window.rows() {
             for cell in row {
                 let Cell { mean, count } = cell;
-                // Loops and no closures: not inlined, those would be compiled without the vectors of this machine.
+                // Loops and no closures, of which not all are inlined.
                 let mut offset = [[0f32; SLABS]; 3];
                 let mut weight = [0f32; SLABS];
                 let mut is_empty = true;
