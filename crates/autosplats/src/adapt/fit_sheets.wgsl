@@ -86,6 +86,8 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             continue;
         }
         let error = quadric.error * noise;
+        // Points of two surfaces scatter more than noise does.
+        let beyond = max(quadric.scatter / noise, 1.0);
         let sheet = Sheet(
             center,
             quadric.radius,
@@ -95,8 +97,8 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             error,
             quadric.curvature,
             quadric.scatter,
-            // One over its power of three quarters.
-            1.0 / (sqrt(error) * sqrt(sqrt(error))),
+            // One over the error's power of three quarters.
+            1.0 / (sqrt(error) * sqrt(sqrt(error)) * (beyond * beyond * beyond)),
         );
         for (var index = 0u; index < SLABS; index++) {
             if left[index] > 0.0 {

@@ -42,7 +42,7 @@ struct Sheet {
     curvature: f32,
     /// Standard deviation of points from it, world units.
     scatter: f32,
-    /// How much it counts beside others, by its error.
+    /// How much it counts beside others, by its error and its scatter.
     trust: f32,
 }
 
@@ -331,6 +331,8 @@ fn fit_cell<S: Simd>(
             continue;
         };
         let error = quadric.error * noise;
+        // Points of two surfaces scatter more than noise does.
+        let beyond = (quadric.scatter / noise).max(1.0);
         let sheet = Sheet {
             center: center.into(),
             radius: quadric.radius,
@@ -340,8 +342,8 @@ fn fit_cell<S: Simd>(
             error,
             curvature: quadric.curvature,
             scatter: quadric.scatter,
-            // One over its power of three quarters.
-            trust: 1.0 / (error.sqrt() * error.sqrt().sqrt()),
+            // One over the error's power of three quarters.
+            trust: 1.0 / (error.sqrt() * error.sqrt().sqrt() * (beyond * beyond * beyond)),
         };
         for (left, cluster) in left.iter_mut().zip(cell.clusters()) {
             if *left > 0.0 {

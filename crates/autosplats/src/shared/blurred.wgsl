@@ -20,6 +20,8 @@ override OFF_SURE: f32;
 override SURE_NOISE_PX: f32;
 override FEWEST_BLURRED: u32;
 override FRINGE_NOISES: f32;
+// Blocks beyond the fringe that tell where it is empty.
+override BEYOND_FRINGE: f32;
 // Reach of a splat in splat radii.
 override SUPPORT: f32;
 
@@ -57,26 +59,58 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
         return SILENT;
     }
     let variance = window * window / PER_VARIANCE;
-    let off = length(offset.xy);
     let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / SURE_NOISE_PX, 0.0);
-    if off <= may_be * variance / sqrt(variance + noise * noise) {
+    let most = may_be * variance / sqrt(variance + noise * noise);
+    // What is off by less altogether is so that way as well.
+    if dot(offset.xy, offset.xy) <= most * most {
         return NO;
     }
-    let steps = u32(fringe_px(reach_px, noise));
+    let fringe = fringe_px(reach_px, noise);
+    let empty = to_empty(pixel, fringe + BEYOND_FRINGE * f32(BLOCK_PX));
+    if all(empty == vec2f(0.0)) {
+        return SILENT;
+    }
+    let ahead = empty / length(empty);
+    if -dot(offset.xy, ahead) <= most {
+        return NO;
+    }
+    let steps = u32(fringe) + 1u;
     for (var step = 1u; step <= steps; step++) {
-        let at = floor(vec2f(pixel) + 0.5 - offset.xy / off * f32(step));
+        let at = floor(vec2f(pixel) + 0.5 + ahead * f32(step));
         if any(at < vec2f(0.0)) || any(at >= vec2f(frame.size)) {
             // Beyond the screen the surface goes on.
             return NO;
         }
         let there = vec2u(at);
-        let block = there / BLOCK_PX;
-        let is_known = beside_picture(there) == 0u || (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u;
+        let is_known = beside_picture(there) == 0u || is_empty_block(there / BLOCK_PX);
         if is_known && cover[there.y * frame.size.x + there.x].rim == EMPTY_RIM {
             return YES;
         }
     }
     return NO;
+}
+
+fn is_empty_block(block: vec2u) -> bool {
+    return (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u;
+}
+
+// Towards the blocks that are empty within so many pixels of a pixel's middle, the nearest of which count most; 0 if there are none,
+// or as many on all sides.
+fn to_empty(pixel: vec2u, radius: f32) -> vec2f {
+    let reach = u32(radius);
+    let first = (max(pixel, vec2u(reach)) - reach) / BLOCK_PX;
+    let last = min((pixel + reach) / BLOCK_PX, block_counts() - 1u);
+    var sum = vec2f(0.0);
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            if is_empty_block(vec2u(x, y)) {
+                let offset = vec2f(BLOCK_PX * vec2u(x, y)) - vec2f(pixel) + 0.5 * f32(BLOCK_PX) - 0.5;
+                let near = max(1.0 - dot(offset, offset) / (radius * radius), 0.0);
+                sum += near * near * near * offset;
+            }
+        }
+    }
+    return sum;
 }
 
 // The mean offset, in pixels, of the sixteenths with points from the middle of a pixel, in a window of such a radius that lies

@@ -21,7 +21,7 @@ struct Sheet {
     curvature: f32,
     // Standard deviation of points from it, world units.
     scatter: f32,
-    // How much it counts beside others, by its error.
+    // How much it counts beside others, by its error and its scatter.
     trust: f32,
 }
 

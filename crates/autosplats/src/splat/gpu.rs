@@ -14,8 +14,8 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
-    BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX, OFF_BLURRED,
-    PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
+    BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
+    OFF_BLURRED, PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
 };
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
@@ -230,6 +230,7 @@ impl SplatPasses {
                 ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
                 ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
                 ("FRINGE_NOISES", FRINGE_NOISES.into()),
+                ("BEYOND_FRINGE", BEYOND_FRINGE.into()),
                 ("SUPPORT", SUPPORT.into()),
             ];
             Pass::new(gpu, &TRIM, &constants)

@@ -6,7 +6,8 @@
 //! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of deviation σ, it is
 //! 0.80 w²/√(w² + σ²) at the straight end of points strewn evenly, and 0.48 w²/√(w² + σ²) where a surface curves away, so that
 //! points lie ever closer up to its end. Silhouettes are nearly always of the second kind; straight ends are cut off by half of
-//! the noise too much. What is off by more, and has something empty ahead on the other side, is beside the surface. All points tell,
+//! the noise too much. What is off by more, away from where it is empty, and has something empty ahead there, is beside the
+//! surface. Only how far it is off that way counts: another surface behind the border draws the mean along it. All points tell,
 //! hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they are dense, and all there
 //! are in the fringe.
 //!
@@ -38,7 +39,7 @@ pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
 pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
 /// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
 /// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more.
-pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.55];
+pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.52];
 /// In pixels.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
 /// From how many sixteenths with points on they tell.
@@ -47,6 +48,8 @@ pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
 pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
 /// nor than so many blocks.
 pub(crate) const FRINGE_BLOCKS: usize = 16;
+/// Blocks that are empty, up to so many beyond the fringe, tell where it is empty.
+pub(in crate::splat) const BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
 pub(crate) const BLOCK_PX: usize = 4;
 
@@ -133,6 +136,31 @@ impl Blurred {
     pub(super) fn blocks_to_empty(&self, column: usize, row: usize) -> u8 {
         self.to_empty[row * self.blocks.columns + column]
     }
+
+    /// The direction, as a unit vector, from the middle of pixel (x, y) to the blocks that are empty within so many pixels, the
+    /// nearest of which count most; `None` if there are none, or as many on all sides.
+    pub(super) fn towards_empty(&self, [x, y]: [usize; 2], radius: f32) -> Option<[f32; 2]> {
+        let reach = radius as usize;
+        let along =
+            |at: usize, most: usize| at.saturating_sub(reach) / BLOCK_PX..((at + reach) / BLOCK_PX + 1).min(most);
+        let middle = |block: usize, at: usize| (BLOCK_PX * block) as f32 - at as f32 + 0.5 * (BLOCK_PX as f32 - 1.0);
+        let per_radius = 1.0 / (radius * radius);
+        let [mut right, mut down] = [0f32; 2];
+        for row in along(y, self.blocks.rows) {
+            for column in along(x, self.blocks.columns) {
+                if self.blocks_to_empty(column, row) > 0 {
+                    continue;
+                }
+                let (ox, oy) = (middle(column, x), middle(row, y));
+                let near = (1.0 - (ox * ox + oy * oy) * per_radius).max(0.0);
+                let weight = near * near * near;
+                right += weight * ox;
+                down += weight * oy;
+            }
+        }
+        let length = right.hypot(down);
+        (length > 0.0).then(|| [right / length, down / length])
+    }
 }
 
 impl Outline<'_> {
@@ -169,14 +197,19 @@ impl Outline<'_> {
         let held = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
         let [ox, oy] = pulp::Arch::new().dispatch(|| held.offset([x, y], window))?;
         let variance = window * window / PER_VARIANCE;
-        let off = (ox * ox + oy * oy).sqrt();
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
-        if off <= may_be * variance / (variance + noise_px * noise_px).sqrt() {
+        let most = may_be * variance / (variance + noise_px * noise_px).sqrt();
+        // What is off by less altogether is so that way as well.
+        if ox * ox + oy * oy <= most * most {
+            return Some(false);
+        }
+        let [ahead_x, ahead_y] = blurred.towards_empty([x, y], fringe + BEYOND_FRINGE * BLOCK_PX as f32)?;
+        if -(ox * ahead_x + oy * ahead_y) <= most {
             return Some(false);
         }
         let ahead = |step: usize| {
-            let at = [(x, ox), (y, oy)].map(|(at, offset)| at as f32 + 0.5 - offset / off * step as f32);
+            let at = [(x, ahead_x), (y, ahead_y)].map(|(at, ahead)| at as f32 + 0.5 + ahead * step as f32);
             let [x, y] = at.map(|at| at.floor() as isize);
             let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
             // Beyond the screen the surface goes on.
@@ -186,7 +219,7 @@ impl Outline<'_> {
             self.rims[self.index([x, y])] == EMPTY
                 && (self.view.beside_picture([x, y]) == 0 || blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX) == 0)
         };
-        let met = (1..=fringe as usize).map_while(ahead).any(is_empty);
+        let met = (1..=fringe as usize + 1).map_while(ahead).any(is_empty);
         Some(met)
     }
 }

@@ -286,6 +286,26 @@ fn blocks_know_how_far_an_empty_one_is() {
 }
 
 #[test]
+fn what_is_empty_lies_where_it_does() {
+    let view = view([TILE as u32; 2]);
+    let found = |is_empty: fn(usize, usize) -> bool, at: [usize; 2]| {
+        let rim = |pixel: usize| if is_empty(pixel % TILE, pixel / TILE) { EMPTY } else { 2.0 };
+        let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
+        let noise = Noise { level: 1.0, ..Noise::NONE };
+        let blurred = Blurred::new(noise, 1.6, &rims, &Sixteenths::with([TILE; 2], []), &view).expect("noise");
+        blurred.towards_empty(at, 16.0)
+    };
+    let is_near = |found: Option<[f32; 2]>, [x, y]: [f32; 2]| {
+        found.is_some_and(|[fx, fy]| (fx - x).hypot(fy - y) < 0.1 && (fx.hypot(fy) - 1.0).abs() < 1e-5)
+    };
+    assert!(is_near(found(|_, y| y < 20, [32, 28]), [0.0, -1.0]), "up to a straight border");
+    assert!(is_near(found(|x, y| x > 40 && y > 40, [35, 35]), [0.5f32.sqrt(); 2]), "into a corner");
+    // The nearest count most: left is nearer than right.
+    assert!(is_near(found(|x, _| !(27..46).contains(&x), [32, 32]), [-1.0, 0.0]), "of two");
+    assert!(found(|x, _| x > 52, [32, 32]).is_none() && found(|_, _| false, [0, 63]).is_none(), "too far away");
+}
+
+#[test]
 fn what_is_thin_stays() {
     // A wire a fifth of a pixel thick, which passes by the middles of most pixels; and a point alone.
     let size = [TILE, 40];
