@@ -22,7 +22,7 @@ use crate::adapt::Noise;
 use crate::camera::View;
 use crate::project::Sixteenths;
 use crate::splat::setup::SUPPORT;
-use crate::splat::tiled_index;
+use crate::splat::{TILE, tiled_index};
 
 /// Least noise, in pixels, that blurs a border: with less, detail of far views that was taken for noise would be cut.
 pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
@@ -52,6 +52,9 @@ pub(crate) const FRINGE_BLOCKS: usize = 16;
 pub(in crate::splat) const BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
 pub(crate) const BLOCK_PX: usize = 4;
+
+/// Along an axis.
+const BLOCKS_PER_TILE: usize = TILE / BLOCK_PX;
 
 /// Squares that are summed up at a time; their sums are added up in this many parts on any machine.
 const LANES: usize = 8;
@@ -102,33 +105,47 @@ impl Blurred {
         };
         let held = |(x, y, len): (usize, usize, usize)| pixels.count[y * width + x..][..len].iter().sum::<u16>();
         let blocks = Held::new([BLOCK_PX, columns, rows], |x, y| rows_of(x, y).map(held).sum());
-        let is_empty = |(x, y, len): (usize, usize, usize)| {
-            rims[tiled_index(width, x, y)..][..len].iter().all(|&rim| rim == EMPTY)
-        };
         // Most of the margin has no splats, and may hold a surface.
         let goes_on = |[x, y]: [usize; 2]| {
             let [first, last] = [0, BLOCK_PX - 1].map(|more| [x, y].map(|at| at * BLOCK_PX + more));
             let is_beside = view.beside_picture(first) > 0 && view.beside_picture(last) > 0;
             is_beside && blocks.count[y * columns + x] > 0
         };
-        let to_empty = |block: usize| {
-            let [x, y] = [block % columns, block / columns];
-            if rows_of(x, y).all(is_empty) && !goes_on([x, y]) { 0 } else { FRINGE_BLOCKS as u8 + 2 }
-        };
-        let mut to_empty: Vec<u8> = (0..columns * rows).into_par_iter().map(to_empty).collect();
-        // From block to block, those across corners as well, down and to the right, then back.
-        let mut step = |x: usize, y: usize, from: [[isize; 2]; 4]| {
-            for [dx, dy] in from {
-                let [bx, by] = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy)];
-                if bx < columns && by < rows {
-                    to_empty[y * columns + x] = to_empty[y * columns + x].min(to_empty[by * columns + bx] + 1);
+        // Along a row of blocks, tile by tile.
+        let along_row = |y: usize, to_empty: &mut [u8]| {
+            let pixel_rows = y * BLOCK_PX..((y + 1) * BLOCK_PX).min(height);
+            for (tile, to_empty) in to_empty.chunks_mut(BLOCKS_PER_TILE).enumerate() {
+                let (first, len) = (tile * TILE, TILE.min(width - tile * TILE));
+                let mut covered = [false; TILE];
+                for y in pixel_rows.clone() {
+                    let rims = &rims[tiled_index(width, first, y)..][..len];
+                    covered.iter_mut().zip(rims).for_each(|(covered, &rim)| *covered |= rim != EMPTY);
+                }
+                for (x, (to_empty, covered)) in to_empty.iter_mut().zip(covered.chunks(BLOCK_PX)).enumerate() {
+                    let is_empty = covered == [false; BLOCK_PX] && !goes_on([tile * BLOCKS_PER_TILE + x, y]);
+                    *to_empty = if is_empty { 0 } else { FRINGE_BLOCKS as u8 + 2 };
                 }
             }
+            (1..columns).for_each(|x| to_empty[x] = to_empty[x].min(to_empty[x - 1] + 1));
+            (1..columns).rev().for_each(|x| to_empty[x - 1] = to_empty[x - 1].min(to_empty[x] + 1));
         };
-        let before = [[-1, -1], [0, -1], [1, -1], [-1, 0]];
-        let after = before.map(|from| from.map(|along| -along));
-        (0..rows).for_each(|y| (0..columns).for_each(|x| step(x, y, before)));
-        (0..rows).rev().for_each(|y| (0..columns).rev().for_each(|x| step(x, y, after)));
+        let mut to_empty = vec![0; columns * rows];
+        to_empty.par_chunks_mut(columns).enumerate().for_each(|(y, row)| along_row(y, row));
+        // Then from row to row, across corners as well: down, and back.
+        let step = |from: &[u8], row: &mut [u8]| {
+            let nearer = |(to_empty, from): (&mut u8, &u8)| *to_empty = (*to_empty).min(from + 1);
+            row.iter_mut().zip(from).for_each(nearer);
+            row.iter_mut().zip(&from[1..]).for_each(nearer);
+            row[1..].iter_mut().zip(from).for_each(nearer);
+        };
+        for y in 1..rows {
+            let (before, after) = to_empty.split_at_mut(y * columns);
+            step(&before[(y - 1) * columns..], &mut after[..columns]);
+        }
+        for y in (1..rows).rev() {
+            let (before, after) = to_empty.split_at_mut(y * columns);
+            step(&after[..columns], &mut before[(y - 1) * columns..]);
+        }
         Some(Self { noise, per_radius, pixels, blocks, to_empty })
     }
 
