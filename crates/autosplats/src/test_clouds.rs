@@ -105,6 +105,11 @@ pub(crate) fn edge(count: usize) -> Positions {
     patch(5, count, |x, y| [x, y, x.abs()])
 }
 
+/// Two halves of a plane, one a tenth before the other.
+pub(crate) fn step(count: usize) -> Positions {
+    patch(1, count, |x, y| [x, y, if x > 0.0 { -0.1 } else { 0.0 }])
+}
+
 /// A plane with more and more points towards one side.
 pub(crate) fn density_ramp(count: usize) -> Positions {
     patch(6, count, |x, y| [x * x * x, y, 0.1 * y])

@@ -438,12 +438,20 @@ fn a_noisy_edge_stays_sharp() {
             (from..to).contains(&x.abs()).then(|| view.view_from_world * face)
         }
     };
-    let adapted = case.adapted();
     let errors = [[0.02, 0.08], [0.08, 0.3], [0.3, 0.8]].map(|[from, to]| {
-        [mean_error(case.fitted.iter().flatten(), beside(from, to)), mean_error(&adapted, beside(from, to))]
+        [mean_error(case.fitted.iter().flatten(), beside(from, to)), mean_error(&case.adapted(), beside(from, to))]
     });
     // Blended over the edge they would be 45° off.
     assert!(errors[0][1] < 12.0 && errors[1][1] < 6.0 && errors[2][1] < 3.0, "{errors:?}");
+}
+
+#[test]
+fn a_step_of_ten_times_the_noise_is_two_surfaces() {
+    let points = noisy(test_clouds::step(30_000), 0.01);
+    let case = Case::new(&points, PROJECTIONS[0], [400, 300]);
+    let is_near = |surfel: &Surfel| points[surfel.source as usize][0].abs() < 0.15;
+    let error = mean_error(case.adapted().iter().filter(|of| is_near(of)), |_| Some(case.view.view_from_world.z_axis));
+    assert!(error < 4.6, "{error} degrees off");
 }
 
 #[test]

@@ -175,7 +175,7 @@ impl Blurred {
                 down += weight * oy;
             }
         }
-        let length = right.hypot(down);
+        let length = (right * right + down * down).sqrt();
         (length > 0.0).then(|| [right / length, down / length])
     }
 }
