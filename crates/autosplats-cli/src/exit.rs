@@ -42,7 +42,7 @@ pub(crate) struct Failure {
 impl Failure {
     /// A failure of a kind, with its message.
     pub(crate) fn new(exit: Exit, message: impl Display) -> Self {
-        Self { exit, message: message.to_string() }
+        Self { exit, message: plain(message.to_string()) }
     }
 
     /// Bad usage.
@@ -53,6 +53,15 @@ impl Failure {
     /// Ctrl-C.
     pub(crate) fn interrupted() -> Self {
         Self::new(Exit::Interrupted, "interrupted")
+    }
+}
+
+/// What the operating system says without the number that it has for that.
+fn plain(message: String) -> String {
+    let number = message.split_once(" (os error ").and_then(|(said, after)| Some((said, after.split_once(')')?)));
+    match number {
+        Some((said, (digits, rest))) if digits.parse::<i32>().is_ok() => format!("{said}{rest}"),
+        _ => message,
     }
 }
 
@@ -68,7 +77,14 @@ pub(crate) fn suggest<'a>(typed: &str, known: impl IntoIterator<Item = &'a str>)
 
 #[cfg(test)]
 mod tests {
-    use super::suggest;
+    use super::{plain, suggest};
+
+    #[test]
+    fn the_system_is_told_without_its_numbers() {
+        let said = |text: &str| plain(text.into());
+        assert_eq!(said("a.ply: No such file (os error 2); type b"), "a.ply: No such file; type b");
+        assert_eq!(said("a (os error b).ply: empty"), "a (os error b).ply: empty", "a name");
+    }
 
     #[test]
     fn suggestions_are_near_or_all() {

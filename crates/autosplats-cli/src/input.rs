@@ -98,24 +98,16 @@ impl Inputs {
             return Err(Failure::usage("--columns: no input is text; scenes have no columns to name"));
         }
         for pose in poses {
-            let (input, matrix) = list
-                .iter_mut()
-                .filter_map(|input| {
-                    let matrix = pose.strip_prefix(&input.name)?.strip_prefix('=')?.to_owned();
-                    Some((input, matrix))
-                })
-                // Of `a` and `a=b` the longer name is meant.
-                .max_by_key(|(input, _)| input.name.len())
-                .ok_or_else(|| {
-                    Failure::usage(format!(
-                        "--pose {pose}: it has to be INPUT=FILE with one of the inputs as typed: {}",
-                        names.join(", ")
-                    ))
-                })?;
-            input.world_from_input = read_pose(Path::new(&matrix))?;
-            input.pose = Some(matrix.into());
+            let (place, file) = posed(names, pose).ok_or_else(|| {
+                let names = names.join(", ");
+                Failure::usage(format!("--pose {pose}: it has to be INPUT=FILE with one of the inputs: {names}"))
+            })?;
+            list[place].world_from_input = read_pose(file)?;
+            list[place].pose = Some(file.into());
         }
-        Ok(Self { list, options: reading.options(), play: playing.options() })
+        // A pipe can wait; what it carries cannot be had again.
+        let play = PlayOptions { all: true, ..playing.options() };
+        Ok(Self { list, options: reading.options(), play })
     }
 
     /// Of several names the last is the output's.
@@ -141,7 +133,8 @@ impl Inputs {
     /// The inputs as the viewer takes them.
     #[cfg(feature = "viewer")]
     pub(crate) fn for_viewer(mut self, watch: bool) -> Vec<autosplats_viewer::Input> {
-        self.play.watch = watch;
+        // The window shows how things are now.
+        (self.play.watch, self.play.all) = (watch, false);
         let Self { list, options, play } = self;
         // What would be passed over otherwise asks for files and scenes to be played as well.
         let made = play.scanners.is_some() || play.sample.is_some();
@@ -199,6 +192,10 @@ impl Inputs {
                 return input.source.read(&self.options, progress);
             }
             let mut player = input.source.play(&self.play, &self.options, progress)?;
+            let frames = player.stream().timeline().map_or(0, |timeline| timeline.stamps().len());
+            if frames > 1 {
+                progress.note(&format!("this is the first of {frames} frames"));
+            }
             player.first(FIRST_POINTS, progress).map(Arc::unwrap_or_clone)
         })
     }
@@ -226,6 +223,13 @@ impl Inputs {
             playing.begins = begins;
         }
         Ok(playing)
+    }
+
+    /// Whether one of them is a pipe, and none comes when it comes otherwise.
+    pub(crate) fn come_by_pipe(&self) -> bool {
+        let is_pipe = |input: &Input| matches!(input.source, Source::StandardInput);
+        let is_remote = |input: &Input| matches!(input.source, Source::Remote(_));
+        self.list.iter().any(is_pipe) && !self.list.iter().any(is_remote)
     }
 
     /// Refuses to watch what cannot be watched, and pictures that would be taken for new files of a watched folder.
@@ -311,6 +315,19 @@ impl Inputs {
         tell_disagreements(&clouds, &parts);
         Ok(PointCloud::merge(clouds))
     }
+}
+
+/// Which of the inputs `INPUT=FILE` places, by its name or by the last part of it if no other has the same, and the file.
+fn posed<'a>(names: &[String], pose: &'a str) -> Option<(usize, &'a Path)> {
+    // Of `a` and `a=b` the longer name is meant.
+    pose.rmatch_indices('=').find_map(|(at, _)| {
+        let (typed, file) = (Path::new(&pose[..at]), Path::new(&pose[at + 1..]));
+        let mut ends =
+            (0..names.len()).filter(|&place| Path::new(&names[place]).file_name() == Some(typed.as_os_str()));
+        let only = ends.next().filter(|_| ends.next().is_none());
+        let place = names.iter().rposition(|name| Path::new(name) == typed).or(only)?;
+        Some((place, file))
+    })
 }
 
 /// Tells what one cloud cannot have because not all of its parts do.
@@ -436,6 +453,18 @@ mod tests {
         };
         assert_eq!(new(&["-"]), Ok(()), "once");
         assert!(new(&["-", "scene:statue:1K", "-"]).is_err_and(|told| told.contains("only once")), "twice");
+    }
+
+    #[test]
+    fn poses_are_of_inputs() {
+        let names = ["a/scan.ply", "./b.ply", "c/scan.ply", "a=b"].map(String::from);
+        let placed = |pose: &'static str| posed(&names, pose).map(|(place, file)| (place, file.to_str().unwrap_or("")));
+        assert_eq!(placed("c/scan.ply=p.txt"), Some((2, "p.txt")), "as typed");
+        assert_eq!(placed("b.ply=p=q.txt"), Some((1, "p=q.txt")), "by the last part of the name");
+        assert_eq!(placed("c//scan.ply=p.txt"), Some((2, "p.txt")), "the same path");
+        assert_eq!(placed("a=b=p.txt"), Some((3, "p.txt")), "the longer name");
+        assert_eq!(placed("scan.ply=p.txt"), None, "either of two");
+        assert_eq!(placed("other.ply=p.txt"), None, "none of them");
     }
 
     #[test]

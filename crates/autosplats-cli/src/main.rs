@@ -102,7 +102,9 @@ fn without_command(typed: Vec<String>) -> Result<(), Failure> {
 fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let paragraphs = text.split("\n\n").filter(|part| !part.starts_with("Usage:") && !part.starts_with("For more"));
-    let what = paragraphs.collect::<Vec<_>>().join(" ");
-    let words: Vec<&str> = what.trim_start_matches("error: ").split_whitespace().collect();
-    format!("{} (--help explains)", words.join(" "))
+    let plain = |part: &str| {
+        let part = part.trim().trim_start_matches("error: ").trim_start_matches("tip: ");
+        part.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    format!("{} (--help explains)", paragraphs.map(plain).collect::<Vec<_>>().join("; "))
 }

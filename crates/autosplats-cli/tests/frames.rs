@@ -43,7 +43,13 @@ fn frames_are_chosen_and_numbered_as_they_are() {
     let folder = folder();
     render(&folder, &["--frames", "1..2", "-o", "f.png"]);
     assert_eq!(pictures(&folder), ["f_00001.png", "f_00002.png"], "both ends are included");
-    folder.fail(&["render", "sweep", "--frames", "2..4", "-o", "f.png"], 2, &["sweep", "4 frames", "0 to 3"]);
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "--frames", "3..99", "-o", "g.png"]);
+    assert!(
+        out.stderr.contains("note: sweep has 4 frames, 0 to 3") && out.stderr.contains("1 picture"),
+        "{}",
+        out.stderr
+    );
+    folder.fail(&["render", "sweep", "--frames", "4..", "-o", "f.png"], 2, &["sweep", "4 frames", "0 to 3"]);
     folder.fail(&["render", "sweep", "--frames", "3..2", "-o", "f.png"], 2, &["--frames"]);
 }
 
@@ -74,7 +80,8 @@ fn json_tells_each_frame() {
 #[test]
 fn a_folder_alone_is_its_first_frame() {
     let folder = folder();
-    render(&folder, &["-o", "first.png"]);
+    let out = folder.succeed(&["render", "sweep", "--size", "120x90", "-o", "first.png"]);
+    assert!(out.stderr.contains("sweep: this is the first of 4 frames"), "which is said: {}", out.stderr);
     folder.succeed(&["render", "sweep/scan_0.xyz", "--size", "120x90", "--quiet", "-o", "file.png"]);
     assert_eq!(folder.read("first.png"), folder.read("file.png"), "the same as the file");
 }
@@ -87,6 +94,18 @@ fn a_frame_that_cannot_be_read_is_told_and_passed_over() {
     assert_eq!(pictures(&folder).len(), 4, "the frame before is shown for it");
     assert_eq!(out.stderr.matches("scan_2.xyz").count(), 1, "told once: {}", out.stderr);
     assert_eq!(folder.read("f_1.png"), folder.read("f_2.png"), "as it was");
+}
+
+#[test]
+fn frames_that_show_nothing_are_told() {
+    let folder = folder();
+    let out = folder.succeed(&["render", "sweep", "--eye", "15,15,2", "--look-at", "15,15.1,12", "-o", "f_%d.png"]);
+    assert_eq!(pictures(&folder).len(), 4, "they have a picture as well");
+    assert!(
+        out.stderr.contains("note: 2 frames show nothing, the first of them 0"),
+        "behind the eye and too near: {}",
+        out.stderr
+    );
 }
 
 #[test]

@@ -83,6 +83,36 @@ fn what_is_not_taken_in_time_is_dropped_and_counted() {
 }
 
 #[test]
+fn where_all_are_taken_the_writer_waits() {
+    let (sender, mut live) = pipe(&LiveOptions { all: true, ..LiveOptions::default() });
+    for count in 1..=100 {
+        let refused: &[u8] = if count % 10 == 0 { b"nonsense\n" } else { b"" };
+        sender.send([&pcd_bytes("binary", count), refused].concat()).unwrap();
+    }
+    std::thread::sleep(Duration::from_millis(100));
+    let (mut lens, mut refusals) = (Vec::new(), 0);
+    loop {
+        match live.next(PATIENCE, &()) {
+            Ok(Next::Update(update)) => lens.push(update.cloud.len()),
+            Ok(_) => break,
+            Err(_) => refusals += 1,
+        }
+        if lens.len() == 99 {
+            // All that is left is one that waits.
+            break;
+        }
+    }
+    assert!(lens.iter().copied().eq(1..=99), "all, in order: {lens:?}");
+    assert_eq!((refusals, live.statistics().dropped), (9, 0), "and all that is refused");
+    drop(live);
+    let started = Instant::now();
+    while sender.send(pcd_bytes("binary", 1)).is_ok() && started.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(started.elapsed() < PATIENCE, "the thread ends where nobody takes what it holds");
+}
+
+#[test]
 fn what_is_refused_is_said_and_the_next_frame_read() {
     let options = LiveOptions { max_frame_bytes: 100_000, ..LiveOptions::default() };
     let (sender, mut live) = pipe(&options);

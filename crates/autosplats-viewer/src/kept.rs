@@ -134,7 +134,7 @@ impl Reading {
 
 impl Play {
     fn of(input: &Input) -> Self {
-        let PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest } = input.play.clone();
+        let PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, all: _ } = input.play.clone();
         Self {
             played: input.played,
             fps,
@@ -159,7 +159,7 @@ impl Play {
         let decay = decay.and_then(|decay| Duration::try_from_secs_f64(decay).ok());
         let latest = LatestOptions { decay, accumulate, ..LatestOptions::default() };
         let (frame, sample, scanners) = (fixed_frame, strew, scan);
-        PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest }
+        PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, all: false }
     }
 }
 
@@ -190,6 +190,7 @@ mod tests {
             scanners: Some(3),
             seed: 7,
             watch: true,
+            all: false,
             latest,
         };
         let world_from_input = DMat4::from_rotation_z(0.5);

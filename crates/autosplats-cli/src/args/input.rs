@@ -31,7 +31,8 @@ pub(crate) struct InputArgs {
 #[command(next_help_heading = "Points that move")]
 pub(crate) struct PlayingArgs {
     /// Files of a sequence in a second, times a second that a glTF or a scene is looked at, and pictures a second of a film
-    /// [default: 10, 30, and for a film the frames' own rate, or 30 where they are not evenly apart]
+    /// [default: 10, 30, and for a film the frames' own rate, or 30 where they are not evenly apart]. 'render' takes the frames
+    /// of a pipe for that far apart, else as they come
     #[arg(long, value_name = "RATE", value_parser = values::rate)]
     pub(crate) fps: Option<f64>,
     /// Topic of a recording to play; can be given several times [default: all that have points]
@@ -50,9 +51,9 @@ pub(crate) struct PlayingArgs {
     /// Strew so many points over the surface of each mesh in place of its corners, which move with it
     #[arg(long, value_name = "COUNT", value_parser = values::count)]
     pub(crate) strew: Option<usize>,
-    /// Put so many simulated scanners, 1 to 4, around each mesh or scene, each noisier than the one before, and take what they
-    /// see. Where that is too little 'render --color k-radius --range 0.01..0.03' shows in red: as far apart as its upper end,
-    /// or further
+    /// Show what so many simulated scanners, 1 to 4, around each mesh or scene would see of it, each noisier than the one before.
+    /// 'render --color k-radius --range 0.01..0.03' shows in red where that is too little: points as far apart as the upper end
+    /// of the range, or further
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u8).range(1..=4))]
     pub(crate) scan: Option<u8>,
 }

@@ -13,9 +13,9 @@ use crate::values::{self, Neighbors, Ortho};
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
-    /// Direction to look from, at a distance that shows everything but far outliers [default: iso; in perspective the
-    /// sensor's own view where the points are in a camera's frame, and from behind it, not showing everything, where it
-    /// stood among points that are far denser near it]
+    /// Side to look from, so that everything is in the picture but far outliers [default: iso, from the front, right and above;
+    /// but points in a camera's frame as that camera saw them, and those around a sensor from close behind it. Both are
+    /// for perspective alone]
     #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
     pub(crate) view: Option<Side>,
     /// Position of the eye in world coordinates
@@ -82,8 +82,8 @@ pub(crate) struct SurfaceArgs {
     /// Keep points that have no neighbour, or are far from all of them
     #[arg(long)]
     pub(crate) keep_outliers: bool,
-    /// How much emptier the surroundings have to become for a group of points to end there, above 1; with '-k auto' the square of
-    /// it for a single neighbour
+    /// Above 1; less keeps narrower gaps open. A point's neighbours end where the next one is further away than all so far times
+    /// the square root of this, or with '-k auto', as long as there is but one, times this
     #[arg(
         long,
         value_name = "FACTOR",

@@ -42,8 +42,8 @@ pub(crate) struct RenderArgs {
     /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures
     #[arg(long, value_name = "FACTOR", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(crate) supersample: u32,
-    /// Frames of what moves to render, from 0, both ends included: 0..99, 50.., ..9 or 7; of what is live, updates in the order
-    /// they come [default: all with a numbered name or a film, else the first]
+    /// Frames of what moves to render, from 0, both ends included: 0..99, 50.., ..9 or 7, as far as there are; of what is live,
+    /// updates in the order they come [default: all with a numbered name or a film, else the first]
     #[arg(long, value_name = "A..B", value_parser = values::frame_range, help_heading = "Points that move")]
     pub(crate) frames: Option<FrameRange>,
     /// Leave out frames whose picture is there already

@@ -12,7 +12,7 @@ use serde_json::error::Category;
 use super::render_failure;
 use crate::args::CameraArgs;
 use crate::choices::{AxesChoice, Side};
-use crate::exit::{Exit, Failure};
+use crate::exit::Failure;
 use crate::output::write_file;
 use crate::values::Ortho;
 
@@ -64,6 +64,15 @@ impl CameraJob {
         }
     }
 
+    /// What to do where there is nothing in the picture.
+    pub(super) fn remedy(&self) -> &'static str {
+        match self.place {
+            Place::File(..) => "a picture without --camera",
+            Place::Eye { .. } => "a picture without --eye",
+            Place::Fitted(_) => "--view iso",
+        }
+    }
+
     /// Places the camera before the points, and says which way is up.
     pub(super) fn place(
         &self,
@@ -72,14 +81,18 @@ impl CameraJob {
         size: [u32; 2],
     ) -> Result<(Camera, Axes), Failure> {
         let axes = self.axes.unwrap_or_else(|| guess_axes(cloud));
-        let fitted = |view| {
+        let fitted_by = |view, projection| {
             let aspect = f64::from(size[0]) / f64::from(size[1]);
-            Camera::fit(cloud, axes, direction(view), aspect, self.projection()).map_err(render_failure)
+            Camera::fit(cloud, axes, direction(view), aspect, projection).map_err(render_failure)
         };
+        let fitted = |view| fitted_by(view, self.projection());
         let mut camera = match self.place {
             Place::File(_, camera) => return Ok((camera, axes)),
             Place::Eye { eye, look_at, up } => {
-                let look_at = look_at.map_or_else(|| fitted(Some(Side::Iso)).map(|fitted| fitted.look_at), Ok)?;
+                // What has no perspective is in the middle where the points are.
+                let middle =
+                    || fitted_by(Some(Side::Iso), Projection::OrthographicHeight(1.0)).map(|fitted| fitted.look_at);
+                let look_at = look_at.map_or_else(middle, Ok)?;
                 let up = up.unwrap_or_else(|| upward(axes, look_at - eye));
                 let projection = match self.ortho {
                     Some(Ortho(None)) => fitted(Some(Side::Iso))?.projection,
@@ -142,7 +155,7 @@ fn upward(axes: Axes, sight: DVec3) -> DVec3 {
 
 fn load(path: &Path) -> Result<Camera, Failure> {
     let shown = path.display();
-    let text = read_to_string(path).map_err(|error| Failure::new(Exit::Input, format!("{shown}: {error}")))?;
+    let text = read_to_string(path).map_err(|error| Failure::usage(format!("{shown}: {error}")))?;
     let camera: Camera = serde_json::from_str(&text).map_err(|error| {
         let why = match error.classify() {
             Category::Data => "eye, look_at and up are three numbers each, projection is one that --save-camera writes",

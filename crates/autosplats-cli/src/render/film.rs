@@ -110,15 +110,17 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
         }
     }
     let mut scene = Moving::new(playing, job.inputs.names());
-    let frames = film.frames.first..film.frames.last.map_or(scene.times.len(), |last| last.saturating_add(1));
-    if frames.end > scene.times.len() || frames.is_empty() {
-        let there = scene.times.len();
-        return Err(Failure::usage(format!(
-            "--frames: {} has {there} frame{}, 0 to {}",
-            job.inputs.names(),
-            if there == 1 { "" } else { "s" },
-            there.saturating_sub(1)
-        )));
+    let there = scene.times.len();
+    let frames = film.frames.first..film.frames.last.map_or(there, |last| last.saturating_add(1)).min(there);
+    let has = || {
+        let plural = if there == 1 { "" } else { "s" };
+        format!("{} has {there} frame{plural}, 0 to {}", job.inputs.names(), there.saturating_sub(1))
+    };
+    if frames.is_empty() {
+        return Err(Failure::usage(format!("--frames: {}", has())));
+    }
+    if film.frames.last.is_some_and(|last| last >= there) && !job.quiet {
+        eprintln!("note: {}", has());
     }
     for file in frames.clone().filter_map(|frame| film.file(frame)) {
         job.read_files.check(&file)?;
@@ -160,7 +162,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
             let cloud = scene.frame(frame, &notes)?;
             let read_ms = super::milliseconds_since(started);
             let rendered = job.render(renderer, &cloud, &camera)?;
-            tally.milliseconds += rendered.timings.frame;
+            tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let seconds = scene.times[frame] as f64 / 1e9;
             let report = FrameReport { frame, seconds, path, pictures, counts, read_ms, timings_ms };
@@ -194,16 +196,32 @@ pub(super) fn picture(job: &Job, frame: &Frame<'_>, writer: &Writer) -> autospla
 pub(super) struct Tally {
     pub(super) written: usize,
     pub(super) kept: usize,
-    pub(super) milliseconds: f64,
+    milliseconds: f64,
+    /// Frames that show nothing, and the first of them.
+    empty: Option<(usize, usize)>,
 }
 
 impl Tally {
+    /// Counts what was rendered of a frame.
+    pub(super) fn count(&mut self, frame: usize, rendered: &Frame<'_>) {
+        self.milliseconds += rendered.timings.frame;
+        if rendered.counts.covered == 0 {
+            let (count, first) = self.empty.unwrap_or((0, frame));
+            self.empty = Some((count + 1, first));
+        }
+    }
+
     /// One line on standard error.
     pub(super) fn summarize(&self, film: &FilmJob, more: &str, begun: Instant, device: &Device) {
         let place = match &film.target {
             Target::Film(path) => path.clone(),
             Target::Frames(names) => names.pattern(),
         };
+        match self.empty {
+            Some((1, frame)) => eprintln!("note: frame {frame} shows nothing"),
+            Some((count, first)) => eprintln!("note: {count} frames show nothing, the first of them {first}"),
+            None => {}
+        }
         eprintln!(
             "{}: {} picture{}{more}; {:.1} s, of which {:.1} s rendering on {}",
             place.display(),

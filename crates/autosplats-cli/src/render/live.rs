@@ -39,10 +39,12 @@ pub(super) fn run(
     // What is there by then is kept, a film as well.
     interrupt::end_gently();
     let rate = film.fps.unwrap_or(schedule::USUAL_RATE);
+    // A pipe gives its frames as fast as they are taken, so that times of arrival may say nothing.
+    let evenly = film.fps.is_some() && job.inputs.come_by_pipe() && !film.watch;
     let begun = Instant::now();
     let mut tally = Tally::default();
     let mut place = Place::default();
-    let (mut first_frame, mut frame) = (None, 0);
+    let (mut first_frame, mut frame): (Option<First>, usize) = (None, 0);
     let writer = Writer::start(film.style(job, rate));
     let is_film = matches!(film.target, Target::Film(_));
     // The last picture of a film is shown until the next one comes, and nobody knows yet when that will be.
@@ -57,20 +59,20 @@ pub(super) fn run(
                 continue;
             }
             let read_ms = super::milliseconds_since(waited);
-            let (camera, first): &(Camera, Instant) = match &first_frame {
-                Some(placed) => placed,
+            let first = match &first_frame {
+                Some(first) => first,
                 None => {
                     let camera = place.settle(job, renderer, &cloud, Arc::clone(&cloud))?;
                     if let Some(path) = &job.save_camera {
                         check_target(path, &job.read_files)?;
                         camera::save(path, &camera)?;
                     }
-                    first_frame.insert((camera, Instant::now()))
+                    first_frame.insert(First { frame, came: Instant::now(), camera, rate: evenly.then_some(rate) })
                 }
             };
-            let seconds = first.elapsed().as_secs_f64();
-            let rendered = job.render(renderer, &place.upright(cloud), camera)?;
-            tally.milliseconds += rendered.timings.frame;
+            let seconds = first.seconds_until(frame);
+            let rendered = job.render(renderer, &place.upright(cloud), &first.camera)?;
+            tally.count(frame, &rendered);
             let (counts, timings_ms) = (rendered.counts, rendered.timings);
             let path = film.file(frame);
             let report = FrameReport { frame, seconds, path, pictures: None, counts, read_ms, timings_ms };
@@ -89,8 +91,8 @@ pub(super) fn run(
         Ok(())
     };
     let rendered = render_all();
-    if let (Some(shot), Some((_, first))) = (shown.take(), &first_frame) {
-        hand_over(shot, Some(first.elapsed().as_secs_f64()), rate, &mut tally, &writer);
+    if let (Some(shot), Some(first)) = (shown.take(), &first_frame) {
+        hand_over(shot, Some(first.seconds_until(frame)), rate, &mut tally, &writer);
     }
     // What cannot be shown of what comes later takes nothing from what was.
     let written = writer.finish(tally.written > 0);
@@ -111,6 +113,25 @@ pub(super) fn run(
         tally.summarize(film, &more, begun, device);
     }
     Ok(())
+}
+
+/// The first frame that is rendered.
+struct First {
+    frame: usize,
+    came: Instant,
+    camera: Camera,
+    /// Of frames that are evenly apart, by their number.
+    rate: Option<f64>,
+}
+
+impl First {
+    /// From the first frame to one that comes now.
+    fn seconds_until(&self, frame: usize) -> f64 {
+        match self.rate {
+            Some(rate) => (frame - self.frame) as f64 / rate,
+            None => self.came.elapsed().as_secs_f64(),
+        }
+    }
 }
 
 /// Has a picture written; a film shows it until so many seconds after its first one, and once at least. Says whether it will be

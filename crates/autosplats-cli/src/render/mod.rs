@@ -21,7 +21,6 @@ use self::shrink::shrink;
 use crate::args::RenderArgs;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
-use crate::input::Inputs;
 use crate::output::{Format, Picture, print_line, write_exr, write_file, write_png};
 use crate::progress::Bar;
 
@@ -51,7 +50,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
     let bar = Bar::spinner("rendering", job.quiet);
     let frame = job.render(&mut renderer, &cloud, &camera)?;
     drop(bar);
-    check_visible(&frame, &job.inputs)?;
+    check_visible(&frame, &job)?;
     if !job.quiet {
         if degrees {
             eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
@@ -93,7 +92,7 @@ fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Jo
 }
 
 /// Refuses a picture without a surface.
-fn check_visible(frame: &Frame<'_>, inputs: &Inputs) -> Result<(), Failure> {
+fn check_visible(frame: &Frame<'_>, job: &Job) -> Result<(), Failure> {
     if frame.counts.covered > 0 {
         return Ok(());
     }
@@ -103,16 +102,20 @@ fn check_visible(frame: &Frame<'_>, inputs: &Inputs) -> Result<(), Failure> {
     } else {
         format!(
             "of {points} points {not_finite} have no finite position, {behind} are behind the eye, {outside} outside the \
-             picture; --view iso finds the rest"
+             picture; {} finds the rest",
+            job.camera.remedy()
         )
     };
-    Err(Failure::new(Exit::Input, format!("{}: nothing to show: {why}", inputs.names())))
+    Err(Failure::new(Exit::Input, format!("{}: nothing to show: {why}", job.inputs.names())))
 }
 
 /// What failing to render is to the caller of the program.
 pub(crate) fn render_failure(error: Error) -> Failure {
     match error {
-        Error::Setting { name, value, range } => Failure::usage(format!("{} {value}: it must be {range}", flag(name))),
+        Error::Setting { name, value, range } => {
+            let or = if name == "k" { ", or 'auto'" } else { "" };
+            Failure::usage(format!("{} {value}: it must be {range}{or}", flag(name)))
+        }
         Error::Camera(_) | Error::MissingAttribute { .. } | Error::ImageSize { .. } => Failure::usage(error),
         Error::TooManyPoints(_) | Error::DeviceLimit { .. } | Error::DeviceMemory(_) => {
             Failure::new(Exit::Memory, error)

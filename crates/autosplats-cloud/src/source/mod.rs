@@ -79,6 +79,8 @@ pub struct PlayOptions {
     pub seed: u64,
     /// A folder is no sequence: its newest file is shown, as it changes.
     pub watch: bool,
+    /// All that comes through a pipe is taken, as in [`LiveOptions::all`].
+    pub all: bool,
     /// What is kept beside the newest points.
     pub latest: LatestOptions,
 }
@@ -192,7 +194,7 @@ impl Source {
                 return Self::plain(Recording::open(path, &options, progress)?, play);
             }
             Self::StandardInput => {
-                let options = LiveOptions { read: options.clone(), ..LiveOptions::default() };
+                let options = LiveOptions { read: options.clone(), all: play.all, ..LiveOptions::default() };
                 return Self::plain(Live::bytes(std::io::stdin(), "standard input", &options)?, play);
             }
             #[cfg(feature = "zenoh")]

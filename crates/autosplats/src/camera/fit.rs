@@ -177,16 +177,37 @@ impl Camera {
             }
             Projection::PerspectiveFovDeg(fov) => {
                 let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
-                let distance = kept.iter().fold(0.0f64, |distance, p| {
-                    let [x, y, z] = [0, 1, 2].map(|i| p[i] - middle[i]);
-                    distance.max((y.abs() + rim) / slope - z).max((x.abs() + rim) / (slope * aspect) - z)
-                });
+                let sides =
+                    [(0, slope * aspect), (1, slope)].map(|(axis, slope)| between_sides(&kept, axis, slope, rim));
+                // What is near is wider than what is far, so that the middle of the picture is not that of the points.
+                camera.look_at = to_world([sides[0].middle, sides[1].middle, middle[2]]);
+                let distance = middle[2] - sides[0].eye.min(sides[1].eye);
                 distance.max(0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * 0.05)
             }
         };
         camera.eye = camera.look_at - forward * distance;
         Ok(self)
     }
+}
+
+/// Where an eye is that sees points between two opposite sides of a picture, and touching both.
+struct BetweenSides {
+    /// Along the axis.
+    middle: f64,
+    /// Along the line of sight.
+    eye: f64,
+}
+
+/// The eye that sees all `points` along `axis`, each `rim` wide to either side. `slope` is that of the sides of the picture
+/// against the line of sight, which is the third axis.
+fn between_sides(points: &[DVec3], axis: usize, slope: f64, rim: f64) -> BetweenSides {
+    let none = [f64::NEG_INFINITY; 2];
+    // How far each side is from the line of sight where that begins.
+    let [right, left] = points.iter().fold(none, |[right, left], p| {
+        let narrower = rim - slope * p.z;
+        [right.max(p[axis] + narrower), left.max(-p[axis] + narrower)]
+    });
+    BetweenSides { middle: 0.5 * (right - left), eye: -0.5 * (right + left) / slope }
 }
 
 /// The camera that sees all of `points` (along `axes`, about `origin`) from the world's origin, where the sensor was if
@@ -350,6 +371,27 @@ mod tests {
                     assert!((0.0..100.0).contains(&x) && (0.0..200.0).contains(&y), "{direction:?}: {x}, {y}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_is_seen_fills_the_picture() {
+        // Ground that goes away from the eye: its near end is wider.
+        let ground = (0..900).map(|i| [(i % 30) as f32, (i / 30) as f32, 0.0]).collect();
+        let cloud = PointCloud::new(DVec3::ZERO, ground);
+        for aspect in [0.5, 1.5, 2.5] {
+            let projection = Projection::PerspectiveFovDeg(60.0);
+            let camera = Camera::fit(&cloud, Axes::ZUp, ViewDirection::Iso, aspect, projection).expect("a fit");
+            let size = [(200.0 * aspect) as u32, 200];
+            let view = camera.view(DVec3::ZERO, size).expect("a view");
+            let pixels: Vec<_> = cloud.positions().iter().map(|&p| view.to_pixel(view.to_view(p))).collect();
+            let free = [0, 1].map(|axis| {
+                let ends = pixels.iter().fold([f32::MAX, f32::MIN], |[a, b], p| [a.min(p[axis]), b.max(p[axis])]);
+                [ends[0] / size[axis] as f32, 1.0 - ends[1] / size[axis] as f32]
+            });
+            let least = free[0][0].min(free[0][1]).min(free[1][0]).min(free[1][1]);
+            let most = free.iter().map(|[a, b]| a.max(*b)).fold(1.0f32, f32::min);
+            assert!(least > 0.04 && most < 0.14, "{aspect}: as large as it fits, and in the middle: {free:?}");
         }
     }
 

@@ -60,7 +60,7 @@ impl Report<'_> {
         }
         page.push_str(
             "Written by `autosplats bench paper`; `autosplats bench paper --help` says how to repeat it. The paper is Preiner, \
-             Jeschke and Wimmer, *Auto Splats*, 2012 ([ARCHITECTURE.md](../ARCHITECTURE.md)); its figures are from a GeForce \
+             Jeschke and Wimmer, *Auto Splats*, 2012; its figures are from a GeForce \
              GTX 580 with an Intel i7-930. Measured here on:\n\n",
         );
         for device in self.renderers.describe() {

@@ -97,7 +97,8 @@ fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {
     let flags = ["GPS time is standard time", "waveforms inside", "waveforms outside", "returns are synthetic", "WKT"];
     let set = flags.into_iter().enumerate().filter(|(bit, _)| header.global_encoding >> bit & 1 == 1);
     detail("global encoding", set.map(|(_, flag)| flag).collect::<Vec<_>>().join(", "));
-    detail("offset of coordinates", header.offset.to_array().map(|value| value.to_string()).join(", "));
+    // Some are written as -0.
+    detail("offset of coordinates", header.offset.to_array().map(|value| (value + 0.0).to_string()).join(", "));
     detail("variable length records", records.all.len().to_string());
     let returns = &header.points_by_return;
     let last = returns.iter().rposition(|&count| count > 0).map_or(0, |index| index + 1);

@@ -12,8 +12,9 @@ use crate::{Error, Next, Progress, Statistics, Update};
 const LOOK: Duration = Duration::from_millis(20);
 
 /// The newest update of each channel.
-#[derive(Default)]
 pub(super) struct Mailbox {
+    /// Whether what nobody has taken yet stays until somebody does.
+    all: bool,
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -31,13 +32,27 @@ struct State {
 }
 
 impl Mailbox {
+    /// An empty one, in which what comes takes the place of what nobody has taken yet, or waits until `all` of that is taken.
+    pub(super) fn new(all: bool) -> Self {
+        Self { all, state: Mutex::default(), changed: Condvar::new() }
+    }
+
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The state, where all are taken once `is_taken` says so or nothing will be taken any more.
+    fn state_once(&self, is_taken: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
+        let mut state = self.state();
+        while self.all && !state.abandoned && !is_taken(&state) {
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        state
+    }
+
     /// Leaves an update in place of the one before of its channel.
     pub(super) fn put(&self, update: Update) {
-        let mut state = self.state();
+        let mut state = self.state_once(|state| !state.updates.contains_key(&update.channel));
         let replaced = state.updates.insert(update.channel, update).is_some();
         state.statistics.dropped += u64::from(replaced);
         self.changed.notify_all();
@@ -49,7 +64,7 @@ impl Mailbox {
     }
 
     pub(super) fn refuse(&self, error: Error) {
-        let mut state = self.state();
+        let mut state = self.state_once(|state| state.refusal.is_none());
         state.statistics.refused += 1;
         state.statistics.last_refusal = Some(error.to_string());
         state.refusal = Some(error);
@@ -65,6 +80,7 @@ impl Mailbox {
     /// Nothing will be taken any more.
     pub(super) fn abandon(&self) {
         self.state().abandoned = true;
+        self.changed.notify_all();
     }
 
     pub(super) fn is_abandoned(&self) -> bool {
@@ -77,10 +93,12 @@ impl Mailbox {
         let mut state = self.state();
         loop {
             if let Some(refusal) = state.refusal.take() {
+                self.changed.notify_all();
                 return Err(refusal);
             }
             if let Some((_, update)) = state.updates.pop_first() {
                 state.statistics.taken += 1;
+                self.changed.notify_all();
                 return Ok(Next::Update(update));
             }
             if state.ended {

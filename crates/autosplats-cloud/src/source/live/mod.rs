@@ -3,7 +3,7 @@
 //! # How it works
 //!
 //! A thread waits for what comes, decodes it and puts it into a [`Mailbox`], where it takes the place of what nobody has
-//! taken yet. So nothing queues, however slow the taker is. Should reading panic, which is a mistake of ours, that is an error
+//! taken yet, or is left only once that is taken. So nothing queues, however slow the taker is. Should reading panic, which is a mistake of ours, that is an error
 //! of the stream like any other, which goes on with what comes next.
 
 mod bytes;
@@ -33,11 +33,14 @@ pub struct LiveOptions {
     pub read: ReadOptions,
     /// Bytes that a frame may have; what announces more is refused. 1 GiB by default.
     pub max_frame_bytes: usize,
+    /// Frames are read as they are taken, so that whoever writes them waits and none is dropped. Without it, which is the
+    /// default, those that nobody takes in time are.
+    pub all: bool,
 }
 
 impl Default for LiveOptions {
     fn default() -> Self {
-        Self { read: ReadOptions::default(), max_frame_bytes: 1 << 30 }
+        Self { read: ReadOptions::default(), max_frame_bytes: 1 << 30, all: false }
     }
 }
 
@@ -51,7 +54,7 @@ impl Live {
     /// [`Error::Io`] if there can be no thread.
     pub fn bytes(input: impl Read + Send + 'static, name: &str, options: &LiveOptions) -> Result<Self, Error> {
         let (name, options) = (name.to_owned(), options.clone());
-        Self::start(&name.clone(), move |mailbox| bytes::read(input, name.as_ref(), &options, mailbox))
+        Self::start(&name.clone(), options.all, move |mailbox| bytes::read(input, name.as_ref(), &options, mailbox))
     }
 
     /// A file, each time it has changed, or the newest of a folder or of those that a pattern like `scans/*.ply` stands for, once
@@ -62,11 +65,11 @@ impl Live {
     /// [`Error::Io`] if there can be no thread.
     pub fn watch(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
         let (path, options) = (path.to_owned(), options.clone());
-        Self::start(&path.display().to_string(), move |mailbox| watch::watch(&path, &options, mailbox))
+        Self::start(&path.display().to_string(), false, move |mailbox| watch::watch(&path, &options, mailbox))
     }
 
-    fn start(name: &str, work: impl FnOnce(&Mailbox) + Send + 'static) -> Result<Self, Error> {
-        let mailbox = Arc::new(Mailbox::default());
+    fn start(name: &str, all: bool, work: impl FnOnce(&Mailbox) + Send + 'static) -> Result<Self, Error> {
+        let mailbox = Arc::new(Mailbox::new(all));
         let filled = Arc::clone(&mailbox);
         let path = PathBuf::from(name);
         let work = move || {
