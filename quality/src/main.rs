@@ -10,7 +10,7 @@ use autosplats_quality::measure::Angles;
 use autosplats_quality::method::{Method, Painter};
 use autosplats_quality::page::page;
 use autosplats_quality::run::{Outcome, measure};
-use autosplats_quality::sheet::{Row, write_all};
+use autosplats_quality::sheet::{Row, write_all, write_full_size};
 use autosplats_quality::subject::Subject;
 use autosplats_quality::target::ratio;
 use clap::Parser;
@@ -28,6 +28,9 @@ struct Arguments {
     /// Folder for QUALITY.md and its pictures [default: docs of this repository, and nothing for some of the cases]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Folder for the pictures of each case at full size: the truth, each method's, and what is right and wrong in ours
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -49,7 +52,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let whole = !arguments.quick && arguments.only.is_none();
     let docs = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let out = arguments.out.clone().or_else(|| whole.then(docs));
-    let (outcomes, rows) = measure_all(&cases)?;
+    let (outcomes, rows) = measure_all(&cases, arguments.pictures.as_deref())?;
     if let Some(out) = out {
         let sheets = write_all(&out.join("quality"), &rows)?;
         let path = out.join("QUALITY.md");
@@ -60,7 +63,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Measures and prints all cases; each subject is made once for all its views.
-fn measure_all(cases: &[Case]) -> Result<(Vec<Outcome>, Vec<Row>)> {
+fn measure_all(cases: &[Case], full_size: Option<&Path>) -> Result<(Vec<Outcome>, Vec<Row>)> {
     let start = Instant::now();
     let mut outcomes = Vec::new();
     let mut rows = Vec::new();
@@ -84,6 +87,9 @@ fn measure_all(cases: &[Case]) -> Result<(Vec<Outcome>, Vec<Row>)> {
             );
             let (outcome, pictures) = measure(case, &subject, &mut painter, &Method::ALL)?;
             print(&outcome);
+            if let Some(folder) = full_size {
+                write_full_size(folder, case, &subject, &pictures)?;
+            }
             if case.sheet {
                 rows.push(Row::new(case, &pictures));
             }

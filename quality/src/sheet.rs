@@ -14,7 +14,8 @@ use crate::light::Lit;
 use crate::measure::angle;
 use crate::method::Method;
 use crate::run::Pictures;
-use crate::verdict::Verdict;
+use crate::subject::Subject;
+use crate::verdict::{Verdict, Verdicts};
 
 /// Widest and highest that a picture on a sheet is.
 const MOST_SIZE: [usize; 2] = [260, 210];
@@ -169,6 +170,33 @@ pub fn write_all(folder: &Path, rows: &[Row]) -> Result<Vec<String>> {
         write(&folder.join(format!("{name}.png")), &rows)?;
     }
     Ok(names.into_iter().map(str::to_owned).collect())
+}
+
+/// Writes the pictures of a case into `folder`, each whole: the truth and each method's, lit, and the verdict on ours.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_full_size(folder: &Path, case: &Case, subject: &Subject, pictures: &Pictures) -> Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let exact = &pictures.truth.exact;
+    let save = |what: &str, color: &dyn Fn(usize) -> [u8; 3]| {
+        let height = exact.seen.len() / exact.width;
+        let image = RgbImage::from_fn(exact.width as u32, height as u32, |x, y| {
+            Rgb(color(y as usize * exact.width + x as usize))
+        });
+        let path = folder.join(format!("{} {what}.png", case.name()).replace([' ', ':'], "_"));
+        image.save(&path).with_context(|| path.display().to_string())
+    };
+    let color = |lit: &Lit, pixel: usize| lit.over_background(pixel).map(|c| (255.0 * c).round() as u8);
+    save("truth", &|pixel| color(&pictures.truth.lit, pixel))?;
+    for (method, picture, lit) in &pictures.drawn {
+        save(&method.name(), &|pixel| color(lit, pixel))?;
+        if *method == Method::Ours {
+            let verdicts = Verdicts::new(exact, picture, subject).verdicts;
+            save("verdict", &|pixel| verdict_color(verdicts[pixel], angle(exact, picture, pixel)))?;
+        }
+    }
+    Ok(())
 }
 
 /// Writes rows below each other, with a title for each column and a legend.
