@@ -5,7 +5,8 @@
 //! cloud, seen or not, it knows no gap, and its bound is its own. For point P with first search radius r̃₀ (§5.1) and the
 //! distances d₁ ≤ d₂ ≤ … to the other screen points:
 //!
-//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions that met nothing;
+//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions that met nothing; with
+//!   adaptive rules, if d₁ is more than [`STEEP`] times that, or no more but a gap ends the neighbourhood;
 //! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
 //!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ; with adaptive rules
 //!   d₂ > λ·d₁ is asked of a gap after one neighbour;
@@ -118,6 +119,11 @@ impl std::ops::Add for SearchCounts {
     }
 }
 
+/// How much further than the radius after e0 expansions the nearest neighbour may be, with adaptive rules, of a point that has all k.
+/// Where a surface is steep, or others stand behind it, density is told too high and first search radii too short: with noise
+/// such a surface lost most of its points. Outliers have gaps around them.
+pub(crate) const STEEP: f32 = 1.6;
+
 /// The question put to an engine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchRules {
@@ -140,7 +146,7 @@ pub(crate) enum EarlyEnd {
 }
 
 impl SearchRules {
-    /// Radius within which a point must have a neighbour.
+    /// Radius within which a point must have a neighbour, but for [`STEEP`].
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
         // Differs from the paper, whose expansion by √k would be none at k = 1, and discard surface below the usual k.
@@ -161,7 +167,9 @@ impl SearchRules {
     /// `None` says that no rule ends the neighbourhood within `known`.
     pub(crate) fn early_end(&self, squared: &[f32], initial_radius: f32, known: f32) -> Option<EarlyEnd> {
         let nearest = squared.first().map_or(known, |d| d.sqrt());
-        if nearest > self.outlier_radius(initial_radius) {
+        let outlier_radius = self.outlier_radius(initial_radius);
+        let is_lone = nearest > outlier_radius;
+        if is_lone && (!self.adaptive || nearest > STEEP * outlier_radius) {
             return Some(EarlyEnd::Outlier);
         }
         let gap_factor = self.gap_factor?;
@@ -170,7 +178,7 @@ impl SearchRules {
             let reach = least_reach.max(self.gap_growth(gap_factor, neighbors) * squared[neighbors - 1].sqrt());
             let next = squared.get(neighbors).map_or(known, |d| d.sqrt());
             if next > reach {
-                return Some(EarlyEnd::Gap(neighbors));
+                return Some(if is_lone { EarlyEnd::Outlier } else { EarlyEnd::Gap(neighbors) });
             }
         }
         None

@@ -4,7 +4,7 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
 
 use super::past::Past;
-use super::{LANES, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts, SearchRules, screen_grid};
+use super::{LANES, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, STEEP, SearchCounts, SearchRules, screen_grid};
 use crate::camera::{Camera, Projection, View};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::test_clouds::{self, EYE, Positions};
@@ -87,10 +87,13 @@ impl Oracle {
             unsure |= (a - b).abs() <= ROUNDING * b;
             a > b
         };
-        let outlier = rules
-            .outlier_expansions
-            .is_some_and(|e0| exceeds(distance(1), initial_radius * f64::from(rules.k.max(10)).sqrt().powi(e0 as i32)));
-        if outlier || self.others[point].is_empty() {
+        let mut beyond = |factor: f64| {
+            let radius = |e0: u32| factor * initial_radius * f64::from(rules.k.max(10)).sqrt().powi(e0 as i32);
+            rules.outlier_expansions.is_some_and(|e0| exceeds(distance(1), radius(e0)))
+        };
+        let is_lone = beyond(1.0);
+        let is_alone = is_lone && (!rules.adaptive || beyond(f64::from(STEEP)));
+        if is_alone || self.others[point].is_empty() {
             return Expected { fate: Fate::Outlier, count: 0, radius: 0.0, unsure };
         }
         let gap = rules.gap_factor.and_then(|lambda| {
@@ -98,6 +101,9 @@ impl Oracle {
             let after = |j| if rules.adaptive && j == 1 { f64::from(lambda) } else { growth };
             (1..k).find(|&j| exceeds(distance(j + 1), (after(j) * distance(j)).max(growth * initial_radius)))
         });
+        if is_lone && gap.is_some() {
+            return Expected { fate: Fate::Outlier, count: 0, radius: 0.0, unsure };
+        }
         let end = gap.unwrap_or(k).min(self.others[point].len());
         let fate = if end < k { Fate::Clamped } else { Fate::Whole };
         Expected { fate, count: end, radius: distance(end), unsure }
@@ -205,7 +211,9 @@ fn every_cloud_with_every_rule() {
                 let (screen, view) = self::screen(&positions, &camera, [90, 70], k);
                 let count = screen.points.len();
                 let radii: Vec<f64> = (0..count).map(|p| oracle.initial_radius(&screen, &view, k, p)).collect();
-                for (e0, lambda) in [(Some(3), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)] {
+                for (e0, lambda) in
+                    [(Some(3), Some(4.0)), (Some(0), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)]
+                {
                     let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0.is_some() };
                     let all: Vec<u32> = (0..count as u32).collect();
                     let third: Vec<u32> = all.iter().copied().step_by(3).collect();
@@ -266,6 +274,32 @@ fn comparison_sees_each_kind_of_error() {
     for rules in other_rules {
         assert!(outcome(rules, |_| ()).is_err(), "not noticed: {rules:?}");
     }
+}
+
+/// What stands behind a wall, denser than that, makes the wall's first search radii too short.
+#[test]
+fn a_surface_before_a_denser_one_is_no_outlier() {
+    let camera = Camera {
+        eye: DVec3::new(10.0, 10.0, 0.0),
+        look_at: DVec3::new(10.0, 10.0, 1.0),
+        up: DVec3::NEG_Y,
+        projection: Projection::OrthographicHeight(20.0),
+    };
+    let wall = (0..400).map(|i| [(i % 20) as f32 + 0.5, (i / 20) as f32 + 0.5, 30.0]);
+    let behind = (0..22_500).map(|i| [(i % 150) as f32 / 7.5, (i / 150) as f32 / 7.5, 60.0]);
+    let positions: Positions = wall.chain(behind).collect();
+    let (screen, view) = screen(&positions, &camera, [1200, 1200], 10);
+    let queries: Vec<u32> =
+        (0..screen.points.len() as u32).filter(|&q| screen.points[q as usize].position_view[2] < 40.0).collect();
+    assert_eq!(queries.len(), 400, "all of the wall is seen");
+    let outliers = |adaptive: bool| {
+        let rules = SearchRules { k: 10, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive };
+        let mut neighborhoods = Neighborhoods::default();
+        screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
+        neighborhoods.counts.outliers
+    };
+    assert_eq!(outliers(false), 400, "first search radii are those of what is behind");
+    assert!(outliers(true) < 5, "but for corners all have their neighbours: {} have not", outliers(true));
 }
 
 /// On a lattice of whole numbers nothing is rounded: all points at the k-th distance belong.

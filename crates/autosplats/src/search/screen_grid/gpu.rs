@@ -5,7 +5,7 @@ use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers, WorkPass};
 use crate::search::past;
-use crate::search::{BOUND_STEP, CROWDED, MARGIN_PX, MAX_CANDIDATES};
+use crate::search::{BOUND_STEP, CROWDED, MARGIN_PX, MAX_CANDIDATES, STEEP};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH, SEARCH_FOUR];
@@ -59,6 +59,7 @@ impl RoundPasses {
         let own = [
             ("QUADS", k.div_ceil(4).into()),
             ("LEAST_GROWTH", LEAST_GROWTH.into()),
+            ("STEEP", STEEP.into()),
             ("LEFT_ONLY", f64::from(u8::from(four))),
         ];
         Ok(Self {

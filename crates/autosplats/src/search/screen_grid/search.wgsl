@@ -30,6 +30,7 @@
 @group(0) @binding(8) var<storage, read> past: array<u32>;
 
 override LEAST_GROWTH: f32;
+override STEEP: f32;
 // Whether only those queries are searched for that `search_four` left.
 override LEFT_ONLY: bool;
 
@@ -127,6 +128,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
 fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
+    let farthest_first = select(1.0, STEEP, frame.adaptive == 1u) * outlier_radius;
     let likely = past_radius(center, initial_radius);
     // A radius that rounds to nothing would never grow.
     var radius = max(select(FIRST_REACH * initial_radius, SLACK * likely, likely > 0.0), MIN_POSITIVE);
@@ -163,12 +165,13 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let sure = min(select(radius, MOST, is_all), bound);
         seen = look_through(nearest, initial_radius, min(sure * sure, MOST));
         let known = select(sure, kth_radius, is_exact);
-        if min(seen.nearest, known) > outlier_radius {
+        if min(seen.nearest, known) > farthest_first {
             return Found(0.0, false, false);
         }
         let is_gap_sure = is_exact || seen.gap_squared <= sure * sure;
         if seen.gap_squared < MOST && is_gap_sure && min(seen.gap_end, known) > seen.gap_reach {
-            return Found(seen.gap_squared, true, false);
+            let is_lone = seen.nearest > outlier_radius;
+            return Found(select(seen.gap_squared, 0.0, is_lone), !is_lone, false);
         }
         if is_exact {
             return Found(kth_squared, false, false);
