@@ -20,6 +20,8 @@ override OFF_SURE: f32;
 override SURE_NOISE_PX: f32;
 override FEWEST_BLURRED: u32;
 override FRINGE_NOISES: f32;
+// How far it is off at least half way to what is empty, as a part of that.
+override OFF_HALF_WAY: f32;
 // Blocks beyond the fringe that tell where it is empty.
 override BEYOND_FRINGE: f32;
 // Reach of a splat in splat radii.
@@ -84,7 +86,15 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
         let there = vec2u(at);
         let is_known = beside_picture(there) == 0u || is_empty_block(there / BLOCK_PX);
         if is_known && cover[there.y * frame.size.x + there.x].rim == EMPTY_RIM {
-            return YES;
+            // Half way.
+            let between = vec2u(floor(vec2f(pixel) + 0.5 + ahead * f32(step / 2u)));
+            let room = min(between, frame.size - 1u - between);
+            if f32(min(room.x, room.y)) < window {
+                return YES;
+            }
+            let met = points_offset(between, window);
+            let goes_on = met.z >= f32(FEWEST_BLURRED) && -dot(met.xy, ahead) <= OFF_HALF_WAY * most;
+            return select(YES, NO, goes_on);
         }
     }
     return NO;

@@ -15,7 +15,7 @@ use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
     BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
-    OFF_BLURRED, PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
+    OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
 };
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
@@ -231,6 +231,7 @@ impl SplatPasses {
                 ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
                 ("FRINGE_NOISES", FRINGE_NOISES.into()),
                 ("BEYOND_FRINGE", BEYOND_FRINGE.into()),
+                ("OFF_HALF_WAY", OFF_HALF_WAY.into()),
                 ("SUPPORT", SUPPORT.into()),
             ];
             Pass::new(gpu, &TRIM, &constants)

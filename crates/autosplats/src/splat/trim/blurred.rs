@@ -7,7 +7,9 @@
 //! 0.80 w²/√(w² + σ²) at the straight end of points strewn evenly, and 0.48 w²/√(w² + σ²) where a surface curves away, so that
 //! points lie ever closer up to its end. Silhouettes are nearly always of the second kind; straight ends are cut off by half of
 //! the noise too much. What is off by more, away from where it is empty, and has something empty ahead there, is beside the
-//! surface. Only how far it is off that way counts: another surface behind the border draws the mean along it. All points tell,
+//! surface. Only how far it is off that way counts: another surface behind the border draws the mean along it. And half way to what
+//! is empty the mean has to be off as well: if not, a surface goes on there, and here it is where another stands behind it that
+//! points are dense on one side. All points tell,
 //! hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they are dense, and all there
 //! are in the fringe.
 //!
@@ -48,6 +50,8 @@ pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
 pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
 /// nor than so many blocks.
 pub(crate) const FRINGE_BLOCKS: usize = 16;
+/// How far it is off at least half way to what is empty, as a part of that.
+pub(in crate::splat) const OFF_HALF_WAY: f32 = 0.7;
 /// Blocks that are empty, up to so many beyond the fringe, tell where it is empty.
 pub(in crate::splat) const BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
@@ -236,8 +240,14 @@ impl Outline<'_> {
             self.rims[self.index([x, y])] == EMPTY
                 && (self.view.beside_picture([x, y]) == 0 || blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX) == 0)
         };
-        let met = (1..=fringe as usize + 1).map_while(ahead).any(is_empty);
-        Some(met)
+        let mut steps = (1..=fringe as usize + 1).map_while(|step| Some((step, ahead(step)?)));
+        let Some((met, _)) = steps.find(|&(_, at)| is_empty(at)) else { return Some(false) };
+        let Some([x, y]) = ahead(met / 2) else { return Some(true) };
+        if (x.min(y).min(width - 1 - x).min(height - 1 - y) as f32) < window {
+            return Some(true);
+        }
+        let goes_on = |[ox, oy]: [f32; 2]| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
+        Some(!pulp::Arch::new().dispatch(|| held.offset([x, y], window)).is_some_and(goes_on))
     }
 }
 

@@ -252,6 +252,28 @@ fn what_noise_has_blurred_ends_about_where_the_surface_does() {
 }
 
 #[test]
+fn a_surface_before_a_denser_one_is_no_fringe() {
+    // Dense on the left, where another stands behind it, and empty on the right.
+    let size = [TILE, TILE];
+    let mut random = Random::new(57);
+    let mut strewn = |count: usize, left: f32, right: f32| {
+        let place = |_| [left + (right - left) * random.unit(), TILE as f32 * random.unit()];
+        (0..count * TILE * (right - left) as usize).map(place).collect::<Vec<_>>()
+    };
+    let points = [strewn(12, 0.0, 30.0), strewn(2, 30.0, 44.0)].concat();
+    let rims: Vec<_> = (0..TILE_AREA).map(|pixel| if pixel % TILE < 44 { -7.0 } else { EMPTY }).collect();
+    let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
+    let noise = Noise { level: 2.0 * view.pixel_size(1.0), ..Noise::NONE };
+    let blurred = Blurred::new(noise, 1.6, &rims, &sixteenths, &view);
+    assert!(blurred.is_some(), "there is noise");
+    let blurred = blurred.as_ref();
+    let outline = Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred };
+    let told = |x: usize| outline.is_beside_blurred([x, 32], SHOWN, 7.0);
+    assert_eq!([30, 31, 32].map(told), [Some(false); 3], "where points become fewer, but go on");
+    assert_eq!(told(43), Some(true), "where they end");
+}
+
+#[test]
 fn blocks_know_how_far_an_empty_one_is() {
     let [width, height] = [TILE + 37, TILE + 5];
     let view = view([width as u32, height as u32]);

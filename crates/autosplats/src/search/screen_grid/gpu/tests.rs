@@ -176,10 +176,15 @@ fn the_device_finds_what_the_host_finds() {
             let sized = |size| test_clouds::all(4000).into_iter().map(move |(name, cloud)| (name, cloud, size));
             for (name, positions, size) in [[121, 90], [300, 2], [1, 1]].into_iter().flat_map(sized) {
                 let (screen, view) = screen(&positions, &camera, size, k);
-                for (e0, lambda) in
-                    [(Some(3), Some(4.0)), (Some(1), Some(4.0)), (Some(1), None), (None, Some(2.0)), (None, None)]
-                {
-                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive: e0 == Some(3) };
+                for (e0, lambda, adaptive) in [
+                    (Some(3), Some(4.0), true),
+                    (Some(0), Some(4.0), true),
+                    (Some(1), Some(4.0), false),
+                    (Some(1), None, false),
+                    (None, Some(2.0), false),
+                    (None, None, false),
+                ] {
+                    let rules = SearchRules { k, outlier_expansions: e0, gap_factor: lambda, adaptive };
                     let case = format!("{name}, {size:?}, {:?}, {rules:?}", camera.projection);
                     let (host, counted_by_host) = on_host(&screen, &view, &rules);
                     for (form, passes) in &forms {
