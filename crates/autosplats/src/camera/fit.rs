@@ -19,6 +19,9 @@ const BORDER: f64 = 0.04;
 /// the picture. Without a margin one that is cut by its edge cannot be told from a surface that goes on.
 const RIM: f64 = 2.5;
 
+/// Times that what is in the middle is looked for: the points at the ends of the picture become others.
+const MIDDLE_STEPS: usize = 8;
+
 /// A sensor stands among its points if they reach so many times as far from it, on the ground, as half of them do: seen from
 /// where all of them are in the picture, what is told best would be small.
 const FAR_REACH: f64 = 4.0;
@@ -177,12 +180,13 @@ impl Camera {
             }
             Projection::PerspectiveFovDeg(fov) => {
                 let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
-                let sides =
-                    [(0, slope * aspect), (1, slope)].map(|(axis, slope)| between_sides(&kept, axis, slope, rim));
+                let eye = eye_before(&kept, 0, slope * aspect, rim).min(eye_before(&kept, 1, slope, rim));
+                let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * 0.05;
+                let distance = (middle[2] - eye).max(least);
                 // What is near is wider than what is far, so that the middle of the picture is not that of the points.
-                camera.look_at = to_world([sides[0].middle, sides[1].middle, middle[2]]);
-                let distance = middle[2] - sides[0].eye.min(sides[1].eye);
-                distance.max(0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * 0.05)
+                let [x, y] = [0, 1].map(|axis| middle_seen(&kept, axis, middle[2] - distance, rim, middle[axis]));
+                camera.look_at = to_world([x, y, middle[2]]);
+                distance
             }
         };
         camera.eye = camera.look_at - forward * distance;
@@ -190,24 +194,34 @@ impl Camera {
     }
 }
 
-/// Where an eye is that sees points between two opposite sides of a picture, and touching both.
-struct BetweenSides {
-    /// Along the axis.
-    middle: f64,
-    /// Along the line of sight.
-    eye: f64,
+/// How far along the line of sight, the third axis, an eye is that sees `points`, each `rim` wide, between two opposite sides of
+/// a picture, and touching both. Those are apart along `axis`, and turned from the line of sight by `slope`.
+fn eye_before(points: &[DVec3], axis: usize, slope: f64, rim: f64) -> f64 {
+    // How far each side is from the line of sight where that begins.
+    let [right, left] = points.iter().fold([f64::NEG_INFINITY; 2], |[right, left], p| {
+        let narrower = rim - slope * p.z;
+        [right.max(p[axis] + narrower), left.max(narrower - p[axis])]
+    });
+    -0.5 * (right + left) / slope
 }
 
-/// The eye that sees all `points` along `axis`, each `rim` wide to either side. `slope` is that of the sides of the picture
-/// against the line of sight, which is the third axis.
-fn between_sides(points: &[DVec3], axis: usize, slope: f64, rim: f64) -> BetweenSides {
-    let none = [f64::NEG_INFINITY; 2];
-    // How far each side is from the line of sight where that begins.
-    let [right, left] = points.iter().fold(none, |[right, left], p| {
-        let narrower = rim - slope * p.z;
-        [right.max(p[axis] + narrower), left.max(-p[axis] + narrower)]
-    });
-    BetweenSides { middle: 0.5 * (right - left), eye: -0.5 * (right + left) / slope }
+/// Where along `axis` an eye is, so far along the line of sight, that sees `points`, each `rim` wide, in the middle of the picture:
+/// looked for from `middle` on.
+fn middle_seen(points: &[DVec3], axis: usize, eye: f64, rim: f64, middle: f64) -> f64 {
+    (0..MIDDLE_STEPS).fold(middle, |middle, _| {
+        // On either side what is furthest from the middle of the picture: how far it is seen, where it is, how far from the eye.
+        let none = [(f64::NEG_INFINITY, 0.0, 1.0); 2];
+        let [(_, right, right_z), (_, left, left_z)] = points.iter().fold(none, |[right, left], p| {
+            let z = p.z - eye;
+            let further = |end: (f64, f64, f64), place: f64, away: f64| {
+                if away / z > end.0 { (away / z, place, z) } else { end }
+            };
+            let [high, low] = [p[axis] + rim, p[axis] - rim];
+            [further(right, high, high - middle), further(left, low, middle - low)]
+        });
+        // As far from both of them.
+        (right * left_z + left * right_z) / (left_z + right_z)
+    })
 }
 
 /// The camera that sees all of `points` (along `axes`, about `origin`) from the world's origin, where the sensor was if

@@ -76,28 +76,35 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     if -dot(offset.xy, ahead) <= most {
         return NO;
     }
-    let steps = u32(fringe) + 1u;
-    for (var step = 1u; step <= steps; step++) {
+    let met = steps_to_empty(pixel, ahead, u32(fringe) + 1u);
+    if met == 0u {
+        return NO;
+    }
+    let half_way = vec2u(floor(vec2f(pixel) + 0.5 + ahead * f32(met / 2u)));
+    let room = min(half_way, frame.size - 1u - half_way);
+    if f32(min(room.x, room.y)) < window {
+        return YES;
+    }
+    let there = points_offset(half_way, window);
+    let goes_on = there.z >= f32(FEWEST_BLURRED) && -dot(there.xy, ahead) <= OFF_HALF_WAY * most;
+    return select(YES, NO, goes_on);
+}
+
+// Steps of a pixel from a pixel to one that is empty, up to `most`; 0 if there is none.
+fn steps_to_empty(pixel: vec2u, ahead: vec2f, most: u32) -> u32 {
+    for (var step = 1u; step <= most; step++) {
         let at = floor(vec2f(pixel) + 0.5 + ahead * f32(step));
         if any(at < vec2f(0.0)) || any(at >= vec2f(frame.size)) {
             // Beyond the screen the surface goes on.
-            return NO;
+            return 0u;
         }
         let there = vec2u(at);
         let is_known = beside_picture(there) == 0u || is_empty_block(there / BLOCK_PX);
         if is_known && cover[there.y * frame.size.x + there.x].rim == EMPTY_RIM {
-            // Half way.
-            let between = vec2u(floor(vec2f(pixel) + 0.5 + ahead * f32(step / 2u)));
-            let room = min(between, frame.size - 1u - between);
-            if f32(min(room.x, room.y)) < window {
-                return YES;
-            }
-            let met = points_offset(between, window);
-            let goes_on = met.z >= f32(FEWEST_BLURRED) && -dot(met.xy, ahead) <= OFF_HALF_WAY * most;
-            return select(YES, NO, goes_on);
+            return step;
         }
     }
-    return NO;
+    return 0u;
 }
 
 fn is_empty_block(block: vec2u) -> bool {

@@ -150,7 +150,7 @@ fn the_device_fits_what_the_host_fits() {
             }
         }
     }
-    assert!(compared > 50_000 && outliers > 100, "there is something to compare: {compared}, {outliers} outliers");
+    assert!(compared > 50_000 && outliers > 50, "there is something to compare: {compared}, {outliers} outliers");
     // Rounding decides what is lopsided, or a line, in few neighbourhoods.
     assert!(different * 10_000 <= compared, "{different} of {compared} differ");
 }
