@@ -19,6 +19,8 @@ const BORDER: f64 = 0.04;
 /// the picture. Without a margin one that is cut by its edge cannot be told from a surface that goes on.
 const RIM: f64 = 2.5;
 
+/// The eye is no nearer to the points than this part of their extent: what is near would hide how large the rest is.
+const ROOM: f64 = 0.2;
 /// Times that what is in the middle is looked for: the points at the ends of the picture become others.
 const MIDDLE_STEPS: usize = 8;
 
@@ -181,7 +183,7 @@ impl Camera {
             Projection::PerspectiveFovDeg(fov) => {
                 let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
                 let eye = eye_before(&kept, 0, slope * aspect, rim).min(eye_before(&kept, 1, slope, rim));
-                let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * 0.05;
+                let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * ROOM;
                 let distance = (middle[2] - eye).max(least);
                 // What is near is wider than what is far, so that the middle of the picture is not that of the points.
                 let [x, y] = [0, 1].map(|axis| middle_seen(&kept, axis, middle[2] - distance, rim, middle[axis]));

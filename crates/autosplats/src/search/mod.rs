@@ -122,7 +122,7 @@ impl std::ops::Add for SearchCounts {
 /// How much further than the radius after e0 expansions the nearest neighbour may be, with adaptive rules, of a point that has all k.
 /// Where a surface is steep, or others stand behind it, density is told too high and first search radii too short: with noise
 /// such a surface lost most of its points. Outliers have gaps around them.
-pub(crate) const STEEP: f32 = 1.6;
+pub(crate) const STEEP: f32 = 1.2;
 
 /// The question put to an engine.
 #[derive(Clone, Copy, Debug)]

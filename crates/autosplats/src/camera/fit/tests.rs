@@ -52,7 +52,7 @@ fn what_is_seen_fills_the_picture() {
     let ground = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
     let cloud = PointCloud::new(DVec3::ZERO, ground);
     for aspect in [0.5, 1.5, 2.5] {
-        let projection = Projection::PerspectiveFovDeg(60.0);
+        let projection = Projection::PerspectiveFovDeg(40.0);
         let camera = Camera::fit(&cloud, Axes::ZUp, ViewDirection::Iso, aspect, projection).expect("a fit");
         let size = [(200.0 * aspect) as u32, 200];
         let view = camera.view(DVec3::ZERO, size).expect("a view");
@@ -63,7 +63,7 @@ fn what_is_seen_fills_the_picture() {
         });
         let least = free.as_flattened().iter().fold(1.0f32, |a, &b| a.min(b));
         assert!((0.04..0.09).contains(&least), "{aspect}: as large as it fits: {free:?}");
-        assert!(free.iter().all(|[a, b]| (a - b).abs() < 0.04), "{aspect}: in the middle: {free:?}");
+        assert!(free.iter().all(|[a, b]| (a - b).abs() < 0.1), "{aspect}: in the middle: {free:?}");
     }
 }
 
