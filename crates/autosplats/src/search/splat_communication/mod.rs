@@ -51,6 +51,8 @@
 //! Up to 0.1 % of each round's points are left when the iterations end. Those between two counters keep the wider bound: one or
 //! two neighbours too many. Those still expanding keep the neighbours met, if any, and are counted as *bounded*. The bound on
 //! search work of [`search`](super) is not kept: a search without the outlier rule draws splats as wide as the picture.
+//! A nearest neighbour beyond the outlier radius makes an outlier with adaptive rules as well, however many follow
+//! ([`STEEP`](super::STEEP)): channels hold the furthest of a radius, not the nearest.
 //! Distances that round to 0 although the points differ, in clouds some 1e-19 units wide, count as such.
 
 pub(crate) mod gpu;
