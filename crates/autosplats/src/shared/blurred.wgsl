@@ -90,7 +90,8 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     return select(YES, NO, goes_on);
 }
 
-// Steps of a pixel from a pixel to one that is empty, up to `most`; 0 if there is none.
+// Steps of a pixel from a pixel to one that is empty, up to `most`; 0 if there is none. A function of its own: Mesa's llvmpipe 22.3
+// makes wrong code of a loop that returns from within what calls another loop.
 fn steps_to_empty(pixel: vec2u, ahead: vec2f, most: u32) -> u32 {
     for (var step = 1u; step <= most; step++) {
         let at = floor(vec2f(pixel) + 0.5 + ahead * f32(step));

@@ -1,6 +1,7 @@
 //! Which topics there are.
 
 use std::{
+    collections::BTreeMap,
     path::Path,
     sync::Arc,
     thread,
@@ -68,10 +69,14 @@ fn find(address: &Address, shared: &Shared, patience: Duration) -> Result<Vec<To
         return Err(format!("{why}; {remedy}"));
     }
     let mut topics = state.graph.topics();
-    let heard: Vec<Topic> = state.channels.iter().map(|channel| channel.topic.clone()).collect();
+    let mut heard: BTreeMap<usize, Topic> =
+        state.channels.iter().map(|channel| channel.topic.clone()).enumerate().collect();
     drop(state);
-    while let Some((channel, message)) = shared.take(Duration::ZERO) {
-        let mut topic = heard[channel].clone();
+    while !heard.is_empty()
+        && let Some((channel, message)) = shared.take(Duration::ZERO)
+    {
+        // More come while these are decoded, of topics told already and of new ones.
+        let Some(mut topic) = heard.remove(&channel) else { continue };
         let bytes = message.payload.to_bytes();
         let decoded = point_cloud2::decode(Path::new(&topic.name), &bytes, Encoding::Cdr, &ReadOptions::default());
         if topic.kind.is_empty() && decoded.is_ok() {
