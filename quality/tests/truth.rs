@@ -150,7 +150,7 @@ fn figure() {
 
 #[test]
 fn two_scales() {
-    Test::new("two-scales", 700_000, [1280, 800]).meets_the_limits(&[
+    Test::new("two-scales", 1_100_000, [1280, 800]).meets_the_limits(&[
         (Shot::Own, 0.85),
         (Shot::Whole(ViewDirection::Iso), 0.85),
         (Shot::Parallel(ViewDirection::Front), 0.85),
