@@ -117,7 +117,9 @@ fn ctrl_c_ends_it_and_leaves_whole_files() {
     assert_eq!(folder.list(), ["f_0.png"], "and no part of another");
     assert!(stderr.contains("1 picture;"), "{stderr}");
 
-    let child = start(&folder, &["-", "-o", "g_%d.png"]);
+    let mut child = start(&folder, &["-", "-o", "g_%d.png"]);
+    // Held open, as the end of the pipe would be another reason to end.
+    let _pipe = input(&mut child);
     std::thread::sleep(Duration::from_millis(500));
     press_ctrl_c(&child);
     let (code, _, stderr) = end(child);
