@@ -9,7 +9,7 @@ use super::depth::{DepthNoise, Known};
 use super::noise::{Noise, Usual, measure};
 use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
 use super::rows::{is_row, turn};
-use super::sheets::{Blend, Sheets, Surface};
+use super::sheets::{Around, Blend, Sheets, Surface};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -143,8 +143,8 @@ impl Adapter {
         };
         sheets.fit(cells, &noise, view);
         let sheets = &*sheets;
-        surfels.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, surfels| {
-            adapt_all(surfels, &task, sheets, gathered);
+        surfels.par_chunks_mut(TASK).for_each_init(Default::default, |(gathered, around), surfels| {
+            adapt_all(surfels, &task, sheets, gathered, around);
         });
     }
 }
@@ -226,6 +226,7 @@ fn adapt_all_with<'a, S: Simd>(
     task: &'a Task<'a>,
     sheets: &'a Sheets,
     gathered: &'a mut Gathered,
+    around: &'a mut [Around; 2],
 ) {
     let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
@@ -252,7 +253,7 @@ fn adapt_all_with<'a, S: Simd>(
             let Quadric { normal, height, curvature, .. } = quadric;
             Some(Surface { offset: normal * height, normal, curvature })
         };
-        let surface = match sheets.blend(surfel.center, first, &goal, cells, view) {
+        let surface = match sheets.blend(simd, surfel.center, first, &goal, (cells, view), around) {
             Blend::Surface(surface) => Some(surface),
             // So would nine of ten quadrics of its own, each at the cost of a sheet.
             Blend::Disagrees => None,
@@ -311,7 +312,7 @@ pub(super) fn choose<S: Simd>(
         if !thin & (scale + 1 < SCALES) {
             continue;
         }
-        if gathered.read(cells, center, radius, view) < LEAST_CLUSTERS {
+        if gathered.read(simd, cells, center, radius, view) < LEAST_CLUSTERS {
             continue;
         }
         if axis.is_none() && scale + 1 < SCALES {
@@ -372,7 +373,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
     let is_sparse = ratio > SPARSE;
     let local = surfel.k_radius / initial_radius(surfel, task.density, task.view, task.rules.k);
     if is_sparse | (surfel.curvature * local * local > LONE) {
-        let len = gathered.read(task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
+        let len = gathered.read(simd, task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
         let plane = (len >= LEAST_OF_PLANE).then(|| gathered.plane(simd));
         if let Some(plane) = plane
             && is_sparse

@@ -193,7 +193,7 @@ fn measure_scatter_with<'a, S: Simd>(
 ) {
     for Sampled { surfel, radius, scatter, .. } in sample {
         *radius *= STEP;
-        if gathered.read(task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
+        if gathered.read(simd, task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
             let plane = gathered.plane(simd);
             let distance = gathered.quadric(simd, *radius, plane.axis, plane.curvature()).scatter;
             let distance = if distance < ROUNDING * *radius { 0.0 } else { distance };

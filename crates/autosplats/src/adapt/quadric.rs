@@ -63,6 +63,26 @@ impl<'a> Window<'a> {
         [&self.columns, &self.rows].map(|range| range.end() - range.start() + 1).iter().product()
     }
 
+    /// Copies the clusters, sixteen to a group, four cells; returns the number of groups.
+    #[inline(always)]
+    fn copy_to(&self, groups: &mut Vec<[Lanes; 4]>) -> usize {
+        let used = (self.len() * SLABS).div_ceil(LANES);
+        if groups.len() < used {
+            groups.resize(used, [Lanes::default(); 4]);
+        }
+        // Of the last group not all is written over.
+        groups[used - 1] = [Lanes::default(); 4];
+        for (index, cell) in self.rows().flatten().enumerate() {
+            let [x, y, z, count] = &mut groups[index * SLABS / LANES];
+            let lanes = index * SLABS % LANES..index * SLABS % LANES + SLABS;
+            x.0[lanes.clone()].copy_from_slice(&cell.mean[0]);
+            y.0[lanes.clone()].copy_from_slice(&cell.mean[1]);
+            z.0[lanes.clone()].copy_from_slice(&cell.mean[2]);
+            count.0[lanes].copy_from_slice(&cell.count);
+        }
+        used
+    }
+
     /// The cells, row by row.
     #[inline(always)]
     pub(super) fn rows(&self) -> impl Iterator<Item = &'a [Cell]> {
@@ -71,7 +91,8 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights.
+/// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights; all of them 0 in lanes
+/// without a cluster.
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
     lanes: Vec<[Lanes; 4]>,
@@ -180,54 +201,49 @@ pub(super) fn tangents(axis: Vec3) -> (Vec3, Vec3) {
 impl Gathered {
     /// Reads the clusters in the ball of `radius` around `center` (view space), and returns their number.
     #[inline(always)]
-    pub(super) fn read(&mut self, cells: &Cells, center: [f32; 3], radius: f32, view: &View) -> usize {
+    pub(super) fn read<S: Simd>(
+        &mut self,
+        simd: S,
+        cells: &Cells,
+        center: [f32; 3],
+        radius: f32,
+        view: &View,
+    ) -> usize {
         (self.filled, self.len) = (0, 0);
         let Some(window) = Window::around(cells, center.into(), radius, view) else { return 0 };
         let per_radius = 1.0 / radius;
         self.side = window.level.side_px as f32 * view.pixel_size(center[2]) * per_radius;
-        let most = window.len() * SLABS;
-        // One more, that the last cluster is written to if it is outside.
-        let room = (most + 1).div_ceil(LANES);
-        if self.lanes.len() < room {
-            self.lanes.resize(room, [Lanes::default(); 4]);
-        }
-        let mut len = 0;
-        for row in window.rows() {
-            for cell in row {
-                let Cell { mean, count } = cell;
-                // Loops and no closures, of which not all are inlined.
-                let mut offset = [[0f32; SLABS]; 3];
-                let mut weight = [0f32; SLABS];
-                let mut is_empty = true;
-                for axis in 0..3 {
-                    for at in 0..SLABS {
-                        offset[axis][at] = (mean[axis][at] - center[axis]) * per_radius;
-                    }
+        let groups = window.copy_to(&mut self.lanes);
+        // Of sixteen clusters all stay if one is inside: those outside weigh nothing, which costs less than to close ranks.
+        let splat = |value: f32| F32s::splat(simd, value);
+        let [cx, cy, cz] = center.map(splat);
+        let [zero, one] = [0.0, 1.0].map(splat);
+        let mut inside = Lanes::default();
+        for group in 0..groups {
+            let from = self.lanes[group];
+            let into = &mut self.lanes[self.filled];
+            let mut is_any = false;
+            for vector in 0..LANES / S::F32_LANES {
+                let [x, y, z, count] = load(simd, &from, vector);
+                let (x, y, z) =
+                    ((x - cx) * splat(per_radius), (y - cy) * splat(per_radius), (z - cz) * splat(per_radius));
+                let rest = one - (x * x + y * y + z * z);
+                // A slab without points weighs nothing.
+                let weight = (rest * splat(1.0 / (1.0 - FULL))).min(one) * count;
+                let is_in = zero.less(weight);
+                is_any |= is_in.any();
+                let placed = [x, y, z, weight].map(|value| is_in.keep(value));
+                for (out, value) in into.iter_mut().zip(placed) {
+                    value.store(&mut out.0, vector);
                 }
-                let [x, y, z] = offset;
-                for at in 0..SLABS {
-                    let rest = 1.0 - (x[at] * x[at] + y[at] * y[at] + z[at] * z[at]);
-                    // A slab without points weighs nothing.
-                    weight[at] = (rest * (1.0 / (1.0 - FULL))).min(1.0) * count[at];
-                    is_empty &= !(weight[at] > 0.0);
-                }
-                if is_empty {
-                    continue;
-                }
-                for at in 0..SLABS {
-                    // Written in any case, and written over if it is outside: a branch would be guessed wrong too often.
-                    let [xs, ys, zs, weights] = &mut self.lanes[len / LANES];
-                    let lane = len % LANES;
-                    (xs.0[lane], ys.0[lane], zs.0[lane], weights.0[lane]) = (x[at], y[at], z[at], weight[at]);
-                    len += usize::from(weight[at] > 0.0);
-                }
+                (F32s::load(simd, &inside.0, vector) + is_in.keep(one)).store(&mut inside.0, vector);
             }
+            self.filled += usize::from(is_any);
         }
-        // Lanes without a cluster weigh nothing.
-        let [.., weights] = &mut self.lanes[len / LANES];
-        weights.0[len % LANES..].fill(0.0);
-        (self.filled, self.len) = (len.div_ceil(LANES), len);
-        len
+        // Whole numbers far below 2²⁴.
+        let [len] = add_lanes(&mut [inside]);
+        self.len = len as usize;
+        self.len
     }
 
     /// Sum of the clusters' weights.
@@ -244,10 +260,10 @@ impl Gathered {
 
     /// Forgets the clusters less than `from` radii from the centre towards `side`; returns the number of those left.
     pub(super) fn keep_beside(&mut self, side: Vec3, from: f32) -> usize {
-        for at in 0..self.len {
+        for at in 0..self.filled * LANES {
             let [x, y, z, w] = &mut self.lanes[at / LANES];
             let lane = at % LANES;
-            if side.dot(Vec3::new(x.0[lane], y.0[lane], z.0[lane])) < from {
+            if (w.0[lane] > 0.0) && side.dot(Vec3::new(x.0[lane], y.0[lane], z.0[lane])) < from {
                 w.0[lane] = 0.0;
                 self.len -= 1;
             }

@@ -106,7 +106,7 @@ fn area<S: Simd>(
     let row = Vec3::from(surfel.major_axis);
     // What is within a radius, on the side if one is given.
     let mut plane = |radius: f32, side: Option<Vec3>| {
-        let mut len = gathered.read(cells, center, radius, view);
+        let mut len = gathered.read(simd, cells, center, radius, view);
         if let Some(side) = side {
             len = gathered.keep_beside(side, -BESIDE);
         }

@@ -6,11 +6,15 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
+use self::blend::Stack;
+pub(super) use self::blend::{Around, Blend, Surface};
 use super::cells::{Cell, Cells, Level, SLABS};
-use super::cpu::{AGREE, FARTHEST, Goal, choose};
-use super::quadric::{Gathered, tangents};
+use super::cpu::{Goal, choose};
+use super::quadric::{Gathered, Quadric, tangents};
 use crate::camera::View;
 use crate::fit::Surfel;
+
+mod blend;
 
 /// Levels of the cells that may have sheets. Their width is about two distances between points, that of the smallest balls
 /// three; or twice as much.
@@ -27,7 +31,7 @@ pub(super) const PARTS: f32 = 64.0;
 pub(super) const MOST_PX: f32 = 2048.0;
 
 /// An upright quadric over the balls that it was fitted to.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Sheet {
     center: Vec3,
     /// Of the quadric.
@@ -36,7 +40,8 @@ struct Sheet {
     axis: Vec3,
     /// At the centre; radii, as `bend`.
     height: f32,
-    bend: [f32; 3],
+    /// Heights by the square of an offset, as a symmetric matrix, xx, xy, xz, yy, yz and zz; of the axis it makes 0.
+    bend: [f32; 6],
     /// Standard error of its normal, radians.
     error: f32,
     curvature: f32,
@@ -46,69 +51,48 @@ struct Sheet {
     trust: f32,
 }
 
-/// Where a place is over a sheet.
-struct Over {
-    u: Vec3,
-    v: Vec3,
-    /// Along `u` and `v`, in radii.
-    x: f32,
-    y: f32,
-    /// Of the sheet above the place, along its axis; world units.
-    height: f32,
-    /// 1 above the ball's centre, 0 at its border, negative beyond.
-    near: f32,
-}
-
 impl Sheet {
+    fn new(center: Vec3, quadric: &Quadric, noise: f32) -> Self {
+        let &Quadric { radius, axis, height, bend: [uu, uv, vv], curvature, scatter, .. } = quadric;
+        let (u, v) = tangents(axis);
+        // Each term of the sum counts twice off the diagonal.
+        let across = u * (0.5 * uv) + v * vv;
+        let along = u * uu + v * (0.5 * uv);
+        let bend = |a: usize, b: usize| along[a] * u[b] + across[a] * v[b];
+        let error = quadric.error * noise;
+        // Points of two surfaces scatter more than noise does.
+        let beyond = (scatter / noise).max(1.0);
+        Self {
+            center,
+            radius,
+            axis,
+            height: height / radius,
+            bend: [bend(0, 0), bend(0, 1), bend(0, 2), bend(1, 1), bend(1, 2), bend(2, 2)],
+            error,
+            curvature,
+            scatter,
+            // One over the error's power of three quarters.
+            trust: 1.0 / (error.sqrt() * error.sqrt().sqrt() * (beyond * beyond * beyond)),
+        }
+    }
+
+    /// How far the sheet is above a place, along its axis, world units, and how near the place is to the ball's axis: 1 on it, 0 at
+    /// the border, negative beyond.
     #[inline(always)]
-    fn under(&self, place: Vec3) -> Over {
-        let (u, v) = tangents(self.axis);
+    fn over(&self, place: Vec3) -> (f32, f32) {
         let offset = (place - self.center) * (1.0 / self.radius);
-        let (x, y) = (u.dot(offset), v.dot(offset));
-        let [xx, xy, yy] = self.bend;
-        let height = self.height + x * (xx * x + xy * y) + y * (yy * y);
-        let height = (height - self.axis.dot(offset)) * self.radius;
-        Over { u, v, x, y, height, near: 1.0 - (x * x + y * y) }
+        let [xx, xy, xz, yy, yz, zz] = self.bend;
+        let Vec3 { x, y, z } = offset;
+        let slope = Vec3::new(xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z);
+        let up = self.axis.dot(offset);
+        let height = (self.height + slope.dot(offset) - up) * self.radius;
+        (height, 1.0 - (offset.length_squared() - up * up))
     }
-
-    /// Unit normal.
-    #[inline(always)]
-    fn normal(&self, over: &Over) -> Vec3 {
-        let &Over { u, v, x, y, .. } = over;
-        let [xx, xy, yy] = self.bend;
-        let slope_x = 2.0 * xx * x + xy * y;
-        let slope_y = 2.0 * yy * y + xy * x;
-        (self.axis - u * slope_x - v * slope_y).normalize()
-    }
-}
-
-/// The surface beside a surfel.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Surface {
-    /// From the surfel to the surface.
-    pub(super) offset: Vec3,
-    /// Unit normal, of either sign.
-    pub(super) normal: Vec3,
-    pub(super) curvature: f32,
-}
-
-/// What the sheets around a surfel say.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Blend {
-    Surface(Surface),
-    /// There are some, but each is unlike the surfel's first normal or scatters too much: it is at an edge, or of detail finer than
-    /// sheets.
-    Disagrees,
-    /// There are none.
-    Nothing,
 }
 
 /// Noise at a place in view space, of a cloud's point with a k-radius, world units, and whether it is known as that of a depth
 /// camera.
 type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> (f32, bool) + Sync + 'a;
-
-/// Sheets of a cell.
-type Stack = [Sheet; SLABS];
 
 /// Who asks for the sheets of a cell.
 #[derive(Debug)]
@@ -175,78 +159,6 @@ impl Sheets {
             },
         );
     }
-
-    /// The surface beside `center`, from the sheets of the four cells around it that agree with the `first` normal, where
-    /// its standard error is known.
-    #[inline(always)]
-    pub(super) fn blend(
-        &self,
-        center: [f32; 3],
-        first: Option<(Vec3, f32)>,
-        goal: &Goal,
-        cells: &Cells,
-        view: &View,
-    ) -> Blend {
-        let Some(level) = cells.levels.get(self.level) else { return Blend::Nothing };
-        let per_side = 1.0 / level.side_px as f32;
-        let [x, y] = view.to_pixel(center.into()).map(|at| at * per_side - 0.5);
-        // Casts from float saturate at 0.
-        let [x0, y0] = [x, y].map(|at| at.floor() as usize);
-        let x1 = ((x + 1.0) as usize).min(level.columns - 1);
-        let y1 = ((y + 1.0) as usize).min(level.rows - 1);
-        let center = Vec3::from(center);
-        let per_farthest = 1.0 / (FARTHEST * goal.noise);
-        let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
-        let mut total = 0.0;
-        let mut disagrees = false;
-        for row in y0..=y1 {
-            for column in x0..=x1 {
-                let cell = row * level.columns + column;
-                let len = self.len[cell];
-                if len == UNKNOWN {
-                    continue;
-                }
-                // Falls to 0 where the next cells come in.
-                let share = (1.0 - (x - column as f32).abs()) * (1.0 - (y - row as f32).abs());
-                for sheet in &self.stacks[cell][..len.into()] {
-                    let over = sheet.under(center);
-                    let away = over.height * per_farthest;
-                    let likely = 1.0 - away * away;
-                    if !((over.near > 0.0) & (likely > 0.0)) {
-                        continue;
-                    }
-                    let normal = sheet.normal(&over);
-                    if let Some((first, error)) = first {
-                        let across = normal.cross(first).length_squared();
-                        // The smallest of a sheet's balls was held against nothing.
-                        let agrees = across <= AGREE * AGREE * (sheet.error * sheet.error + error * error);
-                        if !(agrees & (sheet.scatter <= goal.scatter)) {
-                            disagrees = true;
-                            continue;
-                        }
-                    }
-                    // To the eighth: about as likely as noise puts a point there.
-                    let likely = likely * likely;
-                    let likely = likely * likely;
-                    let likely = likely * likely;
-                    let weight = share * (over.near * over.near) * likely * sheet.trust;
-                    sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
-                    sum.offset += sheet.axis * (over.height * weight);
-                    sum.curvature += sheet.curvature * weight;
-                    total += weight;
-                }
-            }
-        }
-        if !(total > 0.0) {
-            return if disagrees { Blend::Disagrees } else { Blend::Nothing };
-        }
-        let per_total = 1.0 / total;
-        Blend::Surface(Surface {
-            offset: sum.offset * per_total,
-            normal: sum.normal.normalize(),
-            curvature: sum.curvature * per_total,
-        })
-    }
 }
 
 /// What all cells share.
@@ -311,6 +223,7 @@ fn fit_cell<S: Simd>(
 ) -> u8 {
     let Task { cells, noise, view, .. } = *task;
     let mut left = cell.count;
+    *sheets = Stack::default();
     let mut len = 0;
     loop {
         let mut largest = 0;
@@ -330,30 +243,16 @@ fn fit_cell<S: Simd>(
         let Some(quadric) = choose(simd, center, radius, None, &goal, (cells, view), gathered) else {
             continue;
         };
-        let error = quadric.error * noise;
-        // Points of two surfaces scatter more than noise does.
-        let beyond = (quadric.scatter / noise).max(1.0);
-        let sheet = Sheet {
-            center: center.into(),
-            radius: quadric.radius,
-            axis: quadric.axis,
-            height: quadric.height / quadric.radius,
-            bend: quadric.bend,
-            error,
-            curvature: quadric.curvature,
-            scatter: quadric.scatter,
-            // One over the error's power of three quarters.
-            trust: 1.0 / (error.sqrt() * error.sqrt().sqrt() * (beyond * beyond * beyond)),
-        };
+        let sheet = Sheet::new(center.into(), &quadric, noise);
         for (left, cluster) in left.iter_mut().zip(cell.clusters()) {
             if *left > 0.0 {
-                let over = sheet.under(cluster.mean.into());
-                if over.height.abs() < COVERED * noise && over.near > 1.0 - COVERED_REACH {
+                let (height, near) = sheet.over(cluster.mean.into());
+                if height.abs() < COVERED * noise && near > 1.0 - COVERED_REACH {
                     *left = 0.0;
                 }
             }
         }
-        sheets[usize::from(len)] = sheet;
+        sheets.put(len.into(), &sheet);
         len += 1;
     }
 }

@@ -31,7 +31,7 @@ fn quadric_on(depth: impl Fn(f32, f32) -> f32, at: [f32; 2], above: f32, radius:
     let (cells, view) = cells_on(&depth);
     let center = [at[0], at[1], depth(at[0], at[1]) - above];
     let mut gathered = Gathered::default();
-    assert!(gathered.read(&cells, center, radius, &view) > 100, "clusters in the ball");
+    assert!(gathered.read(pulp::Scalar, &cells, center, radius, &view) > 100, "clusters in the ball");
     let curvature = gathered.plane(pulp::Scalar).curvature();
     gathered.quadric(pulp::Scalar, radius, Vec3::Z, curvature)
 }

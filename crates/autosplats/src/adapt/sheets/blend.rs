@@ -1,0 +1,197 @@
+//! What the sheets around a surfel say together.
+
+use glam::Vec3;
+use pulp::Simd;
+
+use super::{Sheet, Sheets, UNKNOWN};
+use crate::adapt::cells::{Cells, SLABS};
+use crate::adapt::cpu::{AGREE, FARTHEST, Goal};
+use crate::camera::View;
+use crate::search::{LANES, Lanes};
+use crate::simd::F32s;
+
+/// The surface beside a surfel.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::adapt) struct Surface {
+    /// From the surfel to the surface.
+    pub(in crate::adapt) offset: Vec3,
+    /// Unit normal, of either sign.
+    pub(in crate::adapt) normal: Vec3,
+    pub(in crate::adapt) curvature: f32,
+}
+
+/// What the sheets around a surfel say.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::adapt) enum Blend {
+    Surface(Surface),
+    /// There are some, but each is unlike the surfel's first normal or scatters too much: it is at an edge, or of detail finer than
+    /// sheets.
+    Disagrees,
+    /// There are none.
+    Nothing,
+}
+
+/// Numbers that tell a sheet.
+const FIELDS: usize = 19;
+
+/// Sheets of a cell, a number of all of them side by side, for SIMD; all 0 where there is none.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stack([[f32; SLABS]; FIELDS]);
+
+impl Stack {
+    pub(super) fn put(&mut self, at: usize, sheet: &Sheet) {
+        let &Sheet { center, radius, axis, height, bend, error, curvature, scatter, trust } = sheet;
+        let [xx, xy, xz, yy, yz, zz] = bend;
+        #[rustfmt::skip]
+        let fields = [
+            center.x, center.y, center.z, radius, 1.0 / radius, axis.x, axis.y, axis.z, height,
+            xx, xy, xz, yy, yz, zz, error * error, curvature, scatter, trust,
+        ];
+        for (field, value) in self.0.iter_mut().zip(fields) {
+            field[at] = value;
+        }
+    }
+}
+
+/// The sheets of four cells, a lane each. Surfels that follow each other mostly have the same around them.
+#[derive(Debug)]
+pub(in crate::adapt) struct Around {
+    /// First and last column and row.
+    cells: [usize; 4],
+    fields: [Lanes; FIELDS],
+    /// Of the cell, for each of its sheets.
+    column: Lanes,
+    row: Lanes,
+}
+
+impl Default for Around {
+    fn default() -> Self {
+        let zero = Lanes::default();
+        // No cells are these.
+        Self { cells: [usize::MAX; 4], fields: [zero; FIELDS], column: zero, row: zero }
+    }
+}
+
+impl Around {
+    #[inline(always)]
+    fn gather(&mut self, sheets: &Sheets, cells: [usize; 4], columns: usize) {
+        if self.cells == cells {
+            return;
+        }
+        self.cells = cells;
+        let [x0, x1, y0, y1] = cells;
+        for (at, [column, row]) in [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].into_iter().enumerate() {
+            let lanes = at * SLABS..(at + 1) * SLABS;
+            self.column.0[lanes.clone()].fill(column as f32);
+            self.row.0[lanes.clone()].fill(row as f32);
+            // At the picture's border there are fewer than four.
+            let is_another = (at & 1 == 0 || x1 > x0) & (at & 2 == 0 || y1 > y0);
+            let cell = row * columns + column;
+            let stack =
+                if is_another && sheets.len[cell] != UNKNOWN { sheets.stacks[cell] } else { Stack::default() };
+            for (field, values) in self.fields.iter_mut().zip(&stack.0) {
+                field.0[lanes.clone()].copy_from_slice(values);
+            }
+        }
+    }
+}
+
+impl Sheets {
+    /// The surface beside `center`, from the sheets of the four cells around it that agree with the `first` normal, where
+    /// its standard error is known.
+    #[inline(always)]
+    pub(in crate::adapt) fn blend<S: Simd>(
+        &self,
+        simd: S,
+        center: [f32; 3],
+        first: Option<(Vec3, f32)>,
+        goal: &Goal,
+        (cells, view): (&Cells, &View),
+        around: &mut [Around; 2],
+    ) -> Blend {
+        let Some(level) = cells.levels.get(self.level) else { return Blend::Nothing };
+        let per_side = 1.0 / level.side_px as f32;
+        let [x, y] = view.to_pixel(center.into()).map(|at| at * per_side - 0.5);
+        // Casts from float saturate at 0.
+        let [x0, y0] = [x as usize, y as usize];
+        let x1 = ((x + 1.0) as usize).min(level.columns - 1);
+        let y1 = ((y + 1.0) as usize).min(level.rows - 1);
+        // Surfels of a strip change from row to row of cells, and back.
+        let around = &mut around[y0 & 1];
+        around.gather(self, [x0, x1, y0, y1], level.columns);
+        let per_farthest = 1.0 / (FARTHEST * goal.noise);
+        let splat = |value: f32| F32s::splat(simd, value);
+        let [zero, one, two] = [0.0, 1.0, 2.0].map(splat);
+        // Weights, normals, heights.
+        let mut told = [Lanes::default(); 5];
+        let mut disagrees = false;
+        for vector in 0..LANES / S::F32_LANES {
+            let field = |index: usize| F32s::load(simd, &around.fields[index].0, vector);
+            let per_radius = field(4);
+            let [ox, oy, oz] = [0, 1, 2].map(|axis: usize| (splat(center[axis]) - field(axis)) * per_radius);
+            let [ax, ay, az] = [field(5), field(6), field(7)];
+            let [xx, xy, xz, yy, yz, zz] = [9, 10, 11, 12, 13, 14].map(field);
+            let sx = xx * ox + xy * oy + xz * oz;
+            let sy = xy * ox + yy * oy + yz * oz;
+            let sz = xz * ox + yz * oy + zz * oz;
+            let up = ax * ox + ay * oy + az * oz;
+            let height = (field(8) + (sx * ox + sy * oy + sz * oz) - up) * field(3);
+            let near = one - (ox * ox + oy * oy + oz * oz - up * up);
+            let away = height * splat(per_farthest);
+            let likely = one - away * away;
+            let trust = field(18);
+            let is_there = zero.less(near).and(zero.less(likely)).and(zero.less(trust));
+            if !is_there.any() {
+                continue;
+            }
+            let [nx, ny, nz] = [ax - two * sx, ay - two * sy, az - two * sz];
+            // Not 0 where there is no sheet.
+            let per_length = one / is_there.select((nx * nx + ny * ny + nz * nz).sqrt(), one);
+            let [nx, ny, nz] = [nx * per_length, ny * per_length, nz * per_length];
+            let mut counts = is_there;
+            if let Some((first, error)) = first {
+                let [fx, fy, fz] = first.to_array().map(splat);
+                let [cx, cy, cz] = [ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx];
+                let across = cx * cx + cy * cy + cz * cz;
+                // The smallest of a sheet's balls was held against nothing.
+                let agrees = across.at_most(splat(AGREE * AGREE) * (field(15) + splat(error * error)));
+                counts = is_there.and(agrees).and(field(17).at_most(splat(goal.scatter)));
+                disagrees = true;
+            }
+            // Falls to 0 where the next cells come in.
+            let share_x = one - (splat(x) - F32s::load(simd, &around.column.0, vector)).abs();
+            let share_y = one - (splat(y) - F32s::load(simd, &around.row.0, vector)).abs();
+            // To the eighth: about as likely as noise puts a point there.
+            let likely = likely * likely;
+            let likely = likely * likely;
+            let likely = likely * likely;
+            let weight = share_x * share_y * (near * near) * likely * trust;
+            for (told, value) in told.iter_mut().zip([counts.keep(weight), nx, ny, nz, height]) {
+                value.store(&mut told.0, vector);
+            }
+        }
+        let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
+        let mut total = 0.0;
+        let [weights, nx, ny, nz, heights] = &told;
+        for lane in 0..LANES {
+            let weight = weights.0[lane];
+            if weight > 0.0 {
+                let normal = Vec3::new(nx.0[lane], ny.0[lane], nz.0[lane]);
+                let [ax, ay, az, curvature] = [5, 6, 7, 16].map(|field: usize| around.fields[field].0[lane]);
+                sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
+                sum.offset += Vec3::new(ax, ay, az) * (heights.0[lane] * weight);
+                sum.curvature += curvature * weight;
+                total += weight;
+            }
+        }
+        if !(total > 0.0) {
+            return if disagrees { Blend::Disagrees } else { Blend::Nothing };
+        }
+        let per_total = 1.0 / total;
+        Blend::Surface(Surface {
+            offset: sum.offset * per_total,
+            normal: sum.normal.normalize(),
+            curvature: sum.curvature * per_total,
+        })
+    }
+}
