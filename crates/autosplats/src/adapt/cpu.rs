@@ -233,7 +233,7 @@ fn adapt_all_with<'a, S: Simd>(
         let call = task.call(surfel);
         if let Call::Row = call {
             let radius = first_radius(surfel, density, view, k);
-            if !turn(simd, surfel, (radius, k), (cells, view), gathered) {
+            if !turn(surfel, (radius, k), (cells, view), gathered) {
                 shrink(simd, surfel, task, gathered);
             }
             continue;

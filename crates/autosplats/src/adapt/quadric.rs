@@ -215,9 +215,10 @@ impl Gathered {
         self.side = window.level.side_px as f32 * view.pixel_size(center[2]) * per_radius;
         let groups = window.copy_to(&mut self.lanes);
         // Of sixteen clusters all stay if one is inside: those outside weigh nothing, which costs less than to close ranks.
-        let splat = |value: f32| F32s::splat(simd, value);
-        let [cx, cy, cz] = center.map(splat);
-        let [zero, one] = [0.0, 1.0].map(splat);
+        // Loops and no closures, of which not all are inlined.
+        let [cx, cy, cz] = [F32s::splat(simd, center[0]), F32s::splat(simd, center[1]), F32s::splat(simd, center[2])];
+        let (zero, one) = (F32s::splat(simd, 0.0), F32s::splat(simd, 1.0));
+        let (per_radius, per_rest) = (F32s::splat(simd, per_radius), F32s::splat(simd, 1.0 / (1.0 - FULL)));
         let mut inside = Lanes::default();
         for group in 0..groups {
             let from = self.lanes[group];
@@ -225,17 +226,16 @@ impl Gathered {
             let mut is_any = false;
             for vector in 0..LANES / S::F32_LANES {
                 let [x, y, z, count] = load(simd, &from, vector);
-                let (x, y, z) =
-                    ((x - cx) * splat(per_radius), (y - cy) * splat(per_radius), (z - cz) * splat(per_radius));
+                let (x, y, z) = ((x - cx) * per_radius, (y - cy) * per_radius, (z - cz) * per_radius);
                 let rest = one - (x * x + y * y + z * z);
                 // A slab without points weighs nothing.
-                let weight = (rest * splat(1.0 / (1.0 - FULL))).min(one) * count;
+                let weight = (rest * per_rest).min(one) * count;
                 let is_in = zero.less(weight);
                 is_any |= is_in.any();
-                let placed = [x, y, z, weight].map(|value| is_in.keep(value));
-                for (out, value) in into.iter_mut().zip(placed) {
-                    value.store(&mut out.0, vector);
-                }
+                is_in.keep(x).store(&mut into[0].0, vector);
+                is_in.keep(y).store(&mut into[1].0, vector);
+                is_in.keep(z).store(&mut into[2].0, vector);
+                is_in.keep(weight).store(&mut into[3].0, vector);
                 (F32s::load(simd, &inside.0, vector) + is_in.keep(one)).store(&mut inside.0, vector);
             }
             self.filled += usize::from(is_any);

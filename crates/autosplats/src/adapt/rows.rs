@@ -64,9 +64,7 @@ fn apart(in_k_radii: f32, k: f32, weight: f32) -> f32 {
 
 /// Turns a surfel whose `k` neighbours are a row to the area that balls around it find; `radius` is that of the ball before
 /// the first, world units. Without an area it becomes thin; returns whether there is one.
-#[inline(always)]
-pub(super) fn turn<S: Simd>(
-    simd: S,
+pub(super) fn turn(
     surfel: &mut Surfel,
     (radius, k): (f32, u32),
     (cells, view): (&Cells, &View),
@@ -74,7 +72,7 @@ pub(super) fn turn<S: Simd>(
 ) -> bool {
     let k = k as f32;
     let row = Vec3::from(surfel.major_axis);
-    let Some((plane, radius)) = area(simd, surfel, (radius, k), (cells, view), gathered) else {
+    let Some((plane, radius)) = area(surfel, (radius, k), (cells, view), gathered) else {
         surfel.radius *= THIN_ROW;
         surfel.major_ratio = 1.0 / THIN_ROW;
         return false;
@@ -94,9 +92,7 @@ pub(super) fn turn<S: Simd>(
 }
 
 /// Plane of the first ball around a `surfel` of a row that holds an area with the row in it, and the ball's radius.
-#[inline(always)]
-fn area<S: Simd>(
-    simd: S,
+fn area(
     surfel: &Surfel,
     (mut radius, k): (f32, f32),
     (cells, view): (&Cells, &View),
@@ -104,14 +100,7 @@ fn area<S: Simd>(
 ) -> Option<(Plane, f32)> {
     let &Surfel { center, k_radius, .. } = surfel;
     let row = Vec3::from(surfel.major_axis);
-    // What is within a radius, on the side if one is given.
-    let mut plane = |radius: f32, side: Option<Vec3>| {
-        let mut len = gathered.read(simd, cells, center, radius, view);
-        if let Some(side) = side {
-            len = gathered.keep_beside(side, -BESIDE);
-        }
-        (len >= LEAST_CLUSTERS).then(|| gathered.plane(simd))
-    };
+    let mut plane = |radius: f32, side: Option<Vec3>| plane_within(center, radius, side, cells, view, gathered);
     let is_area = |plane: &Plane, least: f32| plane.variances[1] > least * plane.variances[2];
     let is_flat = |plane: &Plane| {
         let [least, middle, _] = plane.variances;
@@ -143,6 +132,27 @@ fn area<S: Simd>(
         }
     }
     found.filter(|plane| !is_seen_through(cells, center, radius, plane.axis, view)).map(|plane| (plane, radius))
+}
+
+/// The plane through what is within a `radius`, on the side if one is given.
+///
+/// Called, not inlined: there would be twelve copies, and a closure around it loses what the processor can do.
+#[pulp::with_simd(plane_within = pulp::Arch::new())]
+#[inline(always)]
+fn plane_within_with<'a, S: Simd>(
+    simd: S,
+    center: [f32; 3],
+    radius: f32,
+    side: Option<Vec3>,
+    cells: &'a Cells,
+    view: &'a View,
+    gathered: &'a mut Gathered,
+) -> Option<Plane> {
+    let mut len = gathered.read(simd, cells, center, radius, view);
+    if let Some(side) = side {
+        len = gathered.keep_beside(side, -BESIDE);
+    }
+    (len >= LEAST_CLUSTERS).then(|| gathered.plane(simd))
 }
 
 /// Whether what is behind a disc of `radius` around `center`, square to `axis`, shows through it.

@@ -120,17 +120,20 @@ impl Sheets {
         let around = &mut around[y0 & 1];
         around.gather(self, [x0, x1, y0, y1], level.columns);
         let per_farthest = 1.0 / (FARTHEST * goal.noise);
+        // No closures within arrays' methods, which are not inlined.
         let splat = |value: f32| F32s::splat(simd, value);
-        let [zero, one, two] = [0.0, 1.0, 2.0].map(splat);
+        let (zero, one, two) = (splat(0.0), splat(1.0), splat(2.0));
+        let (cx, cy, cz) = (splat(center[0]), splat(center[1]), splat(center[2]));
         // Weights, normals, heights.
         let mut told = [Lanes::default(); 5];
         let mut disagrees = false;
         for vector in 0..LANES / S::F32_LANES {
             let field = |index: usize| F32s::load(simd, &around.fields[index].0, vector);
             let per_radius = field(4);
-            let [ox, oy, oz] = [0, 1, 2].map(|axis: usize| (splat(center[axis]) - field(axis)) * per_radius);
-            let [ax, ay, az] = [field(5), field(6), field(7)];
-            let [xx, xy, xz, yy, yz, zz] = [9, 10, 11, 12, 13, 14].map(field);
+            let (ox, oy, oz) =
+                ((cx - field(0)) * per_radius, (cy - field(1)) * per_radius, (cz - field(2)) * per_radius);
+            let (ax, ay, az) = (field(5), field(6), field(7));
+            let (xx, xy, xz, yy, yz, zz) = (field(9), field(10), field(11), field(12), field(13), field(14));
             let sx = xx * ox + xy * oy + xz * oz;
             let sy = xy * ox + yy * oy + yz * oz;
             let sz = xz * ox + yz * oy + zz * oz;
@@ -144,14 +147,14 @@ impl Sheets {
             if !is_there.any() {
                 continue;
             }
-            let [nx, ny, nz] = [ax - two * sx, ay - two * sy, az - two * sz];
+            let (nx, ny, nz) = (ax - two * sx, ay - two * sy, az - two * sz);
             // Not 0 where there is no sheet.
             let per_length = one / is_there.select((nx * nx + ny * ny + nz * nz).sqrt(), one);
-            let [nx, ny, nz] = [nx * per_length, ny * per_length, nz * per_length];
+            let (nx, ny, nz) = (nx * per_length, ny * per_length, nz * per_length);
             let mut counts = is_there;
             if let Some((first, error)) = first {
-                let [fx, fy, fz] = first.to_array().map(splat);
-                let [cx, cy, cz] = [ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx];
+                let (fx, fy, fz) = (splat(first.x), splat(first.y), splat(first.z));
+                let (cx, cy, cz) = (ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx);
                 let across = cx * cx + cy * cy + cz * cz;
                 // The smallest of a sheet's balls was held against nothing.
                 let agrees = across.at_most(splat(AGREE * AGREE) * (field(15) + splat(error * error)));
@@ -166,9 +169,11 @@ impl Sheets {
             let likely = likely * likely;
             let likely = likely * likely;
             let weight = share_x * share_y * (near * near) * likely * trust;
-            for (told, value) in told.iter_mut().zip([counts.keep(weight), nx, ny, nz, height]) {
-                value.store(&mut told.0, vector);
-            }
+            counts.keep(weight).store(&mut told[0].0, vector);
+            nx.store(&mut told[1].0, vector);
+            ny.store(&mut told[2].0, vector);
+            nz.store(&mut told[3].0, vector);
+            height.store(&mut told[4].0, vector);
         }
         let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
         let mut total = 0.0;
@@ -177,10 +182,10 @@ impl Sheets {
             let weight = weights.0[lane];
             if weight > 0.0 {
                 let normal = Vec3::new(nx.0[lane], ny.0[lane], nz.0[lane]);
-                let [ax, ay, az, curvature] = [5, 6, 7, 16].map(|field: usize| around.fields[field].0[lane]);
+                let axis = Vec3::new(around.fields[5].0[lane], around.fields[6].0[lane], around.fields[7].0[lane]);
                 sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
-                sum.offset += Vec3::new(ax, ay, az) * (heights.0[lane] * weight);
-                sum.curvature += curvature * weight;
+                sum.offset += axis * (heights.0[lane] * weight);
+                sum.curvature += around.fields[16].0[lane] * weight;
                 total += weight;
             }
         }
