@@ -114,13 +114,17 @@ impl Filling {
         }
     }
 
-    fn finish(&self) -> Cell {
-        let mut cell = Cell::default();
+    /// Writes what it holds to a cell.
+    #[inline(always)]
+    fn finish(&self, cell: &mut Cell) {
+        // Most of many pictures is empty, and was in the frame before: that need not be written.
+        if self.used > 0 || cell.count[0] > 0.0 {
+            *cell = Cell::default();
+        }
         for at in 0..self.used {
             let count = self.count[at];
             cell.put(at, Cluster { mean: self.sum[at].map(|sum| sum / count), count });
         }
-        cell
     }
 }
 
@@ -196,7 +200,6 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
     let strip_px = screen.cells.strip_px;
     let last_x = screen.cells.columns - 1;
     level.cells.par_chunks_mut(columns).enumerate().for_each_init(Vec::new, |filling, (row, out)| {
-        filling.clear();
         filling.resize(columns, Filling::EMPTY);
         let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
         for strip in y0 / strip_px..=y1 / strip_px {
@@ -208,7 +211,10 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
             }
         }
         for (out, filling) in out.iter_mut().zip(filling) {
-            *out = filling.finish();
+            filling.finish(out);
+            if filling.used > 0 {
+                *filling = Filling::EMPTY;
+            }
         }
     });
 }
@@ -226,7 +232,7 @@ fn merge(below: &Level, view: &View, level: &mut Level) {
                     }
                 }
             }
-            *out = filling.finish();
+            filling.finish(out);
         }
     });
 }

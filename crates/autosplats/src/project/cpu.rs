@@ -167,6 +167,15 @@ fn project_chunk(
                 (slot[lane], depth[lane], part[lane]) = project_point(position, view, halves);
             }
         }
+        // Plain loads of all lanes first, which wait for memory together: atomic writes let nothing overtake them.
+        let mut before = [0u64; LANES];
+        let mut held = [0u16; LANES];
+        for lane in 0..positions.len() {
+            if slot[lane] < OUTSIDE {
+                before[lane] = keys[slot[lane] as usize].load(Ordering::Relaxed);
+                held[lane] = sixteenths.of((slot[lane] >> u32::from(halves)) as usize);
+            }
+        }
         for lane in 0..positions.len() {
             match slot[lane] {
                 NOT_FINITE => dropped.not_finite += 1,
@@ -175,12 +184,13 @@ fn project_chunk(
                 slot => {
                     let index = first + (group * LANES + lane) as u32;
                     let key = u64::from(depth[lane].to_bits()) << 32 | u64::from(index);
-                    // Most points lose; a plain load tells them so without taking the cache line from other threads.
-                    let cell = &keys[slot as usize];
-                    if key < cell.load(Ordering::Relaxed) {
-                        cell.fetch_min(key, Ordering::Relaxed);
+                    // Most points lose, and find others in their sixteenth: they take no cache line from other threads.
+                    if key < before[lane] {
+                        keys[slot as usize].fetch_min(key, Ordering::Relaxed);
                     }
-                    sixteenths.add(slot >> u32::from(halves), part[lane]);
+                    if held[lane] >> part[lane] & 1 == 0 {
+                        sixteenths.add(slot >> u32::from(halves), part[lane]);
+                    }
                 }
             }
         }

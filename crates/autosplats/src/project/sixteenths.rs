@@ -28,12 +28,7 @@ impl Sixteenths {
     /// Adds a point in a sixteenth of a pixel.
     #[inline(always)]
     pub(crate) fn add(&self, pixel: u32, sixteenth: u32) {
-        let pixel = &self.pixels[pixel as usize];
-        let bit = 1 << sixteenth;
-        // Most points find others there; a plain load tells them so without taking the cache line from other threads.
-        if pixel.load(Ordering::Relaxed) & bit == 0 {
-            pixel.fetch_or(bit, Ordering::Relaxed);
-        }
+        self.pixels[pixel as usize].fetch_or(1 << sixteenth, Ordering::Relaxed);
     }
 
     /// Those of a pixel, which counts row by row.

@@ -87,8 +87,7 @@ impl Around {
             // At the picture's border there are fewer than four.
             let is_another = (at & 1 == 0 || x1 > x0) & (at & 2 == 0 || y1 > y0);
             let cell = row * columns + column;
-            let stack =
-                if is_another && sheets.len[cell] != UNKNOWN { sheets.stacks[cell] } else { Stack::default() };
+            let stack = if is_another && sheets.len[cell] != UNKNOWN { sheets.stacks[cell] } else { Stack::default() };
             for (field, values) in self.fields.iter_mut().zip(&stack.0) {
                 field.0[lanes.clone()].copy_from_slice(values);
             }

@@ -17,6 +17,7 @@
 //! where scans end, is taken for as sharp as it is seen, and all of the noise counts only where a surface is seen from the side.
 
 use glam::Vec3;
+use pulp::Simd;
 use rayon::prelude::*;
 
 use super::{AROUND_PX, EMPTY, Outline, Rim, Shown};
@@ -216,7 +217,7 @@ impl Outline<'_> {
             return None;
         }
         let held = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
-        let [ox, oy] = pulp::Arch::new().dispatch(|| held.offset([x, y], window))?;
+        let [ox, oy] = mean_offset(held, [x, y], window)?;
         let variance = window * window / PER_VARIANCE;
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
@@ -247,7 +248,7 @@ impl Outline<'_> {
             return Some(true);
         }
         let goes_on = |[ox, oy]: [f32; 2]| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
-        Some(!pulp::Arch::new().dispatch(|| held.offset([x, y], window)).is_some_and(goes_on))
+        Some(!mean_offset(held, [x, y], window).is_some_and(goes_on))
     }
 }
 
@@ -259,43 +260,44 @@ impl Held {
         });
         Self { side, columns, rows, count: counts }
     }
+}
 
-    /// The mean offset, in pixels, of the sixteenths with points from the middle of pixel (x, y), in a window of such a radius
-    /// that lies within the screen; `None` if there are too few.
-    #[inline(always)]
-    fn offset(&self, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
-        let reach = window as usize;
-        // The first square's middle from the pixel's, in pixels, and the squares.
-        let along = |at: usize, most: usize| {
-            let first = (at - reach) / self.side;
-            let middle = (self.side * first) as f32 - at as f32 + 0.5 * (self.side as f32 - 1.0);
-            (middle, first, ((at + reach) / self.side).min(most - 1) + 1)
-        };
-        let ((left, x0, x1), (top, y0, y1)) = (along(x, self.columns), along(y, self.rows));
-        let side = self.side as f32;
-        let per_window = 1.0 / (window * window);
-        let lanes: [f32; LANES] = std::array::from_fn(|lane| side * lane as f32);
-        let [mut count, mut weight, mut right, mut down] = [[0f32; LANES]; 4];
-        for row in y0..y1 {
-            let oy = top + side * (row - y0) as f32;
-            for (first, column) in (x0..x1).step_by(LANES).enumerate() {
-                let first = left + side * (LANES * first) as f32;
-                let held: &[u16; LANES] =
-                    self.count[row * self.columns + column..].first_chunk().expect("some after the last");
-                for lane in 0..LANES {
-                    // Beyond the window, and beyond the row, nothing counts.
-                    let ox = first + lanes[lane];
-                    let near = (1.0 - (ox * ox + oy * oy) * per_window).max(0.0);
-                    let held = f32::from(held[lane]);
-                    let of_lane = held * (near * near * near);
-                    count[lane] += if near > 0.0 { held } else { 0.0 };
-                    weight[lane] += of_lane;
-                    right[lane] += of_lane * ox;
-                    down[lane] += of_lane * oy;
-                }
+/// The mean offset, in pixels, of the sixteenths with points from the middle of pixel (x, y), in a window of such a radius
+/// that lies within the screen; `None` if there are too few.
+#[pulp::with_simd(mean_offset = pulp::Arch::new())]
+#[inline(always)]
+fn mean_offset_with<'a, S: Simd>(_: S, held: &'a Held, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
+    let reach = window as usize;
+    // The first square's middle from the pixel's, in pixels, and the squares.
+    let along = |at: usize, most: usize| {
+        let first = (at - reach) / held.side;
+        let middle = (held.side * first) as f32 - at as f32 + 0.5 * (held.side as f32 - 1.0);
+        (middle, first, ((at + reach) / held.side).min(most - 1) + 1)
+    };
+    let ((left, x0, x1), (top, y0, y1)) = (along(x, held.columns), along(y, held.rows));
+    let side = held.side as f32;
+    let per_window = 1.0 / (window * window);
+    let lanes: [f32; LANES] = std::array::from_fn(|lane| side * lane as f32);
+    let [mut count, mut weight, mut right, mut down] = [[0f32; LANES]; 4];
+    for row in y0..y1 {
+        let oy = top + side * (row - y0) as f32;
+        for (first, column) in (x0..x1).step_by(LANES).enumerate() {
+            let first = left + side * (LANES * first) as f32;
+            let held: &[u16; LANES] =
+                held.count[row * held.columns + column..].first_chunk().expect("some after the last");
+            for lane in 0..LANES {
+                // Beyond the window, and beyond the row, nothing counts.
+                let ox = first + lanes[lane];
+                let near = (1.0 - (ox * ox + oy * oy) * per_window).max(0.0);
+                let held = f32::from(held[lane]);
+                let of_lane = held * (near * near * near);
+                count[lane] += if near > 0.0 { held } else { 0.0 };
+                weight[lane] += of_lane;
+                right[lane] += of_lane * ox;
+                down[lane] += of_lane * oy;
             }
         }
-        let [count, weight, right, down] = [count, weight, right, down].map(|lanes| lanes.iter().sum::<f32>());
-        (count >= FEWEST_BLURRED as f32).then(|| [right / weight, down / weight])
     }
+    let [count, weight, right, down] = [count, weight, right, down].map(|lanes| lanes.iter().sum::<f32>());
+    (count >= FEWEST_BLURRED as f32).then(|| [right / weight, down / weight])
 }
