@@ -193,6 +193,15 @@ impl Outline<'_> {
         let Blurred { noise, per_radius, .. } = blurred;
         let Shown { depth, normal } = shown;
         let pixel = self.view.pixel_size(depth);
+        // One more, as blocks that a border crosses are not empty.
+        let blocks = |fringe: f32| (fringe / BLOCK_PX as f32).ceil() as u8 + 1;
+        let fringe = |noise_px: f32| (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
+        let to_empty = blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX);
+        // Most pixels are further inside than any noise is wide.
+        let most_noise_px = noise.level / pixel;
+        if !(most_noise_px >= LEAST_NOISE_PX) || to_empty > blocks(fringe(most_noise_px)) {
+            return None;
+        }
         let radius_px = reach_px / SUPPORT;
         let to_eye = self.view.to_eye(self.view.unproject([x as f32 + 0.5, y as f32 + 0.5], depth));
         let facing = Vec3::from(normal).dot(to_eye) / to_eye.length();
@@ -201,10 +210,8 @@ impl Outline<'_> {
         if !(noise_px >= LEAST_NOISE_PX) {
             return None;
         }
-        let fringe = (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
-        // One more, as blocks that a border crosses are not empty.
-        let blocks = (fringe / BLOCK_PX as f32).ceil() as u8 + 1;
-        if blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX) > blocks {
+        let fringe = fringe(noise_px);
+        if to_empty > blocks(fringe) {
             return None;
         }
         let [width, height] = self.size();
