@@ -72,13 +72,17 @@ impl<'a> Window<'a> {
         }
         // Of the last group not all is written over.
         groups[used - 1] = [Lanes::default(); 4];
-        for (index, cell) in self.rows().flatten().enumerate() {
-            let [x, y, z, count] = &mut groups[index * SLABS / LANES];
-            let lanes = index * SLABS % LANES..index * SLABS % LANES + SLABS;
-            x.0[lanes.clone()].copy_from_slice(&cell.mean[0]);
-            y.0[lanes.clone()].copy_from_slice(&cell.mean[1]);
-            z.0[lanes.clone()].copy_from_slice(&cell.mean[2]);
-            count.0[lanes].copy_from_slice(&cell.count);
+        let mut at = 0;
+        for row in self.rows() {
+            for cell in row {
+                let [x, y, z, count] = &mut groups[at / LANES];
+                let lanes = at % LANES..at % LANES + SLABS;
+                x.0[lanes.clone()].copy_from_slice(&cell.mean[0]);
+                y.0[lanes.clone()].copy_from_slice(&cell.mean[1]);
+                z.0[lanes.clone()].copy_from_slice(&cell.mean[2]);
+                count.0[lanes].copy_from_slice(&cell.count);
+                at += SLABS;
+            }
         }
         used
     }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use autosplats_cloud::PointCloud;
 use glam::Vec3;
+use rayon::iter::Either;
 use rayon::prelude::*;
 
 use super::sixteenths::{Sixteenths, half, sixteenth, sixteenths_at};
@@ -339,11 +340,10 @@ fn measure_density(screen: &mut ScreenPoints, view: &View, spacing_px: f32, k: u
 /// Puts back the points behind the culling plane of their cell [Paper, §7, Grid Culling], and those that do not matter.
 fn split(&ProjectRules { k, grid_culling, .. }: &ProjectRules, view: &View, screen: &mut ScreenPoints) {
     let ScreenPoints { points, density, active, passive, .. } = screen;
-    active.clear();
-    passive.clear();
-    for (index, point) in (0..).zip(&*points) {
+    (*active, *passive) = (0..points.len()).into_par_iter().partition_map(|index| {
+        let point = &points[index];
         let is_passive = grid_culling & density.culls(point) || !density.matters(point, k, view);
-        let list = if is_passive { &mut *passive } else { &mut *active };
-        list.push(index);
-    }
+        let side = if is_passive { Either::Right } else { Either::Left };
+        side(index as u32)
+    });
 }

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
+use rayon::prelude::*;
 
 use super::attributes::Wanted;
 use super::exposure::Exposure;
@@ -172,13 +173,13 @@ impl CpuRenderer {
         let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
         let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
         recovered.clear();
-        let hidden = |&index: &u32| {
+        let hidden = |index: u32| {
             let point = &screen.points[index as usize];
             let radius_px = screen.density.initial_radius_px(point, settings_splat.k);
             buffers.splatter.hides(point.pixel_xy(), point.position_view[2], radius_px, &view)
         };
-        let matters = |&index: &u32| screen.density.matters(&screen.points[index as usize], settings_splat.k, &view);
-        recovered.extend(screen.passive.iter().filter(|index| matters(index) && !hidden(index)));
+        let matters = |index: u32| screen.density.matters(&screen.points[index as usize], settings_splat.k, &view);
+        recovered.par_extend(screen.passive.par_iter().copied().filter(|&index| matters(index) && !hidden(index)));
         clock.lap(|timings| &mut timings.splat)?;
         if !recovered.is_empty() {
             search_counts = search_counts + reconstruct.run(recovered, &mut buffers, &mut clock)?;

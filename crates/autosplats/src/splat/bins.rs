@@ -1,5 +1,7 @@
 //! Which splats touch which tile.
 
+use pulp::Simd;
+
 use super::setup::Splat;
 use super::{TILE, tile_columns};
 use crate::camera::View;
@@ -29,7 +31,7 @@ impl Run {
     pub(super) fn set_up(&mut self, first: usize, surfels: &[Surfel], view: &View) {
         self.first = first;
         let splats = &mut self.splats;
-        pulp::Arch::new().dispatch(|| set_up_all(surfels, view, splats));
+        set_up_all(surfels, view, splats);
         self.alive.clear();
         self.alive.extend(self.splats.iter().map(|splat| !splat.covers_nothing()));
         self.bin(tile_columns(view.width as usize));
@@ -80,8 +82,12 @@ impl Run {
     }
 }
 
+#[pulp::with_simd(set_up_all = pulp::Arch::new())]
 #[inline(always)]
-fn set_up_all(surfels: &[Surfel], view: &View, splats: &mut Vec<Splat>) {
-    splats.clear();
-    splats.extend(surfels.iter().map(|surfel| Splat::new(surfel, view)));
+fn set_up_all_with<'a, S: Simd>(_: S, surfels: &'a [Surfel], view: &'a View, splats: &'a mut Vec<Splat>) {
+    // Every splat is written below; what iterators call is not compiled for the processor's vectors.
+    splats.resize(surfels.len(), Splat::default());
+    for (splat, surfel) in splats.iter_mut().zip(surfels) {
+        *splat = Splat::new(surfel, view);
+    }
 }

@@ -177,16 +177,21 @@ impl Sheets {
         let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
         let mut total = 0.0;
         let [weights, nx, ny, nz, heights] = &told;
+        // A bit for each that counts: which do is anybody's guess.
+        let mut left = 0u32;
         for lane in 0..LANES {
+            left |= u32::from(weights.0[lane] > 0.0) << lane;
+        }
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
             let weight = weights.0[lane];
-            if weight > 0.0 {
-                let normal = Vec3::new(nx.0[lane], ny.0[lane], nz.0[lane]);
-                let axis = Vec3::new(around.fields[5].0[lane], around.fields[6].0[lane], around.fields[7].0[lane]);
-                sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
-                sum.offset += axis * (heights.0[lane] * weight);
-                sum.curvature += around.fields[16].0[lane] * weight;
-                total += weight;
-            }
+            let normal = Vec3::new(nx.0[lane], ny.0[lane], nz.0[lane]);
+            let axis = Vec3::new(around.fields[5].0[lane], around.fields[6].0[lane], around.fields[7].0[lane]);
+            sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
+            sum.offset += axis * (heights.0[lane] * weight);
+            sum.curvature += around.fields[16].0[lane] * weight;
+            total += weight;
         }
         if !(total > 0.0) {
             return if disagrees { Blend::Disagrees } else { Blend::Nothing };

@@ -413,7 +413,12 @@ impl Block {
     /// Where the spheres up to the thresholds can be seen.
     #[inline(always)]
     fn spheres(&self, view: &View) -> [Window; LANES] {
-        std::array::from_fn(|lane| Window::of_sphere(self.center(lane), self.threshold.0[lane].sqrt(), view))
+        // A loop: what `from_fn` calls is not compiled for the processor's vectors.
+        let mut spheres = [Window::EMPTY; LANES];
+        for lane in 0..LANES {
+            spheres[lane] = Window::of_sphere(self.center(lane), self.threshold.0[lane].sqrt(), view);
+        }
+        spheres
     }
 }
 

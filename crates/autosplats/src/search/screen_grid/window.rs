@@ -57,6 +57,7 @@ impl Window {
         2.0 * side(self.x0, self.x1) * side(self.y0, self.y1) <= MAX_CANDIDATES as f32
     }
 
+    #[inline(always)]
     pub(super) fn union(self, other: Self) -> Self {
         Self {
             x0: self.x0.min(other.x0),
@@ -79,6 +80,7 @@ impl Window {
     }
 
     /// The window grown to what is read anyway: whole strips, and all depths if it is the whole picture.
+    #[inline(always)]
     pub(super) fn grown(mut self, cells: &ScreenCells, view: &View) -> Self {
         let [right, bottom] = [view.width as f32 - 1.0, view.height as f32 - 1.0];
         let strip_px = cells.strip_px as f32;
