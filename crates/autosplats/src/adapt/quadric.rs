@@ -70,6 +70,7 @@ impl<'a> Window<'a> {
         if groups.len() < used {
             groups.resize(used, [Lanes::default(); 4]);
         }
+        let groups = &mut groups[..used];
         // Of the last group not all is written over.
         groups[used - 1] = [Lanes::default(); 4];
         let mut at = 0;
@@ -223,10 +224,12 @@ impl Gathered {
         let [cx, cy, cz] = [F32s::splat(simd, center[0]), F32s::splat(simd, center[1]), F32s::splat(simd, center[2])];
         let (zero, one) = (F32s::splat(simd, 0.0), F32s::splat(simd, 1.0));
         let (per_radius, per_rest) = (F32s::splat(simd, per_radius), F32s::splat(simd, 1.0 / (1.0 - FULL)));
+        let lanes = &mut self.lanes[..groups];
+        let mut filled = 0;
         let mut inside = Lanes::default();
         for group in 0..groups {
-            let from = self.lanes[group];
-            let into = &mut self.lanes[self.filled];
+            let from = lanes[group];
+            let into = &mut lanes[filled];
             let mut is_any = false;
             for vector in 0..LANES / S::F32_LANES {
                 let [x, y, z, count] = load(simd, &from, vector);
@@ -242,8 +245,9 @@ impl Gathered {
                 is_in.keep(weight).store(&mut into[3].0, vector);
                 (F32s::load(simd, &inside.0, vector) + is_in.keep(one)).store(&mut inside.0, vector);
             }
-            self.filled += usize::from(is_any);
+            filled += usize::from(is_any);
         }
+        self.filled = filled;
         // Whole numbers far below 2²⁴.
         let [len] = add_lanes(&mut [inside]);
         self.len = len as usize;
