@@ -208,7 +208,11 @@ impl Outline<'_> {
         let mut sums = [0f32; 3];
         for dy in 0..=2 * window {
             for dx in 0..=2 * window {
-                let (count, offset) = mean(self.centers[self.index([x + dx - window, y + dy - window])]);
+                let centers = self.centers[self.index([x + dx - window, y + dy - window])];
+                if centers == 0 {
+                    continue;
+                }
+                let (count, offset) = mean(centers);
                 let [ox, oy] = [offset[0] + (dx as f32 - window as f32), offset[1] + (dy as f32 - window as f32)];
                 let near = (1.0 - square([ox, oy]) / (AROUND_PX * AROUND_PX)).max(0.0);
                 let weight = count * near * near * near;
@@ -253,11 +257,16 @@ impl Outline<'_> {
         // What has no core anywhere around, as a point alone, sticks out of nothing.
         let mut sticks_out = false;
         for [dx, dy] in LINES {
-            match (meets_core([dx, dy]), meets_core([-dx, -dy])) {
-                (true, true) => return false,
-                (false, false) => {}
-                _ => sticks_out = true,
+            let ahead = meets_core([dx, dy]);
+            // Half a line closes nothing in: the other half is of use only while no core was met at all.
+            if !ahead && sticks_out {
+                continue;
             }
+            let behind = meets_core([-dx, -dy]);
+            if ahead && behind {
+                return false;
+            }
+            sticks_out |= ahead | behind;
         }
         sticks_out
     }
