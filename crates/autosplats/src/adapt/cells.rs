@@ -117,7 +117,8 @@ impl Filling {
     /// Writes what it holds to a cell.
     #[inline(always)]
     fn finish(&self, cell: &mut Cell) {
-        // Most of many pictures is empty, and was in the frame before: that need not be written.
+        // Most of many pictures is empty, and was in the frame before: that need not be written. A cell whose first count is 0
+        // is all 0.
         if self.used > 0 || cell.count[0] > 0.0 {
             *cell = Cell::default();
         }
@@ -236,3 +237,6 @@ fn merge(below: &Level, view: &View, level: &mut Level) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests;

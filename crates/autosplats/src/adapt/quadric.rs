@@ -96,7 +96,7 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights; all of them 0 in lanes
+/// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights, which are 0 in lanes
 /// without a cluster.
 #[derive(Debug, Default)]
 pub(super) struct Gathered {

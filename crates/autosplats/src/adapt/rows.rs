@@ -136,7 +136,8 @@ fn area(
 
 /// The plane through what is within a `radius`, on the side if one is given.
 ///
-/// Called, not inlined: there would be twelve copies, and a closure around it loses what the processor can do.
+/// Dispatched here and not by the caller: inlined, each of the calls would be a copy for each width of vectors, and within a closure
+/// it would lose these.
 #[pulp::with_simd(plane_within = pulp::Arch::new())]
 #[inline(always)]
 fn plane_within_with<'a, S: Simd>(

@@ -15,6 +15,8 @@ use crate::camera::View;
 use crate::fit::Surfel;
 
 mod blend;
+#[cfg(test)]
+mod tests;
 
 /// Levels of the cells that may have sheets. Their width is about two distances between points, that of the smallest balls
 /// three; or twice as much.
@@ -40,7 +42,8 @@ struct Sheet {
     axis: Vec3,
     /// At the centre; radii, as `bend`.
     height: f32,
-    /// Heights by the square of an offset, as a symmetric matrix, xx, xy, xz, yy, yz and zz; of the axis it makes 0.
+    /// Heights by the square of an offset, as a symmetric matrix, xx, xy, xz, yy, yz and zz; of the axis it makes 0. The device has
+    /// its three coefficients along tangents, which is the same but for rounding.
     bend: [f32; 6],
     /// Standard error of its normal, radians.
     error: f32,
@@ -115,20 +118,18 @@ pub(super) struct Sheets {
     /// Of the cells.
     pub(super) level: usize,
     stacks: Vec<Stack>,
-    /// Of each stack; [`UNKNOWN`] before anyone has asked.
-    len: Vec<u8>,
+    /// Whether each stack is of this frame: nobody may have asked for it.
+    fitted: Vec<bool>,
     asked: Vec<Asked>,
 }
-
-const UNKNOWN: u8 = u8::MAX;
 
 impl Sheets {
     /// Forgets those of the frame before.
     pub(super) fn clear(&mut self, cells: &Cells) {
         let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.cells.len());
         self.stacks.resize(len, Stack::default());
-        self.len.clear();
-        self.len.resize(len, UNKNOWN);
+        self.fitted.clear();
+        self.fitted.resize(len, false);
         self.asked.clear();
         self.asked.resize_with(len, Asked::default);
     }
@@ -148,14 +149,14 @@ impl Sheets {
     /// Fits those that were asked for and are not there yet.
     pub(super) fn fit(&mut self, cells: &Cells, noise: &NoiseAt, view: &View) {
         let Some(level) = cells.levels.get(self.level) else { return };
-        let Self { stacks, len, asked, .. } = self;
+        let Self { stacks, fitted, asked, .. } = self;
         let task = Task { cells, level, asked, noise, view };
-        let rows = (stacks.par_chunks_mut(level.columns), len.par_chunks_mut(level.columns));
+        let rows = (stacks.par_chunks_mut(level.columns), fitted.par_chunks_mut(level.columns));
         // There is room for finer ones.
         rows.into_par_iter().take(level.rows).enumerate().for_each_init(
             Gathered::default,
-            |gathered, (row, (stacks, len))| {
-                fit_row(row, stacks, len, &task, gathered);
+            |gathered, (row, (stacks, fitted))| {
+                fit_row(row, stacks, fitted, &task, gathered);
             },
         );
     }
@@ -196,34 +197,35 @@ fn fit_row_with<'a, S: Simd>(
     simd: S,
     row: usize,
     stacks: &'a mut [Stack],
-    len: &'a mut [u8],
+    fitted: &'a mut [bool],
     task: &'a Task<'a>,
     gathered: &'a mut Gathered,
 ) {
     let level = task.level;
     for (column, cell) in level.cells[row * level.columns..][..level.columns].iter().enumerate() {
-        if len[column] == UNKNOWN
+        if !fitted[column]
             && cell.count[0] > 0.0
             && let Some(asked) = task.asked_around(row, column)
         {
-            len[column] = fit_cell(simd, &mut stacks[column], cell, asked, task, gathered);
+            fit_cell(simd, &mut stacks[column], cell, asked, task, gathered);
+            fitted[column] = true;
         }
     }
 }
 
-/// Fits sheets to a cell's clusters, largest first, until each has one or is near one; returns their number.
+/// Fits sheets to a cell's clusters, largest first, until each has one or is near one.
 #[inline(always)]
 fn fit_cell<S: Simd>(
     simd: S,
-    sheets: &mut Stack,
+    stack: &mut Stack,
     cell: &Cell,
     (k_radius_px, point): (f32, u32),
     task: &Task,
     gathered: &mut Gathered,
-) -> u8 {
+) {
     let Task { cells, noise, view, .. } = *task;
     let mut left = cell.count;
-    *sheets = Stack::default();
+    *stack = Stack::default();
     let mut len = 0;
     loop {
         let mut largest = 0;
@@ -233,7 +235,7 @@ fn fit_cell<S: Simd>(
             }
         }
         if left[largest] == 0.0 {
-            return len;
+            return;
         }
         left[largest] = 0.0;
         let center = cell.mean.map(|of| of[largest]);
@@ -252,7 +254,7 @@ fn fit_cell<S: Simd>(
                 }
             }
         }
-        sheets.put(len.into(), &sheet);
+        stack.put(len, &sheet);
         len += 1;
     }
 }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 use autosplats_cloud::PointCloud;
 use glam::Vec3;
+use pulp::Simd;
 use rayon::iter::Either;
 use rayon::prelude::*;
 
@@ -28,7 +29,7 @@ pub(super) const GATE_PX: f32 = 8.0;
 /// Side in pixels of the blocks that tell covered from empty screen when the density is measured.
 const OCCUPANCY_PX: usize = 16;
 
-/// Projects clouds; keeps its buffers from frame to frame.
+/// Projects clouds; keeps its buffers from frame to frame, but for two lists.
 #[derive(Debug, Default)]
 pub(crate) struct Projector {
     /// Per pixel, or half of one, `depth bits << 32 | point index`: positive floats order as their bits do.
@@ -131,7 +132,7 @@ fn nearest_per_pixel(
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
     positions.par_chunks(CHUNK).enumerate().for_each(|(chunk, positions)| {
         let first = (chunk * CHUNK) as u32;
-        let dropped = pulp::Arch::new().dispatch(|| project_chunk(positions, first, view, halves, keys, sixteenths));
+        let dropped = project_chunk(positions, first, view, halves, keys, sixteenths);
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
         outside.fetch_add(dropped.outside, Ordering::Relaxed);
@@ -145,14 +146,16 @@ const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
+#[pulp::with_simd(project_chunk = pulp::Arch::new())]
 #[inline(always)]
-fn project_chunk(
-    positions: &[[f32; 3]],
+fn project_chunk_with<'a, S: Simd>(
+    _: S,
+    positions: &'a [[f32; 3]],
     first: u32,
-    view: &View,
+    view: &'a View,
     halves: bool,
-    keys: &[AtomicU64],
-    sixteenths: &Sixteenths,
+    keys: &'a [AtomicU64],
+    sixteenths: &'a Sixteenths,
 ) -> Dropped {
     let mut dropped = Dropped::default();
     let mut slot = [0u32; LANES];
@@ -340,10 +343,9 @@ fn measure_density(screen: &mut ScreenPoints, view: &View, spacing_px: f32, k: u
 /// Puts back the points behind the culling plane of their cell [Paper, §7, Grid Culling], and those that do not matter.
 fn split(&ProjectRules { k, grid_culling, .. }: &ProjectRules, view: &View, screen: &mut ScreenPoints) {
     let ScreenPoints { points, density, active, passive, .. } = screen;
-    (*active, *passive) = (0..points.len()).into_par_iter().partition_map(|index| {
-        let point = &points[index];
+    (*active, *passive) = (0..points.len() as u32).into_par_iter().partition_map(|index| {
+        let point = &points[index as usize];
         let is_passive = grid_culling & density.culls(point) || !density.matters(point, k, view);
-        let side = if is_passive { Either::Right } else { Either::Left };
-        side(index as u32)
+        if is_passive { Either::Right(index) } else { Either::Left(index) }
     });
 }

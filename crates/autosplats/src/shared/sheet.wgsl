@@ -1,4 +1,4 @@
-// Quadrics that the surfels around share: see the CPU form. A cell has up to SLABS of them. Imports: orthonormal.
+// Quadrics that the surfels around share: see the CPU form, which has `bend` as a matrix. A cell has up to SLABS of them. Imports: orthonormal.
 
 #import orthonormal
 

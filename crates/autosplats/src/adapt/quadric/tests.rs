@@ -2,8 +2,9 @@
 
 use autosplats_cloud::glam::DVec3;
 use glam::Vec3;
+use pulp::Simd;
 
-use super::{Gathered, Quadric, tangents};
+use super::{Gathered, Plane, Quadric, tangents};
 use crate::adapt::STEP;
 use crate::adapt::cells::{Cell, Cells, Cluster, Level};
 use crate::adapt::cpu::{Goal, choose};
@@ -151,4 +152,33 @@ fn a_ball_that_agrees_by_half_counts_by_half() {
     assert!(is_ball(radii[0]) && radii.is_sorted_by(|less, more| less >= more), "{radii:?}");
     let between = radii.iter().filter(|&&radius| !is_ball(radius)).count();
     assert!(between > 30, "{between} of 40 are between two balls");
+}
+
+#[pulp::with_simd(read_and_fit = pulp::Arch::new())]
+#[inline(always)]
+fn read_and_fit_with<'a, S: Simd>(
+    simd: S,
+    cells: &'a Cells,
+    center: [f32; 3],
+    radius: f32,
+    view: &'a View,
+    gathered: &'a mut Gathered,
+) -> (usize, Quadric) {
+    let len = gathered.read(simd, cells, center, radius, view);
+    let Plane { axis, .. } = gathered.plane(simd);
+    (len, gathered.quadric(simd, radius, axis, 0.1))
+}
+
+#[test]
+fn any_width_of_vectors_fits_to_the_same_bits() {
+    let (cells, view) = cells_on(|x, y| 4.0 + 0.1 * x + 0.3 * (x * x - y));
+    let [mut gathered, mut alone]: [Gathered; 2] = Default::default();
+    for radius in [0.21, 0.4, 0.9] {
+        let center = [0.113, -0.237, 4.08];
+        let found = read_and_fit(&cells, center, radius, &view, &mut gathered);
+        assert_eq!(found, read_and_fit_with(pulp::Scalar, &cells, center, radius, &view, &mut alone), "{radius}");
+        let places = cells.levels[0].cells.iter().flat_map(Cell::clusters);
+        let inside = places.filter(|place| Vec3::from(place.mean).distance(center.into()) < radius);
+        assert_eq!(found.0, inside.count(), "clusters within {radius}");
+    }
 }

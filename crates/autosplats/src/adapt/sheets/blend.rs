@@ -3,7 +3,7 @@
 use glam::Vec3;
 use pulp::Simd;
 
-use super::{Sheet, Sheets, UNKNOWN};
+use super::{Sheet, Sheets};
 use crate::adapt::cells::{Cells, SLABS};
 use crate::adapt::cpu::{AGREE, FARTHEST, Goal};
 use crate::camera::View;
@@ -36,14 +36,14 @@ const FIELDS: usize = 19;
 
 /// Sheets of a cell, a number of all of them side by side, for SIMD; all 0 where there is none.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stack([[f32; SLABS]; FIELDS]);
+pub(super) struct Stack(pub(super) [[f32; SLABS]; FIELDS]);
 
 impl Stack {
     pub(super) fn put(&mut self, at: usize, sheet: &Sheet) {
         let &Sheet { center, radius, axis, height, bend, error, curvature, scatter, trust } = sheet;
         let [xx, xy, xz, yy, yz, zz] = bend;
         #[rustfmt::skip]
-        let fields = [
+        let fields: [f32; FIELDS] = [
             center.x, center.y, center.z, radius, 1.0 / radius, axis.x, axis.y, axis.z, height,
             xx, xy, xz, yy, yz, zz, error * error, curvature, scatter, trust,
         ];
@@ -87,7 +87,7 @@ impl Around {
             // At the picture's border there are fewer than four.
             let is_another = (at & 1 == 0 || x1 > x0) & (at & 2 == 0 || y1 > y0);
             let cell = row * columns + column;
-            let stack = if is_another && sheets.len[cell] != UNKNOWN { sheets.stacks[cell] } else { Stack::default() };
+            let stack = if is_another && sheets.fitted[cell] { sheets.stacks[cell] } else { Stack::default() };
             for (field, values) in self.fields.iter_mut().zip(&stack.0) {
                 field.0[lanes.clone()].copy_from_slice(values);
             }
@@ -126,22 +126,30 @@ impl Sheets {
         // Weights, normals, heights.
         let mut told = [Lanes::default(); 5];
         let mut disagrees = false;
+        // In the order of `Stack::put`.
+        #[rustfmt::skip]
+        let [
+            x_lanes, y_lanes, z_lanes, radius, per_radius, axis_x, axis_y, axis_z, height_lanes,
+            bend_xx, bend_xy, bend_xz, bend_yy, bend_yz, bend_zz, squared_error, curvature, scatter, trust,
+        ] = &around.fields;
         for vector in 0..LANES / S::F32_LANES {
-            let field = |index: usize| F32s::load(simd, &around.fields[index].0, vector);
-            let per_radius = field(4);
-            let (ox, oy, oz) =
-                ((cx - field(0)) * per_radius, (cy - field(1)) * per_radius, (cz - field(2)) * per_radius);
-            let (ax, ay, az) = (field(5), field(6), field(7));
-            let (xx, xy, xz, yy, yz, zz) = (field(9), field(10), field(11), field(12), field(13), field(14));
+            let load = |lanes: &Lanes| F32s::load(simd, &lanes.0, vector);
+            let per_radius = load(per_radius);
+            let ox = (cx - load(x_lanes)) * per_radius;
+            let oy = (cy - load(y_lanes)) * per_radius;
+            let oz = (cz - load(z_lanes)) * per_radius;
+            let (ax, ay, az) = (load(axis_x), load(axis_y), load(axis_z));
+            let (xx, xy, xz) = (load(bend_xx), load(bend_xy), load(bend_xz));
+            let (yy, yz, zz) = (load(bend_yy), load(bend_yz), load(bend_zz));
             let sx = xx * ox + xy * oy + xz * oz;
             let sy = xy * ox + yy * oy + yz * oz;
             let sz = xz * ox + yz * oy + zz * oz;
             let up = ax * ox + ay * oy + az * oz;
-            let height = (field(8) + (sx * ox + sy * oy + sz * oz) - up) * field(3);
+            let height = (load(height_lanes) + (sx * ox + sy * oy + sz * oz) - up) * load(radius);
             let near = one - (ox * ox + oy * oy + oz * oz - up * up);
             let away = height * splat(per_farthest);
             let likely = one - away * away;
-            let trust = field(18);
+            let trust = load(trust);
             let is_there = zero.less(near).and(zero.less(likely)).and(zero.less(trust));
             if !is_there.any() {
                 continue;
@@ -153,12 +161,12 @@ impl Sheets {
             let mut counts = is_there;
             if let Some((first, error)) = first {
                 let (fx, fy, fz) = (splat(first.x), splat(first.y), splat(first.z));
-                let (cx, cy, cz) = (ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx);
-                let across = cx * cx + cy * cy + cz * cz;
+                let (across_x, across_y, across_z) = (ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx);
+                let across = across_x * across_x + across_y * across_y + across_z * across_z;
                 // The smallest of a sheet's balls was held against nothing.
-                let agrees = across.at_most(splat(AGREE * AGREE) * (field(15) + splat(error * error)));
-                counts = is_there.and(agrees).and(field(17).at_most(splat(goal.scatter)));
-                disagrees = true;
+                let agrees = across.at_most(splat(AGREE * AGREE) * (load(squared_error) + splat(error * error)));
+                counts = is_there.and(agrees).and(load(scatter).at_most(splat(goal.scatter)));
+                disagrees |= zero.less(is_there.keep(one) - counts.keep(one)).any();
             }
             // Falls to 0 where the next cells come in.
             let share_x = one - (splat(x) - F32s::load(simd, &around.column.0, vector)).abs();
@@ -187,10 +195,10 @@ impl Sheets {
             left &= left - 1;
             let weight = weights.0[lane];
             let normal = Vec3::new(nx.0[lane], ny.0[lane], nz.0[lane]);
-            let axis = Vec3::new(around.fields[5].0[lane], around.fields[6].0[lane], around.fields[7].0[lane]);
+            let axis = Vec3::new(axis_x.0[lane], axis_y.0[lane], axis_z.0[lane]);
             sum.normal += normal * if normal.dot(sum.normal) < 0.0 { -weight } else { weight };
             sum.offset += axis * (heights.0[lane] * weight);
-            sum.curvature += around.fields[16].0[lane] * weight;
+            sum.curvature += curvature.0[lane] * weight;
             total += weight;
         }
         if !(total > 0.0) {

@@ -195,11 +195,11 @@ impl Outline<'_> {
         let pixel = self.view.pixel_size(depth);
         // One more, as blocks that a border crosses are not empty.
         let blocks = |fringe: f32| (fringe / BLOCK_PX as f32).ceil() as u8 + 1;
-        let fringe = |noise_px: f32| (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
+        let fringe_of = |noise_px: f32| (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
         let to_empty = blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX);
         // Most pixels are further inside than any noise is wide.
         let most_noise_px = noise.level / pixel;
-        if !(most_noise_px >= LEAST_NOISE_PX) || to_empty > blocks(fringe(most_noise_px)) {
+        if !(most_noise_px >= LEAST_NOISE_PX) || to_empty > blocks(fringe_of(most_noise_px)) {
             return None;
         }
         let radius_px = reach_px / SUPPORT;
@@ -210,7 +210,7 @@ impl Outline<'_> {
         if !(noise_px >= LEAST_NOISE_PX) {
             return None;
         }
-        let fringe = fringe(noise_px);
+        let fringe = fringe_of(noise_px);
         if to_empty > blocks(fringe) {
             return None;
         }
@@ -223,8 +223,8 @@ impl Outline<'_> {
         if window < AROUND_PX.max(radius_px) {
             return None;
         }
-        let held = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
-        let [ox, oy] = mean_offset(held, [x, y], window)?;
+        let squares = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
+        let [ox, oy] = mean_offset(squares, [x, y], window)?;
         let variance = window * window / PER_VARIANCE;
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
@@ -255,7 +255,7 @@ impl Outline<'_> {
             return Some(true);
         }
         let goes_on = |[ox, oy]: [f32; 2]| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
-        Some(!mean_offset(held, [x, y], window).is_some_and(goes_on))
+        Some(!mean_offset(squares, [x, y], window).is_some_and(goes_on))
     }
 }
 
@@ -273,16 +273,16 @@ impl Held {
 /// that lies within the screen; `None` if there are too few.
 #[pulp::with_simd(mean_offset = pulp::Arch::new())]
 #[inline(always)]
-fn mean_offset_with<'a, S: Simd>(_: S, held: &'a Held, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
+fn mean_offset_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
     let reach = window as usize;
     // The first square's middle from the pixel's, in pixels, and the squares.
     let along = |at: usize, most: usize| {
-        let first = (at - reach) / held.side;
-        let middle = (held.side * first) as f32 - at as f32 + 0.5 * (held.side as f32 - 1.0);
-        (middle, first, ((at + reach) / held.side).min(most - 1) + 1)
+        let first = (at - reach) / squares.side;
+        let middle = (squares.side * first) as f32 - at as f32 + 0.5 * (squares.side as f32 - 1.0);
+        (middle, first, ((at + reach) / squares.side).min(most - 1) + 1)
     };
-    let ((left, x0, x1), (top, y0, y1)) = (along(x, held.columns), along(y, held.rows));
-    let side = held.side as f32;
+    let ((left, x0, x1), (top, y0, y1)) = (along(x, squares.columns), along(y, squares.rows));
+    let side = squares.side as f32;
     let per_window = 1.0 / (window * window);
     let lanes: [f32; LANES] = std::array::from_fn(|lane| side * lane as f32);
     let [mut count, mut weight, mut right, mut down] = [[0f32; LANES]; 4];
@@ -290,13 +290,13 @@ fn mean_offset_with<'a, S: Simd>(_: S, held: &'a Held, [x, y]: [usize; 2], windo
         let oy = top + side * (row - y0) as f32;
         for (first, column) in (x0..x1).step_by(LANES).enumerate() {
             let first = left + side * (LANES * first) as f32;
-            let held: &[u16; LANES] =
-                held.count[row * held.columns + column..].first_chunk().expect("some after the last");
+            let counts: &[u16; LANES] =
+                squares.count[row * squares.columns + column..].first_chunk().expect("some after the last");
             for lane in 0..LANES {
                 // Beyond the window, and beyond the row, nothing counts.
                 let ox = first + lanes[lane];
                 let near = (1.0 - (ox * ox + oy * oy) * per_window).max(0.0);
-                let held = f32::from(held[lane]);
+                let held = f32::from(counts[lane]);
                 let of_lane = held * (near * near * near);
                 count[lane] += if near > 0.0 { held } else { 0.0 };
                 weight[lane] += of_lane;

@@ -1,0 +1,23 @@
+//! Cells that are filled again and again.
+
+use super::Cells;
+use crate::adapt::tests::{Case, PROJECTIONS};
+use crate::test_clouds::{self, noisy};
+
+#[test]
+fn nothing_is_left_of_the_frame_before() {
+    let sphere = Case::new(&noisy(test_clouds::sphere(4000), 0.02), PROJECTIONS[0], [320, 240]);
+    let small = Case::new(&noisy(test_clouds::sphere(900), 0.05), PROJECTIONS[1], [150, 200]);
+    let mut cells = Cells::default();
+    for case in [&sphere, &small, &sphere, &small] {
+        cells.fill(&case.screen, &case.view, crate::adapt::tests::K);
+        let fresh = case.cells();
+        assert_eq!(cells.levels.len(), fresh.levels.len(), "levels");
+        for (level, fresh) in cells.levels.iter().zip(&fresh.levels) {
+            assert_eq!([level.side_px, level.columns, level.rows], [fresh.side_px, fresh.columns, fresh.rows], "sizes");
+            assert!(level.cells == fresh.cells, "cells of {} pixels", level.side_px);
+        }
+    }
+    assert!(cells.levels[0].cells.iter().any(|cell| cell.count[0] > 0.0), "points");
+    assert!(cells.levels[0].cells.iter().any(|cell| cell.count[0] == 0.0), "empty cells");
+}
