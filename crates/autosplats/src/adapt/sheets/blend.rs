@@ -84,10 +84,9 @@ impl Around {
             let lanes = at * SLABS..(at + 1) * SLABS;
             self.column.0[lanes.clone()].fill(column as f32);
             self.row.0[lanes.clone()].fill(row as f32);
-            // At the picture's border there are fewer than four.
-            let is_another = (at & 1 == 0 || x1 > x0) & (at & 2 == 0 || y1 > y0);
             let cell = row * columns + column;
-            let stack = if is_another && sheets.fitted[cell] { sheets.stacks[cell] } else { Stack::default() };
+            // Those at the picture's border count twice, all of them.
+            let stack = if sheets.fitted[cell] { sheets.stacks[cell] } else { Stack::default() };
             for (field, values) in self.fields.iter_mut().zip(&stack.0) {
                 field.0[lanes.clone()].copy_from_slice(values);
             }
