@@ -27,11 +27,9 @@ use crate::project::Sixteenths;
 use crate::splat::setup::SUPPORT;
 use crate::splat::{TILE, tiled_index};
 
-/// Least noise, in pixels, that blurs a border where it is [`LEAST_SPACINGS`] thick, and elsewhere: with less, detail of far views
+/// Least noise, in pixels, that blurs a border where it is [`SURE_SPACINGS`] thick, and elsewhere: with less, detail of far views
 /// that was taken for noise would be cut.
 pub(in crate::splat) const LEAST_NOISE_PX: [f32; 2] = [0.1, 0.25];
-/// In mean distances of points.
-pub(in crate::splat) const LEAST_SPACINGS: f32 = 0.5;
 /// Squared radius of a window over the variance of its kernel, along one axis.
 pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
 /// All of the noise counts where the sine of a surface's tilt from the eye is at least this: in a fringe normals lean towards the
@@ -230,14 +228,13 @@ impl Outline<'_> {
         }
         let squares = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
         let Mean { offset: [ox, oy], count } = mean(squares, [x, y], window)?;
-        let spacing_px = window * (std::f32::consts::PI / count).sqrt();
-        if noise_px < (LEAST_SPACINGS * spacing_px).min(LEAST_NOISE_PX[1]) {
+        let sure_px = SURE_SPACINGS * window * (std::f32::consts::PI / count).sqrt();
+        if noise_px < sure_px.min(LEAST_NOISE_PX[1]) {
             return None;
         }
         let variance = window * window / PER_VARIANCE;
         let [unsure, sure] = OFF_BLURRED;
-        let may_be =
-            sure + (unsure - sure) * (1.0 - noise_px / (SURE_SPACINGS * spacing_px).min(SURE_NOISE_PX)).max(0.0);
+        let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px.min(SURE_NOISE_PX)).max(0.0);
         let most = may_be * variance / (variance + noise_px * noise_px).sqrt();
         // What is off by less altogether is so that way as well.
         if ox * ox + oy * oy <= most * most {
