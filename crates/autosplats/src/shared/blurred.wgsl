@@ -4,8 +4,6 @@
 #import blocks
 #import noise
 
-// Least noise in pixels that blurs a border: where it is `SURE_SPACINGS` thick, and elsewhere.
-override LEAST_NOISE_DENSE_PX: f32;
 override LEAST_NOISE_PX: f32;
 // Squared radius of a window over the variance of its kernel.
 override PER_VARIANCE: f32;
@@ -64,9 +62,6 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
         return SILENT;
     }
     let sure = SURE_SPACINGS * window * sqrt(3.14159265 / offset.z);
-    if noise < min(sure, LEAST_NOISE_PX) {
-        return SILENT;
-    }
     let variance = window * window / PER_VARIANCE;
     let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / min(sure, SURE_NOISE_PX), 0.0);
     let most = may_be * variance / sqrt(variance + noise * noise);

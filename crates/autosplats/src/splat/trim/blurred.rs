@@ -27,9 +27,8 @@ use crate::project::Sixteenths;
 use crate::splat::setup::SUPPORT;
 use crate::splat::{TILE, tiled_index};
 
-/// Least noise, in pixels, that blurs a border where it is [`SURE_SPACINGS`] thick, and elsewhere: with less, detail of far views
-/// that was taken for noise would be cut.
-pub(in crate::splat) const LEAST_NOISE_PX: [f32; 2] = [0.1, 0.25];
+/// Least noise, in pixels, that blurs a border: with less, detail of far views that was taken for noise would be cut.
+pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
 /// Squared radius of a window over the variance of its kernel, along one axis.
 pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
 /// All of the noise counts where the sine of a surface's tilt from the eye is at least this: in a fringe normals lean towards the
@@ -202,7 +201,7 @@ impl Outline<'_> {
         let to_empty = blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX);
         // Most pixels are further inside than any noise is wide.
         let most_noise_px = noise.level / pixel;
-        if !(most_noise_px >= LEAST_NOISE_PX[0]) || to_empty > blocks(fringe_of(most_noise_px)) {
+        if !(most_noise_px >= LEAST_NOISE_PX) || to_empty > blocks(fringe_of(most_noise_px)) {
             return None;
         }
         let radius_px = reach_px / SUPPORT;
@@ -210,7 +209,7 @@ impl Outline<'_> {
         let facing = Vec3::from(normal).dot(to_eye) / to_eye.length();
         let aside = ((1.0 - facing * facing).max(0.0).sqrt() / TILTED).min(1.0);
         let noise_px = aside * noise.at(per_radius * radius_px * pixel) / pixel;
-        if !(noise_px >= LEAST_NOISE_PX[0]) {
+        if !(noise_px >= LEAST_NOISE_PX) {
             return None;
         }
         let fringe = fringe_of(noise_px);
@@ -229,9 +228,6 @@ impl Outline<'_> {
         let squares = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
         let Mean { offset: [ox, oy], count } = mean(squares, [x, y], window)?;
         let sure_px = SURE_SPACINGS * window * (std::f32::consts::PI / count).sqrt();
-        if noise_px < sure_px.min(LEAST_NOISE_PX[1]) {
-            return None;
-        }
         let variance = window * window / PER_VARIANCE;
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px.min(SURE_NOISE_PX)).max(0.0);
