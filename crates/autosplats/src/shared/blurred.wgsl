@@ -14,11 +14,10 @@ override LEAST_RADIUS_PX: f32;
 override WIDEST_RADIUS_PX: f32;
 // Windows with a larger radius than this are summed up in blocks.
 override FINE_RADIUS_PX: f32;
-// How far the mean may be off with hardly any noise, and with so much in pixels and more, or in mean distances of points.
+// How far the mean may be off with hardly any noise, and with so much in pixels and more.
 override OFF_UNSURE: f32;
 override OFF_SURE: f32;
 override SURE_NOISE_PX: f32;
-override SURE_SPACINGS: f32;
 override FEWEST_BLURRED: u32;
 override FRINGE_NOISES: f32;
 // How far it is off at least half way to what is empty, as a part of that.
@@ -61,9 +60,8 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     if offset.z < f32(FEWEST_BLURRED) {
         return SILENT;
     }
-    let sure = SURE_SPACINGS * window * sqrt(3.14159265 / offset.z);
     let variance = window * window / PER_VARIANCE;
-    let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / min(sure, SURE_NOISE_PX), 0.0);
+    let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / SURE_NOISE_PX, 0.0);
     let most = may_be * variance / sqrt(variance + noise * noise);
     // What is off by less altogether is so that way as well.
     if dot(offset.xy, offset.xy) <= most * most {

@@ -15,11 +15,11 @@ use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
     BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
-    OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_NOISE_PX, SURE_SPACINGS, TILTED, WIDEST_RADIUS_PX,
+    OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
 };
 use super::trim::{
-    AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FINE_POINTS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
-    LEAST_SHARE, LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
+    AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
+    LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
 };
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -213,7 +213,6 @@ impl SplatPasses {
                 ("FEWEST_POINTS_NARROW", FEWEST_POINTS[0].into()),
                 ("FEWEST_POINTS_WIDE", FEWEST_POINTS[1].into()),
                 ("MANY_POINTS", MANY_POINTS.into()),
-                ("FINE_POINTS", FINE_POINTS.into()),
                 ("AROUND_PX", AROUND_PX.into()),
                 ("OFF_PX", OFF_PX.into()),
                 ("FEWEST_SPLATS_NARROW", FEWEST_SPLATS[0].into()),
@@ -229,7 +228,6 @@ impl SplatPasses {
                 ("OFF_UNSURE", OFF_BLURRED[0].into()),
                 ("OFF_SURE", OFF_BLURRED[1].into()),
                 ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
-                ("SURE_SPACINGS", SURE_SPACINGS.into()),
                 ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
                 ("FRINGE_NOISES", FRINGE_NOISES.into()),
                 ("BEYOND_FRINGE", BEYOND_FRINGE.into()),

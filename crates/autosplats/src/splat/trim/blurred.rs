@@ -41,12 +41,10 @@ pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
 /// Windows with a larger radius than this, in pixels, are summed up in blocks.
 pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
 /// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
-/// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more, or [`SURE_SPACINGS`].
+/// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more.
 pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.52];
 /// In pixels.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
-/// In mean distances of points.
-pub(in crate::splat) const SURE_SPACINGS: f32 = 1.25;
 /// From how many sixteenths with points on they tell.
 pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
 /// A fringe is no wider than the reach of its splats and this many times the noise,
@@ -226,11 +224,10 @@ impl Outline<'_> {
             return None;
         }
         let squares = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
-        let Mean { offset: [ox, oy], count } = mean(squares, [x, y], window)?;
-        let sure_px = SURE_SPACINGS * window * (std::f32::consts::PI / count).sqrt();
+        let [ox, oy] = mean_offset(squares, [x, y], window)?;
         let variance = window * window / PER_VARIANCE;
         let [unsure, sure] = OFF_BLURRED;
-        let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px.min(SURE_NOISE_PX)).max(0.0);
+        let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
         let most = may_be * variance / (variance + noise_px * noise_px).sqrt();
         // What is off by less altogether is so that way as well.
         if ox * ox + oy * oy <= most * most {
@@ -257,8 +254,8 @@ impl Outline<'_> {
         if (x.min(y).min(width - 1 - x).min(height - 1 - y) as f32) < window {
             return Some(true);
         }
-        let goes_on = |there: Mean| -(there.offset[0] * ahead_x + there.offset[1] * ahead_y) <= OFF_HALF_WAY * most;
-        Some(!mean(squares, [x, y], window).is_some_and(goes_on))
+        let goes_on = |[ox, oy]: [f32; 2]| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
+        Some(!mean_offset(squares, [x, y], window).is_some_and(goes_on))
     }
 }
 
@@ -272,19 +269,11 @@ impl Held {
     }
 }
 
-/// Of the sixteenths with points around a pixel.
-#[derive(Clone, Copy, Debug)]
-struct Mean {
-    /// From the pixel's middle, in pixels.
-    offset: [f32; 2],
-    count: f32,
-}
-
-/// The mean of the sixteenths with points around the middle of pixel (x, y), in a window of such a radius that lies within the
-/// screen; `None` if there are too few.
-#[pulp::with_simd(mean = pulp::Arch::new())]
+/// The mean offset, in pixels, of the sixteenths with points from the middle of pixel (x, y), in a window of such a radius
+/// that lies within the screen; `None` if there are too few.
+#[pulp::with_simd(mean_offset = pulp::Arch::new())]
 #[inline(always)]
-fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<Mean> {
+fn mean_offset_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
     let reach = window as usize;
     // The first square's middle from the pixel's, in pixels, and the squares.
     let along = |at: usize, most: usize| {
@@ -317,5 +306,5 @@ fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> 
         }
     }
     let [count, weight, right, down] = [count, weight, right, down].map(|lanes| lanes.iter().sum::<f32>());
-    (count >= FEWEST_BLURRED as f32).then(|| Mean { offset: [right / weight, down / weight], count })
+    (count >= FEWEST_BLURRED as f32).then(|| [right / weight, down / weight])
 }
