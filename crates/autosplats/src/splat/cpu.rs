@@ -138,12 +138,12 @@ impl Splatter {
             if rims[index * TILE_AREA..][..TILE_AREA].iter().all(|&rim| rim == EMPTY) {
                 return 0;
             }
-            let border = outline.border([x0, y0]);
+            let edges = outline.edges([x0, y0]);
             let mut covered = 0;
             for y in y0..(y0 + TILE).min(view.height as usize) {
                 for x in x0..(x0 + TILE).min(view.width as usize) {
                     let at = (y - y0) * TILE + x - x0;
-                    if outline.sticks_out(x, y, layers.shown(at), border[y - y0] >> (x - x0) & 1 == 1) {
+                    if outline.sticks_out(x, y, layers.shown(at), edges.near([x - x0, y - y0])) {
                         layers.clear(at);
                     }
                     covered += usize::from(layers.covers(at) && view.beside_picture([x, y]) == 0);

@@ -18,8 +18,8 @@ use super::trim::blurred::{
     OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
 };
 use super::trim::{
-    AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX, LEAST_SHARE,
-    LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
+    AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FINE_POINTS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
+    LEAST_SHARE, LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
 };
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -213,6 +213,7 @@ impl SplatPasses {
                 ("FEWEST_POINTS_NARROW", FEWEST_POINTS[0].into()),
                 ("FEWEST_POINTS_WIDE", FEWEST_POINTS[1].into()),
                 ("MANY_POINTS", MANY_POINTS.into()),
+                ("FINE_POINTS", FINE_POINTS.into()),
                 ("AROUND_PX", AROUND_PX.into()),
                 ("OFF_PX", OFF_PX.into()),
                 ("FEWEST_SPLATS_NARROW", FEWEST_SPLATS[0].into()),

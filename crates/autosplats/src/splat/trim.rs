@@ -7,11 +7,12 @@
 //! reaches, and nothing empty in between; or if there is no core around it at all.
 //!
 //! Where points are dense, discs are too coarse a measure, and what ends the surface are the points themselves, all of them,
-//! hidden or not (`Sixteenths`): close to an empty square of three pixels, a pixel stays if points lie on both sides of its
-//! middle, whichever line through it parts them. Where they are few, the mean of the splats around has to be close to its middle
-//! as well: noise strews points past the border, and splats are back on the surface. Lines between cores kept a row of tails
-//! wherever two cores stood out of a border. A surface that curves away has its points close together at its border, however wide
-//! its splats are where it faces the eye: so wide splats are asked as well, but more points have to say it.
+//! hidden or not (`Sixteenths`): close to an empty pixel, one stays if points lie on both sides of its middle, whichever line
+//! through it parts them, or if they lie towards that one. Close to an empty square of three pixels, which is no gap between points, the mean of the splats around
+//! has to be close to its middle as well where points are few: noise strews points past the border, and splats are back on the
+//! surface. Lines between cores kept a row of tails wherever two cores stood out of a border. A surface that curves away has its
+//! points close together at its border, however wide its splats are where it faces the eye: so wide splats are asked as well, but
+//! more points have to say it.
 //!
 //! Where there is noise, the density of points tells in place of all this (`blurred`).
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
@@ -47,6 +48,8 @@ pub(super) const LEAST_SHARE: u32 = 8;
 /// alone.
 pub(super) const FEWEST_POINTS: [u32; 2] = [5, 8];
 pub(super) const MANY_POINTS: u32 = 18;
+/// From how many of them on they tell which way a border runs more finely than the eight lines.
+pub(super) const FINE_POINTS: u32 = 24;
 /// Splats closer than so many pixels are those around a pixel.
 pub(super) const AROUND_PX: f32 = 3.0;
 /// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it is 0.8 pixels off, at that
@@ -58,33 +61,42 @@ pub(super) const FEWEST_SPLATS: [f32; 2] = [3.0, 14.0];
 /// Reach in pixels of the widest narrow splat: points are about two pixels apart then.
 pub(super) const NARROW_PX: f32 = 3.0;
 /// Pixels from the middle of an empty square of three that are the border, along an axis; in a square, but for its corners. An
-/// empty pixel alone is a gap between points, which the rule for borders would widen.
+/// empty pixel alone may be a gap between points, which the splats around would widen.
 const BORDER_PX: usize = 3;
+/// The same from an empty pixel: these are asked by points alone, and whether it is in this distance that way.
+const GAP_PX: usize = 2;
 /// Pixels beside a tile that tell of its border.
 const MARGIN: usize = BORDER_PX + 1;
 const _: () = assert!(TILE == 64, "a row of a tile is a word");
 /// Directions of the eight lines.
 const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
-/// Of the sixteenths around a pixel, as [`Sixteenths::around`] has them, those within a pixel of its middle that lie ahead along
-/// each line, or neither ahead nor behind; then those behind.
-const SIDES: [u64; 2 * LINES.len()] = {
-    let mut sides = [0; 2 * LINES.len()];
+/// Directions across which borders are looked for: along the lines, and between them.
+#[rustfmt::skip]
+const ACROSS: [[isize; 2]; 2 * LINES.len()] = [
+    [1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2],
+    [4, 1], [1, 4], [4, -1], [1, -4], [4, 3], [3, 4], [4, -3], [3, -4],
+];
+/// Of the sixteenths around a pixel, as [`Sixteenths::around`] has them, those within a pixel of its middle that lie ahead in
+/// each direction, or neither ahead nor behind; then those behind.
+const SIDES: [[u64; 2]; ACROSS.len()] = {
+    let mut sides = [[0; 2]; ACROSS.len()];
     let mut at = 0;
-    while at < 64 * sides.len() {
-        let (side, bit) = (at / 64, at % 64);
-        let [dx, dy] = LINES[side % LINES.len()];
-        let sign = if side < LINES.len() { 1 } else { -1 };
+    while at < 64 * ACROSS.len() {
+        let (direction, bit) = (at / 64, at % 64);
+        let [dx, dy] = ACROSS[direction];
         // From the middle, in eighths of a pixel.
         let [x, y] = [2 * (bit as isize % 8) - 7, 2 * (bit as isize / 8) - 7];
-        if x * x + y * y < 64 && sign * (x * dx + y * dy) >= 0 {
-            sides[side] |= 1 << bit;
+        let ahead = x * dx + y * dy;
+        if x * x + y * y < 64 {
+            sides[direction][0] |= ((ahead >= 0) as u64) << bit;
+            sides[direction][1] |= ((ahead <= 0) as u64) << bit;
         }
         at += 1;
     }
     sides
 };
 /// Those within a pixel of the middle, and those of the pixel itself.
-const DISC: u64 = SIDES[0] | SIDES[LINES.len()];
+const DISC: u64 = SIDES[0][0] | SIDES[0][1];
 const OWN: u64 = 0x3c3c_3c3c << 16;
 
 /// What trimming knows of a pixel: [`EMPTY`], or how far its heaviest splat reaches in pixels, below 0 in a core.
@@ -110,6 +122,34 @@ pub(super) struct Shown {
     pub(super) normal: [f32; 3],
 }
 
+/// What is empty close to a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Near {
+    Nothing,
+    /// A pixel, which may be a gap between points.
+    Gap,
+    /// A square of three pixels.
+    Border,
+}
+
+/// What is empty close to the pixels of a tile: of each row a bit for each of them, the lowest the first.
+#[derive(Debug)]
+pub(super) struct Edges {
+    gaps: [u64; TILE],
+    borders: [u64; TILE],
+}
+
+impl Edges {
+    /// Close to pixel (x, y) of the tile.
+    pub(super) fn near(&self, [x, y]: [usize; 2]) -> Near {
+        match [self.borders, self.gaps].map(|rows| rows[y] >> x & 1 == 1) {
+            [true, _] => Near::Border,
+            [_, true] => Near::Gap,
+            _ => Near::Nothing,
+        }
+    }
+}
+
 /// What trimming knows of a picture, tile by tile.
 #[derive(Clone, Copy)]
 pub(super) struct Outline<'a> {
@@ -131,9 +171,8 @@ impl Outline<'_> {
         tiled_index(self.view.width as usize, x, y)
     }
 
-    /// Row by row, which pixels of the tile with this upper left one are close to an empty square of three: a bit each, the
-    /// lowest the first.
-    pub(super) fn border(&self, [x0, y0]: [usize; 2]) -> [u64; TILE] {
+    /// What is empty close to the pixels of the tile with this upper left one.
+    pub(super) fn edges(&self, [x0, y0]: [usize; 2]) -> Edges {
         let [width, height] = self.size();
         let own = &self.rims[self.index([x0, y0])..][..TILE_AREA];
         // Bits of empty pixels, of the margin on each side as well.
@@ -158,44 +197,59 @@ impl Outline<'_> {
         });
         let narrow = |bits: u128| bits | bits << 1 | bits >> 1 | bits << 2 | bits >> 2;
         let wide = |bits: u128| narrow(bits) | bits << 3 | bits >> 3;
-        std::array::from_fn(|y| {
+        let slim = |bits: u128| bits | bits << 1 | bits >> 1;
+        let gaps = |y: usize| {
+            let around = &rows[y + MARGIN - GAP_PX..];
+            ((slim(around[0] | around[4]) | narrow(around[1] | around[2] | around[3])) >> MARGIN) as u64
+        };
+        let borders = |y: usize| {
             let inner = middles[y + 1..y + 6].iter().fold(0, |bits, row| bits | row);
             ((narrow(middles[y] | middles[y + 6]) | wide(inner)) >> MARGIN) as u64
-        })
+        };
+        Edges { gaps: std::array::from_fn(gaps), borders: std::array::from_fn(borders) }
     }
 
-    /// Whether a splat covers pixel (x, y), of which this is shown, but no surface does; `border` says whether the pixel is close
-    /// to an empty square.
-    pub(super) fn sticks_out(&self, x: usize, y: usize, shown: Shown, border: bool) -> bool {
+    /// Whether a splat covers pixel (x, y), of which this is shown, but no surface does.
+    pub(super) fn sticks_out(&self, x: usize, y: usize, shown: Shown, near: Near) -> bool {
         let own = self.rims[self.index([x, y])];
         if own == EMPTY {
             return false;
         }
         let by_density = self.is_beside_blurred([x, y], shown, own.abs());
-        let beside = || if border { self.is_beside([x, y], own.abs() > NARROW_PX) } else { None };
-        by_density.or_else(beside).unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
+        by_density
+            .or_else(|| self.is_beside([x, y], own.abs() > NARROW_PX, near))
+            .unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }
 
     /// Whether pixel (x, y) is beside the surface, by the points around, if they tell; `wide` says whether its splat is.
-    fn is_beside(&self, [x, y]: [usize; 2], wide: bool) -> Option<bool> {
+    fn is_beside(&self, [x, y]: [usize; 2], wide: bool, near: Near) -> Option<bool> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
         // Of points beyond the screen nothing is known.
-        if x < window || y < window || x + window >= width || y + window >= height {
+        let known = x >= window && y >= window && x + window < width && y + window < height;
+        if near == Near::Nothing || !known {
             return None;
         }
         let points = self.sixteenths.around([x, y]);
         let count = (points & DISC).count_ones();
-        if let Some(side) = open_side(points).filter(|_| count >= FEWEST_POINTS[usize::from(wide)]) {
+        if let Some([dx, dy]) = open_side(points).filter(|_| count >= FEWEST_POINTS[usize::from(wide)]) {
+            let most = dx.abs().max(dy.abs());
+            let [dx, dy] = [dx, dy].map(|along| if 2 * along.abs() < most { 0 } else { along.signum() });
+            let ahead = |steps: isize| [x.wrapping_add_signed(steps * dx), y.wrapping_add_signed(steps * dy)];
+            let is_empty = |at: [usize; 2]| self.rims[self.index(at)] == EMPTY;
+            if near == Near::Gap && !(1..=GAP_PX as isize).any(|steps| is_empty(ahead(steps))) {
+                return None;
+            }
             // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
-            let back = if side < LINES.len() { -1 } else { 1 };
-            let [dx, dy] = LINES[side % LINES.len()].map(|along| back * along.signum());
-            let behind = [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy)];
-            let stays = self.rims[self.index(behind)] != EMPTY && open_side(self.sixteenths.around(behind)).is_none();
+            let behind = ahead(-1);
+            let stays = !is_empty(behind) && open_side(self.sixteenths.around(behind)).is_none();
             return Some(points & OWN == 0 || stays);
         }
         if count >= MANY_POINTS {
             return Some(false);
+        }
+        if near == Near::Gap {
+            return None;
         }
         let offset = self.splats_offset([x, y], FEWEST_SPLATS[usize::from(wide)])?;
         Some(square(offset) > OFF_PX * OFF_PX)
@@ -272,11 +326,15 @@ impl Outline<'_> {
     }
 }
 
-/// The side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface.
-fn open_side(points: u64) -> Option<usize> {
+/// Towards the side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface.
+fn open_side(points: u64) -> Option<[isize; 2]> {
     let count = |side: u64| (points & side).count_ones();
-    let least = (0..SIDES.len()).min_by_key(|&side| count(SIDES[side]))?;
-    (LEAST_SHARE * count(SIDES[least]) < count(DISC).max(1)).then_some(least)
+    let all = count(DISC);
+    let told = if all < FINE_POINTS { LINES.len() } else { ACROSS.len() };
+    let side = |at: usize| (count(SIDES[at % told][at / told]), at);
+    let (least, at) = (0..2 * told).map(side).min()?;
+    let sign = if at < told { 1 } else { -1 };
+    (LEAST_SHARE * least < all.max(1)).then(|| ACROSS[at % told].map(|along| sign * along))
 }
 
 fn square([x, y]: [f32; 2]) -> f32 {

@@ -33,6 +33,8 @@ override LEAST_SHARE: u32;
 override FEWEST_POINTS_NARROW: u32;
 override FEWEST_POINTS_WIDE: u32;
 override MANY_POINTS: u32;
+// How many tell which way a border runs more finely than the eight lines.
+override FINE_POINTS: u32;
 // What splats around a pixel are, where their mean may be, how many tell around narrow ones and around wide ones, and which are
 // narrow.
 override AROUND_PX: f32;
@@ -67,12 +69,16 @@ var<workgroup> middles: array<vec2u, 40>;
 // For each row of blocks, a bit for each that is empty, likewise.
 var<workgroup> empty_blocks: array<atomic<u32>, 2u * WIDE_BLOCKS>;
 var<workgroup> is_any_empty: atomic<u32>;
-// For each line, the sixteenths around a pixel that lie ahead, then for each those behind: two words of four rows each.
-var<workgroup> sides: array<vec2u, 16>;
+// For each direction, the sixteenths around a pixel that lie ahead, then for each those behind: two words of four rows each.
+var<workgroup> sides: array<vec2u, 2u * DIRECTIONS>;
 
-// The eight lines, and the places of a pixel's own sixteenths among those around it.
-const LINES = array(
+// The directions across which borders are looked for, the first eight of which are the lines; and the places of a pixel's own
+// sixteenths among those around it.
+const DIRECTIONS = 16u;
+const LINES = 8u;
+const ACROSS = array(
     vec2i(1, 0), vec2i(0, 1), vec2i(1, 1), vec2i(1, -1), vec2i(2, 1), vec2i(1, 2), vec2i(2, -1), vec2i(1, -2),
+    vec2i(4, 1), vec2i(1, 4), vec2i(4, -1), vec2i(1, -4), vec2i(4, 3), vec2i(3, 4), vec2i(4, -3), vec2i(3, -4),
 );
 const OWN = vec2u(0x3c3c0000u, 0x3c3cu);
 
@@ -89,7 +95,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     for (var word = local; word < 2u * WIDE_BLOCKS; word += GROUP) {
         atomicStore(&empty_blocks[word], 0u);
     }
-    if local < 16u {
+    if local < 2u * DIRECTIONS {
         sides[local] = side(local);
     }
     workgroupBarrier();
@@ -130,7 +136,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
         if all(pixel < frame.size) {
             let rim = cover[pixel.y * frame.size.x + pixel.x].rim;
             stay += select(1u, 0u, rim == EMPTY_RIM || beside_picture(pixel) > 0u);
-            if TRIMS == 1u && rim != EMPTY_RIM && (rim > EMPTY_RIM || is_border(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
+            if TRIMS == 1u && rim != EMPTY_RIM && (rim > EMPTY_RIM || is_gap(at) || blurred_by(at, pixel, abs(rim)) > 0.0) {
                 tails[atomicAdd(&tail_count, 1u)] = place;
             }
         }
@@ -170,7 +176,16 @@ fn empty_row(row: u32) -> vec2u {
     return vec2u(atomicLoad(&empties[2u * row]), atomicLoad(&empties[2u * row + 1u]));
 }
 
-// Whether a pixel of the square is close to the middle of an empty square of three.
+// Whether a pixel of the square is close to an empty pixel.
+fn is_gap(place: vec2u) -> bool {
+    // Of the five rows around it, three of the outer ones' pixels and five of the others'.
+    let row = place.y + MARGIN;
+    let inner = empty_row(row - 1u) | empty_row(row) | empty_row(row + 1u);
+    let outer = empty_row(row - 2u) | empty_row(row + 2u);
+    return ((seven_bits(place.x, inner) & 62u) | (seven_bits(place.x, outer) & 28u)) != 0u;
+}
+
+// Whether a pixel of the square is close to the middle of an empty square of three, which makes it close to an empty pixel.
 fn is_border(place: vec2u) -> bool {
     // Around it in the wide square, five of the outer rows' pixels and seven of the others'.
     var inner = vec2u(0u);
@@ -187,10 +202,16 @@ fn seven_bits(column: u32, bits: vec2u) -> u32 {
     return (((bits.x >> column) >> 1u) | (bits.y << (31u - column))) & 127u;
 }
 
-// The sixteenths around a pixel, within a pixel of its middle, that lie ahead along a line, or behind, or neither.
+// A direction across a border, or the opposite one.
+fn across(which: u32) -> vec2i {
+    var directions = ACROSS;
+    let direction = directions[which % DIRECTIONS];
+    return select(direction, -direction, which >= DIRECTIONS);
+}
+
+// The sixteenths around a pixel, within a pixel of its middle, that lie ahead in a direction, or neither ahead nor behind.
 fn side(which: u32) -> vec2u {
-    var lines = LINES;
-    let along = select(lines[which % 8u], -lines[which % 8u], which >= 8u);
+    let along = across(which);
     var bits = vec2u(0u);
     for (var bit = 0u; bit < 64u; bit++) {
         // From the middle, in eighths of a pixel.
@@ -234,8 +255,8 @@ fn sticks_out(place: vec2u, pixel: vec2u, own: f32) -> bool {
     if noise > 0.0 {
         answer = is_beside_blurred(pixel, abs(own), noise);
     }
-    if answer == SILENT && is_border(place) {
-        answer = is_beside(pixel, abs(own) > NARROW_PX);
+    if answer == SILENT && is_gap(place) {
+        answer = is_beside(pixel, abs(own) > NARROW_PX, is_border(place));
     }
     if answer == SILENT {
         return own > EMPTY_RIM && is_open(vec2i(pixel), own);
@@ -248,51 +269,69 @@ const SILENT = 0u;
 const YES = 1u;
 const NO = 2u;
 
-// Whether a pixel is beside the surface, by the points around; `wide` says whether its splat is.
-fn is_beside(pixel: vec2u, wide: bool) -> u32 {
+// Whether a pixel is beside the surface, by the points around; `wide` says whether its splat is, `border` whether it is close to an
+// empty square.
+fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     let window = u32(AROUND_PX);
     // Of points beyond the picture nothing is known.
     if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
         return SILENT;
     }
     let points = around(pixel);
-    let of_disc = count(points & (sides[0] | sides[8]));
+    let of_disc = count_disc(points);
     let open = open_side(points);
-    if of_disc >= select(FEWEST_POINTS_NARROW, FEWEST_POINTS_WIDE, wide) && open < 16u {
+    if of_disc >= select(FEWEST_POINTS_NARROW, FEWEST_POINTS_WIDE, wide) && open < 2u * DIRECTIONS {
+        let towards = across(open);
+        let steep = 2 * abs(towards) >= vec2i(max(abs(towards.x), abs(towards.y)));
+        let step = select(vec2i(0), sign(towards), steep);
+        if !border && !is_empty(vec2u(vec2i(pixel) + step)) && !is_empty(vec2u(vec2i(pixel) + 2 * step)) {
+            return SILENT;
+        }
         // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
         if all((points & OWN) == vec2u(0u)) {
             return YES;
         }
-        var lines = LINES;
-        let along = sign(lines[open % 8u]);
-        let behind = vec2u(vec2i(pixel) + select(along, -along, open < 8u));
-        let is_drawn = cover[behind.y * frame.size.x + behind.x].rim != EMPTY_RIM;
-        return select(NO, YES, is_drawn && open_side(around(behind)) == 16u);
+        let behind = vec2u(vec2i(pixel) - step);
+        return select(NO, YES, !is_empty(behind) && open_side(around(behind)) == 2u * DIRECTIONS);
     }
     if of_disc >= MANY_POINTS {
         return NO;
     }
+    if !border {
+        return SILENT;
+    }
     return mean_of_splats(pixel, select(FEWEST_SPLATS_NARROW, FEWEST_SPLATS_WIDE, wide));
+}
+
+fn is_empty(pixel: vec2u) -> bool {
+    return cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM;
 }
 
 fn count(bits: vec2u) -> u32 {
     return countOneBits(bits.x) + countOneBits(bits.y);
 }
 
+// Those within a pixel of the middle.
+fn count_disc(points: vec2u) -> u32 {
+    return count(points & (sides[0] | sides[DIRECTIONS]));
+}
+
 // The side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface;
-// else 16.
+// else twice `DIRECTIONS`.
 fn open_side(points: vec2u) -> u32 {
-    var side = 0u;
-    var least = count(points & sides[0]);
-    for (var which = 1u; which < 16u; which++) {
+    let all = count_disc(points);
+    let told = select(DIRECTIONS, LINES, all < FINE_POINTS);
+    var open = 0u;
+    var least = all;
+    for (var at = 0u; at < 2u * told; at++) {
+        let which = select(at, at - told + DIRECTIONS, at >= told);
         let there = count(points & sides[which]);
         if there < least {
-            side = which;
+            open = which;
             least = there;
         }
     }
-    let all = count(points & (sides[0] | sides[8]));
-    return select(16u, side, LEAST_SHARE * least < max(all, 1u));
+    return select(2u * DIRECTIONS, open, LEAST_SHARE * least < max(all, 1u));
 }
 
 // The sixteenths no farther than a pixel from the middle of one that hold points: eight rows of eight.
@@ -350,13 +389,12 @@ fn is_open(pixel: vec2i, own: f32) -> bool {
     // Wide splats have wide cores, which strides do not miss; so the work per pixel is bounded whatever the density.
     let stride = i32(max(own / STRIDES_PER_REACH, 1.0));
     let strides = i32(FURTHEST * own) / stride + LEAST_REACH_PX;
-    var lines = LINES;
     // What has no core anywhere around, as a point alone, sticks out of nothing.
     var is_tail = false;
-    for (var line = 0u; line < 8u; line++) {
-        let ahead = meets_core(pixel, lines[line], stride, strides);
+    for (var line = 0u; line < LINES; line++) {
+        let ahead = meets_core(pixel, across(line), stride, strides);
         // Where nothing is ahead, what is behind tells only of a core anywhere around.
-        let behind = (ahead || !is_tail) && meets_core(pixel, -lines[line], stride, strides);
+        let behind = (ahead || !is_tail) && meets_core(pixel, -across(line), stride, strides);
         if ahead && behind {
             return false;
         }

@@ -38,9 +38,9 @@ fn trimmed(drawing: &[&str]) -> Vec<String> {
     let sixteenths = Sixteenths::with(size.map(|side| side as usize), []);
     let outline =
         Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
-    let border = outline.border([0, 0]);
+    let edges = outline.edges([0, 0]);
     let row = |(y, row): (usize, &&str)| {
-        let goes = |x: usize| outline.sticks_out(x, y, SHOWN, border[y] >> x & 1 == 1);
+        let goes = |x: usize| outline.sticks_out(x, y, SHOWN, edges.near([x, y]));
         let pixel = |(x, pixel): (usize, char)| if goes(x) { 'x' } else { pixel };
         row.chars().enumerate().map(pixel).collect()
     };
@@ -110,8 +110,8 @@ fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(u
     let sixteenths = Sixteenths::with(size, points.iter().copied());
     move |x, y| {
         let outline = Outline { rims: &rims, centers: &centers, sixteenths: &sixteenths, view: &view, blurred: None };
-        let border = outline.border([0, 0]);
-        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, border[y] >> x & 1 == 1)
+        let edges = outline.edges([0, 0]);
+        rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, edges.near([x, y]))
     }
 }
 
@@ -175,7 +175,7 @@ fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
     for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
         let below = y as f32 + 0.5 - line(x as f32 + 0.5);
         if below.abs() < 2.0 {
-            let is_beside = outline.is_beside([x, y], wide);
+            let is_beside = outline.is_beside([x, y], wide, Near::Border);
             let is_right = is_beside == Some(below < 0.0);
             counts = [counts[0] + 1, counts[1] + usize::from(is_beside.is_some()), counts[2] + usize::from(is_right)];
         }
@@ -227,9 +227,9 @@ fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
         let facing = Shown { normal: [0.0, 0.0, -1.0], ..SHOWN };
         assert!(outline.is_beside_blurred([32, 28], facing, 2.0).is_none(), "what faces the eye is not blurred");
     }
-    let border = outline.border([0, 0]);
+    let edges = outline.edges([0, 0]);
     let stays =
-        |x: usize, y: usize| rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, border[y] >> x & 1 == 1);
+        |x: usize, y: usize| rims[y * TILE + x] != EMPTY && !outline.sticks_out(x, y, SHOWN, edges.near([x, y]));
     let above = |x: usize| Some(line(x as f32 + 0.5) - (0..TILE).find(|&y| stays(x, y))? as f32);
     (24..40).map(|x| above(x).expect("what is below stays")).collect()
 }
@@ -347,33 +347,85 @@ fn what_is_thin_stays() {
 }
 
 #[test]
-fn borders_are_pixels_close_to_an_empty_square() {
+fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_pixel() {
     let [width, height] = [TILE + 37, TILE + 5];
     let view = view([width as u32, height as u32]);
     let mut random = Random::new(52);
-    // What lies in tiles beyond the picture is of no account.
-    let rims: Vec<_> = (0..4 * TILE_AREA).map(|_| if random.below(5) > 1 { EMPTY } else { 1.0 }).collect();
-    let outline = Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view, blurred: None };
-    let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
-    let mut all = [0, 0];
-    for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {
-        let border = outline.border(tile);
-        for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
-            let [column, row] = [tile[0] + x, tile[1] + y];
-            if column >= width || row >= height {
-                continue;
+    let mut all = [0; 3];
+    for empty_percent in [60, 5] {
+        // What lies in tiles beyond the picture is of no account.
+        let rim = |_| if random.below(100) < empty_percent { EMPTY } else { 1.0 };
+        let rims: Vec<_> = (0..4 * TILE_AREA).map(rim).collect();
+        let outline =
+            Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view, blurred: None };
+        let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
+        // The upper left pixel of the square.
+        let is_square = |x: usize, y: usize| (0..9).all(|at| is_empty(x + at % 3, y + at / 3));
+        for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {
+            let edges = outline.edges(tile);
+            for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
+                let [column, row] = [tile[0] + x, tile[1] + y];
+                if column >= width || row >= height {
+                    continue;
+                }
+                // Whether it holds for a pixel of a square around this one, but for its corners, moved up and left by so much.
+                let around = |side: usize, back: usize, holds: &dyn Fn(usize, usize) -> bool| {
+                    let places = (0..side * side).map(|at| [at % side, at / side]);
+                    let mut places = places.filter(|at| !at.iter().all(|along| along % (side - 1) == 0));
+                    places.any(|[dx, dy]| {
+                        let place = (column + dx).checked_sub(back).zip((row + dy).checked_sub(back));
+                        place.is_some_and(|(x, y)| holds(x, y))
+                    })
+                };
+                let expected = match [around(7, 4, &is_square), around(5, 2, &is_empty)] {
+                    [true, _] => Near::Border,
+                    [_, true] => Near::Gap,
+                    _ => Near::Nothing,
+                };
+                assert_eq!(edges.near([x, y]), expected, "{column}, {row}");
+                all[expected as usize] += 1;
             }
-            let around = (0..7).flat_map(|dy| (0..7).map(move |dx| (dx, dy)));
-            let mut around = around.filter(|&(dx, dy)| dx % 6 != 0 || dy % 6 != 0);
-            // The upper left pixel of the square.
-            let is_square = |(x, y): (usize, usize)| (0..9).all(|at| is_empty(x + at % 3, y + at / 3));
-            let near = around
-                .any(|(dx, dy)| (column + dx).checked_sub(4).zip((row + dy).checked_sub(4)).is_some_and(is_square));
-            assert_eq!(border[y] >> x & 1 == 1, near, "{column}, {row}");
-            all[usize::from(near)] += 1;
         }
     }
-    assert!(all[0] > 1000 && all[1] > 1000, "there are both: {all:?}");
+    assert!(all.iter().all(|&count| count > 1000), "there are all: {all:?}");
+}
+
+#[test]
+fn slits_between_dense_points_are_as_wide_as_they_are() {
+    // Between two surfaces of many points, a slit that splats have closed but for a pixel of each column.
+    let size = [TILE, 40];
+    let mut random = Random::new(58);
+    let strewn = (0..20 * size[0] * size[1]).map(|_| size.map(|side| random.unit() * side as f32));
+    let depth = |x: f32, y: f32| (y - (18.0 + 0.1 * x)).abs() - 1.0;
+    let points: Vec<_> = strewn.filter(|&[x, y]| depth(x, y) > 0.0).collect();
+    let rim = |pixel: usize| {
+        let [x, y] = [pixel % TILE, pixel / TILE].map(|at| at as f32 + 0.5);
+        if depth(x, y) < -0.5 { EMPTY } else { -2.0 }
+    };
+    let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
+    let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
+    let outline =
+        Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
+    let edges = outline.edges([0, 0]);
+    let pixels = (3..size[0] - 3).flat_map(|x| (3..size[1] - 3).map(move |y| [x, y]));
+    // Those that stick out as they should, and all, on either side of the slit's border.
+    let mut counts = [[0, 0], [0, 0]];
+    for [x, y] in pixels {
+        let inside = depth(x as f32 + 0.5, y as f32 + 0.5);
+        let near = edges.near([x, y]);
+        assert_ne!(near, Near::Border, "no square of the slit is empty: {x}, {y}");
+        // Further from both sides lie too few points to tell.
+        if near == Near::Gap && (0.2..0.5).contains(&inside.abs()) {
+            let is_beside = inside < 0.0;
+            let [right, all] = &mut counts[usize::from(is_beside)];
+            *right += u32::from(outline.sticks_out(x, y, SHOWN, near) == is_beside);
+            *all += 1;
+        }
+    }
+    let [[right_in, all_in], [right_out, all_out]] = counts;
+    assert!(right_in == all_in && all_in > 20, "of surfaces {right_in} of {all_in} stay");
+    // Of a slanted border, the empty pixel is not always the one ahead.
+    assert!(4 * right_out > 3 * all_out && all_out > 20, "of the slit {right_out} of {all_out} go");
 }
 
 #[test]
