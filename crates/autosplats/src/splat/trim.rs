@@ -8,11 +8,11 @@
 //!
 //! Where points are dense, discs are too coarse a measure, and what ends the surface are the points themselves, all of them,
 //! hidden or not (`Sixteenths`): close to an empty pixel, one stays if points lie on both sides of its middle, whichever line
-//! through it parts them, or if they lie towards that one. Close to an empty square of three pixels, which is no gap between points, the mean of the splats around
-//! has to be close to its middle as well where points are few: noise strews points past the border, and splats are back on the
-//! surface. Lines between cores kept a row of tails wherever two cores stood out of a border. A surface that curves away has its
-//! points close together at its border, however wide its splats are where it faces the eye: so wide splats are asked as well, but
-//! more points have to say it.
+//! through it parts them, or if it is not there that the pixel is empty. Close to an empty square of three pixels, which is no gap
+//! between points, that need not be, and where points are few the mean of the splats around has to be close to its middle as well:
+//! noise strews points past the border, and splats are back on the surface. Lines between cores kept a row of tails wherever two
+//! cores stood out of a border. A surface that curves away has its points close together at its border, however wide its splats are
+//! where it faces the eye: so wide splats are asked as well, but more points have to say it.
 //!
 //! Where there is noise, the density of points tells in place of all this (`blurred`).
 // Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
@@ -63,7 +63,7 @@ pub(super) const NARROW_PX: f32 = 3.0;
 /// Pixels from the middle of an empty square of three that are the border, along an axis; in a square, but for its corners. An
 /// empty pixel alone may be a gap between points, which the splats around would widen.
 const BORDER_PX: usize = 3;
-/// The same from an empty pixel: these are asked by points alone, and whether it is in this distance that way.
+/// The same from an empty pixel that may be a gap: points alone tell there, if their open side has it no farther away.
 const GAP_PX: usize = 2;
 /// Pixels beside a tile that tell of its border.
 const MARGIN: usize = BORDER_PX + 1;

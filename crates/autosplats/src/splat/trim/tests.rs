@@ -391,7 +391,7 @@ fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_
 }
 
 #[test]
-fn slits_between_dense_points_are_as_wide_as_they_are() {
+fn slits_between_dense_points_open_beside_single_empty_pixels() {
     // Between two surfaces of many points, a slit that splats have closed but for a pixel of each column.
     let size = [TILE, 40];
     let mut random = Random::new(58);
