@@ -39,13 +39,17 @@ impl Sixteenths {
     /// Those no farther than a pixel from the middle of pixel (x, y), which lies not at the edge of the picture: eight rows of
     /// eight, a bit each, the upper left one the lowest.
     pub(crate) fn around(&self, [x, y]: [usize; 2]) -> u64 {
-        let row = |row: usize| {
-            let [y, of_pixel] = [y + (row + 2) / 4 - 1, (row + 2) % 4];
-            let [left, own, right] =
-                [x - 1, x, x + 1].map(|x| u64::from(self.of(y * self.width + x)) >> (4 * of_pixel) & 15);
-            left >> 2 | own << 2 | (right & 3) << 6
+        // Each row of a pixel's in a byte.
+        let bytes = |x: usize, y: usize| {
+            let pixel = u32::from(self.of(y * self.width + x));
+            let pairs = (pixel | pixel << 8) & 0x00ff_00ff;
+            (pairs | pairs << 4) & 0x0f0f_0f0f
         };
-        (0..8).fold(0, |rows, at| rows | row(at) << (8 * at))
+        let rows = |y: usize| {
+            let [left, own, right] = [x - 1, x, x + 1].map(|x| bytes(x, y));
+            u64::from((left >> 2 & 0x0303_0303) | own << 2 | (right & 0x0303_0303) << 6)
+        };
+        rows(y - 1) >> 16 | rows(y) << 16 | rows(y + 1) << 48
     }
 }
 

@@ -95,6 +95,9 @@ const SIDES: [[u64; 2]; ACROSS.len()] = {
     }
     sides
 };
+/// Each side holds one of these whole.
+const QUARTERS: [u64; 4] =
+    [SIDES[0][0] & SIDES[1][0], SIDES[0][0] & SIDES[1][1], SIDES[0][1] & SIDES[1][0], SIDES[0][1] & SIDES[1][1]];
 /// Those within a pixel of the middle, and those of the pixel itself.
 const DISC: u64 = SIDES[0][0] | SIDES[0][1];
 const OWN: u64 = 0x3c3c_3c3c << 16;
@@ -232,7 +235,8 @@ impl Outline<'_> {
         }
         let points = self.sixteenths.around([x, y]);
         let count = (points & DISC).count_ones();
-        if let Some([dx, dy]) = open_side(points).filter(|_| count >= FEWEST_POINTS[usize::from(wide)]) {
+        let open = if count < FEWEST_POINTS[usize::from(wide)] { None } else { open_side(points) };
+        if let Some([dx, dy]) = open {
             let most = dx.abs().max(dy.abs());
             let [dx, dy] = [dx, dy].map(|along| if 2 * along.abs() < most { 0 } else { along.signum() });
             let ahead = |steps: isize| [x.wrapping_add_signed(steps * dx), y.wrapping_add_signed(steps * dy)];
@@ -330,11 +334,16 @@ impl Outline<'_> {
 fn open_side(points: u64) -> Option<[isize; 2]> {
     let count = |side: u64| (points & side).count_ones();
     let all = count(DISC);
+    let is_few = |count: u32| LEAST_SHARE * count < all.max(1);
+    // Most pixels have points on all sides.
+    if !QUARTERS.iter().any(|&quarter| is_few(count(quarter))) {
+        return None;
+    }
     let told = if all < FINE_POINTS { LINES.len() } else { ACROSS.len() };
-    let side = |at: usize| (count(SIDES[at % told][at / told]), at);
-    let (least, at) = (0..2 * told).map(side).min()?;
-    let sign = if at < told { 1 } else { -1 };
-    (LEAST_SHARE * least < all.max(1)).then(|| ACROSS[at % told].map(|along| sign * along))
+    let sides = |back: usize| (0..told).map(move |at| (count(SIDES[at][back]), back, at));
+    let (least, back, at) = sides(0).chain(sides(1)).min()?;
+    let sign = [1, -1][back];
+    is_few(least).then(|| ACROSS[at].map(|along| sign * along))
 }
 
 fn square([x, y]: [f32; 2]) -> f32 {
