@@ -9,7 +9,8 @@ use super::cpu::{
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
     APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES,
-    QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, THICK_NOISE, THIN, THIN_SHARE,
+    QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, SURE_SHARES, THICK_NOISE, THIN,
+    THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -42,6 +43,8 @@ const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgs
 const GROUP: usize = 64;
 /// Quantiles: of scatters at each scale, of the densest third of the sample, of the sparsest, of all, and of all by steady shares.
 const QUANTILES_TAKEN: usize = 4 * SCALES;
+/// What is measured of noise: `noise.wgsl`.
+pub(crate) const NOISE_FLOATS: usize = 6;
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 
@@ -66,8 +69,8 @@ pub(crate) struct AdaptBuffers {
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
     quantiles: wgpu::Buffer,
-    /// Level and power of the noise, the median k-radius, the level of the cells that have sheets, and the k-radius up to which
-    /// noise grows.
+    /// Level and power of the noise, the median k-radius, the level of the cells that have sheets, the k-radius up to which noise
+    /// grows, and how sure it is.
     measured: wgpu::Buffer,
     /// Not of the stage's own: [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
@@ -91,8 +94,8 @@ impl AdaptBuffers {
             sheets: gpu.storage::<[Sheet; SLABS]>("sheets", most_sheet_cells(size))?,
             sampled: gpu.storage::<u32>("sampled surfels", SAMPLE + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
-            quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN)?,
-            measured: gpu.storage::<f32>("noise", 5)?,
+            quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN + STEADY_SCALES)?,
+            measured: gpu.storage::<f32>("noise", NOISE_FLOATS)?,
             depth_noise: known.runs.clone(),
         })
     }
@@ -310,6 +313,9 @@ impl AdaptPasses {
                     ("THICK_NOISE", THICK_NOISE.into()),
                     ("FINE_SHEETS", SHEET_LEVELS[0] as f64),
                     ("COARSE_SHEETS", SHEET_LEVELS[1] as f64),
+                    ("SURE_FROM", SURE_SHARES[0].into()),
+                    ("SURE_TO", SURE_SHARES[1].into()),
+                    ("STEADY_SCALES", STEADY_SCALES as f64),
                 ],
             )?,
             forget: Pass::new(gpu, &FORGET, &[("FINE_SHEETS", SHEET_LEVELS[0] as f64)])?,

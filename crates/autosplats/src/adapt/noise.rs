@@ -57,6 +57,8 @@ pub(super) const NOISE_SHARES: [f32; 2] = [0.1, 0.2];
 pub(super) const DIFFERS_SHARES: [f32; 2] = [0.55, 0.7];
 /// and at the second it is this quantile. Noise alone is as steady; it leans less low by that.
 pub(super) const QUANTILE_DIFFERS: f32 = 0.67;
+/// Up to the first of these shares of steady balls it may be structure after all, from the second on it is noise for sure.
+pub(super) const SURE_SHARES: [f32; 2] = [0.3, 0.45];
 /// Scales that this is known of. Balls after these and the next are so wide against cells that noise of one thickness has two
 /// scatters, as slabs cut it or not.
 pub(super) const STEADY_SCALES: usize = 2;
@@ -85,11 +87,13 @@ pub(crate) struct Noise {
     pub(crate) power: f32,
     /// K-radius up to which its growth was seen, world units.
     pub(crate) most: f32,
+    /// How sure it is that this is noise and no structure: 0 to 1.
+    pub(crate) sure: f32,
 }
 
 impl Noise {
     /// Of points that have none.
-    pub(crate) const NONE: Self = Self { level: 0.0, power: 0.0, most: 0.0 };
+    pub(crate) const NONE: Self = Self { level: 0.0, power: 0.0, most: 0.0, sure: 0.0 };
 
     /// Of points with a k-radius above 0.
     #[inline(always)]
@@ -102,7 +106,12 @@ impl Noise {
         let [dense, sparse] = ends(sample);
         let all = scatter_level(sample, None);
         // Of all, as the ends need not be told by the same scale.
-        let steady = std::array::from_fn(|scale| steady_share(sample, scale));
+        let steady: [_; STEADY_SCALES] = std::array::from_fn(|scale| steady_share(sample, scale));
+        // Told by the largest balls that are asked, as more of those are thin.
+        let told = (0..SCALES).find(|&scale| tells_noise(sample, scale));
+        let share =
+            told.and_then(|scale| steady[..=scale.min(STEADY_SCALES - 1)].iter().rev().copied().flatten().next());
+        let sure = share.map_or(0.0, |share| between(SURE_SHARES, share));
         let by_steady = if all > 0.0 { scatter_level(sample, Some(steady)) / all } else { 1.0 };
         let third = dense.len();
         if third > 0
@@ -115,19 +124,19 @@ impl Noise {
                 // Little growth is chance, or other things where points are sparse.
                 let much = ((growth - GROWTH) * (1.0 / GROWTH_SURE)).clamp(0.0, 1.0);
                 let apart = ((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0))).min(1.0);
-                let sure = much * apart;
-                if sure > 0.0 {
-                    let power = sure * growth.min(2.0);
+                let grows = much * apart;
+                if grows > 0.0 {
+                    let power = grows * growth.min(2.0);
                     // Through the middle of the two, coming from what all say together.
                     let both = least.sqrt() * most.sqrt();
-                    let middle = if all > 0.0 { all.powf(1.0 - sure) * both.powf(sure) } else { both };
+                    let middle = if all > 0.0 { all.powf(1.0 - grows) * both.powf(grows) } else { both };
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
                     let level = by_steady * middle * (beyond / (small.sqrt() * large.sqrt())).powf(power);
-                    return Self { level, power, most: beyond };
+                    return Self { level, power, most: beyond, sure };
                 }
             }
         }
-        Self { level: by_steady * all, power: 0.0, most: 0.0 }
+        Self { level: by_steady * all, power: 0.0, most: 0.0, sure }
     }
 }
 

@@ -1,7 +1,7 @@
 // How far points scatter about the surface: see the CPU form. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: measured: the noise, its power of the k-radius, the median k-radius,
-// the level of the cells that have sheets, and the k-radius up to which noise grows.
+// Reads: surfels, sampled, quantiles. Writes: measured: the noise, its power of the k-radius, the median k-radius, the level of the
+// cells that have sheets, the k-radius up to which noise grows, and how sure it is.
 
 #import frame
 #import surfel
@@ -23,6 +23,9 @@ override BEYOND: u32;
 override THICK_NOISE: f32;
 override FINE_SHEETS: u32;
 override COARSE_SHEETS: u32;
+override SURE_FROM: f32;
+override SURE_TO: f32;
+override STEADY_SCALES: u32;
 
 // The noise of a part of the sample, whose points are about as dense; 0 if it is too small to tell.
 fn scatter_level(part: u32) -> f32 {
@@ -45,6 +48,17 @@ fn scatter_level(part: u32) -> f32 {
         before = select(-1.0, now, found.x == ALL_TELL);
     }
     return plateau;
+}
+
+// How sure it is that what all of the sample tells is noise.
+fn sureness() -> f32 {
+    for (var scale = 0u; scale < SCALES; scale++) {
+        if quantiles[ALL * SCALES + scale].x == THIN_TELL {
+            let share = bitcast<f32>(quantiles[PARTS * SCALES + min(scale, STEADY_SCALES - 1u)].y);
+            return saturate((share - SURE_FROM) * (1.0 / (SURE_TO - SURE_FROM)));
+        }
+    }
+    return 0.0;
 }
 
 // Of the surfel at a place of the sample, densest first.
@@ -72,12 +86,12 @@ fn noise_of_sample() -> vec3f {
             // Little growth is chance, or other things where points are sparse.
             let much = clamp((growth - GROWTH) * (1.0 / GROWTH_SURE), 0.0, 1.0);
             let apart = min((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0)), 1.0);
-            let sure = much * apart;
-            if sure > 0.0 {
-                let power = sure * min(growth, 2.0);
+            let grows = much * apart;
+            if grows > 0.0 {
+                let power = grows * min(growth, 2.0);
                 // Through the middle of the two, coming from what all say together.
                 let both = sqrt(least) * sqrt(most);
-                let middle = select(both, pow(all, 1.0 - sure) * pow(both, sure), all > 0.0);
+                let middle = select(both, pow(all, 1.0 - grows) * pow(both, grows), all > 0.0);
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);
                 let level = by_steady * middle * pow(beyond / (sqrt(small) * sqrt(large)), power);
                 return vec3f(level, power, beyond);
@@ -93,6 +107,7 @@ fn noise() {
     measured[0] = found.x;
     measured[1] = found.y;
     measured[4] = found.z;
+    measured[5] = sureness();
     let len = sampled[SAMPLE];
     var middle = 0.0;
     if len > 0u {

@@ -1,7 +1,8 @@
 // A quantile of the scatter in balls of one size: a workgroup for each size of the densest third of the sample, then of the
 // sparsest, then of all of it, and once more of all of it by the steady shares.
 //
-// Reads: sampled, scatters. Writes: quantiles, each as what it tells and its bits.
+// Reads: sampled, scatters. Writes: quantiles, each as what it tells and its bits; then, for each of the first sizes, the bits of the
+// steady share of the largest up to it, likewise.
 
 #import frame
 #import scatters
@@ -124,6 +125,13 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let is_noise = saturate((most_steady - NOISE_FROM) * (1.0 / (NOISE_TO - NOISE_FROM)));
     if is_asked && scale < STEADY_SCALES && most_steady >= 0.0 {
         found = bitcast<u32>(is_noise * bitcast<f32>(found));
+    }
+    if local == 0u && part == STEADY_ALL && scale < STEADY_SCALES {
+        var largest = first_steady;
+        for (var size = 1u; size <= scale; size++) {
+            largest = select(largest, steady_share(size), steady_share(size) >= 0.0);
+        }
+        quantiles[PARTS * SCALES + scale] = vec2u(NONE_TELL, bitcast<u32>(largest));
     }
     if local == 0u {
         let tells = select(ALL_TELL, THIN_TELL, is_thin);

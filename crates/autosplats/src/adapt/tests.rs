@@ -132,7 +132,8 @@ fn the_noise_of_a_plane_is_measured() {
     for sigma in [0.005, 0.01] {
         for projection in PROJECTIONS {
             let case = Case::new(&noisy(test_clouds::plane(8000), sigma), projection, [240, 180]);
-            let Noise { level, power, .. } = case.noise();
+            let Noise { level, power, sure, .. } = case.noise();
+            assert_eq!(sure, 1.0, "{sigma} {projection:?}: there is nothing else");
             // A quantile below the middle, of balls that hold few clusters, leans low.
             let ratio = level / sigma;
             assert!(power == 0.0 && (0.75..1.1).contains(&ratio), "{sigma} {projection:?}: {level}, {power}");
@@ -195,10 +196,10 @@ fn normals_of_a_noisy_sphere_are_the_spheres() {
 #[test]
 fn structure_is_no_noise() {
     for projection in PROJECTIONS {
-        let noise = |sigma| Case::new(&noisy(test_clouds::bumpy(6_000), sigma), projection, [96, 72]).noise().level;
-        assert_eq!(noise(0.0), 0.0, "{projection:?}");
+        let noise = |sigma| Case::new(&noisy(test_clouds::bumpy(6_000), sigma), projection, [96, 72]).noise();
+        assert_eq!((noise(0.0).level, noise(0.0).sure), (0.0, 0.0), "{projection:?}");
         for sigma in [0.008, 0.012, 0.016, 0.02] {
-            let ratio = noise(sigma) / sigma;
+            let ratio = noise(sigma).level / sigma;
             assert!((0.75..1.3).contains(&ratio), "{sigma} {projection:?}: {ratio} times the noise");
         }
     }

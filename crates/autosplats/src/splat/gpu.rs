@@ -15,13 +15,14 @@ use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
     BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
-    OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
+    OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_DISTANCES, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
 };
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FINE_POINTS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
     LEAST_SHARE, LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
 };
 use crate::Error;
+use crate::adapt::gpu::NOISE_FLOATS;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::MARGIN_REACH;
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};
@@ -125,7 +126,7 @@ impl SplatBuffers {
             cells: gpu.storage::<u32>("cells of the depth map", cells(size) as usize)?,
             centers: gpu.storage::<u32>("centres of splats", pixels)?,
             blocks: gpu.storage::<u32>("blocks of pixels", block_count(size) as usize)?,
-            no_noise: gpu.storage::<f32>("no noise", 5)?,
+            no_noise: gpu.storage::<f32>("no noise", NOISE_FLOATS)?,
         })
     }
 }
@@ -229,6 +230,7 @@ impl SplatPasses {
                 ("OFF_UNSURE", OFF_BLURRED[0].into()),
                 ("OFF_SURE", OFF_BLURRED[1].into()),
                 ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
+                ("SURE_DISTANCES", SURE_DISTANCES.into()),
                 ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
                 ("FRINGE_NOISES", FRINGE_NOISES.into()),
                 ("BEYOND_FRINGE", BEYOND_FRINGE.into()),

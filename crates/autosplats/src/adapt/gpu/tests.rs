@@ -42,11 +42,11 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     }
     steps.iter().for_each(|step| recorder.run(step));
     recorder.finish();
-    let [level, power, k_radius, sheet_level, most] =
-        read_back::<[f32; 5]>(gpu, &buffers.measured, 1).expect("noise")[0];
+    let [level, power, k_radius, sheet_level, most, sure] =
+        read_back::<[f32; NOISE_FLOATS]>(gpu, &buffers.measured, 1).expect("noise")[0];
     Made {
         cells: read_cells(gpu, &buffers, screen.size),
-        usual: Usual { noise: Noise { level, power, most }, k_radius, sheet_level: sheet_level as usize },
+        usual: Usual { noise: Noise { level, power, most, sure }, k_radius, sheet_level: sheet_level as usize },
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }
@@ -113,6 +113,7 @@ fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
     let same = near(device.noise.level, host.noise.level)
         && near(device.noise.most, host.noise.most)
         && near(device.noise.power, host.noise.power)
+        && near(device.noise.sure, host.noise.sure)
         && device.k_radius == host.k_radius
         && device.sheet_level == host.sheet_level;
     if same { Ok(()) } else { Err(format!("{device:?}, on the host {host:?}")) }
@@ -294,11 +295,16 @@ fn comparison_sees_what_is_wrong() {
 
     let usual = case.usual();
     assert!(compare_usual(usual, usual).is_ok(), "nothing is wrong yet");
-    let Usual { noise: Noise { level, power, most }, k_radius, sheet_level } = usual;
-    let with =
-        |level: f32, power: f32, k_radius: f32| Usual { noise: Noise { level, power, most }, k_radius, sheet_level };
+    let Usual { noise, k_radius, sheet_level } = usual;
+    let Noise { level, power, sure, .. } = noise;
+    let with = |level: f32, power: f32, k_radius: f32| {
+        let noise = Noise { level, power, ..noise };
+        Usual { noise, k_radius, ..usual }
+    };
     assert!(compare_usual(with(1.02 * level, power, k_radius), usual).is_err(), "more noise");
     assert!(compare_usual(with(level, 0.1, k_radius), usual).is_err(), "that grows");
+    let less_sure = Usual { noise: Noise { sure: 0.9 * sure, ..noise }, ..usual };
+    assert!(compare_usual(less_sure, usual).is_err(), "that is less sure");
     assert!(compare_usual(with(level, power, 1.001 * k_radius), usual).is_err(), "points further apart");
     assert!(compare_usual(Usual { sheet_level: 3 - sheet_level, ..usual }, usual).is_err(), "sheets of other cells");
 

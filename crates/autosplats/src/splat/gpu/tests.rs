@@ -95,8 +95,8 @@ impl Scene<'_> {
         set_counter(gpu, screen, Counter::Recovered, self.surfels.len() - self.active);
         visibility(Round::Recovered);
         let before = depth();
-        let Noise { level, power, most } = self.noise;
-        let noise = gpu.storage_with("noise", &[level, power, 0.0, 0.0, most]).expect("room");
+        let Noise { level, power, most, sure } = self.noise;
+        let noise = gpu.storage_with("noise", &[level, power, 0.0, 0.0, most, sure]).expect("room");
         let rules = LayerRules { depth_refinement: self.refinement, trim: true, noise: Some(&noise) };
         run(passes.steps_layers(gpu, frame, screen, surfels, splats, layers, rules));
         Drawn { depth: [before, depth()], layers: read_layers(gpu, layers) }
@@ -255,6 +255,7 @@ fn the_device_ends_blurred_borders_where_the_host_does() {
     let (small, large) = (([233, 190], 16_000, 70.0), ([411, 390], 40_000, 120.0));
     for ((size, count, away_px), noise_px, power, tilt) in [
         (small, 0.1, 0.0, 0.8),
+        (([120, 100], 16_000, 30.0), 0.6, 0.0, 0.8),
         (small, 1.0, 0.0, 0.8),
         (small, 2.5, 1.5, 0.6),
         (small, 6.0, 0.0, 0.8),
@@ -265,7 +266,7 @@ fn the_device_ends_blurred_borders_where_the_host_does() {
         for view in views(size).into_iter().filter(|view| tilt > 0.0 || !view.perspective) {
             let surfels = blurred_disc(count, away_px, noise_px, tilt, &view);
             let pixel = view.pixel_size(4.0);
-            let noise = Noise { level: noise_px * pixel, power, most: 2.0 * pixel };
+            let noise = Noise { level: noise_px * pixel, power, most: 2.0 * pixel, sure: 0.7 };
             let active = surfels.len();
             let blurred = Scene { surfels: &surfels, active, view: &view, refinement: true, data: &data, noise };
             let case = format!("noise of {noise_px} pixels, tilt {tilt}, perspective {}", view.perspective);

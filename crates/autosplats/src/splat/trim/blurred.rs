@@ -16,6 +16,8 @@
 //! Scanners err along their rays, and what is left over of fits is across surfaces. So the border of a surface that faces the eye,
 //! where scans end, is taken for as sharp as it is seen, and all of the noise counts only where a surface is seen from the side.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
@@ -45,6 +47,8 @@ pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
 pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.52];
 /// In pixels.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
+/// If it is sure to be noise, less is enough: as much as this many mean distances of the points around.
+pub(in crate::splat) const SURE_DISTANCES: f32 = 1.25;
 /// From how many sixteenths with points on they tell.
 pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
 /// A fringe is no wider than the reach of its splats and this many times the noise,
@@ -224,10 +228,12 @@ impl Outline<'_> {
             return None;
         }
         let squares = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
-        let [ox, oy] = mean_offset(squares, [x, y], window)?;
+        let Mean { offset: [ox, oy], count } = mean(squares, [x, y], window)?;
         let variance = window * window / PER_VARIANCE;
+        let apart = window * (PI / count).sqrt();
+        let sure_px = SURE_NOISE_PX + noise.sure * ((SURE_DISTANCES * apart).min(SURE_NOISE_PX) - SURE_NOISE_PX);
         let [unsure, sure] = OFF_BLURRED;
-        let may_be = sure + (unsure - sure) * (1.0 - noise_px / SURE_NOISE_PX).max(0.0);
+        let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px).max(0.0);
         let most = may_be * variance / (variance + noise_px * noise_px).sqrt();
         // What is off by less altogether is so that way as well.
         if ox * ox + oy * oy <= most * most {
@@ -254,8 +260,8 @@ impl Outline<'_> {
         if (x.min(y).min(width - 1 - x).min(height - 1 - y) as f32) < window {
             return Some(true);
         }
-        let goes_on = |[ox, oy]: [f32; 2]| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
-        Some(!mean_offset(squares, [x, y], window).is_some_and(goes_on))
+        let goes_on = |Mean { offset: [ox, oy], .. }: Mean| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
+        Some(!mean(squares, [x, y], window).is_some_and(goes_on))
     }
 }
 
@@ -269,11 +275,19 @@ impl Held {
     }
 }
 
-/// The mean offset, in pixels, of the sixteenths with points from the middle of pixel (x, y), in a window of such a radius
-/// that lies within the screen; `None` if there are too few.
-#[pulp::with_simd(mean_offset = pulp::Arch::new())]
+/// Of the sixteenths with points around a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Mean {
+    /// From the pixel's middle, in pixels.
+    offset: [f32; 2],
+    count: f32,
+}
+
+/// The mean of the sixteenths with points in a window of such a radius around the middle of pixel (x, y), which lies within the
+/// screen; `None` if there are too few.
+#[pulp::with_simd(mean = pulp::Arch::new())]
 #[inline(always)]
-fn mean_offset_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<[f32; 2]> {
+fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<Mean> {
     let reach = window as usize;
     // The first square's middle from the pixel's, in pixels, and the squares.
     let along = |at: usize, most: usize| {
@@ -306,5 +320,5 @@ fn mean_offset_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f
         }
     }
     let [count, weight, right, down] = [count, weight, right, down].map(|lanes| lanes.iter().sum::<f32>());
-    (count >= FEWEST_BLURRED as f32).then(|| [right / weight, down / weight])
+    (count >= FEWEST_BLURRED as f32).then(|| Mean { offset: [right / weight, down / weight], count })
 }

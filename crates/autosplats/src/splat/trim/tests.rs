@@ -194,13 +194,15 @@ fn wide_splats_end_by_points_where_these_lie_close() {
     assert!(narrow > 0.1 && wide < 0.02, "of a gap's border {wide} told, {narrow} if splats were narrow");
 }
 
-/// Whether pixels of a picture stay in which points lie below a line, strewn evenly, moved by noise of so many pixels, and drawn with
-/// discs of two pixels; by how many pixels they do so above the line, in the columns of the middle. Noise is `known` or not.
-fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
+/// Whether pixels of a picture stay in which points lie below a line, so many in each pixel, strewn evenly, moved by noise of so many
+/// pixels, and drawn with discs of two pixels; by how many pixels they do so above the line, in the columns of the middle. It is known
+/// how sure noise is, or there is said to be none.
+fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32> {
     let size = [TILE, TILE];
     let line = |x: f32| 28.0 + 0.1 * x;
     let mut random = Random::new(55);
-    let mut strewn = (0..3 * TILE_AREA).map(|_| size.map(|side| random.unit() * side as f32)).collect::<Vec<_>>();
+    let mut strewn =
+        (0..per_pixel * TILE_AREA).map(|_| size.map(|side| random.unit() * side as f32)).collect::<Vec<_>>();
     strewn.retain(|&[x, y]| y > line(x));
     let mut points: Vec<_> =
         strewn.into_iter().map(|point| point.map(|along| along + noise_px * random.gaussian())).collect();
@@ -211,9 +213,9 @@ fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
     };
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
-    let level = if known { noise_px * view.pixel_size(1.0) } else { 0.0 };
-    let blurred = Blurred::new(Noise { level, ..Noise::NONE }, 1.6, &rims, &sixteenths, &view);
-    assert_eq!(blurred.is_some(), known, "nothing is blurred without noise");
+    let known = |sure: f32| Noise { level: noise_px * view.pixel_size(1.0), sure, ..Noise::NONE };
+    let blurred = Blurred::new(sure.map_or(Noise::NONE, known), 1.6, &rims, &sixteenths, &view);
+    assert_eq!(blurred.is_some(), sure.is_some(), "nothing is blurred without noise");
     let outline = Outline {
         rims: &rims,
         centers: &[0; TILE_AREA],
@@ -221,7 +223,7 @@ fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
         view: &view,
         blurred: blurred.as_ref(),
     };
-    if known {
+    if sure.is_some() {
         let told = |reach_px: f32| outline.is_beside_blurred([32, 28], SHOWN, reach_px);
         assert!(told(2.0).is_some() && told(60.0).is_none(), "where splats are wide, windows tell of rows");
         let facing = Shown { normal: [0.0, 0.0, -1.0], ..SHOWN };
@@ -238,7 +240,7 @@ fn above_the_line(noise_px: f32, known: bool) -> Vec<f32> {
 fn what_noise_has_blurred_ends_about_where_the_surface_does() {
     // In pixels, and in blocks.
     for noise_px in [1.5, 4.0] {
-        let [with, without] = [true, false].map(|known| above_the_line(noise_px, known));
+        let [with, without] = [Some(0.0), None].map(|sure| above_the_line(3, noise_px, sure));
         // In some columns there is a point far out, alone, which nothing tells of.
         let median = |above: &[f32]| {
             let mut above = above.to_vec();
@@ -249,6 +251,17 @@ fn what_noise_has_blurred_ends_about_where_the_surface_does() {
         assert!((-0.9..0.0).contains(&(median(&with) / noise_px)), "noise of {noise_px} pixels: {with:?}");
         assert!(median(&without) > 1.5 * noise_px, "noise of {noise_px} pixels that is not known: {without:?}");
     }
+}
+
+#[test]
+fn thin_noise_blurs_if_it_is_sure_and_points_are_close() {
+    let mean = |per_pixel: usize, sure: f32| {
+        let above = above_the_line(per_pixel, 0.5, Some(sure));
+        above.iter().sum::<f32>() / above.len() as f32
+    };
+    let [unsure, sure] = [0.0, 1.0].map(|sure| mean(12, sure));
+    assert!(sure < unsure - 0.1, "{unsure} pixels, sure {sure}");
+    assert_eq!(mean(2, 1.0), mean(2, 0.0), "where points are as far apart as noise is thick");
 }
 
 #[test]
