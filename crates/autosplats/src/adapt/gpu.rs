@@ -68,6 +68,7 @@ pub(crate) struct AdaptBuffers {
     /// Places of the surfels of the sample, and their number.
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
+    /// And after them the steady shares of the first scales.
     quantiles: wgpu::Buffer,
     /// Level and power of the noise, the median k-radius, the level of the cells that have sheets, the k-radius up to which noise
     /// grows, and how sure it is.

@@ -2,7 +2,7 @@
 // sparsest, then of all of it, and once more of all of it by the steady shares.
 //
 // Reads: sampled, scatters. Writes: quantiles, each as what it tells and its bits; then, for each of the first sizes, the bits of the
-// steady share of the largest up to it, likewise.
+// steady share of the largest up to it of which enough balls tell, below 0 if there is none.
 
 #import frame
 #import scatters
@@ -127,11 +127,11 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         found = bitcast<u32>(is_noise * bitcast<f32>(found));
     }
     if local == 0u && part == STEADY_ALL && scale < STEADY_SCALES {
-        var largest = first_steady;
+        var of_largest = first_steady;
         for (var size = 1u; size <= scale; size++) {
-            largest = select(largest, steady_share(size), steady_share(size) >= 0.0);
+            of_largest = select(of_largest, steady_share(size), steady_share(size) >= 0.0);
         }
-        quantiles[PARTS * SCALES + scale] = vec2u(NONE_TELL, bitcast<u32>(largest));
+        quantiles[PARTS * SCALES + scale] = vec2u(NONE_TELL, bitcast<u32>(of_largest));
     }
     if local == 0u {
         let tells = select(ALL_TELL, THIN_TELL, is_thin);

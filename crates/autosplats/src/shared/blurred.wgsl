@@ -18,7 +18,7 @@ override FINE_RADIUS_PX: f32;
 override OFF_UNSURE: f32;
 override OFF_SURE: f32;
 override SURE_NOISE_PX: f32;
-// If it is sure to be noise, as much as so many mean distances of the points around is enough.
+// If it is sure to be noise, as much as so many mean distances of the sixteenths with points in the window is enough.
 override SURE_DISTANCES: f32;
 override FEWEST_BLURRED: u32;
 override FRINGE_NOISES: f32;
@@ -64,7 +64,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     }
     let variance = window * window / PER_VARIANCE;
     let apart = window * sqrt(3.14159265 / offset.z);
-    let sure_px = SURE_NOISE_PX + measured[5] * (min(SURE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
+    let sure_px = SURE_NOISE_PX + noise_sure() * (min(SURE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
     let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / sure_px, 0.0);
     let most = may_be * variance / sqrt(variance + noise * noise);
     // What is off by less altogether is so that way as well.

@@ -5,6 +5,7 @@ const DENSEST = 0u;
 const SPARSEST = 1u;
 const ALL = 2u;
 const STEADY_ALL = 3u;
+// How many there are.
 const PARTS = 4u;
 
 // Too few balls could be fitted; the quantile of all; that of those in which the surface is thin, which are enough.

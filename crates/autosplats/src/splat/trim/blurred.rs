@@ -43,11 +43,12 @@ pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
 /// Windows with a larger radius than this, in pixels, are summed up in blocks.
 pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
 /// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
-/// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more.
+/// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more, or [`SURE_DISTANCES`].
 pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.52];
 /// In pixels.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
-/// If it is sure to be noise, less is enough: as much as this many mean distances of the points around.
+/// If it is sure to be noise, less is enough: as much as this many mean distances of the sixteenths with points in the window, what
+/// is empty of it included. At a border those are √2 times as far apart as on the surface.
 pub(in crate::splat) const SURE_DISTANCES: f32 = 1.25;
 /// From how many sixteenths with points on they tell.
 pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;

@@ -261,7 +261,7 @@ fn thin_noise_blurs_if_it_is_sure_and_points_are_close() {
     };
     let [unsure, sure] = [0.0, 1.0].map(|sure| mean(12, sure));
     assert!(sure < unsure - 0.1, "{unsure} pixels, sure {sure}");
-    assert_eq!(mean(2, 1.0), mean(2, 0.0), "where points are as far apart as noise is thick");
+    assert_eq!(mean(2, 1.0), mean(2, 0.0), "where 1.25 distances of points are more than is sure anyway");
 }
 
 #[test]
