@@ -260,6 +260,7 @@ fn thin_noise_blurs_if_it_is_sure_and_points_are_close() {
         above.iter().sum::<f32>() / above.len() as f32
     };
     let [unsure, sure] = [0.0, 1.0].map(|sure| mean(12, sure));
+    // More than one column of sixteen, which end by whole pixels.
     assert!(sure < unsure - 0.1, "{unsure} pixels, sure {sure}");
     assert_eq!(mean(2, 1.0), mean(2, 0.0), "where 1.25 distances of points are more than is sure anyway");
 }
