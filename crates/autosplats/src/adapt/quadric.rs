@@ -414,8 +414,8 @@ fn store<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, lanes: &mu
 /// other.
 #[inline(always)]
 fn add_lanes<const N: usize>(lanes: &mut [Lanes; N]) -> [f32; N] {
-    for half in [8, 4, 2, 1] {
-        for Lanes(lanes) in &mut *lanes {
+    for Lanes(lanes) in &mut *lanes {
+        for half in [8, 4, 2, 1] {
             let (low, high) = lanes.split_at_mut(half);
             for lane in 0..half {
                 low[lane] += high[lane];

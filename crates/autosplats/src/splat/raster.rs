@@ -34,7 +34,7 @@ pub(super) fn draw_depth(run: &Run, tile: Tile, view: &View, depth: &mut [f32]) 
 #[pulp::with_simd(draw_depth_entries = pulp::Arch::new())]
 #[inline(always)]
 fn draw_depth_entries_with<'a, S: Simd>(simd: S, run: &'a Run, tile: Tile, view: &'a View, depth: &'a mut [f32]) {
-    let one = F32s::splat(simd, 1.0);
+    let (one, beyond) = (F32s::splat(simd, 1.0), F32s::splat(simd, f32::INFINITY));
     for splat in run.living(tile.index).map(|index| &run.splats[index]) {
         let brush = Brush::new(simd, splat, view);
         let epsilon = F32s::splat(simd, splat.epsilon);
@@ -46,8 +46,8 @@ fn draw_depth_entries_with<'a, S: Simd>(simd: S, run: &'a Run, tile: Tile, view:
                 let fragment = brush.fragment(dx);
                 let pushed = fragment.depth + epsilon;
                 let before = F32s::load(simd, row, vector);
-                let nearer = fragment.squared.at_most(one).and(pushed.less(before));
-                nearer.select(pushed, before).store(row, vector);
+                // A minimum: what is selected of before and written back becomes a masked store, slow on many processors.
+                fragment.squared.at_most(one).select(pushed, beyond).min(before).store(row, vector);
                 dx += F32s::splat(simd, S::F32_LANES as f32);
             }
         }
@@ -107,17 +107,17 @@ fn draw_attribute_entries_with<'a, S: Simd>(
                 for (channel, &value) in sums.channels.chunks_exact_mut(TILE_AREA).zip(&values[..channels]) {
                     add(simd, &mut channel[row.clone()], vector, weight * F32s::splat(simd, value));
                 }
-                let heaviest = &mut sums.heaviest[row.clone()];
-                let before = F32s::load(simd, heaviest, vector);
+                // All are read before any is written, or what is selected would become a masked store here too.
+                let before = F32s::load(simd, &sums.heaviest[row.clone()], vector);
+                let point = F32s::load(simd, &sums.point[row.clone()], vector);
+                let reach = F32s::load(simd, &sums.reach[row.clone()], vector);
                 let heavier = before.less(weight);
-                heavier.select(weight, before).store(heaviest, vector);
+                before.max(weight).store(&mut sums.heaviest[row.clone()], vector);
                 // Indices ride along as the bits of floats.
-                let point = &mut sums.point[row.clone()];
                 let source = F32s::splat(simd, f32::from_bits(surfel.source));
-                heavier.select(source, F32s::load(simd, point, vector)).store(point, vector);
-                let reach = &mut sums.reach[row.clone()];
+                heavier.select(source, point).store(&mut sums.point[row.clone()], vector);
                 let own = F32s::splat(simd, splat.reach_px());
-                heavier.select(own, F32s::load(simd, reach, vector)).store(reach, vector);
+                heavier.select(own, reach).store(&mut sums.reach[row.clone()], vector);
             }
         }
     }

@@ -308,12 +308,12 @@ fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> 
             let counts: &[u16; LANES] =
                 squares.count[row * squares.columns + column..].first_chunk().expect("some after the last");
             for lane in 0..LANES {
-                // Beyond the window, and beyond the row, nothing counts.
+                // Beyond the window, and beyond the row, nothing counts: what is left of 1 there is none, else 2⁻²⁴ at least.
                 let ox = first + lanes[lane];
                 let near = (1.0 - (ox * ox + oy * oy) * per_window).max(0.0);
                 let held = f32::from(counts[lane]);
                 let of_lane = held * (near * near * near);
-                count[lane] += if near > 0.0 { held } else { 0.0 };
+                count[lane] += held * (near * (1 << 24) as f32).min(1.0);
                 weight[lane] += of_lane;
                 right[lane] += of_lane * ox;
                 down[lane] += of_lane * oy;
