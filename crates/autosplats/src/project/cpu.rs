@@ -295,13 +295,15 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
             for (y, key) in rows.clone().flat_map(|y| keys.at(x, y).iter().map(move |key| (y, key))) {
                 let key = key.load(Ordering::Relaxed);
                 if key != EMPTY {
-                    let index = key as u32;
-                    let position_view = view.to_view(positions[index as usize]).to_array();
-                    points[next] = ScreenPoint { position_view, pixel: (y << 16 | x) as u32 };
-                    source[next] = index;
+                    points[next].pixel = (y << 16 | x) as u32;
+                    source[next] = key as u32;
                     next += 1;
                 }
             }
+        }
+        // In a loop of their own, in which nothing branches, positions anywhere in memory are waited for together.
+        for (point, &index) in points.iter_mut().zip(&*source) {
+            point.position_view = view.to_view(positions[index as usize]).to_array();
         }
     });
 }

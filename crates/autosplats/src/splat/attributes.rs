@@ -29,16 +29,17 @@ pub(crate) struct PointColors<'a> {
 }
 
 impl Attributes<'_> {
-    fn channels(&self) -> usize {
+    /// How many channels a splat carries.
+    pub(super) fn channels(&self) -> usize {
         3 + if self.color.is_some() { 3 } else { 0 }
             + if self.scalar.is_some() { 2 } else { 0 }
             + if self.measures { 3 } else { 0 }
             + usize::from(self.backs)
     }
 
-    /// Lists what `surfel` carries and returns the number of channels.
+    /// Lists what `surfel` carries.
     #[inline(always)]
-    pub(super) fn values(&self, surfel: &Surfel, values: &mut [f32; CHANNELS]) -> usize {
+    pub(super) fn values(&self, surfel: &Surfel, values: &mut [f32; CHANNELS]) {
         values[..3].copy_from_slice(&surfel.normal);
         let mut next = 3;
         if let Some(PointColors { srgb, linear }) = self.color {
@@ -60,9 +61,7 @@ impl Attributes<'_> {
         }
         if self.backs {
             values[next] = f32::from(surfel.shows_back());
-            next += 1;
         }
-        next
     }
 }
 
@@ -196,21 +195,29 @@ pub(super) struct TileLayers<'a> {
 }
 
 impl GBuffer {
-    /// Makes room for a frame of this size with these layers.
-    pub(super) fn resize(&mut self, view: &View, area: usize, attributes: &Attributes<'_>) {
+    /// Makes room for a frame of this size with these layers; whether all are as long as before, and so hold what they did.
+    pub(super) fn resize(&mut self, view: &View, area: usize, attributes: &Attributes<'_>) -> bool {
+        fn fit<T: Copy + Default>(layer: &mut Vec<T>, len: usize) -> bool {
+            let fits = layer.len() == len;
+            layer.resize(len, T::default());
+            fits
+        }
         let wanted = |wanted: bool| if wanted { area } else { 0 };
         [self.width, self.height] = view.picture_size();
         self.margin = view.margin;
-        self.weight.resize(area, 0.0);
-        self.depth.resize(area, 0.0);
-        self.normal.resize(area, [0.0; 3]);
-        self.point.resize(area, 0);
-        self.color.resize(wanted(attributes.color.is_some()), [0.0; 3]);
-        self.scalar.resize(wanted(attributes.scalar.is_some()), 0.0);
-        self.radius.resize(wanted(attributes.measures), 0.0);
-        self.k_radius.resize(wanted(attributes.measures), 0.0);
-        self.curvature.resize(wanted(attributes.measures), 0.0);
-        self.back.resize(wanted(attributes.backs), 0.0);
+        let fits = [
+            fit(&mut self.weight, area),
+            fit(&mut self.depth, area),
+            fit(&mut self.normal, area),
+            fit(&mut self.point, area),
+            fit(&mut self.color, wanted(attributes.color.is_some())),
+            fit(&mut self.scalar, wanted(attributes.scalar.is_some())),
+            fit(&mut self.radius, wanted(attributes.measures)),
+            fit(&mut self.k_radius, wanted(attributes.measures)),
+            fit(&mut self.curvature, wanted(attributes.measures)),
+            fit(&mut self.back, wanted(attributes.backs)),
+        ];
+        fits == [true; 10]
     }
 
     /// Cuts all layers into tiles.

@@ -32,6 +32,8 @@ pub(crate) struct Splatter {
     rims: Vec<Rim>,
     centers: Vec<u32>,
     layers: GBuffer,
+    /// Tiles of which all this is known to hold nothing.
+    empty: Vec<bool>,
 }
 
 impl Splatter {
@@ -93,20 +95,27 @@ impl Splatter {
 
     /// Attribute pass: the weighted mean of all living surfels within ε of the depth map [Paper, §7].
     pub(crate) fn attributes(&mut self, surfels: &[Surfel], view: &View, attributes: &Attributes<'_>) -> &GBuffer {
-        let Self { runs, used, depth, rims, centers, layers, .. } = self;
-        layers.resize(view, depth.len(), attributes);
+        let Self { runs, used, depth, rims, centers, layers, empty, .. } = self;
+        if !layers.resize(view, depth.len(), attributes) {
+            empty.clear();
+        }
         rims.resize(depth.len(), 0.0);
         centers.resize(depth.len(), 0);
-        let known = rims.par_chunks_mut(TILE_AREA).zip(centers.par_chunks_mut(TILE_AREA));
+        empty.resize(depth.len() / TILE_AREA, false);
+        let known = rims.par_chunks_mut(TILE_AREA).zip(centers.par_chunks_mut(TILE_AREA)).zip(empty);
         let tiles = layers.tiles().into_par_iter().zip(depth.par_chunks(TILE_AREA)).zip(known);
-        tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), (rims, centers)))| {
+        tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), known))| {
+            let ((rims, centers), empty) = known;
             if runs[..*used].iter().all(|run| run.tile(index).is_empty()) {
-                // Much of many pictures.
-                layers.clear_all();
-                rims.fill(EMPTY);
-                centers.fill(0);
+                // Much of many pictures, and often what was empty before.
+                if !std::mem::replace(empty, true) {
+                    layers.clear_all();
+                    rims.fill(EMPTY);
+                    centers.fill(0);
+                }
                 return;
             }
+            *empty = false;
             sums.clear(attributes);
             add_centers(&runs[..*used], surfels, tile(index, view), centers);
             for run in &runs[..*used] {

@@ -21,6 +21,9 @@ pub(super) struct Tile {
 /// How steeply the kernel falls: see [`kernel`].
 pub(super) const KERNEL_SLOPE: f32 = 0.52;
 
+/// Splats whose attributes are looked up at a time.
+const BATCH: usize = 32;
+
 /// Offsets of the pixels of a vector from its first one.
 const STEPS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
@@ -83,41 +86,48 @@ fn draw_attribute_entries_with<'a, S: Simd>(
     sums: &'a mut TileSums,
 ) {
     let one = F32s::splat(simd, 1.0);
-    let mut values = [0f32; CHANNELS];
-    for index in run.living(tile.index) {
-        let splat = &run.splats[index];
-        let surfel = &surfels[run.first + index];
-        let channels = attributes.values(surfel, &mut values);
-        let brush = Brush::new(simd, splat, view);
-        for Row { y, x, end, dx, dy } in rows(splat, tile, S::F32_LANES) {
-            let row = y * TILE..(y + 1) * TILE;
-            let brush = brush.row(dy);
-            let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &STEPS, 0);
-            for vector in x..end {
-                let fragment = brush.fragment(dx);
-                dx += F32s::splat(simd, S::F32_LANES as f32);
-                let limit = F32s::load(simd, &depth[row.clone()], vector);
-                let visible = fragment.squared.at_most(one).and(fragment.depth.at_most(limit));
-                if !visible.any() {
-                    continue;
+    let channels = attributes.channels();
+    let mut values = [[0f32; CHANNELS]; BATCH];
+    for batch in run.tile(tile.index).chunks(BATCH) {
+        let is_living = |index: u32| run.alive[index as usize];
+        let surfel = |index: u32| &surfels[run.first + index as usize];
+        // What splats carry lies anywhere in memory: that of several is waited for together.
+        for (values, &index) in values.iter_mut().zip(batch).filter(|(_, index)| is_living(**index)) {
+            attributes.values(surfel(index), values);
+        }
+        for (values, &index) in values.iter().zip(batch).filter(|(_, index)| is_living(**index)) {
+            let (splat, surfel) = (&run.splats[index as usize], surfel(index));
+            let brush = Brush::new(simd, splat, view);
+            for Row { y, x, end, dx, dy } in rows(splat, tile, S::F32_LANES) {
+                let row = y * TILE..(y + 1) * TILE;
+                let brush = brush.row(dy);
+                let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &STEPS, 0);
+                for vector in x..end {
+                    let fragment = brush.fragment(dx);
+                    dx += F32s::splat(simd, S::F32_LANES as f32);
+                    let limit = F32s::load(simd, &depth[row.clone()], vector);
+                    let visible = fragment.squared.at_most(one).and(fragment.depth.at_most(limit));
+                    if !visible.any() {
+                        continue;
+                    }
+                    let weight = visible.keep(kernel(simd, fragment.squared));
+                    add(simd, &mut sums.weight[row.clone()], vector, weight);
+                    add(simd, &mut sums.depth[row.clone()], vector, weight * fragment.depth);
+                    for (channel, &value) in sums.channels.chunks_exact_mut(TILE_AREA).zip(&values[..channels]) {
+                        add(simd, &mut channel[row.clone()], vector, weight * F32s::splat(simd, value));
+                    }
+                    // All are read before any is written, or what is selected would become a masked store here too.
+                    let before = F32s::load(simd, &sums.heaviest[row.clone()], vector);
+                    let point = F32s::load(simd, &sums.point[row.clone()], vector);
+                    let reach = F32s::load(simd, &sums.reach[row.clone()], vector);
+                    let heavier = before.less(weight);
+                    before.max(weight).store(&mut sums.heaviest[row.clone()], vector);
+                    // Indices ride along as the bits of floats.
+                    let source = F32s::splat(simd, f32::from_bits(surfel.source));
+                    heavier.select(source, point).store(&mut sums.point[row.clone()], vector);
+                    let own = F32s::splat(simd, splat.reach_px());
+                    heavier.select(own, reach).store(&mut sums.reach[row.clone()], vector);
                 }
-                let weight = visible.keep(kernel(simd, fragment.squared));
-                add(simd, &mut sums.weight[row.clone()], vector, weight);
-                add(simd, &mut sums.depth[row.clone()], vector, weight * fragment.depth);
-                for (channel, &value) in sums.channels.chunks_exact_mut(TILE_AREA).zip(&values[..channels]) {
-                    add(simd, &mut channel[row.clone()], vector, weight * F32s::splat(simd, value));
-                }
-                // All are read before any is written, or what is selected would become a masked store here too.
-                let before = F32s::load(simd, &sums.heaviest[row.clone()], vector);
-                let point = F32s::load(simd, &sums.point[row.clone()], vector);
-                let reach = F32s::load(simd, &sums.reach[row.clone()], vector);
-                let heavier = before.less(weight);
-                before.max(weight).store(&mut sums.heaviest[row.clone()], vector);
-                // Indices ride along as the bits of floats.
-                let source = F32s::splat(simd, f32::from_bits(surfel.source));
-                heavier.select(source, point).store(&mut sums.point[row.clone()], vector);
-                let own = F32s::splat(simd, splat.reach_px());
-                heavier.select(own, reach).store(&mut sums.reach[row.clone()], vector);
             }
         }
     }

@@ -185,17 +185,35 @@ pub(super) fn sixteenths(surfels: &[Surfel], view: &View) -> Sixteenths {
 }
 
 fn draw(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> GBuffer {
-    let mut splatter = Splatter::default();
+    let scalars = FieldValues::F32(data.scalars.clone());
+    let color = PointColors { srgb: &data.colors, linear: &data.linear };
+    let attributes = Attributes { color: Some(color), scalar: Some(&scalars), measures: true, backs: true };
+    draw_with(&mut Splatter::default(), surfels, view, refinements, &attributes)
+}
+
+fn draw_with(
+    splatter: &mut Splatter,
+    surfels: &[Surfel],
+    view: &View,
+    refinements: usize,
+    attributes: &Attributes<'_>,
+) -> GBuffer {
     splatter.begin(view);
     // In two parts, as the renderer adds recovered points.
     let first = surfels.len() * 2 / 3;
     splatter.add(&surfels[..first], 0, view);
     splatter.add(surfels, first, view);
     (0..refinements).for_each(|_| splatter.refine(surfels, view));
-    let scalars = FieldValues::F32(data.scalars.clone());
-    let color = PointColors { srgb: &data.colors, linear: &data.linear };
-    let attributes = Attributes { color: Some(color), scalar: Some(&scalars), measures: true, backs: true };
-    splatter.attributes(surfels, view, &attributes).clone()
+    splatter.attributes(surfels, view, attributes).clone()
+}
+
+/// All layers, to the bit.
+fn bits(layers: &GBuffer) -> (Vec<u32>, Vec<u32>) {
+    let floats = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
+    let vectors = layers.normal.iter().chain(&layers.color).flatten();
+    let bits =
+        floats.into_iter().flatten().chain(&layers.curvature).chain(vectors).map(|value| value.to_bits()).collect();
+    (bits, layers.point.clone())
 }
 
 /// Compares all layers; returns the number of pixels compared.
@@ -373,16 +391,32 @@ fn any_number_of_threads_gives_the_same_bits() {
     let data = Data::new(40_000);
     // More than two runs of surfels.
     let surfels = surfels(34, 36_000, Discs::Surface, &view);
-    let bits = |threads: usize| {
+    let drawn = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");
-        let layers = pool.install(|| draw(&surfels, &view, 2, &data));
-        let floats = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
-        let vectors = layers.normal.iter().chain(&layers.color).flatten();
-        let bits: Vec<u32> = floats.into_iter().flatten().chain(vectors).map(|value| value.to_bits()).collect();
-        (bits, layers.point)
+        bits(&pool.install(|| draw(&surfels, &view, 2, &data)))
     };
-    let one = bits(1);
+    let one = drawn(1);
     for threads in [2, 5] {
-        assert!(bits(threads) == one, "{threads} threads give another picture than one");
+        assert!(drawn(threads) == one, "{threads} threads give another picture than one");
+    }
+}
+
+#[test]
+fn nothing_is_left_of_frames_before() {
+    let data = Data::new(2000);
+    let color = PointColors { srgb: &data.colors, linear: &data.linear };
+    let bare = Attributes { color: Some(color), ..Attributes::default() };
+    let scalars = FieldValues::F32(data.scalars.clone());
+    let all = Attributes { scalar: Some(&scalars), measures: true, backs: true, ..bare };
+    let mut splatter = Splatter::default();
+    // Tiles are empty that were not, stay so while layers are added, are filled again, and become those of another picture.
+    let frames = [(150, 0..75, bare), (150, 75..150, bare), (150, 75..150, all), (150, 0..0, all), (150, 0..75, all)];
+    for (frame, (side, columns, attributes)) in frames.into_iter().chain([(200, 0..75, all)]).enumerate() {
+        let view = views([side, side])[0];
+        let mut surfels = surfels(36, 1500, Discs::Surface, &view);
+        surfels.retain(|surfel| columns.contains(&(surfel.pixel & 0xffff)));
+        let [again, alone] = [&mut splatter, &mut Splatter::default()]
+            .map(|splatter| bits(&draw_with(splatter, &surfels, &view, 1, &attributes)));
+        assert!(again == alone, "frame {frame} shows what is left of others");
     }
 }
