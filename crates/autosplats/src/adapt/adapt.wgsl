@@ -27,6 +27,8 @@
 override ROUND: u32;
 override THICKEST_FIRST: f32;
 override WIDEST: f32;
+override STRAY_MOVE: f32;
+override STRAY_MOVE_KNOWN: f32;
 override GRAZING: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
@@ -135,8 +137,13 @@ fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> 
     return otherwise;
 }
 
-// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known.
-fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
+// Radius of a surfel that is drawn as a dot.
+fn dot_radius(surfel: Surfel) -> f32 {
+    return min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
+}
+
+// Turns and moves a surfel with so much noise onto a surface, along the ray along which its noise was made if that is known.
+fn move_onto(place: u32, surfel: Surfel, surface: Surface, noise: f32, known: Known) {
     var offset = surface.offset;
     if known.noise > 0.0 {
         offset = offset_along(known, surface.normal, offset);
@@ -144,6 +151,9 @@ fn move_onto(place: u32, surfel: Surfel, surface: Surface, known: Known) {
     let center = surfel.center + offset;
     let normal = turned_to_eye(surface.normal, center);
     var out = surfel;
+    if length(surface.offset) > select(STRAY_MOVE, STRAY_MOVE_KNOWN, known.noise > 0.0) * noise {
+        out.radius = dot_radius(surfel);
+    }
     out.normal = normal;
     var shadow = vec4f(any_orthonormal(normal), 1.0);
     if known.noise > 0.0 {
@@ -190,7 +200,7 @@ fn shrink(place: u32, surfel: Surfel) {
         surfels[place].radius = 0.0;
         atomicAdd(&counters[OUTLIERS], 1u);
     } else if stray >= STRAY_DOT {
-        surfels[place].radius = min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
+        surfels[place].radius = dot_radius(surfel);
     }
 }
 
@@ -242,7 +252,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
             let widest = WIDEST * own_initial_radius(surfel);
             shrunk.radius *= min(widest / surfel.k_radius, 1.0);
         }
-        move_onto(first_of_round + index, shrunk, surface, known);
+        move_onto(first_of_round + index, shrunk, surface, noise, known);
     } else if surfel.radius > 0.0 {
         shrink(first_of_round + index, surfel);
     }

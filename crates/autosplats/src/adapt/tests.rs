@@ -22,6 +22,9 @@ pub(crate) const K: u32 = 10;
 /// Shapes stay as the fit leaves them.
 const ADAPT_RULES: AdaptRules = AdaptRules { k: K, longest: f32::MAX, keep_outliers: false };
 
+/// Of the depth camera's depths, at depth 1.
+const STEP: f32 = 0.0029;
+
 /// The surfels of a cloud as the fit leaves them: of the active points, and of the passive ones.
 #[derive(Clone)]
 pub(crate) struct Case {
@@ -44,7 +47,11 @@ impl Case {
 
     /// What a depth camera with coarse steps sees of a room, seen from beside the camera.
     pub(crate) fn stepped() -> Self {
-        let positions = test_clouds::room(320, |depth| test_clouds::stepped(depth, 0.0029));
+        Self::of_room(|depth| test_clouds::stepped(depth, STEP))
+    }
+
+    fn of_room(measured: impl FnMut(f32) -> f32) -> Self {
+        let positions = test_clouds::room(320, measured);
         let scan = Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..positions.len() };
         let camera = Camera {
             eye: DVec3::new(0.4, -0.3, 0.1),
@@ -384,6 +391,45 @@ fn points_just_before_a_surface_are_dots() {
         let shrunk = of_sphere.filter(|(before, after)| after.radius < before.radius).count();
         assert!(shrunk * 1000 < fitted.len(), "{shrunk} of the sphere's");
     }
+}
+
+/// Noise puts hardly any point four deviations before its surface, or one of a depth camera three steps.
+#[test]
+fn points_too_far_off_for_noise_are_dots() {
+    let sigma = 0.01;
+    let mut positions = noisy(test_clouds::sphere(40_000), sigma);
+    let surface = positions.len() as u32;
+    let mut random = Random::new(8);
+    positions.extend((0..400).map(|_| random.direction().map(|c| c * (1.0 + 4.5 * sigma))));
+    for projection in PROJECTIONS {
+        let case = Case::new(&positions, projection, [400, 300]);
+        let [[of_sphere, its_dots], [off, dots]] = dots(&case, |source| source >= surface);
+        assert!(off > 200 && dots * 20 > off * 19, "{dots} of {off} are dots");
+        assert!(its_dots * 100 < of_sphere, "{its_dots} of {of_sphere} are dots");
+    }
+    let mut pixel = 0;
+    let is_off = |source: u32| source % 211 == 0;
+    let room = Case::of_room(|depth| {
+        let stepped = test_clouds::stepped(depth, STEP);
+        pixel += 1;
+        if is_off(pixel - 1) { 1.0 / (1.0 / stepped + 3.0 * STEP) } else { stepped }
+    });
+    // Beside the others no sheet is near enough.
+    let [[of_room, its_dots], [off, dots]] = dots(&room, is_off);
+    assert!(off > 60 && dots * 2 > off, "{dots} of {off} are dots");
+    assert!(its_dots * 1000 < of_room, "{its_dots} of {of_room} are dots");
+}
+
+/// How many discs of the fit there are, and how many of them are dots now: of points that are not off, and of those that are.
+fn dots(case: &Case, is_off: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
+    let mut counts = [[0; 2]; 2];
+    let is_disc = |surfel: &Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
+    for (before, after) in case.fitted.concat().iter().zip(&case.adapted()).filter(|(before, _)| is_disc(before)) {
+        let [discs, dots] = &mut counts[usize::from(is_off(before.source))];
+        *discs += 1;
+        *dots += usize::from(!is_disc(after));
+    }
+    counts
 }
 
 /// In the plane of the surface, so that only how one-sided their neighbours are tells of them.
