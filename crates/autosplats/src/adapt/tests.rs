@@ -1,7 +1,8 @@
 //! Adapted surfels against surfaces that are known.
 
+mod dots;
+
 use std::collections::HashMap;
-use std::ops::Range;
 
 use autosplats_cloud::glam::{DMat4, DVec3};
 use autosplats_cloud::{PointCloud, Scan};
@@ -355,121 +356,6 @@ fn wires_are_no_area_and_nor_is_what_is_seen_through() {
         let wall = (0..200_000).map(|_| [1.2 * random.signed(), 1.2 * random.signed(), 1.0]).collect();
         let before_wall = share_of_areas(&lines(&many, wall));
         assert!(before_wall < 0.01, "of lines {apart} apart before a wall {before_wall} do");
-    }
-}
-
-#[test]
-fn strewn_points_are_no_surface_however_flat_they_lie() {
-    let mut positions = test_clouds::sphere(40_000);
-    let surface = positions.len() as u32;
-    let mut random = Random::new(42);
-    positions.extend((0..1500).map(|_| [random.signed(), random.signed(), random.signed()].map(|c| 1.4 * c)));
-    let case = Case::new(&positions, PROJECTIONS[0], [400, 300]);
-    let apart =
-        |surfel: &&Surfel| surfel.source >= surface && surfel.radius > 2.0 * case.view.pixel_size(surfel.center[2]);
-    let discs = |surfels: &[Surfel]| surfels.iter().filter(apart).count();
-    let [before, after] = [discs(&case.fitted.concat()), discs(&case.adapted())];
-    assert!(before > 300 && after * 4 < before, "{before} discs, then {after}");
-}
-
-#[test]
-fn points_just_before_a_surface_are_dots() {
-    for projection in PROJECTIONS {
-        let mut positions = test_clouds::sphere(40_000);
-        let surface = positions.len() as u32;
-        let mut random = Random::new(7);
-        // Up to eighteen spacings of the sphere's points away, by mean six from each other.
-        let strewn = (0..1000).map(|_| random.direction().map(|c| c * (1.0 + 0.32 * random.unit())));
-        positions.extend(strewn);
-        let case = Case::new(&positions, projection, [400, 300]);
-        let is_disc = |surfel: &&Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
-        let discs = |surfels: &[Surfel]| surfels.iter().filter(|s| s.source >= surface).filter(is_disc).count();
-        let (fitted, adapted) = (case.fitted.concat(), case.adapted());
-        let [before, after] = [discs(&fitted), discs(&adapted)];
-        assert!(before > 200 && after * 3 < before, "{before} discs, then {after}");
-        let of_sphere = fitted.iter().zip(&adapted).filter(|(before, _)| before.source < surface);
-        let shrunk = of_sphere.filter(|(before, after)| after.radius < before.radius).count();
-        assert!(shrunk * 1000 < fitted.len(), "{shrunk} of the sphere's");
-    }
-}
-
-/// Noise puts hardly any point four deviations before its surface, or one of a depth camera three steps.
-#[test]
-fn points_too_far_off_for_noise_are_dots() {
-    let sigma = 0.01;
-    let mut positions = noisy(test_clouds::sphere(40_000), sigma);
-    let surface = positions.len() as u32;
-    let mut random = Random::new(8);
-    positions.extend((0..400).map(|_| random.direction().map(|c| c * (1.0 + 4.5 * sigma))));
-    for projection in PROJECTIONS {
-        let case = Case::new(&positions, projection, [400, 300]);
-        let [[of_sphere, its_dots], [off, dots]] = dots(&case, |source| source >= surface);
-        assert!(off > 200 && dots * 20 > off * 19, "{dots} of {off} are dots");
-        assert!(its_dots * 100 < of_sphere, "{its_dots} of {of_sphere} are dots");
-    }
-    let mut pixel = 0;
-    let is_off = |source: u32| source % 211 == 0;
-    let room = Case::of_room(|depth| {
-        let stepped = test_clouds::stepped(depth, STEP);
-        pixel += 1;
-        if is_off(pixel - 1) { 1.0 / (1.0 / stepped + 3.0 * STEP) } else { stepped }
-    });
-    // Beside the others no sheet is near enough.
-    let [[of_room, its_dots], [off, dots]] = dots(&room, is_off);
-    assert!(off > 60 && dots * 2 > off, "{dots} of {off} are dots");
-    assert!(its_dots * 1000 < of_room, "{its_dots} of {of_room} are dots");
-}
-
-/// How many discs of the fit there are, and how many of them are dots now: of points that are not off, and of those that are.
-fn dots(case: &Case, is_off: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
-    let mut counts = [[0; 2]; 2];
-    let is_disc = |surfel: &Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
-    for (before, after) in case.fitted.concat().iter().zip(&case.adapted()).filter(|(before, _)| is_disc(before)) {
-        let [discs, dots] = &mut counts[usize::from(is_off(before.source))];
-        *discs += 1;
-        *dots += usize::from(!is_disc(after));
-    }
-    counts
-}
-
-/// In the plane of the surface, so that only how one-sided their neighbours are tells of them.
-#[test]
-fn points_beyond_a_border_are_dots() {
-    for projection in PROJECTIONS {
-        let (positions, surface) = test_clouds::beyond_a_border();
-        let case = Case::new(&positions, projection, [400, 300]);
-        let is_disc = |surfel: &&Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
-        let discs = |surfels: &[Surfel], of: Range<u32>| {
-            surfels.iter().filter(|surfel| of.contains(&surfel.source)).filter(is_disc).count()
-        };
-        let (fitted, adapted) = (case.fitted.concat(), case.adapted());
-        let [before, after] = [&fitted, &adapted].map(|surfels| discs(surfels, surface..u32::MAX));
-        assert!(before > 40 && after * 3 < before, "{before} discs, then {after}");
-        let [before, after] = [&fitted, &adapted].map(|surfels| discs(surfels, 0..surface));
-        assert!(after * 1000 > before * 999, "{before} of the surface, then {after}");
-    }
-}
-
-/// A cube of few points above a dense floor: none of it stands aside of what surrounds it.
-#[test]
-fn sparse_edges_and_corners_are_surface() {
-    for projection in PROJECTIONS {
-        let mut random = Random::new(19);
-        let floor = (0..60_000).map(|_| [1.2 * random.signed(), 0.9, 1.2 * random.signed()]);
-        let mut positions: Positions = floor.collect();
-        let floor = positions.len() as u32;
-        let mut random = Random::new(20);
-        positions.extend((0..2400).map(|at| {
-            let [a, b] = [random.signed(), random.signed()].map(|c| 0.45 * c);
-            let side = if at % 2 == 0 { 0.45 } else { -0.45 };
-            [[a, b, side], [a, side, b], [side, a, b]][at % 3]
-        }));
-        let case = Case::new(&positions, projection, [480, 360]);
-        let (fitted, adapted) = (case.fitted.concat(), case.adapted());
-        let of_cube = fitted.iter().zip(&adapted).filter(|(before, _)| before.source >= floor && before.radius > 0.0);
-        let (all, dots) = of_cube
-            .fold((0, 0), |(all, dots), (before, after)| (all + 1, dots + usize::from(after.radius < before.radius)));
-        assert!(all > 1500 && dots * 33 < all, "{dots} of {all} are dots");
     }
 }
 

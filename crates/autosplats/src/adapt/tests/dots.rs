@@ -1,0 +1,101 @@
+//! Which surfels are dots and which are not.
+
+use super::*;
+
+/// How many discs of the fit there are and how many of them are dots now: of points that are not strays, and of those that are.
+fn dots(case: &Case, is_stray: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
+    let mut counts = [[0; 2]; 2];
+    let is_disc = |surfel: &Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
+    for (before, after) in case.fitted.concat().iter().zip(&case.adapted()).filter(|(before, _)| is_disc(before)) {
+        let [discs, dots] = &mut counts[usize::from(is_stray(before.source))];
+        *discs += 1;
+        *dots += usize::from(!is_disc(after));
+    }
+    counts
+}
+
+#[test]
+fn strewn_points_are_no_surface_however_flat_they_lie() {
+    let mut positions = test_clouds::sphere(40_000);
+    let surface = positions.len() as u32;
+    let mut random = Random::new(42);
+    positions.extend((0..1500).map(|_| [random.signed(), random.signed(), random.signed()].map(|c| 1.4 * c)));
+    let case = Case::new(&positions, PROJECTIONS[0], [400, 300]);
+    let [_, [strays, dots]] = dots(&case, |source| source >= surface);
+    assert!(strays > 300 && dots * 4 > strays * 3, "{dots} of {strays} are dots");
+}
+
+#[test]
+fn points_just_before_a_surface_are_dots() {
+    for projection in PROJECTIONS {
+        let mut positions = test_clouds::sphere(40_000);
+        let surface = positions.len() as u32;
+        let mut random = Random::new(7);
+        // Up to eighteen spacings of the sphere's points away, by mean six from each other.
+        let strewn = (0..1000).map(|_| random.direction().map(|c| c * (1.0 + 0.32 * random.unit())));
+        positions.extend(strewn);
+        let case = Case::new(&positions, projection, [400, 300]);
+        let [[of_sphere, its_dots], [strays, dots]] = dots(&case, |source| source >= surface);
+        assert!(strays > 200 && dots * 3 > strays * 2, "{dots} of {strays} are dots");
+        assert!(its_dots * 1000 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
+    }
+}
+
+/// Noise puts hardly any point four deviations before its surface, or one of a depth camera three steps.
+#[test]
+fn points_too_far_off_for_noise_are_dots() {
+    let sigma = 0.01;
+    let mut positions = noisy(test_clouds::sphere(40_000), sigma);
+    let surface = positions.len() as u32;
+    let mut random = Random::new(8);
+    positions.extend((0..400).map(|_| random.direction().map(|c| c * (1.0 + 4.5 * sigma))));
+    for projection in PROJECTIONS {
+        let case = Case::new(&positions, projection, [400, 300]);
+        let [[of_sphere, its_dots], [strays, dots]] = dots(&case, |source| source >= surface);
+        assert!(strays > 200 && dots * 20 > strays * 19, "{dots} of {strays} are dots");
+        assert!(its_dots * 100 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
+    }
+    let mut pixel = 0;
+    let is_stray = |source: u32| source.is_multiple_of(211);
+    let room = Case::of_room(|depth| {
+        let stepped = test_clouds::stepped(depth, STEP);
+        pixel += 1;
+        if is_stray(pixel - 1) { 1.0 / (1.0 / stepped + 3.0 * STEP) } else { stepped }
+    });
+    // Beside the others no sheet is near enough.
+    let [[of_room, its_dots], [strays, dots]] = dots(&room, is_stray);
+    assert!(strays > 60 && dots * 2 > strays, "{dots} of {strays} are dots");
+    assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
+}
+
+/// In the plane of the surface, so that only how one-sided their neighbours are tells of them.
+#[test]
+fn points_beyond_a_border_are_dots() {
+    for projection in PROJECTIONS {
+        let (positions, surface) = test_clouds::beyond_a_border();
+        let case = Case::new(&positions, projection, [400, 300]);
+        let [[of_surface, its_dots], [strays, dots]] = dots(&case, |source| source >= surface);
+        assert!(strays > 40 && dots * 3 > strays * 2, "{dots} of {strays} are dots");
+        assert!(its_dots * 1000 < of_surface, "{its_dots} of the surface's {of_surface} are dots");
+    }
+}
+
+/// A cube of few points above a dense floor: none of it stands aside of what surrounds it.
+#[test]
+fn sparse_edges_and_corners_are_surface() {
+    for projection in PROJECTIONS {
+        let mut random = Random::new(19);
+        let floor = (0..60_000).map(|_| [1.2 * random.signed(), 0.9, 1.2 * random.signed()]);
+        let mut positions: Positions = floor.collect();
+        let floor = positions.len() as u32;
+        let mut random = Random::new(20);
+        positions.extend((0..2400).map(|at| {
+            let [a, b] = [random.signed(), random.signed()].map(|c| 0.45 * c);
+            let side = if at % 2 == 0 { 0.45 } else { -0.45 };
+            [[a, b, side], [a, side, b], [side, a, b]][at % 3]
+        }));
+        let case = Case::new(&positions, projection, [480, 360]);
+        let [_, [of_cube, dots]] = dots(&case, |source| source >= floor);
+        assert!(of_cube > 1500 && dots * 33 < of_cube, "{dots} of {of_cube} are dots");
+    }
+}
