@@ -145,7 +145,7 @@ fn print(outcome: &Outcome) {
     }
     let best = |value: fn(&Angles) -> f64| {
         let k = outcome.best_fit(value).map_or(0, |(k, _)| k);
-        format!("{:.3} of k = {k}", ratio(outcome, value).unwrap_or(f64::NAN))
+        format!("{:.3} of k = {k}", ratio(outcome, Method::Ours, value).unwrap_or(f64::NAN))
     };
     println!("    ours / best fit: mean {}, band {}", best(|angles| angles.mean), best(|angles| angles.band));
     if let Some(motion) = &outcome.motion {

@@ -5,8 +5,9 @@ use std::num::NonZero;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use anyhow::Result;
+use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DVec3, Vec3};
-use autosplats::{Camera, ColorMode, Normals, PointSurfel, Reconstruction, Renderer, SearchEngine, Settings, Shading};
+use autosplats::{Camera, ColorMode, Normals, Reconstruction, Renderer, SearchEngine, Settings, Shading};
 use rayon::prelude::*;
 
 use crate::neighbors::Neighbors;
@@ -31,12 +32,22 @@ pub enum Method {
     /// The paper's splats, but trimmed, with normals of plane fits to the exact nearest neighbours in the whole cloud, so many of
     /// them.
     Fit(usize),
+    /// Our splats, of points that lie on the surface, without noise, misregistration and outliers, with its normals there.
+    Known,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Ours, Self::Paper, Self::Dots, Self::Fit(10), Self::Fit(40), Self::Fit(160), Self::Fit(640)];
+    pub const ALL: [Self; 8] = [
+        Self::Ours,
+        Self::Paper,
+        Self::Dots,
+        Self::Fit(10),
+        Self::Fit(40),
+        Self::Fit(160),
+        Self::Fit(640),
+        Self::Known,
+    ];
 
     /// A short name.
     pub fn name(self) -> String {
@@ -45,6 +56,7 @@ impl Method {
             Self::Paper => "paper".into(),
             Self::Dots => "dots".into(),
             Self::Fit(k) => format!("fit {k}"),
+            Self::Known => "known".into(),
         }
     }
 }
@@ -94,22 +106,53 @@ impl<'a> Painter<'a> {
     /// # Errors
     /// What the renderer refuses.
     pub fn paint(&mut self, method: Method, camera: &Camera, size: [u32; 2]) -> Result<Picture> {
+        let subject = self.subject;
         match method {
             Method::Ours => self.render(Reconstruction::default(), camera, size),
             Method::Paper => self.render(paper(), camera, size),
-            Method::Dots => Ok(dots(self.subject, &Rays::new(camera, size)?, size)),
+            Method::Dots => Ok(dots(subject, &Rays::new(camera, size)?, size)),
             Method::Fit(k) => {
                 // They are compared by their normals: what whole splats draw past silhouettes would be no fault of these.
                 let trimmed = Reconstruction { trim: true, ..paper() };
-                // Without culling every visible point has a surfel, and its radius.
-                let all = plain(Reconstruction { grid_culling: false, ..trimmed.clone() });
-                self.renderer.render(&self.subject.cloud, camera, size, &all)?;
-                let normals = self.fits.normals(self.subject, &self.renderer.surfels()?, k);
-                let cloud = &self.subject.cloud;
-                let frame = self.renderer.render_with_normals(cloud, &normals, camera, size, &plain(trimmed))?;
-                Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
+                self.give(&subject.cloud, trimmed, camera, size, |fits, points| fits.normals(&subject.cloud, points, k))
+            }
+            Method::Known => {
+                let exact = |_: &mut Fits, points: &[u32]| {
+                    points.par_iter().map(|&point| subject.normal(point).as_vec3()).collect()
+                };
+                self.give(&subject.clean_cloud, Reconstruction::default(), camera, size, exact)
             }
         }
+    }
+
+    /// A picture of `cloud` with normals that `find` gives to some of its points. They have the radii that `reconstruction` finds,
+    /// so that nothing but normals is another.
+    fn give(
+        &mut self,
+        cloud: &PointCloud,
+        reconstruction: Reconstruction,
+        camera: &Camera,
+        size: [u32; 2],
+        find: impl FnOnce(&mut Fits, &[u32]) -> Vec<Vec3>,
+    ) -> Result<Picture> {
+        // Without culling every visible point has a surfel, and its radius.
+        let all = plain(Reconstruction { grid_culling: false, ..reconstruction.clone() });
+        self.renderer.render(cloud, camera, size, &all)?;
+        let mut surfels = self.renderer.surfels()?;
+        // Who has the whole cloud knows its outliers, and draws none.
+        surfels.retain(|surfel| surfel.radius > 0.0 && !self.subject.is_outlier(surfel.point));
+        let points: Vec<u32> = surfels.iter().map(|surfel| surfel.point).collect();
+        let mut normals = Normals {
+            normals: vec![[f32::NAN; 3]; cloud.len()],
+            curvature: vec![0.0; cloud.len()],
+            radius: vec![f32::NAN; cloud.len()],
+        };
+        for (surfel, normal) in surfels.iter().zip(find(&mut self.fits, &points)) {
+            normals.normals[surfel.point as usize] = normal.to_array();
+            normals.radius[surfel.point as usize] = surfel.radius;
+        }
+        let frame = self.renderer.render_with_normals(cloud, &normals, camera, size, &plain(reconstruction))?;
+        Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
     }
 
     /// A picture with the renderer's own way to find normals.
@@ -131,36 +174,19 @@ struct Fits {
 }
 
 impl Fits {
-    /// Normals of the points of `surfels` and of no others, with the radii that they have there, so that nothing but normals
-    /// is another than in the paper's picture.
-    fn normals(&mut self, subject: &Subject, surfels: &[PointSurfel], k: usize) -> Normals {
-        let cloud = &subject.cloud;
+    /// Normals of the planes through these points of a cloud and their k nearest neighbours, the same cloud each time.
+    fn normals(&mut self, cloud: &PointCloud, points: &[u32], k: usize) -> Vec<Vec3> {
         let first = NonZero::new(FIT_KS[0]).expect("above 0");
         let neighbors = self.neighbors.get_or_insert_with(|| Neighbors::new(cloud, first));
-        // Who has the whole cloud knows its outliers, and draws none.
-        let drawn = surfels.iter().filter(|surfel| surfel.radius > 0.0 && !subject.is_outlier(surfel.point));
-        let missing: Vec<u32> =
-            drawn.clone().map(|surfel| surfel.point).filter(|point| !self.found.contains_key(point)).collect();
+        let missing: Vec<u32> = points.iter().copied().filter(|point| !self.found.contains_key(point)).collect();
         let fit = |&point: &u32| {
             let normals = neighbors.normals(point, &FIT_KS);
             (point, std::array::from_fn(|i| normals[i].as_vec3()))
         };
         let found: Vec<_> = missing.par_iter().map(fit).collect();
         self.found.extend(found);
-
         let which = FIT_KS.iter().position(|&number| number == k).expect("one of the numbers");
-        let mut normals = Normals {
-            normals: vec![[f32::NAN; 3]; cloud.len()],
-            curvature: vec![0.0; cloud.len()],
-            radius: vec![f32::NAN; cloud.len()],
-        };
-        for surfel in drawn {
-            if let Some(found) = self.found.get(&surfel.point) {
-                normals.normals[surfel.point as usize] = found[which].to_array();
-                normals.radius[surfel.point as usize] = surfel.radius;
-            }
-        }
-        normals
+        points.iter().map(|point| self.found[point][which]).collect()
     }
 }
 

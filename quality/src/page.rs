@@ -32,6 +32,8 @@ One ray through the centre of each pixel tells what is truly there. These ways t
 occlusion to show the shape.
 - **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours in \
 the whole cloud, outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
+- **known**: our splats, of points free of noise, misregistration and outliers, with the normals of the surface itself: what is \
+left to want if all is known that can be known of single points. Those of swept points do not reach from ring to ring.
 
 Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \
 pixels of a silhouette, *flipped* the share above 90° to all that is truly seen at the pixel and the eight around it, at an edge \
@@ -87,7 +89,7 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         &lit(outcomes),
         "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in 255ths. \
          Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is averaged over \
-         about eight pictures; the first here follows none. *Alone* are ours, each made by itself, and *off* is the mean error \
+         about eight pictures, and eight of the same movement go before those that count. *Alone* are ours, each made by itself, and *off* is the mean error \
          of normals in the last picture.\n\n",
         &motion(outcomes),
         CREDITS,
@@ -96,21 +98,27 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
 }
 
 fn targets(outcomes: &[Outcome]) -> String {
-    let mut table = Table::new(&["target", "met", "worst", "where", ""]);
+    let mut table = Table::new(&["target", "met", "worst", "where", "", "known: met", "missed by ours alone"]);
     for target in TARGETS {
-        let values = outcomes.iter().filter_map(|outcome| Some((outcome, (target.value)(outcome)?)));
-        let values: Vec<_> = values.filter(|(_, value)| value.is_finite()).collect();
-        let met = values.iter().filter(|(_, value)| target.is_met(*value)).count();
+        let of = |outcome, method| (target.value)(outcome, method).filter(|value| value.is_finite());
+        let values: Vec<_> =
+            outcomes.iter().filter_map(|outcome| Some((outcome, of(outcome, Method::Ours)?))).collect();
         let worst =
             values.iter().copied().reduce(|one, other| if target.is_worse(other.1, one.1) { other } else { one });
-        let Some((outcome, worst)) = worst else { continue };
+        let Some((at_worst, worst)) = worst else { continue };
+        let met = values.iter().filter(|(_, value)| target.is_met(*value)).count();
         let verdict = if met == values.len() { "met" } else { "missed" };
+        let known = values.iter().filter_map(|&(outcome, ours)| Some((ours, of(outcome, Method::Known)?)));
+        let known: Vec<_> = known.map(|(ours, known)| [ours, known].map(|value| target.is_met(value))).collect();
+        let count = |of: fn(&&[bool; 2]) -> bool| known.iter().filter(of).count();
         table.row(&[
             target.what.into(),
             format!("{met} of {}", values.len()),
             number(worst, target.decimals),
-            outcome.case.name(),
+            at_worst.case.name(),
             verdict.into(),
+            format!("{} of {}", count(|[_, known]| *known), known.len()),
+            count(|[ours, known]| !ours && *known).to_string(),
         ]);
     }
     table.finish()
@@ -198,6 +206,9 @@ fn normals(outcomes: &[Outcome]) -> String {
         "> 90°",
         "flipped",
         "band",
+        "known: mean",
+        "flipped",
+        "band",
     ];
     columns.extend(fits.iter().map(String::as_str));
     columns.extend(["best k", "ours / best", "best k, band", "ours / best, band"]);
@@ -220,10 +231,13 @@ fn normals(outcomes: &[Outcome]) -> String {
             percent(paper.flipped, 2),
             number(paper.band, 2),
         ];
+        let known = outcome.of(Method::Known).and_then(|known| known.angles);
+        let known = known.map_or([f64::NAN; 3], |known| [known.mean, 100.0 * known.flipped, known.band]);
+        cells.extend(known.map(|value| number(value, 2)));
         cells.extend(FIT_KS.map(|k| number(of(outcome, Method::Fit(k), mean), 2)));
         let best = |value: fn(&crate::measure::Angles) -> f64| {
             let k = outcome.best_fit(value).map_or("–".into(), |best| best.0.to_string());
-            [k, number(ratio(outcome, value).unwrap_or(f64::NAN), 2)]
+            [k, number(ratio(outcome, Method::Ours, value).unwrap_or(f64::NAN), 2)]
         };
         cells.extend(best(|angles| angles.mean));
         cells.extend(best(|angles| angles.band));
@@ -248,6 +262,8 @@ fn cover(outcomes: &[Outcome]) -> String {
         "IoU",
         "wider px",
         "dots: IoU",
+        "known: holes",
+        "IoU",
     ]);
     for outcome in outcomes {
         let Some(first) = outcome.of(Method::Ours) else { continue };
@@ -258,6 +274,8 @@ fn cover(outcomes: &[Outcome]) -> String {
             cells.extend([number(cover.iou, 4), number(cover.wider_px, 2)]);
         }
         cells.push(number(of(outcome, Method::Dots, |measures| measures.cover.iou), 4));
+        cells.push(percent(of(outcome, Method::Known, |measures| measures.cover.holes), 3));
+        cells.push(number(of(outcome, Method::Known, |measures| measures.cover.iou), 4));
         table.row(&cells);
     }
     table.finish()
@@ -301,10 +319,12 @@ fn lit(outcomes: &[Outcome]) -> String {
         "paper",
         "dots",
         "best fit",
+        "known",
         "FLIP: ours",
         "paper",
         "dots",
         "best fit",
+        "known",
         "depth: ours",
         "paper",
         "dots",
@@ -313,7 +333,7 @@ fn lit(outcomes: &[Outcome]) -> String {
     for outcome in outcomes {
         // The best plane fits are those with the best normals.
         let best = outcome.best_fit(|angles| angles.mean).map(|(k, _)| Method::Fit(k));
-        let with_best = || methods.into_iter().chain(best);
+        let with_best = || methods.into_iter().chain(best).chain([Method::Known]);
         let mut cells = vec![outcome.case.name()];
         cells.extend(with_best().map(|method| number(of(outcome, method, |measures| measures.psnr), 2)));
         cells.extend(with_best().map(|method| number(of(outcome, method, |measures| measures.flip), 3)));
@@ -330,22 +350,24 @@ fn motion(outcomes: &[Outcome]) -> String {
         "ours",
         "alone",
         "paper",
+        "known",
         "lightness: truth",
         "ours",
         "alone",
         "paper",
         "dots",
+        "known",
         "off °: alone",
         "steady",
     ]);
     for outcome in outcomes {
         let Some(motion) = &outcome.motion else { continue };
         let of = |method| motion.methods.iter().find(|(other, _)| *other == method).map(|(_, change)| *change);
-        let [ours, paper, dots] = [Method::Ours, Method::Paper, Method::Dots].map(of);
+        let [ours, paper, dots, known] = [Method::Ours, Method::Paper, Method::Dots, Method::Known].map(of);
         let [truth, alone] = [motion.truth, motion.alone].map(Some);
         let mut cells = vec![outcome.case.name()];
-        cells.extend([truth, ours, alone, paper].map(|c| number(c.map_or(f64::NAN, |c| c.degrees), 2)));
-        cells.extend([truth, ours, alone, paper, dots].map(|c| number(c.map_or(f64::NAN, |c| c.lightness), 2)));
+        cells.extend([truth, ours, alone, paper, known].map(|c| number(c.map_or(f64::NAN, |c| c.degrees), 2)));
+        cells.extend([truth, ours, alone, paper, dots, known].map(|c| number(c.map_or(f64::NAN, |c| c.lightness), 2)));
         cells.extend(motion.degrees_off.map(|degrees| number(degrees, 2)));
         table.row(&cells);
     }

@@ -8,7 +8,7 @@ use crate::exact::Exact;
 use crate::light::Lit;
 use crate::measure::{Angles, Measures, Truth};
 use crate::method::{Method, Painter};
-use crate::motion::{Change, Changes, STEP_DEGREES, STEPS, same};
+use crate::motion::{Change, Changes, LEAD_IN, STEP_DEGREES, STEPS, same};
 use crate::picture::Picture;
 use crate::subject::Subject;
 use crate::view::orbit;
@@ -78,6 +78,9 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
     let mut follower = Painter::new(subject);
     let steady = Reconstruction { steady: true, ..Reconstruction::default() };
     let mut changes = vec![Changes::default(); 2 + methods.len()];
+    for step in (1..=LEAD_IN).rev() {
+        follower.render(steady.clone(), &orbit(&camera, step as f64 * -STEP_DEGREES)?, case.size)?;
+    }
     let mut before: Option<(Exact, Vec<(Picture, Lit)>)> = None;
     for step in 0..=STEPS {
         let camera = orbit(&camera, step as f64 * STEP_DEGREES)?;

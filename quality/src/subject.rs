@@ -183,6 +183,8 @@ pub struct Subject {
     pub cloud: PointCloud,
     /// The points where they would be without noise, misregistration and outliers, in the same order.
     pub clean: Neighbors,
+    /// The same, to be rendered.
+    pub clean_cloud: PointCloud,
     /// How far points may lie off the surface, in its unit.
     pub blur: f64,
     /// Diagonal of the clean points' box.
@@ -229,9 +231,20 @@ impl Subject {
             surface,
             cloud: with_axes(PointCloud::new(even.origin(), positions)),
             clean: Neighbors::new(&even, SPACING_K),
+            clean_cloud: even,
             blur: NEARLY_ALL * (recipe.noise * diagonal + recipe.sweep.map_or(0.0, |sweep| sweep.noise)) + misplaced,
             diagonal,
         })
+    }
+
+    /// Normal of the surface at a point that is no outlier, where it would be without noise; of either sign.
+    pub fn normal(&self, point: u32) -> DVec3 {
+        let place = self.clean.position(point);
+        let fitted = self.clean.normal(point);
+        // From half as far as the nearest other point: other surfaces are seldom between.
+        let height = 0.5 * self.clean.around(place)[1].length();
+        let hit = self.surface.trace(place + fitted * height, -fitted);
+        hit.filter(|hit| hit.distance < 2.0 * height).map_or(fitted, |hit| hit.normal)
     }
 
     /// Whether a point is one of the outliers.
