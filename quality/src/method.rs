@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use anyhow::Result;
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DVec3, Vec3};
-use autosplats::{Camera, ColorMode, Normals, Reconstruction, Renderer, SearchEngine, Settings, Shading};
+use autosplats::{Camera, ColorMode, Normals, PointSurfel, Reconstruction, Renderer, SearchEngine, Settings, Shading};
 use rayon::prelude::*;
 
 use crate::neighbors::Neighbors;
@@ -32,7 +32,8 @@ pub enum Method {
     /// The paper's splats, but trimmed, with normals of plane fits to the exact nearest neighbours in the whole cloud, so many of
     /// them.
     Fit(usize),
-    /// Our splats, of points that lie on the surface, without noise, misregistration and outliers, with its normals there.
+    /// Our splats as discs, of points that lie on the surface, without noise, misregistration and outliers, with its normals there;
+    /// of those alone that nothing hides.
     Known,
 }
 
@@ -114,40 +115,53 @@ impl<'a> Painter<'a> {
             Method::Fit(k) => {
                 // They are compared by their normals: what whole splats draw past silhouettes would be no fault of these.
                 let trimmed = Reconstruction { trim: true, ..paper() };
-                self.give(&subject.cloud, trimmed, camera, size, |fits, points| fits.normals(&subject.cloud, points, k))
+                let mut surfels = self.surfels(&subject.cloud, &trimmed, camera, size)?;
+                // Who has the whole cloud knows its outliers, and draws none.
+                surfels.retain(|surfel| !subject.is_outlier(surfel.point));
+                let normals = self.fits.normals(&subject.cloud, &surfels, k);
+                self.draw(&subject.cloud, trimmed, surfels.iter().zip(normals), camera, size)
             }
             Method::Known => {
-                let exact = |_: &mut Fits, points: &[u32]| {
-                    points.par_iter().map(|&point| subject.normal(point).as_vec3()).collect()
-                };
-                self.give(&subject.clean_cloud, Reconstruction::default(), camera, size, exact)
+                let (cloud, rays) = (&subject.clean_cloud, Rays::new(camera, size)?);
+                let surfels = self.surfels(cloud, &Reconstruction::default(), camera, size)?;
+                let seen = surfels.par_iter().filter(|surfel| subject.is_seen(surfel.point, &rays));
+                let seen: Vec<_> = seen.map(|surfel| (surfel, subject.normal(surfel.point).as_vec3())).collect();
+                self.draw(cloud, Reconstruction::default(), seen.into_iter(), camera, size)
             }
         }
     }
 
-    /// A picture of `cloud` with normals that `find` gives to some of its points. They have the radii that `reconstruction` finds,
-    /// so that nothing but normals is another.
-    fn give(
+    /// All points of `cloud` that may be seen, with their radii.
+    fn surfels(
         &mut self,
         cloud: &PointCloud,
-        reconstruction: Reconstruction,
+        reconstruction: &Reconstruction,
         camera: &Camera,
         size: [u32; 2],
-        find: impl FnOnce(&mut Fits, &[u32]) -> Vec<Vec3>,
-    ) -> Result<Picture> {
-        // Without culling every visible point has a surfel, and its radius.
+    ) -> Result<Vec<PointSurfel>> {
+        // Without culling every visible point has a surfel.
         let all = plain(Reconstruction { grid_culling: false, ..reconstruction.clone() });
         self.renderer.render(cloud, camera, size, &all)?;
         let mut surfels = self.renderer.surfels()?;
-        // Who has the whole cloud knows its outliers, and draws none.
-        surfels.retain(|surfel| surfel.radius > 0.0 && !self.subject.is_outlier(surfel.point));
-        let points: Vec<u32> = surfels.iter().map(|surfel| surfel.point).collect();
+        surfels.retain(|surfel| surfel.radius > 0.0);
+        Ok(surfels)
+    }
+
+    /// A picture of these points of `cloud` alone, as discs with these normals.
+    fn draw<'s>(
+        &mut self,
+        cloud: &PointCloud,
+        reconstruction: Reconstruction,
+        surfels: impl Iterator<Item = (&'s PointSurfel, Vec3)>,
+        camera: &Camera,
+        size: [u32; 2],
+    ) -> Result<Picture> {
         let mut normals = Normals {
             normals: vec![[f32::NAN; 3]; cloud.len()],
             curvature: vec![0.0; cloud.len()],
             radius: vec![f32::NAN; cloud.len()],
         };
-        for (surfel, normal) in surfels.iter().zip(find(&mut self.fits, &points)) {
+        for (surfel, normal) in surfels {
             normals.normals[surfel.point as usize] = normal.to_array();
             normals.radius[surfel.point as usize] = surfel.radius;
         }
@@ -174,11 +188,12 @@ struct Fits {
 }
 
 impl Fits {
-    /// Normals of the planes through these points of a cloud and their k nearest neighbours, the same cloud each time.
-    fn normals(&mut self, cloud: &PointCloud, points: &[u32], k: usize) -> Vec<Vec3> {
+    /// Normals of the planes through the points of `surfels` and their k nearest neighbours in a cloud, the same each time.
+    fn normals(&mut self, cloud: &PointCloud, surfels: &[PointSurfel], k: usize) -> Vec<Vec3> {
         let first = NonZero::new(FIT_KS[0]).expect("above 0");
         let neighbors = self.neighbors.get_or_insert_with(|| Neighbors::new(cloud, first));
-        let missing: Vec<u32> = points.iter().copied().filter(|point| !self.found.contains_key(point)).collect();
+        let points = || surfels.iter().map(|surfel| surfel.point);
+        let missing: Vec<u32> = points().filter(|point| !self.found.contains_key(point)).collect();
         let fit = |&point: &u32| {
             let normals = neighbors.normals(point, &FIT_KS);
             (point, std::array::from_fn(|i| normals[i].as_vec3()))
@@ -186,7 +201,7 @@ impl Fits {
         let found: Vec<_> = missing.par_iter().map(fit).collect();
         self.found.extend(found);
         let which = FIT_KS.iter().position(|&number| number == k).expect("one of the numbers");
-        points.iter().map(|point| self.found[point][which]).collect()
+        points().map(|point| self.found[&point][which]).collect()
     }
 }
 

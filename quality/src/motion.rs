@@ -10,8 +10,8 @@ use crate::picture::Picture;
 
 /// Steps in a movement.
 pub const STEPS: usize = 6;
-/// Pictures of the same movement before them, so that what is averaged over pictures has enough of them: it is about the flicker
-/// that stays.
+/// Pictures of the same movement before them, so that what is averaged over pictures has enough of them: what is measured is the
+/// flicker that stays.
 pub const LEAD_IN: usize = 8;
 /// Degrees around the subject for each step.
 pub const STEP_DEGREES: f64 = 0.7;

@@ -32,8 +32,9 @@ One ray through the centre of each pixel tells what is truly there. These ways t
 occlusion to show the shape.
 - **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours in \
 the whole cloud, outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
-- **known**: our splats, of points free of noise, misregistration and outliers, with the normals of the surface itself: what is \
-left to want if all is known that can be known of single points. Those of swept points do not reach from ring to ring.
+- **known**: our splats, of points free of noise, misregistration and outliers, those alone that are truly seen, with the normals \
+of the surface itself: what pictures are without errors of normals and of places. They are discs, so that swept points' do not \
+reach from ring to ring, and in motion each picture is made alone.
 
 Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \
 pixels of a silhouette, *flipped* the share above 90° to all that is truly seen at the pixel and the eight around it, at an edge \
@@ -89,7 +90,7 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         &lit(outcomes),
         "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in 255ths. \
          Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is averaged over \
-         about eight pictures, and eight of the same movement go before those that count. *Alone* are ours, each made by itself, and *off* is the mean error \
+         about eight pictures, and eight of the same movement go before those that count. All others are made by themselves. *Alone* are ours, each made by itself, and *off* is the mean error \
          of normals in the last picture.\n\n",
         &motion(outcomes),
         CREDITS,
@@ -98,7 +99,8 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
 }
 
 fn targets(outcomes: &[Outcome]) -> String {
-    let mut table = Table::new(&["target", "met", "worst", "where", "", "known: met", "missed by ours alone"]);
+    let mut table =
+        Table::new(&["target", "met", "worst", "where", "", "known: met", "ours alone misses", "known alone misses"]);
     for target in TARGETS {
         let of = |outcome, method| (target.value)(outcome, method).filter(|value| value.is_finite());
         let values: Vec<_> =
@@ -111,14 +113,16 @@ fn targets(outcomes: &[Outcome]) -> String {
         let known = values.iter().filter_map(|&(outcome, ours)| Some((ours, of(outcome, Method::Known)?)));
         let known: Vec<_> = known.map(|(ours, known)| [ours, known].map(|value| target.is_met(value))).collect();
         let count = |of: fn(&&[bool; 2]) -> bool| known.iter().filter(of).count();
+        let dash_for_none = |text: String| if known.is_empty() { "–".into() } else { text };
         table.row(&[
             target.what.into(),
             format!("{met} of {}", values.len()),
             number(worst, target.decimals),
             at_worst.case.name(),
             verdict.into(),
-            format!("{} of {}", count(|[_, known]| *known), known.len()),
-            count(|[ours, known]| !ours && *known).to_string(),
+            dash_for_none(format!("{} of {}", count(|[_, known]| *known), known.len())),
+            dash_for_none(count(|[ours, known]| !ours && *known).to_string()),
+            dash_for_none(count(|[ours, known]| *ours && !known).to_string()),
         ]);
     }
     table.finish()

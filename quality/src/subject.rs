@@ -17,8 +17,9 @@ use autosplats::cloud::{Axes, PointCloud, Scene, sample_surface};
 use crate::mesh::Mesh;
 use crate::neighbors::Neighbors;
 use crate::random::Random;
-use crate::surface::Surface;
+use crate::surface::{Hit, Surface};
 use crate::sweep::Sweep;
+use crate::view::Rays;
 
 /// Neighbours that say how densely a surface is sampled.
 const SPACING_K: NonZero<usize> = NonZero::new(10).expect("above 0");
@@ -237,14 +238,31 @@ impl Subject {
         })
     }
 
-    /// Normal of the surface at a point that is no outlier, where it would be without noise; of either sign.
+    /// Normal of the surface at a point that is no outlier, where it would be without noise; of either sign. Where the surface is
+    /// not found, that of a plane fit.
     pub fn normal(&self, point: u32) -> DVec3 {
         let place = self.clean.position(point);
         let fitted = self.clean.normal(point);
-        // From half as far as the nearest other point: other surfaces are seldom between.
-        let height = 0.5 * self.clean.around(place)[1].length();
-        let hit = self.surface.trace(place + fitted * height, -fitted);
-        hit.filter(|hit| hit.distance < 2.0 * height).map_or(fitted, |hit| hit.normal)
+        let height = self.height(place);
+        // From above and from below, whichever meets the surface nearer to the point: other surfaces may be near.
+        let hits = [fitted, -fitted].map(|up| self.surface.trace(place + up * height, -up));
+        let off = |hit: &Hit| (hit.distance - height).abs();
+        let nearest = hits.into_iter().flatten().min_by(|one, other| off(one).total_cmp(&off(other)));
+        nearest.filter(|hit| off(hit) < height).map_or(fitted, |hit| hit.normal)
+    }
+
+    /// Whether nothing lies before such a point.
+    pub fn is_seen(&self, point: u32, rays: &Rays) -> bool {
+        let place = self.clean.position(point);
+        let Some((at, _)) = rays.project(place) else { return false };
+        let (origin, direction) = rays.through(at);
+        let distance = (place - origin).dot(direction) - self.height(place);
+        self.surface.trace(origin, direction).is_none_or(|hit| hit.distance > distance)
+    }
+
+    /// A quarter of how far the nearest other point is from one: much farther than rounding puts it off the surface.
+    fn height(&self, place: DVec3) -> f64 {
+        0.25 * self.clean.around(place)[1].length()
     }
 
     /// Whether a point is one of the outliers.

@@ -1,9 +1,10 @@
 //! Points are as good or as bad as a recipe says, and the same each time.
 
+use autosplats::ViewDirection::Front;
 use autosplats::cloud::glam::DVec3;
 use autosplats_quality::exact::Exact;
 use autosplats_quality::subject::{Density, Recipe, Source, Subject};
-use autosplats_quality::view::Shot;
+use autosplats_quality::view::{Rays, Shot};
 
 const COUNT: usize = 40_000;
 const RECIPE: Recipe = Recipe::new(Source::Bumpy(5), COUNT);
@@ -58,6 +59,39 @@ fn outliers_come_on_top() {
 }
 
 #[test]
+fn normals_are_the_surfaces_and_not_those_of_plane_fits() {
+    let subject = Subject::new(Recipe::new(Source::Bumpy(6), 20_000).noise(0.003)).expect("a subject");
+    // A sphere with bumps has its middle at the origin, and all of it is seen from outside.
+    let exact = |point: u32| {
+        let outward = subject.clean.position(point).normalize();
+        subject.surface.trace(2.0 * outward * subject.diagonal, -outward).expect("the surface").normal
+    };
+    let share = |found: &dyn Fn(u32) -> DVec3| {
+        // By the sine, which tells small angles.
+        let is_right = |&point: &u32| found(point).cross(exact(point)).length().asin().to_degrees() < 0.1;
+        (0..20_000).filter(is_right).count() as f64 / 20_000.0
+    };
+    let [found, fitted] = [share(&|point| subject.normal(point)), share(&|point| subject.clean.normal(point))];
+    assert!(found > 0.99 && fitted < 0.5, "{found} are right, of plane fits {fitted}");
+}
+
+#[test]
+fn the_near_side_is_seen() {
+    let subject = Subject::new(Recipe::new(Source::Bumpy(6), 20_000)).expect("a subject");
+    let camera = Shot::Parallel(Front).camera(&subject, [96, 60]).expect("a camera");
+    let rays = Rays::new(&camera, [96, 60]).expect("a view");
+    let towards_eye = -rays.axes[2];
+    let seen = |near: bool| {
+        let side = (0..20_000).filter(|&point| (subject.clean.position(point).dot(towards_eye) > 0.0) == near);
+        let (all, seen) = side.fold((0, 0), |(all, seen), p| (all + 1, seen + usize::from(subject.is_seen(p, &rays))));
+        seen as f64 / f64::from(all)
+    };
+    // Bumps hide some of the near side at its border, and show some of the far one.
+    let [near, far] = [true, false].map(seen);
+    assert!(near > 0.85 && far < 0.1, "{near} of the near side, {far} of the far one");
+}
+
+#[test]
 fn every_other_point_is_of_a_second_scan() {
     let subject = subject(RECIPE.misregistration(0.0015));
     let lengths: Vec<_> = offsets(&subject).iter().map(|offset| offset.length() / subject.diagonal).collect();
@@ -87,7 +121,6 @@ fn densities_differ_and_counts_do_not() {
 
 #[test]
 fn near_and_far_are_near_and_far() {
-    use autosplats::ViewDirection::Front;
     let subject = subject(RECIPE);
     let size = [120, 90];
     let exact = |shot: Shot| {

@@ -27,8 +27,8 @@
 override ROUND: u32;
 override THICKEST_FIRST: f32;
 override WIDEST: f32;
-override STRAY_MOVE: f32;
-override STRAY_MOVE_KNOWN: f32;
+override STRAY_OFFSET: f32;
+override STRAY_OFFSET_KNOWN: f32;
 override GRAZING: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
@@ -142,7 +142,8 @@ fn dot_radius(surfel: Surfel) -> f32 {
     return min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
 }
 
-// Turns and moves a surfel with so much noise onto a surface, along the ray along which its noise was made if that is known.
+// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known. Where `noise` does not
+// explain how far it is from there, it becomes a dot.
 fn move_onto(place: u32, surfel: Surfel, surface: Surface, noise: f32, known: Known) {
     var offset = surface.offset;
     if known.noise > 0.0 {
@@ -151,18 +152,20 @@ fn move_onto(place: u32, surfel: Surfel, surface: Surface, noise: f32, known: Kn
     let center = surfel.center + offset;
     let normal = turned_to_eye(surface.normal, center);
     var out = surfel;
-    if length(surface.offset) > select(STRAY_MOVE, STRAY_MOVE_KNOWN, known.noise > 0.0) * noise {
-        out.radius = dot_radius(surfel);
-    }
     out.normal = normal;
+    let is_stray = length(surface.offset) > select(STRAY_OFFSET, STRAY_OFFSET_KNOWN, known.noise > 0.0) * noise;
     var shadow = vec4f(any_orthonormal(normal), 1.0);
-    if known.noise > 0.0 {
+    if known.noise > 0.0 && !is_stray {
         shadow = shadow_along(known, surfel.normal, normal, shadow);
     }
     out.major_axis = shadow.xyz;
     out.major_ratio = shadow.w;
     out.curvature = surface.curvature;
-    surfels[place] = moved(out, center);
+    out = moved(out, center);
+    if is_stray {
+        out.radius = dot_radius(out);
+    }
+    surfels[place] = out;
 }
 
 fn own_initial_radius(surfel: Surfel) -> f32 {

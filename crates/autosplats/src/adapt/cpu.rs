@@ -48,11 +48,11 @@ pub(super) const AGREE: f32 = 3.0;
 pub(super) const WIDEST: f32 = 3.0;
 /// A surfel moves at most this many times the noise; a quadric further away is another surface.
 pub(super) const FARTHEST: f32 = 9.0;
-/// One that moves more than this many times the noise hardly belongs to that surface, and is drawn as a dot: on the surface it is
-/// in the way of what does, with a disc that is as large as its neighbours are far.
-pub(super) const STRAY_MOVE: f32 = 3.0;
-/// The same of depth cameras, whose noise has an end; what they see half of two surfaces lies anywhere between.
-pub(super) const STRAY_MOVE_KNOWN: f32 = 2.0;
+/// One further from that surface than this many times the noise hardly belongs to it, and is drawn as a dot: moved there, its disc,
+/// as wide as its neighbours are far, would hide those that belong.
+pub(super) const STRAY_OFFSET: f32 = 3.0;
+/// The same of depth cameras. A pixel of theirs that sees two surfaces lies anywhere between, nearly always that far from both.
+pub(super) const STRAY_OFFSET_KNOWN: f32 = 2.0;
 /// Points whose surface variation, times the square of the k-radius in usual ones, is at least this are drawn as dots. Surface
 /// variation is up to 0.15 at edges and corners, which stay where points are up to four times as far apart as usual; in a
 /// cloud that fills space it is 0.2 by mean, and much less for some.
@@ -405,27 +405,30 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
     }
 }
 
+/// Leaves of a surfel what its point covers.
 #[inline(always)]
 fn make_dot(surfel: &mut Surfel, view: &View) {
     surfel.radius = surfel.radius.min(DOT_PX * view.pixel_size(surfel.center[2]));
 }
 
-/// Turns and moves a surfel with so much noise onto a surface, along the ray along which its noise was made if that is known.
+/// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known. Where `noise` does not
+/// explain how far it is from there, it becomes a dot.
 #[inline(always)]
 fn place(surfel: &mut Surfel, surface: &Surface, noise: f32, known: Option<&Known>, view: &View) {
     let &Surface { offset, normal, curvature } = surface;
-    let most = if known.is_some() { STRAY_MOVE_KNOWN } else { STRAY_MOVE };
-    if offset.length() > most * noise {
-        make_dot(surfel, view);
-    }
+    let most = if known.is_some() { STRAY_OFFSET_KNOWN } else { STRAY_OFFSET };
+    let is_stray = offset.length() > most * noise;
     let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(normal, offset));
     let normal = view.turned_to_eye(normal, center);
     let circle = (normal.any_orthonormal_vector(), 1.0);
     let (major_axis, major_ratio) =
-        known.and_then(|known| known.shadow(surfel.normal.into(), normal)).unwrap_or(circle);
+        known.filter(|_| !is_stray).and_then(|known| known.shadow(surfel.normal.into(), normal)).unwrap_or(circle);
     surfel.normal = normal.to_array();
     surfel.major_axis = major_axis.to_array();
     surfel.major_ratio = major_ratio;
     surfel.curvature = curvature;
     surfel.move_to(center, view);
+    if is_stray {
+        make_dot(surfel, view);
+    }
 }

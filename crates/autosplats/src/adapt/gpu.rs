@@ -3,8 +3,8 @@
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
     AGREE, AROUND_SPARSE, ASIDE, CROWD, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, OFF_MIDDLE, RELIABLE,
-    SCATTER, SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, STRAY_MOVE, STRAY_MOVE_KNOWN, THICKEST, THICKEST_FIRST,
-    TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
+    SCATTER, SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, STRAY_OFFSET, STRAY_OFFSET_KNOWN, THICKEST,
+    THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
@@ -244,8 +244,8 @@ impl AdaptPasses {
                 least_reach,
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("WIDEST", WIDEST.into()),
-                ("STRAY_MOVE", STRAY_MOVE.into()),
-                ("STRAY_MOVE_KNOWN", STRAY_MOVE_KNOWN.into()),
+                ("STRAY_OFFSET", STRAY_OFFSET.into()),
+                ("STRAY_OFFSET_KNOWN", STRAY_OFFSET_KNOWN.into()),
                 ("SPARSE", SPARSE.into()),
                 ("LONE", LONE.into()),
                 ("AROUND_SPARSE", AROUND_SPARSE.into()),

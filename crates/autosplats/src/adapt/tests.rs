@@ -51,6 +51,29 @@ impl Case {
         Self::of_room(|depth| test_clouds::stepped(depth, STEP))
     }
 
+    /// A sphere with noise, and points before it, further off than noise puts them, and which points those are.
+    pub(crate) fn noisy_with_strays(projection: Projection) -> (Self, fn(u32) -> bool) {
+        const SPHERE: usize = 40_000;
+        let sigma = 0.01;
+        let mut positions = noisy(test_clouds::sphere(SPHERE), sigma);
+        assert_eq!(positions.len(), SPHERE, "a sphere of so many points");
+        let mut random = Random::new(8);
+        positions.extend((0..400).map(|_| random.direction().map(|c| c * (1.0 + 4.5 * sigma))));
+        (Self::new(&positions, projection, [400, 300]), |source| source >= SPHERE as u32)
+    }
+
+    /// The same of the depth camera's room.
+    pub(crate) fn stepped_with_strays() -> (Self, fn(u32) -> bool) {
+        let is_stray = |source: u32| source.is_multiple_of(211);
+        let mut pixel = 0;
+        let case = Self::of_room(|depth| {
+            let stepped = test_clouds::stepped(depth, STEP);
+            pixel += 1;
+            if is_stray(pixel - 1) { 1.0 / (1.0 / stepped + 3.0 * STEP) } else { stepped }
+        });
+        (case, is_stray)
+    }
+
     fn of_room(measured: impl FnMut(f32) -> f32) -> Self {
         let positions = test_clouds::room(320, measured);
         let scan = Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..positions.len() };

@@ -184,16 +184,23 @@ fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
 fn the_device_draws_as_dots_what_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let passes = AdaptPasses::new(&gpu).expect("passes");
+    let compare = |name: &str, case: &Case, is_stray: &dyn Fn(u32) -> bool, least: f64| {
+        let of = |surfels: Surfels| -> Surfels { surfels.into_iter().filter(|s| is_stray(s.source)).collect() };
+        let [device, host, fitted] =
+            [on_device(&gpu, &passes, case).surfels, case.adapted(), case.fitted.concat()].map(of);
+        let shrunk = host.iter().zip(&fitted).filter(|(host, fitted)| host.radius < fitted.radius).count();
+        assert!(shrunk as f64 > least * host.len() as f64, "{name}: {shrunk} of {}", host.len());
+        compare_surfels(&device, &host).unwrap_or_else(|error| panic!("{name}: {error}"));
+    };
     for projection in PROJECTIONS {
         let (positions, surface) = test_clouds::beyond_a_border();
         let case = Case::new(&positions, projection, [400, 300]);
-        let of = |surfels: Surfels| -> Surfels { surfels.into_iter().filter(|s| s.source >= surface).collect() };
-        let [device, host, fitted] =
-            [on_device(&gpu, &passes, &case).surfels, case.adapted(), case.fitted.concat()].map(of);
-        let shrunk = host.iter().zip(&fitted).filter(|(host, fitted)| host.radius < fitted.radius).count();
-        assert!(3 * shrunk > 2 * host.len(), "{shrunk} of {}", host.len());
-        compare_surfels(&device, &host).unwrap_or_else(|error| panic!("{projection:?}: {error}"));
+        compare("beyond a border", &case, &|source| source >= surface, 0.66);
+        let (case, is_stray) = Case::noisy_with_strays(projection);
+        compare("before noise", &case, &is_stray, 0.8);
     }
+    let (room, is_stray) = Case::stepped_with_strays();
+    compare("in a room", &room, &is_stray, 0.2);
 }
 
 #[test]

@@ -44,27 +44,26 @@ fn points_just_before_a_surface_are_dots() {
 /// Noise puts hardly any point four deviations before its surface, or one of a depth camera three steps.
 #[test]
 fn points_too_far_off_for_noise_are_dots() {
-    let sigma = 0.01;
-    let mut positions = noisy(test_clouds::sphere(40_000), sigma);
-    let surface = positions.len() as u32;
-    let mut random = Random::new(8);
-    positions.extend((0..400).map(|_| random.direction().map(|c| c * (1.0 + 4.5 * sigma))));
     for projection in PROJECTIONS {
-        let case = Case::new(&positions, projection, [400, 300]);
-        let [[of_sphere, its_dots], [strays, dots]] = dots(&case, |source| source >= surface);
+        let (case, is_stray) = Case::noisy_with_strays(projection);
+        let [[of_sphere, its_dots], [strays, dots]] = dots(&case, is_stray);
         assert!(strays > 200 && dots * 20 > strays * 19, "{dots} of {strays} are dots");
         assert!(its_dots * 100 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
     }
-    let mut pixel = 0;
-    let is_stray = |source: u32| source.is_multiple_of(211);
-    let room = Case::of_room(|depth| {
-        let stepped = test_clouds::stepped(depth, STEP);
-        pixel += 1;
-        if is_stray(pixel - 1) { 1.0 / (1.0 / stepped + 3.0 * STEP) } else { stepped }
-    });
+    let (room, is_stray) = Case::stepped_with_strays();
     // Beside the others no sheet is near enough.
     let [[of_room, its_dots], [strays, dots]] = dots(&room, is_stray);
     assert!(strays > 60 && dots * 2 > strays, "{dots} of {strays} are dots");
+    assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
+}
+
+/// Noise of disparities has no end as that of steps has.
+#[test]
+fn depth_cameras_with_noise_of_disparities_lose_no_surface() {
+    let mut random = Random::new(9);
+    let room = Case::of_room(|depth| 1.0 / (1.0 / depth + 0.0014 * random.gaussian()));
+    assert_eq!(room.known.on_device().len(), 1, "the noise of one scan is known");
+    let [[of_room, its_dots], _] = dots(&room, |_| false);
     assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
 }
 
