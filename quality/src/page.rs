@@ -28,22 +28,23 @@ One ray through the centre of each pixel tells what is truly there. These ways t
 
 - **ours**: this project with its default settings.
 - **paper**: the paper's, k = 10, one point a pixel, splats whole at silhouettes.
-- **dots**: squares of 3×3 pixels, the nearest in front, without normals; shaded as if they faced the eye, with \
-occlusion to show the shape.
-- **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours in \
-the whole cloud, outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best fit* means.
-- **known**: our splats, of points free of noise, misregistration and outliers, those alone that are truly seen, with the normals \
-of the surface itself: what pictures are without errors of normals and of places. They are discs, so that swept points' do not \
-reach from ring to ring, and in motion each picture is made alone.
+- **dots**: squares of 3×3 pixels, the nearest in front, without normals; shaded as if they faced the eye, with occlusion \
+to show the shape.
+- **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours \
+in the whole cloud, outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best \
+fit* means.
+- **known**: our splats, of points free of noise, misregistration and outliers, those alone that are truly seen, with the \
+normals of the surface itself: what pictures are without errors of normals and of places. They are discs, so that swept \
+points' do not reach from ring to ring, and in motion each picture is made alone.
 
 Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \
-pixels of a silhouette, *flipped* the share above 90° to all that is truly seen at the pixel and the eight around it, at an edge \
-either side. *Holes* are empty pixels at least two pixels inside the true \
-silhouette, *leaks* pixels that show something behind the surface and all that is seen beside it, *before* the same in \
-front of it, *IoU* is the covered pixels' intersection over union, *wider* the pixels by which the silhouette is too wide: \
-all five only where points lie at most 1.5 pixels apart (*sampled*), swept ones from ring to ring, and left out if that is \
-hardly anywhere. *Depth* is the mean error in depth in pixels. PSNR and FLIP compare pictures lit by the same lights in \
-plain clay, over the pixels that either covers. A moving camera goes around the subject in six steps of 0.7°; *change* is the mean difference of one \
+pixels of a silhouette, *flipped* the share above 90° to all that is truly seen at the pixel and the eight around it, at \
+an edge either side. *Holes* are empty pixels at least two pixels inside the true silhouette, *leaks* pixels that show \
+something behind the surface and all that is seen beside it, *before* the same in front of it, *IoU* is the covered \
+pixels' intersection over union, *wider* the pixels by which the silhouette is too wide: all five only where points lie at \
+most 1.5 pixels apart (*sampled*), swept ones from ring to ring, and left out if that is hardly anywhere. *Depth* is the \
+mean error in depth in pixels. PSNR and FLIP compare pictures lit by the same lights in plain clay, over the pixels that \
+either covers. A moving camera goes around the subject in six steps of 0.7°; *change* is the mean difference of one \
 surface point between two pictures after one another, which in the true ones comes from light that goes with the camera, \
 and from pixels.
 
@@ -56,15 +57,15 @@ Percent of pixels. *Seen* is the share of the surface that the lidar sees: betwe
 nothing in the way, struck at less than 87°. Of that, *closed* is what is covered, by whatever it may be, and *right* what \
 is covered by a surface that is no farther from the true one, in depth, than rings are apart there. *Over* are pixels \
 covered though nothing is there, or what is there is not seen by the lidar and lies behind by more than a hundredth of the \
-diagonal, as a share of those seen: closing gaps must not close what is open. Past the last ring on something no point tells \
-where it ends, so not all of it can be closed. Nothing else is asked about what the lidar does not see, here and in all \
-tables but that of motion.
+diagonal, as a share of those seen: closing gaps must not close what is open. Past the last ring on something no point \
+tells where it ends, so not all of it can be closed. Nothing else is asked about what the lidar does not see, here and in \
+all tables but that of motion.
 
 ";
 
 const CREDITS: &str = "\
-The bunny is from the Stanford 3D Scanning Repository, the horse by Sumner and Popović, the dancer by Vlasic et al. FLIP is \
-that of Andersson et al. 2020, at 67 pixels per degree.
+The bunny is from the Stanford 3D Scanning Repository, the horse by Sumner and Popović, the dancer by Vlasic et al. FLIP \
+is that of Andersson et al. 2020, at 67 pixels per degree.
 ";
 
 /// The whole page. `sheets` are the names of pictures beside it.
@@ -88,10 +89,11 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels. The best fit is the one with the best \
          normals.\n\n",
         &lit(outcomes),
-        "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness in 255ths. \
-         Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is averaged over \
-         about eight pictures, and eight of the same movement go before those that count. All others are made by themselves. *Alone* are ours, each made by itself, and *off* is the mean error \
-         of normals in the last picture.\n\n",
+        "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness \
+         in 255ths. Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is \
+         averaged over about eight pictures, and eight of the same movement go before those that count. All others are \
+         made by themselves. *Alone* are ours, each made by itself, and *off* is the mean error of normals in the last \
+         picture.\n\n",
         &motion(outcomes),
         CREDITS,
     ]
