@@ -33,7 +33,7 @@ pub enum Method {
     /// them.
     Fit(usize),
     /// Our splats as discs, of points that lie on the surface, without noise, misregistration and outliers, with its normals there;
-    /// of those alone that nothing hides.
+    /// without those that lie just beyond its borders.
     Known,
 }
 
@@ -124,7 +124,7 @@ impl<'a> Painter<'a> {
             Method::Known => {
                 let (cloud, rays) = (&subject.clean_cloud, Rays::new(camera, size)?);
                 let surfels = self.surfels(cloud, &Reconstruction::default(), camera, size)?;
-                let seen = surfels.par_iter().filter(|surfel| subject.is_seen(surfel.point, &rays));
+                let seen = surfels.par_iter().filter(|surfel| !subject.is_beyond_border(surfel.point, &rays));
                 let seen: Vec<_> = seen.map(|surfel| (surfel, subject.normal(surfel.point).as_vec3())).collect();
                 self.draw(cloud, Reconstruction::default(), seen.into_iter(), camera, size)
             }

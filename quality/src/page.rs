@@ -33,8 +33,8 @@ to show the shape.
 - **fit k**: the paper's splats, but trimmed as ours are and with normals of plane fits to the k exact nearest neighbours \
 in the whole cloud, outliers known and left out. The best k of each case, chosen with the truth at hand, is what *best \
 fit* means.
-- **known**: our splats, of points free of noise, misregistration and outliers, those alone that are truly seen, with the \
-normals of the surface itself: what pictures are without errors of normals and of places. They are discs, so that swept \
+- **known**: our splats, of points free of noise, misregistration and outliers, without those just beyond a silhouette, with \
+the normals of the surface itself: what pictures are without errors of normals and of places. They are discs, so that swept \
 points' do not reach from ring to ring, and in motion each picture is made alone.
 
 Errors of normals are angles to the true normal, over all pixels that both pictures cover; *band* is their mean within 4 \

@@ -251,13 +251,15 @@ impl Subject {
         nearest.filter(|hit| off(hit) < height).map_or(fitted, |hit| hit.normal)
     }
 
-    /// Whether nothing lies before such a point.
-    pub fn is_seen(&self, point: u32, rays: &Rays) -> bool {
+    /// Whether the surface before such a point is no nearer to the eye than its neighbours are to the point: it lies just beyond a
+    /// border then, and faces away. What is hidden by more may be all that there is of a thing, as scanners see one side of many.
+    pub fn is_beyond_border(&self, point: u32, rays: &Rays) -> bool {
         let place = self.clean.position(point);
         let Some((at, _)) = rays.project(place) else { return false };
         let (origin, direction) = rays.through(at);
-        let distance = (place - origin).dot(direction) - self.height(place);
-        self.surface.trace(origin, direction).is_none_or(|hit| hit.distance > distance)
+        let reach = self.clean.around(place).last().map_or(0.0, |farthest| farthest.length());
+        let behind = |hit: Hit| (place - origin).dot(direction) - hit.distance;
+        self.surface.trace(origin, direction).is_some_and(|hit| (self.height(place)..reach).contains(&behind(hit)))
     }
 
     /// A quarter of how far the nearest other point is from one: much farther than rounding puts it off the surface.

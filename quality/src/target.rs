@@ -30,12 +30,7 @@ impl Target {
         Self { what, limit, more: false, decimals, value }
     }
 
-    const fn least(
-        what: &'static str,
-        limit: f64,
-        decimals: usize,
-        value: fn(&Outcome, Method) -> Option<f64>,
-    ) -> Self {
+    const fn least(what: &'static str, limit: f64, decimals: usize, value: Value) -> Self {
         Self { what, limit, more: true, decimals, value }
     }
 
