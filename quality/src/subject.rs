@@ -252,7 +252,8 @@ impl Subject {
     }
 
     /// Whether the surface before such a point is no nearer to the eye than its neighbours are to the point: it lies just beyond a
-    /// border then, and mostly faces away. What is hidden by more may be all that there is of a thing, as scanners see one side of many.
+    /// border then, and mostly faces away. What is hidden by more may be all that there is of a thing, as scanners see one side of
+    /// many.
     pub fn is_beyond_border(&self, point: u32, rays: &Rays) -> bool {
         let place = self.clean.position(point);
         let Some((at, _)) = rays.project(place) else { return false };
