@@ -251,7 +251,7 @@ impl Subject {
         nearest.filter(|hit| off(hit) < height).map_or(fitted, |hit| hit.normal)
     }
 
-    /// Whether the surface before such a point is no nearer to the eye than its neighbours are to the point: it lies just beyond a
+    /// Whether a surface hides such a point, and lies before it by less than its neighbours are away: the point is just beyond a
     /// border then, and mostly faces away. What is hidden by more may be all that there is of a thing, as scanners see one side of
     /// many.
     pub fn is_beyond_border(&self, point: u32, rays: &Rays) -> bool {

@@ -51,7 +51,7 @@ fn points_too_far_off_for_noise_are_dots() {
         assert!(its_dots * 100 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
     }
     let (room, is_stray) = Case::stepped_with_strays();
-    // Beside the others no sheet is near enough.
+    // The others have no sheet near enough to be moved to.
     let [[of_room, its_dots], [strays, dots]] = dots(&room, is_stray);
     assert!(strays > 60 && dots * 2 > strays, "{dots} of {strays} are dots");
     assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
