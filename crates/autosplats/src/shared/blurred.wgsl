@@ -7,14 +7,18 @@
 override LEAST_NOISE_PX: f32;
 // Squared radius of a window over the variance of its kernel.
 override PER_VARIANCE: f32;
+// And over the variance of the noise.
+override PER_NOISE: f32;
 // How far a surface is tilted of which all noise counts.
 override TILTED: f32;
 // Radius of the window without noise, and of the widest, in pixels.
 override LEAST_RADIUS_PX: f32;
 override WIDEST_RADIUS_PX: f32;
-// Windows with a larger radius than this are summed up in blocks.
+// Windows with a larger radius than this are summed up in pairs of pixels, and those larger than twice this in blocks.
 override FINE_RADIUS_PX: f32;
-// How far the mean may be off with hardly any noise, and with so much in pixels and more.
+// How much of the mean square counts against the mean.
+override SPREAD: f32;
+// How far it may be off then with hardly any noise, and with so much in pixels and more.
 override OFF_UNSURE: f32;
 override OFF_SURE: f32;
 override SURE_NOISE_PX: f32;
@@ -53,22 +57,21 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     // Of points beyond the screen nothing is known.
     let to_edge = min(pixel, frame.size - 1u - pixel);
     let widest = min(WIDEST_RADIUS_PX, f32(min(to_edge.x, to_edge.y)));
-    let window = min(sqrt(LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_VARIANCE * noise * noise), widest);
+    let window = min(sqrt(LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_NOISE * noise * noise), widest);
     // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
     if window < max(AROUND_PX, reach_px / SUPPORT) {
         return SILENT;
     }
-    let offset = points_offset(pixel, window);
-    if offset.z < f32(FEWEST_BLURRED) {
+    let here = moments(pixel, window);
+    if here.count < f32(FEWEST_BLURRED) {
         return SILENT;
     }
-    let variance = window * window / PER_VARIANCE;
-    let apart = window * sqrt(3.14159265 / offset.z);
+    let blur = vec2f(window * window / PER_VARIANCE, noise * noise);
+    let apart = window * sqrt(3.14159265 / here.count);
     let sure_px = SURE_NOISE_PX + noise_sure() * (min(SURE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
     let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / sure_px, 0.0);
-    let most = may_be * variance / sqrt(variance + noise * noise);
     // What is off by less altogether is so that way as well.
-    if dot(offset.xy, offset.xy) <= most * most {
+    if length(here.offset) / blur_unit(blur) <= may_be {
         return NO;
     }
     let fringe = fringe_px(reach_px, noise);
@@ -77,7 +80,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
         return SILENT;
     }
     let ahead = empty / length(empty);
-    if -dot(offset.xy, ahead) <= most {
+    if off(here, ahead, blur) <= may_be {
         return NO;
     }
     let met = steps_to_empty(pixel, ahead, u32(fringe) + 1u);
@@ -89,8 +92,8 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     if f32(min(room.x, room.y)) < window {
         return YES;
     }
-    let there = points_offset(half_way, window);
-    let goes_on = there.z >= f32(FEWEST_BLURRED) && -dot(there.xy, ahead) <= OFF_HALF_WAY * most;
+    let there = moments(half_way, window);
+    let goes_on = there.count >= f32(FEWEST_BLURRED) && off(there, ahead, blur) <= OFF_HALF_WAY * may_be;
     return select(YES, NO, goes_on);
 }
 
@@ -135,34 +138,74 @@ fn to_empty(pixel: vec2u, radius: f32) -> vec2f {
     return sum;
 }
 
-// The mean offset, in pixels, of the sixteenths with points from the middle of a pixel, in a window of such a radius that lies
-// within the screen, and how many they are.
-fn points_offset(pixel: vec2u, window: f32) -> vec3f {
+// Of the sixteenths with points around a pixel.
+struct Moments {
+    // Mean offset from the pixel's middle, in pixels.
+    offset: vec2f,
+    count: f32,
+    // Means of squares: of x, of x and y, of y.
+    squares: vec3f,
+}
+
+// How far a mean is off in w²/√(w² + σ²), in pixels, of the variances of the window and the noise.
+fn blur_unit(blur: vec2f) -> f32 {
+    return blur.x / sqrt(blur.x + blur.y);
+}
+
+// How far the mean is off away from `ahead`, less a part of the mean square along it.
+fn off(points: Moments, ahead: vec2f, blur: vec2f) -> f32 {
+    let unit = blur_unit(blur);
+    let mean = -dot(points.offset, ahead) / unit;
+    let square = dot(points.squares, vec3f(ahead.x * ahead.x, 2.0 * ahead.x * ahead.y, ahead.y * ahead.y));
+    let of_noise = blur.x * blur.y / (blur.x + blur.y);
+    return mean - SPREAD * clamp((square - of_noise) / (unit * unit), 0.0, 1.0);
+}
+
+// How many sixteenths hold points in a square of a grid of such, whose side is 1, 2 or 4 pixels.
+fn held_by(square: vec2u, side: u32) -> f32 {
+    var held = 0u;
+    if side == BLOCK_PX {
+        held = blocks[square.y * block_counts().x + square.x] & ~EMPTY_BLOCK;
+    } else {
+        let first = side * square;
+        let more = min(first + side, frame.size) - first > vec2u(1u);
+        let at = first.y * frame.size.x + first.x;
+        held = countOneBits(of_pixel_at(at));
+        if more.x {
+            held += countOneBits(of_pixel_at(at + 1u));
+        }
+        if more.y {
+            held += countOneBits(of_pixel_at(at + frame.size.x));
+        }
+        if all(more) {
+            held += countOneBits(of_pixel_at(at + frame.size.x + 1u));
+        }
+    }
+    return f32(held);
+}
+
+// The moments of the sixteenths with points in a window of such a radius around the middle of a pixel, which lies within the
+// screen, and how many they are.
+fn moments(pixel: vec2u, window: f32) -> Moments {
     var sums = vec3f(0.0);
+    var squares = vec3f(0.0);
     var count = 0.0;
-    let is_fine = window <= FINE_RADIUS_PX;
-    let side = select(BLOCK_PX, 1u, is_fine);
-    let columns = select(block_counts().x, frame.size.x, is_fine);
+    let side = select(select(BLOCK_PX, 2u, window <= 2.0 * FINE_RADIUS_PX), 1u, window <= FINE_RADIUS_PX);
     let reach = u32(window);
     let first = (pixel - reach) / side;
-    let last = min((pixel + reach) / side, select(block_counts(), frame.size, is_fine) - 1u);
+    let last = min((pixel + reach) / side, (frame.size + side - 1u) / side - 1u);
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
             let offset = vec2f(side * vec2u(x, y)) - vec2f(pixel) + 0.5 * f32(side) - 0.5;
             let near = 1.0 - dot(offset, offset) / (window * window);
             if near > 0.0 {
-                let at = y * columns + x;
-                var held = 0u;
-                if is_fine {
-                    held = countOneBits(of_pixel_at(at));
-                } else {
-                    held = blocks[at] & ~EMPTY_BLOCK;
-                }
-                let weight = f32(held) * (near * near * near);
+                let held = held_by(vec2u(x, y), side);
+                let weight = held * (near * near * near);
                 sums += weight * vec3f(1.0, offset);
-                count += f32(held);
+                squares += weight * vec3f(offset.x * offset.x, offset.x * offset.y, offset.y * offset.y);
+                count += held;
             }
         }
     }
-    return vec3f(sums.yz / sums.x, count);
+    return Moments(sums.yz / sums.x, count, squares / sums.x);
 }

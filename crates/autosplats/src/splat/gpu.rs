@@ -15,7 +15,8 @@ use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
 use super::trim::blurred::{
     BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
-    OFF_BLURRED, OFF_HALF_WAY, PER_VARIANCE, SURE_DISTANCES, SURE_NOISE_PX, TILTED, WIDEST_RADIUS_PX,
+    OFF_BLURRED, OFF_HALF_WAY, PER_NOISE, PER_VARIANCE, SPREAD, SURE_DISTANCES, SURE_NOISE_PX, TILTED,
+    WIDEST_RADIUS_PX,
 };
 use super::trim::{
     AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FINE_POINTS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
@@ -224,9 +225,11 @@ impl SplatPasses {
                 ("LEAST_NOISE_PX", LEAST_NOISE_PX.into()),
                 ("LEAST_RADIUS_PX", LEAST_RADIUS_PX.into()),
                 ("PER_VARIANCE", PER_VARIANCE.into()),
+                ("PER_NOISE", PER_NOISE.into()),
                 ("TILTED", TILTED.into()),
                 ("WIDEST_RADIUS_PX", WIDEST_RADIUS_PX.into()),
                 ("FINE_RADIUS_PX", FINE_RADIUS_PX.into()),
+                ("SPREAD", SPREAD.into()),
                 ("OFF_UNSURE", OFF_BLURRED[0].into()),
                 ("OFF_SURE", OFF_BLURRED[1].into()),
                 ("SURE_NOISE_PX", SURE_NOISE_PX.into()),

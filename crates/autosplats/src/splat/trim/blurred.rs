@@ -5,13 +5,16 @@
 //! the noise. Around a place in it points are the fewer the further out they are, and their mean in a window lies on the side of
 //! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of deviation σ, it is
 //! 0.80 w²/√(w² + σ²) at the straight end of points strewn evenly, and 0.48 w²/√(w² + σ²) where a surface curves away, so that
-//! points lie ever closer up to its end. Silhouettes are nearly always of the second kind; straight ends are cut off by half of
-//! the noise too much. What is off by more, away from where it is empty, and has something empty ahead there, is beside the
-//! surface. Only how far it is off that way counts: another surface behind the border draws the mean along it. And half way to what
-//! is empty the mean has to be off as well: if not, a surface goes on there, and here it is where another stands behind it that
-//! points are dense on one side. All points tell,
-//! hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they are dense, and all there
-//! are in the fringe.
+//! points lie ever closer up to its end. Their spread tells more: where density grows from the end inwards with power a - 1, the
+//! mean square of what their places would be without noise is a (w² + σ²), which makes 1 and 0.5. The mean less a quarter of the
+//! mean square says where a surface ends with fewer points, and differs less between the two, 0.55 and 0.35. Silhouettes are nearly
+//! always of the second kind; straight ends are cut off by half of the noise too much.
+//!
+//! What is off by more, away from where it is empty, and has something empty ahead there, is beside the surface. Only how far it is
+//! off that way counts: another surface behind the border draws the mean along it. And half way to what is empty the mean has to be
+//! off as well: if not, a surface goes on there, and here it is where another stands behind it that points are dense on one side.
+//! All points tell, hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they are dense,
+//! and all there are in the fringe.
 //!
 //! Scanners err along their rays, and what is left over of fits is across surfaces. So the border of a surface that faces the eye,
 //! where scans end, is taken for as sharp as it is seen, and all of the noise counts only where a surface is seen from the side.
@@ -36,15 +39,22 @@ pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
 /// All of the noise counts where the sine of a surface's tilt from the eye is at least this: in a fringe normals lean towards the
 /// eye.
 pub(in crate::splat) const TILTED: f32 = 0.8;
+/// Squared radius of a window over the variance of the noise, but for what it is without noise.
+pub(in crate::splat) const PER_NOISE: f32 = 12.0;
 /// Radius of the window without noise, in pixels: smaller ones hold so few points that borders come out ragged.
 pub(in crate::splat) const LEAST_RADIUS_PX: f32 = 4.0;
 /// And of the widest one.
 pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
-/// Windows with a larger radius than this, in pixels, are summed up in blocks.
+/// Windows with a larger radius than this, in pixels, are summed up in pairs of pixels along both axes, and those larger than twice
+/// this in blocks.
 pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
-/// How far the mean may be off, in w²/√(w² + σ²): with hardly any noise, which may as well be small structure, as far as at sharp
-/// borders ([`OFF_PX`](super::OFF_PX)), and with noise of [`SURE_NOISE_PX`] and more, or [`SURE_DISTANCES`].
-pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.7, 0.52];
+/// How much of the mean square counts against the mean: more of it than would tell the ends apart even better where points are
+/// many, and worse where they are few.
+pub(in crate::splat) const SPREAD: f32 = 0.25;
+/// Of what that makes, how much there may be: with hardly any noise, which may as well be small structure, as much as at sharp
+/// borders, where the mean may be off by [`OFF_PX`](super::OFF_PX), and with noise of [`SURE_NOISE_PX`] and more, or
+/// [`SURE_DISTANCES`].
+pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.5, 0.335];
 /// In pixels.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
 /// If it is sure to be noise, less is enough: as much as this many mean distances of the sixteenths with points in the window, what
@@ -86,8 +96,8 @@ pub(in crate::splat) struct Blurred {
     noise: Noise,
     /// K-radii in splat radii.
     per_radius: f32,
-    pixels: Held,
-    blocks: Held,
+    /// Of pixels, of pairs of them along both axes, and of blocks.
+    held: [Held; 3],
     /// Of each block, how many blocks away the nearest is that is empty, along either axis: without splats and, beside the
     /// picture, without points.
     to_empty: Vec<u8>,
@@ -108,13 +118,8 @@ impl Blurred {
         let [width, height] = [view.width as usize, view.height as usize];
         let pixels = Held::new([1, width, height], |x, y| sixteenths.of(y * width + x).count_ones() as u16);
         let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
-        // Rows of a block's pixels, each one piece of a picture's row and of a tile's.
-        let rows_of = |x: usize, y: usize| {
-            let [x0, y0] = [x, y].map(|at| at * BLOCK_PX);
-            (y0..(y0 + BLOCK_PX).min(height)).map(move |y| (x0, y, BLOCK_PX.min(width - x0)))
-        };
-        let held = |(x, y, len): (usize, usize, usize)| pixels.count[y * width + x..][..len].iter().sum::<u16>();
-        let blocks = Held::new([BLOCK_PX, columns, rows], |x, y| rows_of(x, y).map(held).sum());
+        let pairs = pixels.in_pairs();
+        let blocks = pairs.in_pairs();
         // Most of the margin has no splats, and may hold a surface.
         let goes_on = |[x, y]: [usize; 2]| {
             let [first, last] = [0, BLOCK_PX - 1].map(|more| [x, y].map(|at| at * BLOCK_PX + more));
@@ -156,12 +161,22 @@ impl Blurred {
             let (before, after) = to_empty.split_at_mut(y * columns);
             step(&after[..columns], &mut before[(y - 1) * columns..]);
         }
-        Some(Self { noise, per_radius, pixels, blocks, to_empty })
+        Some(Self { noise, per_radius, held: [pixels, pairs, blocks], to_empty })
+    }
+
+    fn blocks(&self) -> &Held {
+        &self.held[2]
+    }
+
+    /// The squares that a window of such a radius is summed up in.
+    fn squares(&self, window: f32) -> &Held {
+        let wider = [1.0, 2.0].map(|times| usize::from(window > times * FINE_RADIUS_PX));
+        &self.held[wider[0] + wider[1]]
     }
 
     /// How many blocks the nearest empty one is from a block, at most two more than a fringe has.
     pub(super) fn blocks_to_empty(&self, column: usize, row: usize) -> u8 {
-        self.to_empty[row * self.blocks.columns + column]
+        self.to_empty[row * self.blocks().columns + column]
     }
 
     /// The direction, as a unit vector, from the middle of pixel (x, y) to the blocks that are empty within so many pixels, the
@@ -173,8 +188,8 @@ impl Blurred {
         let middle = |block: usize, at: usize| (BLOCK_PX * block) as f32 - at as f32 + 0.5 * (BLOCK_PX as f32 - 1.0);
         let per_radius = 1.0 / (radius * radius);
         let [mut right, mut down] = [0f32; 2];
-        for row in along(y, self.blocks.rows) {
-            for column in along(x, self.blocks.columns) {
+        for row in along(y, self.blocks().rows) {
+            for column in along(x, self.blocks().columns) {
                 if self.blocks_to_empty(column, row) > 0 {
                     continue;
                 }
@@ -223,29 +238,28 @@ impl Outline<'_> {
         // Of points beyond the screen nothing is known.
         let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
         let widest = WIDEST_RADIUS_PX.min(to_edge);
-        let window = (LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_VARIANCE * noise_px * noise_px).sqrt().min(widest);
+        let window = (LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_NOISE * noise_px * noise_px).sqrt().min(widest);
         // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
         if window < AROUND_PX.max(radius_px) {
             return None;
         }
-        let squares = if window <= FINE_RADIUS_PX { &blurred.pixels } else { &blurred.blocks };
-        let Mean { offset: [ox, oy], count } = mean(squares, [x, y], window)?;
-        let variance = window * window / PER_VARIANCE;
-        let apart = window * (PI / count).sqrt();
+        let squares = blurred.squares(window);
+        let here = moments(squares, [x, y], window)?;
+        let blur = Blur { window: window * window / PER_VARIANCE, noise: noise_px * noise_px };
+        let apart = window * (PI / here.count).sqrt();
         let sure_px = SURE_NOISE_PX + noise.sure * ((SURE_DISTANCES * apart).min(SURE_NOISE_PX) - SURE_NOISE_PX);
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px).max(0.0);
-        let most = may_be * variance / (variance + noise_px * noise_px).sqrt();
         // What is off by less altogether is so that way as well.
-        if ox * ox + oy * oy <= most * most {
+        if blur.most_off(here) <= may_be {
             return Some(false);
         }
-        let [ahead_x, ahead_y] = blurred.towards_empty([x, y], fringe + BEYOND_FRINGE * BLOCK_PX as f32)?;
-        if -(ox * ahead_x + oy * ahead_y) <= most {
+        let towards = blurred.towards_empty([x, y], fringe + BEYOND_FRINGE * BLOCK_PX as f32)?;
+        if blur.off(here, towards) <= may_be {
             return Some(false);
         }
         let ahead = |step: usize| {
-            let at = [(x, ahead_x), (y, ahead_y)].map(|(at, ahead)| at as f32 + 0.5 + ahead * step as f32);
+            let at = [(x, towards[0]), (y, towards[1])].map(|(at, along)| at as f32 + 0.5 + along * step as f32);
             let [x, y] = at.map(|at| at.floor() as isize);
             let inside = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
             // Beyond the screen the surface goes on.
@@ -261,8 +275,8 @@ impl Outline<'_> {
         if (x.min(y).min(width - 1 - x).min(height - 1 - y) as f32) < window {
             return Some(true);
         }
-        let goes_on = |Mean { offset: [ox, oy], .. }: Mean| -(ox * ahead_x + oy * ahead_y) <= OFF_HALF_WAY * most;
-        Some(!mean(squares, [x, y], window).is_some_and(goes_on))
+        let goes_on = |half_way: Moments| blur.off(half_way, towards) <= OFF_HALF_WAY * may_be;
+        Some(!moments(squares, [x, y], window).is_some_and(goes_on))
     }
 }
 
@@ -274,21 +288,61 @@ impl Held {
         });
         Self { side, columns, rows, count: counts }
     }
+
+    /// In squares twice as wide.
+    fn in_pairs(&self) -> Self {
+        let size = [2 * self.side, self.columns.div_ceil(2), self.rows.div_ceil(2)];
+        Self::new(size, |x, y| {
+            let [columns, rows] = [(x, self.columns), (y, self.rows)].map(|(at, most)| 2 * at..(2 * at + 2).min(most));
+            rows.flat_map(|y| &self.count[y * self.columns..][columns.clone()]).sum()
+        })
+    }
+}
+
+/// What blurs a border, as variances in square pixels: the window, and the noise.
+#[derive(Clone, Copy, Debug)]
+struct Blur {
+    window: f32,
+    noise: f32,
+}
+
+impl Blur {
+    /// How far a mean is off in w²/√(w² + σ²), in pixels.
+    fn unit(self) -> f32 {
+        self.window / (self.window + self.noise).sqrt()
+    }
+
+    /// How far the mean of points is off, if all of it is away from what is empty, and what is spread does not count.
+    fn most_off(self, Moments { offset: [x, y], .. }: Moments) -> f32 {
+        (x * x + y * y).sqrt() / self.unit()
+    }
+
+    /// How far it is off away from `towards`, a unit vector, less a part of the mean square along it, of which no more counts than
+    /// a straight end has: further out it grows faster than the mean.
+    fn off(self, Moments { offset, squares: [xx, xy, yy], .. }: Moments, [x, y]: [f32; 2]) -> f32 {
+        let mean = -(offset[0] * x + offset[1] * y) / self.unit();
+        let square = xx * x * x + 2.0 * xy * x * y + yy * y * y;
+        // Noise strews points by so much about where the window sees them.
+        let of_noise = self.window * self.noise / (self.window + self.noise);
+        mean - SPREAD * ((square - of_noise) / (self.unit() * self.unit())).clamp(0.0, 1.0)
+    }
 }
 
 /// Of the sixteenths with points around a pixel.
 #[derive(Clone, Copy, Debug)]
-struct Mean {
-    /// From the pixel's middle, in pixels.
+struct Moments {
+    /// Mean offset from the pixel's middle, in pixels.
     offset: [f32; 2],
+    /// Means of squares, in square pixels: of x, of x and y, of y.
+    squares: [f32; 3],
     count: f32,
 }
 
-/// The mean of the sixteenths with points in a window of such a radius around the middle of pixel (x, y), which lies within the
+/// The moments of the sixteenths with points in a window of such a radius around the middle of pixel (x, y), which lies within the
 /// screen; `None` if there are too few.
-#[pulp::with_simd(mean = pulp::Arch::new())]
+#[pulp::with_simd(moments = pulp::Arch::new())]
 #[inline(always)]
-fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<Mean> {
+fn moments_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<Moments> {
     let reach = window as usize;
     // The first square's middle from the pixel's, in pixels, and the squares.
     let along = |at: usize, most: usize| {
@@ -300,7 +354,7 @@ fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> 
     let side = squares.side as f32;
     let per_window = 1.0 / (window * window);
     let lanes: [f32; LANES] = std::array::from_fn(|lane| side * lane as f32);
-    let [mut count, mut weight, mut right, mut down] = [[0f32; LANES]; 4];
+    let [mut count, mut weight, mut right, mut down, mut xx, mut xy, mut yy] = [[0f32; LANES]; 7];
     for row in y0..y1 {
         let oy = top + side * (row - y0) as f32;
         for (first, column) in (x0..x1).step_by(LANES).enumerate() {
@@ -317,9 +371,79 @@ fn mean_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> 
                 weight[lane] += of_lane;
                 right[lane] += of_lane * ox;
                 down[lane] += of_lane * oy;
+                xx[lane] += of_lane * (ox * ox);
+                xy[lane] += of_lane * (ox * oy);
+                yy[lane] += of_lane * (oy * oy);
             }
         }
     }
-    let [count, weight, right, down] = [count, weight, right, down].map(|lanes| lanes.iter().sum::<f32>());
-    (count >= FEWEST_BLURRED as f32).then(|| Mean { offset: [right / weight, down / weight], count })
+    let sum = |lanes: [f32; LANES]| lanes.iter().sum::<f32>();
+    let [count, weight] = [count, weight].map(sum);
+    let of_weight = |lanes: [f32; LANES]| sum(lanes) / weight;
+    (count >= FEWEST_BLURRED as f32).then(|| Moments {
+        offset: [right, down].map(of_weight),
+        squares: [xx, xy, yy].map(of_weight),
+        count,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_clouds::Random;
+
+    /// How far off the points of a surface are at its slanted end in the middle of a picture, where their density grows with this
+    /// power of the distance from it, if noise of so many pixels moves them: with the spread, and without.
+    fn off_at_end(power: f32, noise_px: f32) -> [f32; 2] {
+        let [width, height] = [256, 256];
+        let ([x, y], window) = ([128, 128], (16.0 + PER_NOISE * noise_px * noise_px).sqrt());
+        let (sin, cos) = 0.4f32.sin_cos();
+        let mut random = Random::new(91);
+        let mut counts = vec![0; width * height];
+        for _ in 0..400_000 {
+            let inside = 100.0 * random.unit().powf(1.0 / (1.0 + power));
+            let [along, across] = [180.0 * (random.unit() - 0.5), inside].map(|at| at + noise_px * random.gaussian());
+            let place = [128.5 + cos * along + sin * across, 128.5 - sin * along + cos * across];
+            if let [Some(column), Some(row)] = place.map(|at| (at >= 0.0 && at < 256.0).then_some(at as usize)) {
+                counts[row * width + column] += 1;
+            }
+        }
+        let pixels = Held::new([1, width, height], |x, y| counts[y * width + x]);
+        let pairs = pixels.in_pairs();
+        let blur = Blur { window: window * window / PER_VARIANCE, noise: noise_px * noise_px };
+        let [pixels, pairs] =
+            [pixels, pairs].map(|squares| moments(&squares, [x, y], window).expect("there are thousands"));
+        let off = blur.off(pixels, [-sin, -cos]);
+        let differs = (blur.off(pairs, [-sin, -cos]) - off).abs();
+        assert!(window < FINE_RADIUS_PX || differs < 0.03, "in pairs of pixels it differs by {differs}");
+        [off, blur.most_off(pixels)]
+    }
+
+    #[test]
+    fn at_an_end_points_are_as_far_off_whatever_the_noise() {
+        for noise_px in [0.0, 1.5, 4.0] {
+            let [straight, curved] = [0.0, -0.5].map(|power| off_at_end(power, noise_px));
+            for ([off, most], [expected_off, expected_most]) in [(straight, [0.55, 0.80]), (curved, [0.353, 0.478])] {
+                let what =
+                    format!("noise of {noise_px} pixels: {off} and {most}, not {expected_off} and {expected_most}");
+                // The kernel ends, and pixels are wide.
+                assert!((off - expected_off).abs() < 0.05 && (most - expected_most).abs() < 0.05, "{what}");
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_hold_what_their_pixels_do() {
+        let mut random = Random::new(92);
+        for [width, height] in [[1, 1], [2, 3], [7, 4], [5, 9]] {
+            let counts: Vec<_> = (0..width * height).map(|_| random.below(17) as u16).collect();
+            let pairs = Held::new([1, width, height], |x, y| counts[y * width + x]).in_pairs();
+            assert_eq!([pairs.side, pairs.columns, pairs.rows], [2, width.div_ceil(2), height.div_ceil(2)]);
+            for (x, y) in (0..pairs.columns).flat_map(|x| (0..pairs.rows).map(move |y| (x, y))) {
+                let inside = |&at: &usize| at % width / 2 == x && at / width / 2 == y;
+                let expected: u16 = (0..width * height).filter(inside).map(|at| counts[at]).sum();
+                assert_eq!(pairs.count[y * pairs.columns + x], expected, "{width}x{height}: {x}, {y}");
+            }
+        }
+    }
 }
