@@ -6,9 +6,9 @@
 //! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of deviation σ, it is
 //! 0.80 w²/√(w² + σ²) at the straight end of points strewn evenly, and 0.48 w²/√(w² + σ²) where a surface curves away, so that
 //! points lie ever closer up to its end. Their spread tells more: where density grows from the end inwards with power a - 1, the
-//! mean square of what their places would be without noise is a (w² + σ²), which makes 1 and 0.5. The mean less a quarter of the
-//! mean square says where a surface ends with fewer points, and differs less between the two, 0.55 and 0.35. Silhouettes are nearly
-//! always of the second kind; straight ends are cut off by half of the noise too much.
+//! mean square of what their places would be without noise is a (w² + σ²), which makes 1 and 0.5. So what counts is the mean less a
+//! quarter of the mean square, 0.55 and 0.35 at the two ends: outlines come out smoother by it than by the mean alone. Silhouettes
+//! are nearly always of the second kind; straight ends are cut off by half of the noise too much.
 //!
 //! What is off by more, away from where it is empty, and has something empty ahead there, is beside the surface. Only how far it is
 //! off that way counts: another surface behind the border draws the mean along it. And half way to what is empty the mean has to be
@@ -48,8 +48,8 @@ pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
 /// Windows with a larger radius than this, in pixels, are summed up in pairs of pixels along both axes, and those larger than twice
 /// this in blocks.
 pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
-/// How much of the mean square counts against the mean: more of it than would tell the ends apart even better where points are
-/// many, and worse where they are few.
+/// How much of the mean square counts against the mean. More would make less of how a surface ends, and more of single points where
+/// these are few.
 pub(in crate::splat) const SPREAD: f32 = 0.25;
 /// Of what that makes, how much there may be: with hardly any noise, which may as well be small structure, as much as at sharp
 /// borders, where the mean may be off by [`OFF_PX`](super::OFF_PX), and with noise of [`SURE_NOISE_PX`] and more, or
