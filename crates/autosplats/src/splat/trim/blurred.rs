@@ -404,7 +404,7 @@ mod tests {
             let inside = 100.0 * random.unit().powf(1.0 / (1.0 + power));
             let [along, across] = [180.0 * (random.unit() - 0.5), inside].map(|at| at + noise_px * random.gaussian());
             let place = [128.5 + cos * along + sin * across, 128.5 - sin * along + cos * across];
-            if let [Some(column), Some(row)] = place.map(|at| (at >= 0.0 && at < 256.0).then_some(at as usize)) {
+            if let [Some(column), Some(row)] = place.map(|at| (0.0..256.0).contains(&at).then_some(at as usize)) {
                 counts[row * width + column] += 1;
             }
         }
