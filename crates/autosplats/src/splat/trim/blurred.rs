@@ -73,6 +73,7 @@ pub(in crate::splat) const BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
 pub(crate) const BLOCK_PX: usize = 4;
 
+const _: () = assert!(BLOCK_PX == 4, "pairs of pairs of pixels are blocks");
 /// Along an axis.
 const BLOCKS_PER_TILE: usize = TILE / BLOCK_PX;
 
@@ -117,9 +118,9 @@ impl Blurred {
         }
         let [width, height] = [view.width as usize, view.height as usize];
         let pixels = Held::new([1, width, height], |x, y| sixteenths.of(y * width + x).count_ones() as u16);
-        let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
         let pairs = pixels.in_pairs();
         let blocks = pairs.in_pairs();
+        let [columns, rows] = [blocks.columns, blocks.rows];
         // Most of the margin has no splats, and may hold a surface.
         let goes_on = |[x, y]: [usize; 2]| {
             let [first, last] = [0, BLOCK_PX - 1].map(|more| [x, y].map(|at| at * BLOCK_PX + more));
