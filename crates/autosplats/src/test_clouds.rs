@@ -88,6 +88,19 @@ pub(crate) fn beyond_a_border() -> (Positions, u32) {
     (positions, surface)
 }
 
+/// A sheet of points before a wall that is forty times as dense; with the number of the first of the wall.
+pub(crate) fn before_a_wall() -> (Positions, u32) {
+    let mut random = Random::new(23);
+    let mut square = |half: f32, per_unit: f32, z: f32| -> Positions {
+        let count = (per_unit * 4.0 * half * half) as usize;
+        (0..count).map(|_| [half * random.signed(), half * random.signed(), z]).collect()
+    };
+    let mut positions = square(1.5, 100.0, 0.0);
+    let sheet = positions.len() as u32;
+    positions.extend(square(2.5, 4000.0, 1.0));
+    (positions, sheet)
+}
+
 pub(crate) fn sphere(count: usize) -> Positions {
     let mut random = Random::new(2);
     (0..count).map(|_| random.direction()).collect()

@@ -13,6 +13,7 @@
 #import moved
 #import rows
 #import sheet
+#import through
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -41,6 +42,12 @@ override CROWD: f32;
 override STRAY_DOT: f32;
 override STRAY_DROPPED: f32;
 override DOT_PX: f32;
+override LEAST_ON: f32;
+override ON_DISC: f32;
+override ON_DISC_NOISE: f32;
+override DENSER: f32;
+override CELLS_TO_COUNT: f32;
+override SUPPORT: f32;
 
 // The surface beside a surfel.
 struct Surface {
@@ -185,7 +192,7 @@ fn shrink(place: u32, surfel: Surfel) {
     let is_sparse = ratio > SPARSE;
     let local = surfel.k_radius / own_initial_radius(surfel);
     if is_sparse || surfel.curvature * local * local > LONE {
-        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius));
+        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius, CELLS_PER_RADIUS));
         if is_sparse && around.len >= LEAST_CLUSTERS {
             stray = max(stray, curvature_of(around) * ratio * ratio);
         } else if is_sparse && around.weight < f32(frame.k) {
@@ -207,6 +214,24 @@ fn shrink(place: u32, surfel: Surfel) {
     }
 }
 
+// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is; to a dot at least.
+fn open(place: u32, noise: f32) {
+    let surfel = surfels[place];
+    let least = dot_radius(surfel);
+    if !(surfel.radius > least && surfel.k_radius > DENSER * own_initial_radius(surfel)) {
+        return;
+    }
+    let radius = SUPPORT * surfel.radius;
+    let disc = ball_around(surfel.center, radius, CELLS_TO_COUNT);
+    let points = seen(disc, surfel.normal, max(ON_DISC * radius, ON_DISC_NOISE * noise)).points;
+    // Its own point is on it, and may have moved.
+    let on = max(points.x, 1.0);
+    let share = on / (on + points.y);
+    if share < LEAST_ON {
+        surfels[place].radius = max(surfel.radius * (share / LEAST_ON), least);
+    }
+}
+
 @compute @workgroup_size(64)
 fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let active_points = atomicLoad(&counters[ACTIVE]);
@@ -216,25 +241,28 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if index >= len {
         return;
     }
-    let surfel = surfels[first_of_round + index];
+    let place = first_of_round + index;
+    let surfel = surfels[place];
     let known = known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source);
     let noise = max(known.noise, noise_at(surfel.k_radius));
     if is_row(surfel, known.noise) {
         let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
         let area = area(surfel, radius);
         let out = turned(surfel, area);
-        surfels[first_of_round + index] = out;
+        surfels[place] = out;
         if area.radius == 0.0 {
-            shrink(first_of_round + index, out);
+            shrink(place, out);
         }
+        open(place, 0.0);
         return;
     }
     // A line has no width to draw.
     let drawn_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MOST);
-    surfels[first_of_round + index].major_ratio = drawn_ratio;
+    surfels[place].major_ratio = drawn_ratio;
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
+    let is_noisy = calls(surfel, noise, enough);
     var surface = Surface();
-    if calls(surfel, noise, enough) {
+    if is_noisy {
         let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
         let first = vec4f(surfel.normal, select(-1.0, noise / surfel.k_radius, is_reliable));
         let scatter = most_scatter(noise, known.noise > 0.0);
@@ -255,8 +283,9 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
             let widest = WIDEST * own_initial_radius(surfel);
             shrunk.radius *= min(widest / surfel.k_radius, 1.0);
         }
-        move_onto(first_of_round + index, shrunk, surface, noise, known);
+        move_onto(place, shrunk, surface, noise, known);
     } else if surfel.radius > 0.0 {
-        shrink(first_of_round + index, surfel);
+        shrink(place, surfel);
     }
+    open(place, select(0.0, noise, is_noisy));
 }

@@ -10,6 +10,7 @@ use super::noise::{Noise, Usual, measure};
 use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
 use super::rows::{is_row, turn};
 use super::sheets::{Around, Blend, Sheets, Surface};
+use super::through::{DENSER, open};
 use super::{LEAST_REACH, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -236,44 +237,51 @@ fn adapt_all_with<'a, S: Simd>(
     let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
         let call = task.call(surfel);
-        if let Call::Row = call {
-            let radius = first_radius(surfel, density, view, k);
-            if !turn(surfel, (radius, k), (cells, view), gathered) {
-                shrink(simd, surfel, task, gathered);
-            }
-            continue;
+        if !matches!(call, Call::Row) {
+            // A line has no width to draw.
+            let is_line = surfel.major_ratio == f32::MAX;
+            surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
         }
-        // A line has no width to draw.
-        let is_line = surfel.major_ratio == f32::MAX;
-        surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
-        let Call::Noise(Noisy { goal, known }) = call else {
-            shrink(simd, surfel, task, gathered);
-            continue;
-        };
-        let is_reliable = goal.noise < THICKEST_FIRST * surfel.k_radius;
-        let first = is_reliable.then(|| (surfel.normal.into(), goal.noise / surfel.k_radius));
-        let mut alone = || {
-            let radius = first_radius(surfel, density, view, k);
-            let quadric = choose(simd, surfel.center, radius, first, &goal, (cells, view), gathered)?;
-            let Quadric { normal, height, curvature, .. } = quadric;
-            Some(Surface { offset: normal * height, normal, curvature })
-        };
-        let surface = match sheets.blend(simd, surfel.center, first, &goal, (cells, view), around) {
-            Blend::Surface(surface) => Some(surface),
-            // So would nine of ten quadrics of its own, each at the cost of a sheet.
-            Blend::Disagrees => None,
-            Blend::Nothing => alone(),
-        };
-        match surface {
-            Some(surface) => {
-                if known.is_some() {
-                    // Between two surfaces the k-radius is the way to one of them.
-                    let widest = WIDEST * initial_radius(surfel, density, view, k);
-                    surfel.radius *= (widest / surfel.k_radius).min(1.0);
+        let mut scatter = 0.0;
+        match call {
+            Call::Nothing => shrink(simd, surfel, task, gathered),
+            Call::Row => {
+                let radius = first_radius(surfel, density, view, k);
+                if !turn(surfel, (radius, k), (cells, view), gathered) {
+                    shrink(simd, surfel, task, gathered);
                 }
-                place(surfel, &surface, goal.noise, known.as_ref(), view);
             }
-            None => shrink(simd, surfel, task, gathered),
+            Call::Noise(Noisy { goal, known }) => {
+                scatter = goal.noise;
+                let is_reliable = goal.noise < THICKEST_FIRST * surfel.k_radius;
+                let first = is_reliable.then(|| (surfel.normal.into(), goal.noise / surfel.k_radius));
+                let mut alone = || {
+                    let radius = first_radius(surfel, density, view, k);
+                    let quadric = choose(simd, surfel.center, radius, first, &goal, (cells, view), gathered)?;
+                    let Quadric { normal, height, curvature, .. } = quadric;
+                    Some(Surface { offset: normal * height, normal, curvature })
+                };
+                let surface = match sheets.blend(simd, surfel.center, first, &goal, (cells, view), around) {
+                    Blend::Surface(surface) => Some(surface),
+                    // So would nine of ten quadrics of its own, each at the cost of a sheet.
+                    Blend::Disagrees => None,
+                    Blend::Nothing => alone(),
+                };
+                match surface {
+                    Some(surface) => {
+                        if known.is_some() {
+                            // Between two surfaces the k-radius is the way to one of them.
+                            let widest = WIDEST * initial_radius(surfel, density, view, k);
+                            surfel.radius *= (widest / surfel.k_radius).min(1.0);
+                        }
+                        place(surfel, &surface, goal.noise, known.as_ref(), view);
+                    }
+                    None => shrink(simd, surfel, task, gathered),
+                }
+            }
+        }
+        if surfel.k_radius > DENSER * initial_radius(surfel, density, view, k) {
+            open(surfel, scatter, cells, view);
         }
     }
 }

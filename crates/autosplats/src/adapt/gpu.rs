@@ -18,9 +18,10 @@ use super::rows::{
     ROW_TILT, SEEN_THROUGH, THIN_ROW,
 };
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
+use super::through::{CELLS_TO_COUNT, DENSER, LEAST_ON, ON_DISC, ON_DISC_NOISE};
 use super::{LEAST_REACH, SCALES, STEP, noise};
 use crate::Error;
-use crate::fit::{LONGEST, SWEEPS};
+use crate::fit::{LONGEST, SUPPORT, SWEEPS};
 use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers};
 
@@ -255,6 +256,12 @@ impl AdaptPasses {
                 ("STRAY_DOT", STRAY_DOT.into()),
                 ("STRAY_DROPPED", STRAY_DROPPED.into()),
                 ("DOT_PX", DOT_PX.into()),
+                ("LEAST_ON", LEAST_ON.into()),
+                ("ON_DISC", ON_DISC.into()),
+                ("ON_DISC_NOISE", ON_DISC_NOISE.into()),
+                ("DENSER", DENSER.into()),
+                ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
+                ("SUPPORT", SUPPORT.into()),
                 ("GRAZING", GRAZING.into()),
                 ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
                 ("LONGEST_SHADOW", LONGEST_SHADOW.into()),

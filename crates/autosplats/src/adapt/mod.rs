@@ -24,6 +24,8 @@
 //! Points of a spinning lidar are dense along its rings and sparse across: their first neighbours are a *row* (`rows`), no
 //! surface. Balls around such a surfel grow until they hold more than the row.
 //!
+//! What lies far before denser points hides no more than its share of them (`through`).
+//!
 //! Depth cameras have noise that no ball of these sizes shows, because neighbours err alike. It is known from the scan as a whole
 //! (`depth`) and taken where it is the larger; surfels move along the sensor's ray then.
 
@@ -37,6 +39,7 @@ mod rows;
 mod sheets;
 #[cfg(test)]
 mod tests;
+mod through;
 
 #[cfg(test)]
 pub(crate) use cells::SLABS;

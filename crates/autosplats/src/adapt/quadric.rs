@@ -36,15 +36,21 @@ pub(super) struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// Of the ball of `radius` around `center` (view space), in the coarsest cells of which that is at least
-    /// [`CELLS_PER_RADIUS`], or the finest; `None` if there are no cells.
+    /// Of the ball of `radius` around `center` (view space), in the coarsest cells of which that is at least so many, or the
+    /// finest; `None` if there are no cells.
     #[inline(always)]
-    pub(super) fn around(cells: &'a Cells, center: Vec3, radius: f32, view: &View) -> Option<Self> {
+    pub(super) fn around(
+        cells: &'a Cells,
+        center: Vec3,
+        radius: f32,
+        cells_per_radius: f32,
+        view: &View,
+    ) -> Option<Self> {
         let [px, py] = view.to_pixel(center);
         let radius_px = radius / view.pixel_size(center.z);
         let mut level = cells.levels.first()?;
         for coarser in &cells.levels[1..] {
-            if coarser.side_px as f32 * CELLS_PER_RADIUS <= radius_px {
+            if coarser.side_px as f32 * cells_per_radius <= radius_px {
                 level = coarser;
             }
         }
@@ -215,7 +221,7 @@ impl Gathered {
         view: &View,
     ) -> usize {
         (self.filled, self.len) = (0, 0);
-        let Some(window) = Window::around(cells, center.into(), radius, view) else { return 0 };
+        let Some(window) = Window::around(cells, center.into(), radius, CELLS_PER_RADIUS, view) else { return 0 };
         let per_radius = 1.0 / radius;
         self.side = window.level.side_px as f32 * view.pixel_size(center[2]) * per_radius;
         let groups = window.copy_to(&mut self.lanes);

@@ -11,8 +11,9 @@
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{Cells, Cluster};
-use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane, Window};
+use super::cells::Cells;
+use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, Plane};
+use super::through::{Disc, seen};
 use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::{LONGEST, Surfel};
@@ -131,7 +132,12 @@ fn area(
             }
         }
     }
-    found.filter(|plane| !is_seen_through(cells, center, radius, plane.axis, view)).map(|plane| (plane, radius))
+    let is_opaque = |plane: &Plane| {
+        let disc = Disc { center: center.into(), axis: plane.axis, radius, thickness: OFF_AREA * radius };
+        let [on, through] = seen(&disc, CELLS_PER_RADIUS, cells, view).cells;
+        through <= SEEN_THROUGH * (through + on)
+    };
+    found.filter(is_opaque).map(|plane| (plane, radius))
 }
 
 /// The plane through what is within a `radius`, on the side if one is given.
@@ -154,29 +160,4 @@ fn plane_within_with<'a, S: Simd>(
         len = gathered.keep_beside(side, -BESIDE);
     }
     (len >= LEAST_CLUSTERS).then(|| gathered.plane(simd))
-}
-
-/// Whether what is behind a disc of `radius` around `center`, square to `axis`, shows through it.
-fn is_seen_through(cells: &Cells, center: [f32; 3], radius: f32, axis: Vec3, view: &View) -> bool {
-    let center = Vec3::from(center);
-    let of_plane = axis.dot(center);
-    let mut counts = [0u32; 2];
-    let Some(window) = Window::around(cells, center, radius, view) else { return false };
-    for cell in window.rows().flatten() {
-        let (mut is_on, mut is_behind) = (false, false);
-        for Cluster { mean, .. } in cell.clusters() {
-            let place = Vec3::from(mean);
-            let off = of_plane - axis.dot(place);
-            // Where the line of sight meets the plane.
-            let along = if view.perspective { place } else { Vec3::Z };
-            let way = off / axis.dot(along);
-            if (place + along * way - center).length_squared() < radius * radius {
-                is_on |= off.abs() <= OFF_AREA * radius;
-                is_behind |= way < 0.0;
-            }
-        }
-        counts[usize::from(is_on)] += u32::from(is_on | is_behind);
-    }
-    let [through, on] = counts.map(|count| count as f32);
-    through > SEEN_THROUGH * (through + on)
 }

@@ -35,7 +35,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     for (var smaller = 0u; smaller < scale; smaller++) {
         radius *= STEP;
     }
-    let ball = ball_around(surfel.center, radius);
+    let ball = ball_around(surfel.center, radius, CELLS_PER_RADIUS);
     let plane = plane_of(ball);
     var found = TOO_FEW;
     if plane.len >= LEAST_CLUSTERS {

@@ -1,6 +1,7 @@
 //! Adapted surfels against surfaces that are known.
 
 mod dots;
+mod through;
 
 use std::collections::HashMap;
 

@@ -31,6 +31,7 @@ const SHARED: &[(&str, &str)] = &[
     ("noise", include_str!("../shared/noise.wgsl")),
     ("calls", include_str!("../shared/calls.wgsl")),
     ("choose", include_str!("../shared/choose.wgsl")),
+    ("through", include_str!("../shared/through.wgsl")),
     ("rows", include_str!("../shared/rows.wgsl")),
     ("sheet", include_str!("../shared/sheet.wgsl")),
     ("scatters", include_str!("../shared/scatters.wgsl")),

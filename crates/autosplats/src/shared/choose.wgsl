@@ -69,7 +69,7 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
         if !thin && scale + 1u < SCALES {
             continue;
         }
-        let ball = ball_around(center, radius);
+        let ball = ball_around(center, radius, CELLS_PER_RADIUS);
         if !has_axis {
             plane = plane_of(ball);
             let least = noise * (1.0 / (RELIABLE * radius));

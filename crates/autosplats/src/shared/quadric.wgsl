@@ -60,13 +60,14 @@ struct Quadric {
     bend: vec3f,
 }
 
-fn ball_around(center: vec3f, radius: f32) -> Ball {
+// A ball in the coarsest cells of which its radius is at least so many, or the finest.
+fn ball_around(center: vec3f, radius: f32, cells_per_radius: f32) -> Ball {
     let at = to_pixel(center);
     let radius_px = radius / pixel_size(center.z);
     var level = levels[0];
     for (var index = 1u; index < MOST_LEVELS; index++) {
         let coarser = levels[index];
-        if coarser.side_px == 0u || !(f32(coarser.side_px) * CELLS_PER_RADIUS <= radius_px) {
+        if coarser.side_px == 0u || !(f32(coarser.side_px) * cells_per_radius <= radius_px) {
             break;
         }
         level = coarser;

@@ -3,6 +3,7 @@
 
 #import quadric
 #import surfel
+#import through
 
 override AREA: f32;
 override AREA_NEAR: f32;
@@ -68,34 +69,8 @@ fn area_beside(ball: Ball, beyond: Ball, row: vec3f) -> Area {
 
 // Whether what is behind a ball's disc square to `axis` shows through it.
 fn is_seen_through(ball: Ball, axis: vec3f) -> bool {
-    let of_plane = dot(axis, ball.center);
-    var on = 0u;
-    var through = 0u;
-    for (var row = ball.low.y; row <= ball.high.y; row++) {
-        let cells = ball.level.first + row * ball.level.columns;
-        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
-            var is_on = false;
-            var is_behind = false;
-            for (var slab = 0u; slab < SLABS; slab++) {
-                let cluster = clusters[cell * SLABS + slab];
-                if cluster.w == 0.0 {
-                    break;
-                }
-                let off = of_plane - dot(axis, cluster.xyz);
-                // Where the line of sight meets the plane.
-                let along = select(vec3f(0.0, 0.0, 1.0), cluster.xyz, frame.perspective == 1u);
-                let way = off / dot(axis, along);
-                let apart = cluster.xyz + along * way - ball.center;
-                if dot(apart, apart) < ball.radius * ball.radius {
-                    is_on |= abs(off) <= OFF_AREA * ball.radius;
-                    is_behind |= way < 0.0;
-                }
-            }
-            on += select(0u, 1u, is_on);
-            through += select(0u, 1u, is_behind && !is_on);
-        }
-    }
-    return f32(through) > SEEN_THROUGH * f32(through + on);
+    let cells = seen(ball, axis, OFF_AREA * ball.radius).cells;
+    return cells.y > SEEN_THROUGH * (cells.y + cells.x);
 }
 
 // The first ball around a surfel of a row that holds an area with the row in it.
@@ -106,13 +81,14 @@ fn area(surfel: Surfel, least_radius: f32) -> Area {
     var found = Area(Plane(), 0.0);
     for (var scale = 0u; scale < SCALES; scale++) {
         radius *= STEP;
-        let ball = ball_around(center, radius);
+        let ball = ball_around(center, radius, CELLS_PER_RADIUS);
         let plane = plane_of(ball);
         if !is_area(plane, AREA) {
             continue;
         }
         let apart = surfel.k_radius * rows_apart(radius / surfel.k_radius, plane.weight);
-        let beyond = ball_around(center, clamp(BEYOND * apart, LEAST_BEYOND * radius, MOST_BEYOND * radius));
+        let beyond_radius = clamp(BEYOND * apart, LEAST_BEYOND * radius, MOST_BEYOND * radius);
+        let beyond = ball_around(center, beyond_radius, CELLS_PER_RADIUS);
         if is_flat(plane, row) && is_area(plane_of(beyond), AREA) {
             found = Area(plane, radius);
         } else {

@@ -12,7 +12,7 @@
 use super::centers::STEPS;
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH, SUPPORT};
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH};
 use super::trim::blurred::{
     BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
     OFF_BLURRED, OFF_HALF_WAY, PER_NOISE, PER_VARIANCE, SPREAD, SURE_DISTANCES, SURE_NOISE_PX, TILTED,
@@ -24,6 +24,7 @@ use super::trim::{
 };
 use crate::Error;
 use crate::adapt::gpu::NOISE_FLOATS;
+use crate::fit::SUPPORT;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::MARGIN_REACH;
 use crate::project::gpu::{Counter, Round, ScreenBuffers, Work, WorkPass, scan_pass};

@@ -7,7 +7,7 @@
 //! multiplications and at most one division.
 
 use crate::camera::View;
-use crate::fit::Surfel;
+use crate::fit::{SUPPORT, Surfel};
 
 /// Radius in pixels of the dot that is always drawn around a surfel's centre, so that a splat smaller than a pixel or
 /// seen from its edge still covers the pixel of its point: the low-pass filter of [BHZK05]. The furthest that a pixel's
@@ -19,10 +19,6 @@ pub(super) const DOT_RADIUS_PX: f32 = 0.71;
 // Differs from the paper: it asks at the point's own pixel only; in the cathedral 0.3 % of the pixels then changed with grid
 // culling, holes among them, against 0.05 %, for 6 % more points reconstructed.
 pub(super) const RECOVER_REACH: f32 = 1.3;
-/// A splat is drawn out to this many splat radii, its weight falling to nearly nothing: with randomly scattered points
-/// every fiftieth place on a surface lies in no disc of the splat radius, every three-thousandth in none of these.
-// Differs from the paper: it cuts the Gaussian at the splat radius.
-pub(super) const SUPPORT: f32 = 1.4;
 /// Discs that face the eye less than this (cosine) are drawn as dots: their gradients are no longer numbers to trust.
 pub(super) const GRAZING: f32 = 0.01;
 /// Depth tolerance ε in splat radii: layers of one surface blend, layers further apart occlude.

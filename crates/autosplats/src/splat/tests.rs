@@ -3,10 +3,10 @@
 use autosplats_cloud::FieldValues;
 use autosplats_cloud::glam::DVec3;
 
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, SUPPORT};
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST};
 use super::{Attributes, GBuffer, PointColors, Splatter};
 use crate::camera::{Camera, Projection, View};
-use crate::fit::Surfel;
+use crate::fit::{SUPPORT, Surfel};
 use crate::project::Sixteenths;
 use crate::test_clouds::Random;
 

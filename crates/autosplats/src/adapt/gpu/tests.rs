@@ -181,7 +181,7 @@ fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
 
 /// They are few, so that they are compared by themselves.
 #[test]
-fn the_device_draws_as_dots_what_the_host_does() {
+fn the_device_shrinks_what_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let passes = AdaptPasses::new(&gpu).expect("passes");
     let compare = |name: &str, case: &Case, is_stray: &dyn Fn(u32) -> bool, least: f64| {
@@ -198,6 +198,9 @@ fn the_device_draws_as_dots_what_the_host_does() {
         compare("beyond a border", &case, &|source| source >= surface, 0.66);
         let (case, is_stray) = Case::noisy_with_strays(projection);
         compare("before noise", &case, &is_stray, 0.8);
+        let (positions, sheet) = test_clouds::before_a_wall();
+        let case = Case::new(&positions, projection, [400, 300]);
+        compare("before a wall", &case, &|source| source < sheet, 0.6);
     }
     let (room, is_stray) = Case::stepped_with_strays();
     compare("in a room", &room, &is_stray, 0.2);

@@ -28,8 +28,8 @@ use rayon::prelude::*;
 use super::{AROUND_PX, EMPTY, Outline, Rim, Shown};
 use crate::adapt::Noise;
 use crate::camera::View;
+use crate::fit::SUPPORT;
 use crate::project::Sixteenths;
-use crate::splat::setup::SUPPORT;
 use crate::splat::{TILE, tiled_index};
 
 /// Least noise, in pixels, that blurs a border: with less, detail of far views that was taken for noise would be cut.

@@ -1,0 +1,50 @@
+//! How much discs hide that others are seen through.
+
+use super::*;
+use crate::adapt::through::LEAST_ON;
+
+/// How much of their radius discs keep, ascending: of the points that are asked for, and that the fit left discs.
+fn kept(case: &Case, is_asked: impl Fn(&Surfel) -> bool) -> Vec<f32> {
+    let (fitted, adapted) = (case.fitted.concat(), case.adapted());
+    let asked = fitted.iter().zip(&adapted).filter(|(before, _)| before.radius > 0.0 && is_asked(before));
+    let mut kept: Vec<f32> = asked.map(|(before, after)| after.radius / before.radius).collect();
+    kept.sort_by(f32::total_cmp);
+    kept
+}
+
+#[test]
+fn a_sheet_before_a_denser_wall_hides_its_share() {
+    let (positions, sheet) = test_clouds::before_a_wall();
+    for projection in PROJECTIONS {
+        let case = Case::new(&positions, projection, [400, 300]);
+        // Others have lost neighbours to gaps.
+        let of_sheet = kept(&case, |surfel| surfel.source < sheet && surfel.k_radius > 0.14);
+        assert!(of_sheet.len() > 300, "{} discs", of_sheet.len());
+        // Of 41 points a disc hides one is its own.
+        let right = 1.0 / 41.0 / LEAST_ON;
+        let [low, middle, high] = [1, 5, 9].map(|tenth| of_sheet[of_sheet.len() * tenth / 10]);
+        let is_right = (0.8..1.25).contains(&(middle / right)) && low > 0.4 * right && high < 2.5 * right;
+        assert!(is_right, "{projection:?}: {low} {middle} {high} of their radii, {right} is right");
+        let of_wall = kept(&case, |surfel| surfel.source >= sheet);
+        let whole = of_wall.iter().filter(|&&kept| kept == 1.0).count();
+        assert!(whole * 100 > of_wall.len() * 99, "{projection:?}: {whole} of {} are whole", of_wall.len());
+    }
+}
+
+/// On the screen the wall is sixteen times as dense.
+#[test]
+fn what_is_close_to_the_eye_stays_closed() {
+    let mut random = Random::new(24);
+    let mut square = |half: f32, z: f32| -> Positions {
+        let count = (1500.0 * 4.0 * half * half) as usize;
+        (0..count).map(|_| [half * random.signed(), half * random.signed(), z]).collect()
+    };
+    let mut positions = square(0.4, -3.0);
+    let near = positions.len() as u32;
+    positions.extend(square(1.5, 0.0));
+    let camera = Camera { eye: DVec3::NEG_Z * 4.0, look_at: DVec3::ZERO, up: DVec3::Y, projection: PROJECTIONS[0] };
+    let case = Case::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [400, 300]);
+    let of_near = kept(&case, |surfel| surfel.source < near);
+    let whole = of_near.iter().filter(|&&kept| kept == 1.0).count();
+    assert!(of_near.len() > 250 && whole * 50 > of_near.len() * 49, "{whole} of {} are whole", of_near.len());
+}
