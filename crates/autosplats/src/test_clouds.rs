@@ -88,16 +88,17 @@ pub(crate) fn beyond_a_border() -> (Positions, u32) {
     (positions, surface)
 }
 
-/// A sheet of points before a wall that is forty times as dense; with the number of the first of the wall.
-pub(crate) fn before_a_wall() -> (Positions, u32) {
+/// A sheet of points, in waves so high, before a wall that is forty times as dense; with the number of the first of the wall.
+pub(crate) fn before_a_wall(waves: f32) -> (Positions, u32) {
     let mut random = Random::new(23);
-    let mut square = |half: f32, per_unit: f32, z: f32| -> Positions {
+    let mut square = |half: f32, per_unit: f32| -> Vec<[f32; 2]> {
         let count = (per_unit * 4.0 * half * half) as usize;
-        (0..count).map(|_| [half * random.signed(), half * random.signed(), z]).collect()
+        (0..count).map(|_| [half * random.signed(), half * random.signed()]).collect()
     };
-    let mut positions = square(1.5, 100.0, 0.0);
+    let sheet = square(1.5, 100.0).into_iter().map(|[x, y]| [x, y, waves * (6.0 * x).sin()]);
+    let mut positions: Positions = sheet.collect();
     let sheet = positions.len() as u32;
-    positions.extend(square(2.5, 4000.0, 1.0));
+    positions.extend(square(2.5, 4000.0).into_iter().map(|[x, y]| [x, y, 1.0]));
     (positions, sheet)
 }
 

@@ -46,6 +46,9 @@ override LEAST_ON: f32;
 override ON_DISC: f32;
 override ON_DISC_NOISE: f32;
 override DENSER: f32;
+override GOES_ON: f32;
+override FLAT_AROUND: f32;
+override ALL_AROUND: f32;
 override CELLS_TO_COUNT: f32;
 override SUPPORT: f32;
 
@@ -214,7 +217,8 @@ fn shrink(place: u32, surfel: Surfel) {
     }
 }
 
-// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is; to a dot at least.
+// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is, unless it is one of a surface; to a
+// dot at least.
 fn open(place: u32, noise: f32) {
     let surfel = surfels[place];
     let least = dot_radius(surfel);
@@ -227,7 +231,13 @@ fn open(place: u32, noise: f32) {
     // Its own point is on it, and may have moved.
     let on = max(points.x, 1.0);
     let share = on / (on + points.y);
-    if share < LEAST_ON {
+    if share >= LEAST_ON {
+        return;
+    }
+    let around = plane_of(ball_around(surfel.center, GOES_ON * surfel.k_radius, CELLS_PER_RADIUS));
+    let is_flat = curvature_of(around) < FLAT_AROUND;
+    let is_all_around = length(around.mean) < ALL_AROUND;
+    if around.len < LEAST_CLUSTERS || !(is_flat && is_all_around) {
         surfels[place].radius = max(surfel.radius * (share / LEAST_ON), least);
     }
 }

@@ -281,7 +281,7 @@ fn adapt_all_with<'a, S: Simd>(
             }
         }
         if surfel.k_radius > DENSER * initial_radius(surfel, density, view, k) {
-            open(surfel, scatter, cells, view);
+            open(simd, surfel, scatter, (cells, view), gathered);
         }
     }
 }

@@ -18,7 +18,7 @@ use super::rows::{
     ROW_TILT, SEEN_THROUGH, THIN_ROW,
 };
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
-use super::through::{CELLS_TO_COUNT, DENSER, LEAST_ON, ON_DISC, ON_DISC_NOISE};
+use super::through::{ALL_AROUND, CELLS_TO_COUNT, DENSER, FLAT_AROUND, GOES_ON, LEAST_ON, ON_DISC, ON_DISC_NOISE};
 use super::{LEAST_REACH, SCALES, STEP, noise};
 use crate::Error;
 use crate::fit::{LONGEST, SUPPORT, SWEEPS};
@@ -260,6 +260,9 @@ impl AdaptPasses {
                 ("ON_DISC", ON_DISC.into()),
                 ("ON_DISC_NOISE", ON_DISC_NOISE.into()),
                 ("DENSER", DENSER.into()),
+                ("GOES_ON", GOES_ON.into()),
+                ("FLAT_AROUND", FLAT_AROUND.into()),
+                ("ALL_AROUND", ALL_AROUND.into()),
                 ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
                 ("SUPPORT", SUPPORT.into()),
                 ("GRAZING", GRAZING.into()),

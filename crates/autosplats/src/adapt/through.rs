@@ -3,14 +3,15 @@
 //! A surface hides what is behind it: from the scanner, so that it is as dense as what lies around it, and from the eye. Leaves,
 //! wires, and what a scanner measured halfway between two surfaces, are few points before many. Their neighbours are far away and
 //! flat often enough, and their discs would hide what is seen between them. So where far more points are seen through a disc
-//! than on it, it shrinks to what is its share. Points in front that are sparse on the screen alone, because the eye is close
+//! than on it, and what surrounds it is no surface, it shrinks to what is its share. Points in front that are sparse on the screen alone, because the eye is close
 //! to them, have as many behind them only if these are no further from the eye: hence each counts as if it lay as close as the disc.
 
 use glam::Vec3;
+use pulp::Simd;
 
 use super::cells::{Cells, Cluster};
 use super::cpu::DOT_PX;
-use super::quadric::Window;
+use super::quadric::{Gathered, LEAST_CLUSTERS, Plane, Window};
 use crate::camera::View;
 use crate::fit::{SUPPORT, Surfel};
 
@@ -22,6 +23,13 @@ pub(super) const ON_DISC: f32 = 0.3;
 pub(super) const ON_DISC_NOISE: f32 = 3.0;
 /// Where the k-radius is less than this many first search radii, what is around is not so much denser.
 pub(super) const DENSER: f32 = 3.0;
+/// A surface is one however sparse it is, if it goes on to so many k-radii from the point: sheets of what was measured between two
+/// others do not.
+pub(super) const GOES_ON: f32 = 4.0;
+/// It is as flat as this there, by surface variation,
+pub(super) const FLAT_AROUND: f32 = 0.005;
+/// and lies on all sides: the mean is no further from the point, radii. On a straight border it is 0.38.
+pub(super) const ALL_AROUND: f32 = 0.3;
 /// The disc's radius is at least so many cells, unless they are the finest: enough to count.
 pub(super) const CELLS_TO_COUNT: f32 = 2.0;
 
@@ -77,8 +85,16 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
     seen
 }
 
-/// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is; to a dot at least.
-pub(super) fn open(surfel: &mut Surfel, noise: f32, cells: &Cells, view: &View) {
+/// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is, unless it is one of a surface; to
+/// a dot at least.
+#[inline(always)]
+pub(super) fn open<S: Simd>(
+    simd: S,
+    surfel: &mut Surfel,
+    noise: f32,
+    (cells, view): (&Cells, &View),
+    gathered: &mut Gathered,
+) {
     let dot = DOT_PX * view.pixel_size(surfel.center[2]);
     if surfel.radius <= dot {
         return;
@@ -90,7 +106,12 @@ pub(super) fn open(surfel: &mut Surfel, noise: f32, cells: &Cells, view: &View) 
     // Its own point is on it, and may have moved.
     let on = on.max(1.0);
     let share = on / (on + behind);
-    if share < LEAST_ON {
+    if share >= LEAST_ON {
+        return;
+    }
+    let len = gathered.read(simd, cells, surfel.center, GOES_ON * surfel.k_radius, view);
+    let is_surface = |plane: Plane| (plane.curvature() < FLAT_AROUND) & (plane.mean.length() < ALL_AROUND);
+    if len < LEAST_CLUSTERS || !is_surface(gathered.plane(simd)) {
         surfel.radius = (surfel.radius * (share / LEAST_ON)).max(dot);
     }
 }

@@ -198,7 +198,7 @@ fn the_device_shrinks_what_the_host_does() {
         compare("beyond a border", &case, &|source| source >= surface, 0.66);
         let (case, is_stray) = Case::noisy_with_strays(projection);
         compare("before noise", &case, &is_stray, 0.8);
-        let (positions, sheet) = test_clouds::before_a_wall();
+        let (positions, sheet) = test_clouds::before_a_wall(0.07);
         let case = Case::new(&positions, projection, [400, 300]);
         compare("before a wall", &case, &|source| source < sheet, 0.6);
     }

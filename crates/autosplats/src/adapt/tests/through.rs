@@ -13,21 +13,32 @@ fn kept(case: &Case, is_asked: impl Fn(&Surfel) -> bool) -> Vec<f32> {
 }
 
 #[test]
-fn a_sheet_before_a_denser_wall_hides_its_share() {
-    let (positions, sheet) = test_clouds::before_a_wall();
+fn a_crooked_sheet_before_a_denser_wall_hides_its_share() {
+    let (positions, sheet) = test_clouds::before_a_wall(0.07);
     for projection in PROJECTIONS {
         let case = Case::new(&positions, projection, [400, 300]);
         // Others have lost neighbours to gaps.
         let of_sheet = kept(&case, |surfel| surfel.source < sheet && surfel.k_radius > 0.14);
         assert!(of_sheet.len() > 300, "{} discs", of_sheet.len());
-        // Of 41 points a disc hides one is its own.
-        let right = 1.0 / 41.0 / LEAST_ON;
-        let [low, middle, high] = [1, 5, 9].map(|tenth| of_sheet[of_sheet.len() * tenth / 10]);
+        // Of 41 points one is of the sheet, and the disc's own point besides: of eight or nine.
+        let right = 1.12 / 41.0 / LEAST_ON;
+        let [low, middle, high] = [1, 5, 7].map(|tenth| of_sheet[of_sheet.len() * tenth / 10]);
         let is_right = (0.8..1.25).contains(&(middle / right)) && low > 0.4 * right && high < 2.5 * right;
         assert!(is_right, "{projection:?}: {low} {middle} {high} of their radii, {right} is right");
         let of_wall = kept(&case, |surfel| surfel.source >= sheet);
         let whole = of_wall.iter().filter(|&&kept| kept == 1.0).count();
         assert!(whole * 100 > of_wall.len() * 99, "{projection:?}: {whole} of {} are whole", of_wall.len());
+    }
+}
+
+#[test]
+fn a_flat_sheet_before_a_denser_wall_stays_closed() {
+    let (positions, sheet) = test_clouds::before_a_wall(0.0);
+    for projection in PROJECTIONS {
+        let case = Case::new(&positions, projection, [400, 300]);
+        let of_sheet = kept(&case, |surfel| surfel.source < sheet && surfel.k_radius > 0.14);
+        let whole = of_sheet.iter().filter(|&&kept| kept == 1.0).count();
+        assert!(of_sheet.len() > 300 && whole * 4 > of_sheet.len() * 3, "{whole} of {} are whole", of_sheet.len());
     }
 }
 
