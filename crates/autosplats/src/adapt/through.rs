@@ -28,7 +28,7 @@ pub(super) const DENSER: f32 = 3.0;
 pub(super) const GOES_ON: f32 = 4.0;
 /// It is as flat as this there, by surface variation,
 pub(super) const FLAT_AROUND: f32 = 0.005;
-/// and lies on all sides: the mean is no further from the point, radii. On a straight border it is 0.38.
+/// and lies on all sides: the mean is no further from the point, radii. On a straight border it is 0.37.
 pub(super) const ALL_AROUND: f32 = 0.3;
 /// The disc's radius is at least so many cells, unless they are the finest: enough to count.
 pub(super) const CELLS_TO_COUNT: f32 = 2.0;
