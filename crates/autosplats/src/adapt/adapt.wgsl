@@ -48,6 +48,7 @@ override ON_DISC_NOISE: f32;
 override DENSER: f32;
 override GOES_ON: f32;
 override FLAT_AROUND: f32;
+override WIDE_AROUND: f32;
 override ALL_AROUND: f32;
 override CELLS_TO_COUNT: f32;
 override SUPPORT: f32;
@@ -218,11 +219,11 @@ fn shrink(place: u32, surfel: Surfel) {
 }
 
 // Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is, unless it is one of a surface; to a
-// dot at least.
+// dot at least. Of an ellipse the circle within is asked, and the ellipse shrinks.
 fn open(place: u32, noise: f32) {
     let surfel = surfels[place];
     let least = dot_radius(surfel);
-    if !(surfel.radius > least && surfel.k_radius > DENSER * own_initial_radius(surfel)) {
+    if !(surfel.radius > least) {
         return;
     }
     let radius = SUPPORT * surfel.radius;
@@ -231,13 +232,14 @@ fn open(place: u32, noise: f32) {
     // Its own point is on it, and may have moved.
     let on = max(points.x, 1.0);
     let share = on / (on + points.y);
-    if share >= LEAST_ON {
+    if !(share < LEAST_ON) {
         return;
     }
     let around = plane_of(ball_around(surfel.center, GOES_ON * surfel.k_radius, CELLS_PER_RADIUS));
     let is_flat = curvature_of(around) < FLAT_AROUND;
+    let is_wide = around.variances.y > WIDE_AROUND * around.variances.z;
     let is_all_around = length(around.mean) < ALL_AROUND;
-    if around.len < LEAST_CLUSTERS || !(is_flat && is_all_around) {
+    if around.len < LEAST_CLUSTERS || !(is_flat && is_wide && is_all_around) {
         surfels[place].radius = max(surfel.radius * (share / LEAST_ON), least);
     }
 }
@@ -255,6 +257,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let surfel = surfels[place];
     let known = known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source);
     let noise = max(known.noise, noise_at(surfel.k_radius));
+    let is_sparser = surfel.k_radius > DENSER * own_initial_radius(surfel);
     if is_row(surfel, known.noise) {
         let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
         let area = area(surfel, radius);
@@ -263,7 +266,9 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         if area.radius == 0.0 {
             shrink(place, out);
         }
-        open(place, 0.0);
+        if is_sparser {
+            open(place, 0.0);
+        }
         return;
     }
     // A line has no width to draw.
@@ -297,5 +302,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     } else if surfel.radius > 0.0 {
         shrink(place, surfel);
     }
-    open(place, select(0.0, noise, is_noisy));
+    if is_sparser {
+        open(place, select(0.0, noise, is_noisy));
+    }
 }

@@ -237,12 +237,12 @@ fn adapt_all_with<'a, S: Simd>(
     let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
         let call = task.call(surfel);
+        let is_sparser = surfel.k_radius > DENSER * initial_radius(surfel, density, view, k);
         if !matches!(call, Call::Row) {
             // A line has no width to draw.
             let is_line = surfel.major_ratio == f32::MAX;
             surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
         }
-        let mut scatter = 0.0;
         match call {
             Call::Nothing => shrink(simd, surfel, task, gathered),
             Call::Row => {
@@ -252,7 +252,6 @@ fn adapt_all_with<'a, S: Simd>(
                 }
             }
             Call::Noise(Noisy { goal, known }) => {
-                scatter = goal.noise;
                 let is_reliable = goal.noise < THICKEST_FIRST * surfel.k_radius;
                 let first = is_reliable.then(|| (surfel.normal.into(), goal.noise / surfel.k_radius));
                 let mut alone = || {
@@ -280,8 +279,9 @@ fn adapt_all_with<'a, S: Simd>(
                 }
             }
         }
-        if surfel.k_radius > DENSER * initial_radius(surfel, density, view, k) {
-            open(simd, surfel, scatter, (cells, view), gathered);
+        if is_sparser {
+            let noise = if let Call::Noise(Noisy { goal, .. }) = call { goal.noise } else { 0.0 };
+            open(simd, surfel, noise, (cells, view), gathered);
         }
     }
 }

@@ -18,7 +18,9 @@ use super::rows::{
     ROW_TILT, SEEN_THROUGH, THIN_ROW,
 };
 use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
-use super::through::{ALL_AROUND, CELLS_TO_COUNT, DENSER, FLAT_AROUND, GOES_ON, LEAST_ON, ON_DISC, ON_DISC_NOISE};
+use super::through::{
+    ALL_AROUND, CELLS_TO_COUNT, DENSER, FLAT_AROUND, GOES_ON, LEAST_ON, ON_DISC, ON_DISC_NOISE, WIDE_AROUND,
+};
 use super::{LEAST_REACH, SCALES, STEP, noise};
 use crate::Error;
 use crate::fit::{LONGEST, SUPPORT, SWEEPS};
@@ -262,6 +264,7 @@ impl AdaptPasses {
                 ("DENSER", DENSER.into()),
                 ("GOES_ON", GOES_ON.into()),
                 ("FLAT_AROUND", FLAT_AROUND.into()),
+                ("WIDE_AROUND", WIDE_AROUND.into()),
                 ("ALL_AROUND", ALL_AROUND.into()),
                 ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
                 ("SUPPORT", SUPPORT.into()),

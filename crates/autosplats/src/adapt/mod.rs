@@ -24,7 +24,7 @@
 //! Points of a spinning lidar are dense along its rings and sparse across: their first neighbours are a *row* (`rows`), no
 //! surface. Balls around such a surfel grow until they hold more than the row.
 //!
-//! What lies far before denser points hides no more than its share of them (`through`).
+//! What is sparse before denser points, and no surface, hides no more than its share of them (`through`).
 //!
 //! Depth cameras have noise that no ball of these sizes shows, because neighbours err alike. It is known from the scan as a whole
 //! (`depth`) and taken where it is the larger; surfels move along the sensor's ray then.

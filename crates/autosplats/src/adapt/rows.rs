@@ -133,7 +133,7 @@ fn area(
         }
     }
     let is_opaque = |plane: &Plane| {
-        let disc = Disc { center: center.into(), axis: plane.axis, radius, thickness: OFF_AREA * radius };
+        let disc = Disc { center: center.into(), axis: plane.axis, radius, half_thickness: OFF_AREA * radius };
         let [on, through] = seen(&disc, CELLS_PER_RADIUS, cells, view).cells;
         through <= SEEN_THROUGH * (through + on)
     };

@@ -1,10 +1,10 @@
 //! What is seen through a disc, and discs that hide too much.
 //!
-//! A surface hides what is behind it: from the scanner, so that it is as dense as what lies around it, and from the eye. Leaves,
-//! wires, and what a scanner measured halfway between two surfaces, are few points before many. Their neighbours are far away and
-//! flat often enough, and their discs would hide what is seen between them. So where far more points are seen through a disc
-//! than on it, and what surrounds it is no surface, it shrinks to what is its share. Points in front that are sparse on the screen alone, because the eye is close
-//! to them, have as many behind them only if these are no further from the eye: hence each counts as if it lay as close as the disc.
+//! A surface takes all the points that its scanner sends there, so it is about as dense as what is seen beside it. Leaves, wires,
+//! and what was measured halfway between two surfaces, are few points before many. Their neighbours are far away and flat often
+//! enough, and their discs would hide what is seen between them. So where far more points are seen through a disc than on it, and
+//! what surrounds it is no surface, it shrinks to its share. What is close to the eye is sparse on the screen only: each point
+//! behind it counts for as many as would fall there if it lay no further away.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -15,7 +15,7 @@ use super::quadric::{Gathered, LEAST_CLUSTERS, Plane, Window};
 use crate::camera::View;
 use crate::fit::{SUPPORT, Surfel};
 
-/// A disc on which less than this share is of the points seen where it is shrinks in the same measure.
+/// Of the points seen where a disc is at least this share has to be on it; its radius shrinks in the measure that is lacking.
 pub(super) const LEAST_ON: f32 = 0.1;
 /// What is this far from the disc's plane is on it, radii.
 pub(super) const ON_DISC: f32 = 0.3;
@@ -28,20 +28,22 @@ pub(super) const DENSER: f32 = 3.0;
 pub(super) const GOES_ON: f32 = 4.0;
 /// It is as flat as this there, by surface variation,
 pub(super) const FLAT_AROUND: f32 = 0.005;
-/// and lies on all sides: the mean is no further from the point, radii. On a straight border it is 0.37.
+/// as wide as this, or it is a wire: variance across over that along; at a straight border it is 0.33,
+pub(super) const WIDE_AROUND: f32 = 0.25;
+/// and goes on to all sides: the mean is no further from the point, radii. At a straight border it is 0.37.
 pub(super) const ALL_AROUND: f32 = 0.3;
 /// The disc's radius is at least so many cells, unless they are the finest: enough to count.
 pub(super) const CELLS_TO_COUNT: f32 = 2.0;
 
-/// A flat cylinder, view space.
+/// A disc, and what is near its plane, view space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
     pub(super) center: Vec3,
     /// Unit normal, of either sign.
     pub(super) axis: Vec3,
     pub(super) radius: f32,
-    /// What is no further from the plane on either side is on the disc.
-    pub(super) thickness: f32,
+    /// What is no further from the plane, on either side, is on the disc.
+    pub(super) half_thickness: f32,
 }
 
 /// What is seen where a disc is: on it, and behind it.
@@ -49,13 +51,13 @@ pub(super) struct Disc {
 pub(super) struct Seen {
     /// Cells that hold something on the disc, and others that hold something behind it.
     pub(super) cells: [f32; 2],
-    /// Points on it, and behind it: these count as many as there were if they lay no further from the eye than the disc's centre.
+    /// Points on it, and behind it: each of these counts for as many as would fall there if it lay on the disc's plane.
     pub(super) points: [f32; 2],
 }
 
 /// What is seen on a `disc` and through it, in cells of which its radius is at least so many.
 pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &View) -> Seen {
-    let &Disc { center, axis, radius, thickness } = disc;
+    let &Disc { center, axis, radius, half_thickness } = disc;
     let of_plane = axis.dot(center);
     let mut seen = Seen::default();
     let Some(window) = Window::around(cells, center, radius, cells_per_radius, view) else { return seen };
@@ -68,10 +70,11 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
             let along = if view.perspective { place } else { Vec3::Z };
             let way = off / axis.dot(along);
             if (place + along * way - center).length_squared() < radius * radius {
-                if off.abs() <= thickness {
+                if off.abs() <= half_thickness {
                     points[0] += count;
                 } else if way < 0.0 {
-                    let nearer = if view.perspective { center.z / place.z } else { 1.0 };
+                    // Distance from the eye on the plane over that of the point.
+                    let nearer = if view.perspective { (1.0 + way).max(0.0) } else { 1.0 };
                     points[1] += count * (nearer * nearer);
                 }
             }
@@ -86,7 +89,7 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
 }
 
 /// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is, unless it is one of a surface; to
-/// a dot at least.
+/// a dot at least. Of an ellipse the circle within is asked, and the ellipse shrinks.
 #[inline(always)]
 pub(super) fn open<S: Simd>(
     simd: S,
@@ -96,21 +99,24 @@ pub(super) fn open<S: Simd>(
     gathered: &mut Gathered,
 ) {
     let dot = DOT_PX * view.pixel_size(surfel.center[2]);
-    if surfel.radius <= dot {
+    if !(surfel.radius > dot) {
         return;
     }
     let radius = SUPPORT * surfel.radius;
-    let thickness = (ON_DISC * radius).max(ON_DISC_NOISE * noise);
-    let disc = Disc { center: surfel.center.into(), axis: surfel.normal.into(), radius, thickness };
+    let half_thickness = (ON_DISC * radius).max(ON_DISC_NOISE * noise);
+    let disc = Disc { center: surfel.center.into(), axis: surfel.normal.into(), radius, half_thickness };
     let [on, behind] = seen(&disc, CELLS_TO_COUNT, cells, view).points;
     // Its own point is on it, and may have moved.
     let on = on.max(1.0);
     let share = on / (on + behind);
-    if share >= LEAST_ON {
+    if !(share < LEAST_ON) {
         return;
     }
     let len = gathered.read(simd, cells, surfel.center, GOES_ON * surfel.k_radius, view);
-    let is_surface = |plane: Plane| (plane.curvature() < FLAT_AROUND) & (plane.mean.length() < ALL_AROUND);
+    let is_surface = |plane: Plane| {
+        let [_, across, along] = plane.variances;
+        (plane.curvature() < FLAT_AROUND) & (across > WIDE_AROUND * along) & (plane.mean.length() < ALL_AROUND)
+    };
     if len < LEAST_CLUSTERS || !is_surface(gathered.plane(simd)) {
         surfel.radius = (surfel.radius * (share / LEAST_ON)).max(dot);
     }

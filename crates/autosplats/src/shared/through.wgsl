@@ -7,13 +7,13 @@
 struct Seen {
     // Cells that hold something on the disc, and others that hold something behind it.
     cells: vec2f,
-    // Points on it, and behind it: these count as many as there were if they lay no further from the eye than the disc's centre.
+    // Points on it, and behind it: each of these counts for as many as would fall there if it lay on the disc's plane.
     points: vec2f,
 }
 
-// What is seen on and through a ball's disc square to `axis`, in the ball's cells; what is no further from the plane than its
-// thickness is on it.
-fn seen(ball: Ball, axis: vec3f, thickness: f32) -> Seen {
+// What is seen on and through a ball's disc square to `axis`, in the ball's cells; what is no further from the plane, on either
+// side, is on it.
+fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
     let of_plane = dot(axis, ball.center);
     var sum = Seen(vec2f(0.0), vec2f(0.0));
     for (var row = ball.low.y; row <= ball.high.y; row++) {
@@ -31,8 +31,9 @@ fn seen(ball: Ball, axis: vec3f, thickness: f32) -> Seen {
                 let way = off / dot(axis, along);
                 let apart = cluster.xyz + along * way - ball.center;
                 if dot(apart, apart) < ball.radius * ball.radius {
-                    let nearer = select(1.0, ball.center.z / cluster.z, frame.perspective == 1u);
-                    let is_on = abs(off) <= thickness;
+                    // Distance from the eye on the plane over that of the point.
+                    let nearer = select(1.0, max(1.0 + way, 0.0), frame.perspective == 1u);
+                    let is_on = abs(off) <= half_thickness;
                     points.x += select(0.0, cluster.w, is_on);
                     points.y += select(0.0, cluster.w * (nearer * nearer), !is_on && way < 0.0);
                 }

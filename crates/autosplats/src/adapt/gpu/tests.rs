@@ -179,13 +179,13 @@ fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
     ]
 }
 
-/// They are few, so that they are compared by themselves.
+/// Of what shrinks there is little, so that it is compared by itself.
 #[test]
 fn the_device_shrinks_what_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let passes = AdaptPasses::new(&gpu).expect("passes");
-    let compare = |name: &str, case: &Case, is_stray: &dyn Fn(u32) -> bool, least: f64| {
-        let of = |surfels: Surfels| -> Surfels { surfels.into_iter().filter(|s| is_stray(s.source)).collect() };
+    let compare = |name: &str, case: &Case, is_asked: &dyn Fn(u32) -> bool, least: f64| {
+        let of = |surfels: Surfels| -> Surfels { surfels.into_iter().filter(|s| is_asked(s.source)).collect() };
         let [device, host, fitted] =
             [on_device(&gpu, &passes, case).surfels, case.adapted(), case.fitted.concat()].map(of);
         let shrunk = host.iter().zip(&fitted).filter(|(host, fitted)| host.radius < fitted.radius).count();
@@ -201,6 +201,9 @@ fn the_device_shrinks_what_the_host_does() {
         let (positions, sheet) = test_clouds::before_a_wall(0.07);
         let case = Case::new(&positions, projection, [400, 300]);
         compare("before a wall", &case, &|source| source < sheet, 0.6);
+        let case = Case::new(&noisy(positions, 0.01), projection, [400, 300]);
+        assert!(case.noise().level > 0.0, "{projection:?}: noise is told");
+        compare("before a noisy wall", &case, &|source| source < sheet, 0.5);
     }
     let (room, is_stray) = Case::stepped_with_strays();
     compare("in a room", &room, &is_stray, 0.2);

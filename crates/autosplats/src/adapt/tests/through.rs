@@ -42,17 +42,36 @@ fn a_flat_sheet_before_a_denser_wall_stays_closed() {
     }
 }
 
-/// On the screen the wall is sixteen times as dense.
+/// Of what is as flat, and no wider than its points are apart.
+#[test]
+fn strips_before_a_denser_wall_hide_their_share() {
+    let mut random = Random::new(25);
+    let mut strip =
+        |y: f32| -> Positions { (0..120).map(|_| [1.5 * random.signed(), y + 0.05 * random.signed(), 0.0]).collect() };
+    let mut positions: Positions = [-0.7, 0.0, 0.7].into_iter().flat_map(&mut strip).collect();
+    let strips = positions.len() as u32;
+    let (with_wall, wall) = test_clouds::before_a_wall(0.0);
+    positions.extend(&with_wall[wall as usize..]);
+    for projection in PROJECTIONS {
+        let case = Case::new(&positions, projection, [400, 300]);
+        let of_strips = kept(&case, |surfel| surfel.source < strips && surfel.k_radius > 0.1);
+        let shrunk = of_strips.iter().filter(|&&kept| kept < 0.9).count();
+        assert!(of_strips.len() > 50 && shrunk * 3 > of_strips.len() * 2, "{shrunk} of {} shrank", of_strips.len());
+    }
+}
+
+/// On the screen the wall is sixteen times as dense, and the sheet is crooked.
 #[test]
 fn what_is_close_to_the_eye_stays_closed() {
     let mut random = Random::new(24);
-    let mut square = |half: f32, z: f32| -> Positions {
+    let mut square = |half: f32, z: f32, waves: f32| -> Positions {
         let count = (1500.0 * 4.0 * half * half) as usize;
-        (0..count).map(|_| [half * random.signed(), half * random.signed(), z]).collect()
+        let at = |[x, y]: [f32; 2]| [x, y, z + waves * (24.0 * x).sin()];
+        (0..count).map(|_| at([half * random.signed(), half * random.signed()])).collect()
     };
-    let mut positions = square(0.4, -3.0);
+    let mut positions = square(0.4, -3.0, 0.018);
     let near = positions.len() as u32;
-    positions.extend(square(1.5, 0.0));
+    positions.extend(square(1.5, 0.0, 0.0));
     let camera = Camera { eye: DVec3::NEG_Z * 4.0, look_at: DVec3::ZERO, up: DVec3::Y, projection: PROJECTIONS[0] };
     let case = Case::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [400, 300]);
     let of_near = kept(&case, |surfel| surfel.source < near);
