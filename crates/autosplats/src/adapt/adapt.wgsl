@@ -1,5 +1,5 @@
-// Turns and moves each surfel that the noise tilts onto the sheets beside it, and those of rows onto areas: an invocation per
-// surfel. See the CPU form.
+// Turns and moves each surfel that the noise tilts onto the sheets beside it, and those of rows onto areas; shrinks those that are
+// no surface: an invocation per surfel. See the CPU form.
 //
 // Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
 
