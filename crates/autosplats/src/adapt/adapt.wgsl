@@ -1,5 +1,5 @@
-// Turns and moves each surfel that the noise tilts onto the sheets beside it, and those of rows onto areas; shrinks those that are
-// no surface: an invocation per surfel. See the CPU form.
+// Turns and moves each surfel that the noise tilts onto the sheets beside it, and shrinks those that are no surface: an invocation
+// per surfel. Those of rows are left to `turn_rows`. See the CPU form.
 //
 // Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
 
@@ -11,9 +11,9 @@
 #import choose
 #import depth_noise
 #import moved
-#import rows
 #import sheet
-#import through
+#import alone
+#import shrink
 
 @group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
@@ -33,25 +33,6 @@ override STRAY_OFFSET_KNOWN: f32;
 override GRAZING: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
-override SPARSE: f32;
-override LONE: f32;
-override AROUND_SPARSE: f32;
-override ASIDE: f32;
-override OFF_MIDDLE: f32;
-override CROWD: f32;
-override STRAY_DOT: f32;
-override STRAY_DROPPED: f32;
-override DOT_PX: f32;
-override LEAST_ON: f32;
-override ON_DISC: f32;
-override ON_DISC_NOISE: f32;
-override DENSER: f32;
-override GOES_ON: f32;
-override FLAT_AROUND: f32;
-override WIDE_AROUND: f32;
-override ALL_AROUND: f32;
-override CELLS_TO_COUNT: f32;
-override SUPPORT: f32;
 
 // The surface beside a surfel.
 struct Surface {
@@ -148,14 +129,9 @@ fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> 
     return otherwise;
 }
 
-// Radius of a surfel that is drawn as a dot.
-fn dot_radius(surfel: Surfel) -> f32 {
-    return min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
-}
-
-// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known. Where `noise` does not
+// A surfel turned and moved onto a surface, along the ray along which its noise was made if that is known. Where `noise` does not
 // explain how far it is from there, it becomes a dot.
-fn move_onto(place: u32, surfel: Surfel, surface: Surface, noise: f32, known: Known) {
+fn moved_onto(surfel: Surfel, surface: Surface, noise: f32, known: Known) -> Surfel {
     var offset = surface.offset;
     if known.noise > 0.0 {
         offset = offset_along(known, surface.normal, offset);
@@ -176,72 +152,7 @@ fn move_onto(place: u32, surfel: Surfel, surface: Surface, noise: f32, known: Kn
     if is_stray {
         out.radius = dot_radius(out);
     }
-    surfels[place] = out;
-}
-
-fn own_initial_radius(surfel: Surfel) -> f32 {
-    return initial_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
-}
-
-// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from all
-// others.
-fn shrink(place: u32, surfel: Surfel) {
-    let usual = measured[2];
-    // A handful of points has nothing that is usual.
-    if usual == 0.0 {
-        return;
-    }
-    let ratio = surfel.k_radius / usual;
-    var stray = surfel.curvature * ratio * ratio;
-    let is_sparse = ratio > SPARSE;
-    let local = surfel.k_radius / own_initial_radius(surfel);
-    if is_sparse || surfel.curvature * local * local > LONE {
-        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius, CELLS_PER_RADIUS));
-        if is_sparse && around.len >= LEAST_CLUSTERS {
-            stray = max(stray, curvature_of(around) * ratio * ratio);
-        } else if is_sparse && around.weight < f32(frame.k) {
-            stray = max(stray, STRAY_DOT);
-        }
-        let is_crowd = around.weight > CROWD * f32(frame.k);
-        let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
-        let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
-        let stands_alone = ((is_crowd || around.len < LEAST_CLUSTERS) && is_aside) || (is_crowd && is_outside);
-        if around.len >= LEAST_OF_PLANE && stands_alone {
-            stray = max(stray, STRAY_DOT);
-        }
-    }
-    if stray > STRAY_DROPPED && frame.keep_outliers == 0u {
-        surfels[place].radius = 0.0;
-        atomicAdd(&counters[OUTLIERS], 1u);
-    } else if stray >= STRAY_DOT {
-        surfels[place].radius = dot_radius(surfel);
-    }
-}
-
-// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is, unless it is one of a surface; to a
-// dot at least. Of an ellipse the circle within is asked, and the ellipse shrinks.
-fn open(place: u32, noise: f32) {
-    let surfel = surfels[place];
-    let least = dot_radius(surfel);
-    if !(surfel.radius > least) {
-        return;
-    }
-    let radius = SUPPORT * surfel.radius;
-    let disc = ball_around(surfel.center, radius, CELLS_TO_COUNT);
-    let points = seen(disc, surfel.normal, max(ON_DISC * radius, ON_DISC_NOISE * noise)).points;
-    // Its own point is on it, and may have moved.
-    let on = max(points.x, 1.0);
-    let share = on / (on + points.y);
-    if !(share < LEAST_ON) {
-        return;
-    }
-    let around = plane_of(ball_around(surfel.center, GOES_ON * surfel.k_radius, CELLS_PER_RADIUS));
-    let is_flat = curvature_of(around) < FLAT_AROUND;
-    let is_wide = around.variances.y > WIDE_AROUND * around.variances.z;
-    let is_all_around = length(around.mean) < ALL_AROUND;
-    if around.len < LEAST_CLUSTERS || !(is_flat && is_wide && is_all_around) {
-        surfels[place].radius = max(surfel.radius * (share / LEAST_ON), least);
-    }
+    return out;
 }
 
 @compute @workgroup_size(64)
@@ -254,26 +165,18 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         return;
     }
     let place = first_of_round + index;
-    let surfel = surfels[place];
+    var surfel = surfels[place];
     let known = known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source);
-    let noise = max(known.noise, noise_at(surfel.k_radius));
-    let is_sparser = surfel.k_radius > DENSER * own_initial_radius(surfel);
     if is_row(surfel, known.noise) {
-        let radius = base_radius(surfel, atomicLoad(&counters[CELL_PX]), atomicLoad(&counters[CELL_COLUMNS]));
-        let area = area(surfel, radius);
-        let out = turned(surfel, area);
-        surfels[place] = out;
-        if area.radius == 0.0 {
-            shrink(place, out);
-        }
-        if is_sparser {
-            open(place, 0.0);
-        }
         return;
     }
+    let noise = max(known.noise, noise_at(surfel.k_radius));
+    let cell_px = atomicLoad(&counters[CELL_PX]);
+    let cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+    // Before it moves, maybe to where nothing is.
+    let own_radius = initial_radius(surfel, cell_px, cell_columns);
     // A line has no width to draw.
-    let drawn_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MOST);
-    surfels[place].major_ratio = drawn_ratio;
+    surfel.major_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MOST);
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     let is_noisy = calls(surfel, noise, enough);
     var surface = Surface();
@@ -283,8 +186,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         let scatter = most_scatter(noise, known.noise > 0.0);
         surface = blend(surfel.center, first, noise, scatter);
         if surface.weight == 0.0 {
-            let cell_px = atomicLoad(&counters[CELL_PX]);
-            let radius = base_radius(surfel, cell_px, atomicLoad(&counters[CELL_COLUMNS]));
+            let radius = base_radius(surfel, cell_px, cell_columns);
             let quadric = choose(surfel.center, radius, first, noise, enough, scatter);
             if quadric.len > 0u {
                 surface = Surface(quadric.axis * quadric.height, 1.0, quadric.normal, quadric.curvature);
@@ -292,17 +194,19 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         }
     }
     if surface.weight > 0.0 {
-        var shrunk = surfel;
         if known.noise > 0.0 {
             // Between two surfaces the k-radius is the way to one of them.
-            let widest = WIDEST * own_initial_radius(surfel);
-            shrunk.radius *= min(widest / surfel.k_radius, 1.0);
+            surfel.radius *= min(WIDEST * own_radius / surfel.k_radius, 1.0);
         }
-        move_onto(place, shrunk, surface, noise, known);
+        surfel = moved_onto(surfel, surface, noise, known);
     } else if surfel.radius > 0.0 {
-        shrink(place, surfel);
+        surfel.radius = shrunk(surfel, own_radius);
+        if surfel.radius == 0.0 {
+            atomicAdd(&counters[OUTLIERS], 1u);
+        }
     }
-    if is_sparser {
-        open(place, select(0.0, noise, is_noisy));
+    if surfel.k_radius > DENSER * own_radius {
+        surfel.radius = opened(surfel, select(0.0, noise, is_noisy));
     }
+    surfels[place] = surfel;
 }

@@ -1,4 +1,5 @@
-// Lays out the levels of cells, whose sizes follow from the density of screen points, and says how many workgroups fill each.
+// Lays out the levels of cells, whose sizes follow from the density of screen points, and says how many workgroups fill each, and
+// after that how many fit sheets.
 //
 // Reads: counters. Writes: levels, arguments. One invocation.
 
@@ -13,6 +14,15 @@
 
 override MOST_LEVELS: u32;
 override MOST_FINEST: u32;
+// The finest level whose cells may have sheets, and cells of a workgroup that fits them.
+override FINE_SHEETS: u32;
+override FEW: u32;
+
+fn put(at: u32, groups: u32) {
+    arguments[3u * at] = min(groups, GROUPS_PER_ROW);
+    arguments[3u * at + 1u] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
+    arguments[3u * at + 2u] = 1u;
+}
 
 // Cells in a row and in a column of a picture.
 fn cells_across(side_px: u32) -> vec2u {
@@ -40,10 +50,10 @@ fn arrange() {
         let cells = select(0u, level.columns * level.rows, index <= doublings);
         level.side_px = select(0u, level.side_px, index <= doublings);
         levels[index] = level;
-        let groups = (cells + 63u) / 64u;
-        arguments[3u * index] = min(groups, GROUPS_PER_ROW);
-        arguments[3u * index + 1u] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
-        arguments[3u * index + 2u] = 1u;
+        put(index, (cells + 63u) / 64u);
+        if index == FINE_SHEETS {
+            put(MOST_LEVELS, (cells + FEW - 1u) / FEW);
+        }
         level.side_px *= 2u;
         level.columns = (level.columns + 1u) / 2u;
         level.rows = (level.rows + 1u) / 2u;

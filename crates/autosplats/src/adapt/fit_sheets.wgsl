@@ -1,5 +1,5 @@
-// Fits sheets to the clusters of each cell that surfels ask for, largest first, until each has one or is near one: an invocation
-// per cell. See the CPU form.
+// Fits sheets to the clusters of each cell that surfels ask for, largest first, until each has one or is near one: a workgroup for
+// a few cells, which takes up those that are asked for together. See the CPU form.
 //
 // Reads: levels, clusters, measured, asked, depth_noise. Reads and writes: sheets.
 
@@ -8,6 +8,7 @@
 #import calls
 #import choose
 #import depth_noise
+#import together
 #import sheet
 #import divide
 
@@ -21,6 +22,8 @@
 override PARTS: f32;
 override COVERED: f32;
 override COVERED_REACH: f32;
+// Cells of a workgroup.
+override FEW: u32;
 
 struct Asked {
     // Mean k-radius, pixels; 0 if none asks.
@@ -46,24 +49,41 @@ fn asked_around(level: Level, cell: u32) -> Asked {
     return Asked(select(0.0, f32(sum.y) / (f32(sum.x) * PARTS), sum.x > 0u), point);
 }
 
-@compute @workgroup_size(64)
+// Which of the workgroup's cells want sheets, as bits.
+var<workgroup> found_wanted: atomic<u32>;
+var<workgroup> shared_wanted: u32;
+
+@compute @workgroup_size(TOGETHER)
 fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    own_place = local;
     let level = levels[sheet_level()];
-    let cell = group_index(workgroup) * 64u + local;
-    if cell >= level.columns * level.rows || sheets[cell * SLABS].radius != UNKNOWN {
-        return;
+    let first = group_index(workgroup) * FEW;
+    if local == 0u {
+        atomicStore(&found_wanted, 0u);
     }
+    workgroupBarrier();
+    for (var index = local; index < FEW; index += TOGETHER) {
+        let cell = first + index;
+        if cell < level.columns * level.rows && sheets[cell * SLABS].radius == UNKNOWN && asked_around(level, cell).k_radius_px > 0.0 {
+            atomicOr(&found_wanted, 1u << index);
+        }
+    }
+    workgroupBarrier();
+    if local == 0u {
+        shared_wanted = atomicLoad(&found_wanted);
+    }
+    for (var wanted = workgroupUniformLoad(&shared_wanted); wanted != 0u; wanted &= wanted - 1u) {
+        fit_cell(level, first + firstTrailingBit(wanted));
+    }
+}
+
+// All invocations do so together.
+fn fit_cell(level: Level, cell: u32) {
     let around = asked_around(level, cell);
-    if around.k_radius_px == 0.0 {
-        return;
-    }
     let first = (level.first + cell) * SLABS;
     var left: array<f32, SLABS>;
     for (var index = 0u; index < SLABS; index++) {
         left[index] = clusters[first + index].w;
-        if left[index] == 0.0 {
-            break;
-        }
     }
     var len = 0u;
     loop {
@@ -107,10 +127,12 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
                 left[index] = select(left[index], 0.0, is_covered);
             }
         }
-        sheets[cell * SLABS + len] = sheet;
+        if own_place == 0u {
+            sheets[cell * SLABS + len] = sheet;
+        }
         len++;
     }
-    if len == 0u {
+    if len == 0u && own_place == 0u {
         sheets[cell * SLABS].radius = NONE;
     }
 }

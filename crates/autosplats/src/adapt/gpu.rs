@@ -25,11 +25,11 @@ use super::{LEAST_REACH, SCALES, STEP, noise};
 use crate::Error;
 use crate::fit::{LONGEST, SUPPORT, SWEEPS};
 use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
-use crate::project::gpu::{Round, ScreenBuffers};
+use crate::project::gpu::{Round, ScreenBuffers, few};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] =
-    &[ARRANGE, FILL, MERGE, FORGET, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ASK, FIT_SHEETS, ADAPT];
+    &[ARRANGE, FILL, MERGE, FORGET, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ASK, FIT_SHEETS, ADAPT, TURN_ROWS];
 const ARRANGE: PassSource = PassSource::new("adapt/arrange", include_str!("arrange.wgsl"));
 const FILL: PassSource = PassSource::new("adapt/fill", include_str!("fill.wgsl"));
 const MERGE: PassSource = PassSource::new("adapt/merge", include_str!("merge.wgsl"));
@@ -41,9 +41,13 @@ const FORGET: PassSource = PassSource::new("adapt/forget", include_str!("forget.
 const ASK: PassSource = PassSource::new("adapt/ask", include_str!("ask.wgsl"));
 const FIT_SHEETS: PassSource = PassSource::new("adapt/fit_sheets", include_str!("fit_sheets.wgsl"));
 const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgsl"));
+const TURN_ROWS: PassSource = PassSource::new("adapt/turn_rows", include_str!("turn_rows.wgsl"));
 
 /// Invocations in a workgroup of the passes.
 const GROUP: usize = 64;
+/// Invocations that sum up a ball together, on hardware and on a device that is a program on the processor: that runs eight side by
+/// side, and barriers between more cost it as much as all else.
+const TOGETHER: [u32; 2] = [32, 8];
 /// Quantiles: of scatters at each scale, of the densest third of the sample, of the sparsest, of all, and of all by steady shares.
 const QUANTILES_TAKEN: usize = 4 * SCALES;
 /// What is measured of noise: `noise.wgsl`.
@@ -62,7 +66,7 @@ type Sheet = [f32; 16];
 #[derive(Debug)]
 pub(crate) struct AdaptBuffers {
     levels: wgpu::Buffer,
-    /// Workgroups that fill each level, three `u32`.
+    /// Workgroups that fill each level, three `u32`, and those that fit sheets.
     arguments: wgpu::Buffer,
     clusters: wgpu::Buffer,
     /// Number of surfels that ask for the sheets of a cell, the sum of their k-radii and the first of their points.
@@ -90,7 +94,7 @@ impl AdaptBuffers {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
                 "arguments of levels",
-                MOST_LEVELS as u64 * WORK_BYTES,
+                (MOST_LEVELS as u64 + 1) * WORK_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size))?,
@@ -177,6 +181,7 @@ pub(crate) struct AdaptPasses {
     /// Of both rounds.
     ask: [Pass; 2],
     adapt: [Pass; 2],
+    turn_rows: [Pass; 2],
 }
 
 impl AdaptPasses {
@@ -185,6 +190,12 @@ impl AdaptPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
+        Self::with_form(gpu, TOGETHER[usize::from(gpu.is_software())])
+    }
+
+    fn with_form(gpu: &Gpu, together: u32) -> Result<Self, Error> {
+        let together = ("TOGETHER", together.into());
+        let few = ("FEW", few(gpu).into());
         let quadric = [
             ("SWEEPS", SWEEPS as f64),
             ("MOST_LEVELS", MOST_LEVELS as f64),
@@ -194,9 +205,9 @@ impl AdaptPasses {
             ("FULL", FULL.into()),
             ("RIDGE", RIDGE.into()),
             ("LEAST_PIVOT", LEAST_PIVOT.into()),
+            ("STEP", STEP.into()),
         ];
         let least_reach = ("LEAST_REACH", LEAST_REACH.into());
-        let step = ("STEP", STEP.into());
         let calls = [
             ("ENOUGH", ENOUGH.into()),
             ("TINY_PX", TINY_PX.into()),
@@ -208,7 +219,6 @@ impl AdaptPasses {
             ("SCATTER_KNOWN", SCATTER_KNOWN.into()),
         ];
         let choose = [
-            step,
             ("RELIABLE", RELIABLE.into()),
             ("LEAST_TRACE", LEAST_TRACE.into()),
             ("THICKEST", THICKEST.into()),
@@ -241,45 +251,53 @@ impl AdaptPasses {
         };
         let sample = ("SAMPLE", SAMPLE as f64);
         let scales = ("SCALES", SCALES as f64);
+        let shrink = [
+            ("SPARSE", SPARSE.into()),
+            ("LONE", LONE.into()),
+            ("AROUND_SPARSE", AROUND_SPARSE.into()),
+            ("ASIDE", ASIDE.into()),
+            ("OFF_MIDDLE", OFF_MIDDLE.into()),
+            ("CROWD", CROWD.into()),
+            ("STRAY_DOT", STRAY_DOT.into()),
+            ("STRAY_DROPPED", STRAY_DROPPED.into()),
+            ("DOT_PX", DOT_PX.into()),
+            ("LEAST_ON", LEAST_ON.into()),
+            ("ON_DISC", ON_DISC.into()),
+            ("ON_DISC_NOISE", ON_DISC_NOISE.into()),
+            ("DENSER", DENSER.into()),
+            ("GOES_ON", GOES_ON.into()),
+            ("FLAT_AROUND", FLAT_AROUND.into()),
+            ("WIDE_AROUND", WIDE_AROUND.into()),
+            ("ALL_AROUND", ALL_AROUND.into()),
+            ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
+            ("SUPPORT", SUPPORT.into()),
+            least_reach,
+        ];
         let adapt = |round: Round| {
             let own = [
                 ("ROUND", f64::from(round as u32)),
-                least_reach,
                 ("THICKEST_FIRST", THICKEST_FIRST.into()),
                 ("WIDEST", WIDEST.into()),
                 ("STRAY_OFFSET", STRAY_OFFSET.into()),
                 ("STRAY_OFFSET_KNOWN", STRAY_OFFSET_KNOWN.into()),
-                ("SPARSE", SPARSE.into()),
-                ("LONE", LONE.into()),
-                ("AROUND_SPARSE", AROUND_SPARSE.into()),
-                ("ASIDE", ASIDE.into()),
-                ("OFF_MIDDLE", OFF_MIDDLE.into()),
-                ("CROWD", CROWD.into()),
-                ("STRAY_DOT", STRAY_DOT.into()),
-                ("STRAY_DROPPED", STRAY_DROPPED.into()),
-                ("DOT_PX", DOT_PX.into()),
-                ("LEAST_ON", LEAST_ON.into()),
-                ("ON_DISC", ON_DISC.into()),
-                ("ON_DISC_NOISE", ON_DISC_NOISE.into()),
-                ("DENSER", DENSER.into()),
-                ("GOES_ON", GOES_ON.into()),
-                ("FLAT_AROUND", FLAT_AROUND.into()),
-                ("WIDE_AROUND", WIDE_AROUND.into()),
-                ("ALL_AROUND", ALL_AROUND.into()),
-                ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
-                ("SUPPORT", SUPPORT.into()),
                 ("GRAZING", GRAZING.into()),
                 ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
                 ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
             ];
-            Pass::new(gpu, &ADAPT, &[&quadric[..], &calls, &choose, &rows, &own].concat())
+            Pass::new(gpu, &ADAPT, &[&quadric[..], &calls, &choose, &shrink, &own].concat())
+        };
+        let turn_rows = |round: Round| {
+            let own = [("ROUND", f64::from(round as u32)), together, few];
+            Pass::new(gpu, &TURN_ROWS, &[&quadric[..], &calls, &shrink, &rows, &own].concat())
         };
         let which = |level: usize| {
             let told = gpu.uniform::<u32>("level")?;
             gpu.queue.write_buffer(&told, 0, bytemuck::bytes_of(&(level as u32)));
             Ok::<_, Error>(told)
         };
-        let sheets = [parts, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
+        let fine_sheets = ("FINE_SHEETS", SHEET_LEVELS[0] as f64);
+
+        let sheets = [together, parts, few, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
         let quantile = [
             scales,
             sample,
@@ -301,7 +319,7 @@ impl AdaptPasses {
             arrange: Pass::new(
                 gpu,
                 &ARRANGE,
-                &[("MOST_LEVELS", MOST_LEVELS as f64), ("MOST_FINEST", MOST_FINEST as f64)],
+                &[("MOST_LEVELS", MOST_LEVELS as f64), ("MOST_FINEST", MOST_FINEST as f64), fine_sheets, few],
             )?,
             fill: Pass::new(gpu, &FILL, &[])?,
             merge: Pass::new(gpu, &MERGE, &[])?,
@@ -310,7 +328,7 @@ impl AdaptPasses {
             scatter: Pass::new(
                 gpu,
                 &SCATTERS,
-                &[&quadric[..], &[sample, step, least_reach, ("THIN", THIN.into()), ("ROUNDING", ROUNDING.into())]]
+                &[&quadric[..], &[together, sample, least_reach, ("THIN", THIN.into()), ("ROUNDING", ROUNDING.into())]]
                     .concat(),
             )?,
             quantile: Pass::new(gpu, &QUANTILES, &quantile)?,
@@ -334,10 +352,11 @@ impl AdaptPasses {
                     ("STEADY_SCALES", STEADY_SCALES as f64),
                 ],
             )?,
-            forget: Pass::new(gpu, &FORGET, &[("FINE_SHEETS", SHEET_LEVELS[0] as f64)])?,
+            forget: Pass::new(gpu, &FORGET, &[fine_sheets])?,
             fit_sheets: Pass::new(gpu, &FIT_SHEETS, &[&quadric[..], &calls, &choose, &sheets].concat())?,
             ask: [ask(Round::Active)?, ask(Round::Recovered)?],
             adapt: [adapt(Round::Active)?, adapt(Round::Recovered)?],
+            turn_rows: [turn_rows(Round::Active)?, turn_rows(Round::Recovered)?],
         })
     }
 
@@ -380,19 +399,21 @@ impl AdaptPasses {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
             steps.extend([
                 self.sample.step(gpu, &[frame, counters, surfels, sampled], SAMPLE.div_ceil(GROUP) as u32),
-                self.scatter.step(gpu, &balls, (SCALES * SAMPLE).div_ceil(GROUP) as u32),
+                self.scatter.step(gpu, &balls, (SCALES * SAMPLE) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);
         }
-        let groups = || screen.groups(round.work_64());
         let ask = [frame, counters, levels, measured, surfels, depth_noise, asked];
         let fit = [frame, levels, clusters, measured, asked, depth_noise, sheets];
         let adapt = [frame, counters, density, levels, clusters, measured, sheets, depth_noise, surfels];
+        let turn_rows = [frame, counters, density, levels, clusters, measured, depth_noise, surfels];
+        let round_at = round as usize;
         steps.extend([
-            self.ask[round as usize].step(gpu, &ask, groups()),
-            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), SHEET_LEVELS[0] as u64 * WORK_BYTES)),
-            self.adapt[round as usize].step(gpu, &adapt, groups()),
+            self.ask[round_at].step(gpu, &ask, screen.groups(round.work_64())),
+            self.fit_sheets.step(gpu, &fit, Groups::Counted(arguments.clone(), MOST_LEVELS as u64 * WORK_BYTES)),
+            self.adapt[round_at].step(gpu, &adapt, screen.groups(round.work_64())),
+            self.turn_rows[round_at].step(gpu, &turn_rows, screen.groups(round.work_few())),
         ]);
         steps
     }

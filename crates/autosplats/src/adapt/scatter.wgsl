@@ -1,4 +1,4 @@
-// How far points scatter about the quadrics of the balls around each surfel of the sample: an invocation per ball.
+// How far points scatter about the quadrics of the balls around each surfel of the sample: a workgroup per ball.
 //
 // Reads: counters, density, surfels, levels, clusters, sampled. Writes: scatters, ball size by ball size.
 
@@ -7,6 +7,7 @@
 #import counters
 #import base_radius
 #import quadric
+#import together
 #import scatters
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
@@ -18,13 +19,13 @@
 @group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
 
 override SAMPLE: u32;
-override STEP: f32;
 override THIN: f32;
 override ROUNDING: f32;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(TOGETHER)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let index = group_index(workgroup) * 64u + local;
+    own_place = local;
+    let index = group_index(workgroup);
     let scale = index / SAMPLE;
     let rank = index % SAMPLE;
     if scale >= SCALES || rank >= sampled[SAMPLE] {
@@ -43,5 +44,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
         let distance = select(scatter, 0.0, scatter < ROUNDING * radius);
         found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN * radius);
     }
-    scatters[index] = found;
+    if local == 0u {
+        scatters[index] = found;
+    }
 }

@@ -38,6 +38,8 @@ pub(crate) enum Work {
     LargeSplats,
     LeftActive64,
     LeftRecovered64,
+    ActiveFew,
+    RecoveredFew,
 }
 
 /// Which queries the search, the fit and the splatting take up.
@@ -50,6 +52,11 @@ pub(crate) enum Round {
 }
 
 impl Round {
+    /// In workgroups that take up [`few`] of them together.
+    pub(crate) fn work_few(self) -> Work {
+        [Work::ActiveFew, Work::RecoveredFew][self as usize]
+    }
+
     /// In workgroups of 64 invocations.
     pub(crate) fn work_64(self) -> Work {
         [Work::Active64, Work::Recovered64][self as usize]
@@ -66,10 +73,16 @@ impl Round {
     }
 }
 
+/// Things that a workgroup takes up together, one after the other: the fewer, the more evenly a device is at work; but where it is
+/// a program on the processor each workgroup costs more than most things. Up to 32.
+pub(crate) fn few(gpu: &Gpu) -> u32 {
+    if gpu.is_software() { 16 } else { 4 }
+}
+
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
 /// How many of them there are.
-const WORKS: u64 = Work::LeftRecovered64 as u64 + 1;
+const WORKS: u64 = Work::RecoveredFew as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
@@ -200,7 +213,7 @@ impl WorkPass {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Pass::new(gpu, &WORK, &[]).map(Self)
+        Pass::new(gpu, &WORK, &[("FEW", few(gpu).into())]).map(Self)
     }
 
     /// To be run after counters have changed.

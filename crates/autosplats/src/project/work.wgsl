@@ -21,6 +21,10 @@ const QUERIES256 = 7u;
 const LARGE_SPLATS = 8u;
 const LEFT_ACTIVE64 = 9u;
 const LEFT_RECOVERED64 = 10u;
+const ACTIVE_FEW = 11u;
+const RECOVERED_FEW = 12u;
+
+override FEW: u32;
 
 fn put(kind: u32, items: u32, per_group: u32) {
     let groups = (items + per_group - 1u) / per_group;
@@ -41,5 +45,7 @@ fn work() {
     put(LARGE_SPLATS, counters[LARGE], 1u);
     put(LEFT_ACTIVE64, counters[LEFT_ACTIVE], 64u);
     put(LEFT_RECOVERED64, counters[LEFT_RECOVERED], 64u);
+    put(ACTIVE_FEW, counters[ACTIVE], FEW);
+    put(RECOVERED_FEW, counters[RECOVERED], FEW);
     put(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
 }

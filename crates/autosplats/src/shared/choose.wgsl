@@ -3,7 +3,6 @@
 
 #import quadric
 
-override STEP: f32;
 override RELIABLE: f32;
 override LEAST_TRACE: f32;
 override THICKEST: f32;

@@ -74,9 +74,8 @@ fn finish(cell: u32) {
     for (var index = 0u; index < used; index++) {
         clusters[cell * SLABS + index] = vec4f(sums[index].xyz / sums[index].w, sums[index].w);
     }
-    // Those after the last one are not read.
-    if used < SLABS {
-        clusters[cell * SLABS + used] = vec4f(0.0);
+    for (var index = used; index < SLABS; index++) {
+        clusters[cell * SLABS + index] = vec4f(0.0);
     }
 }
 

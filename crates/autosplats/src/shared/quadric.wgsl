@@ -1,12 +1,16 @@
 // A height field with six coefficients over a ball's points: see the CPU form. Imports: frame, levels, eigen,
-// orthonormal. The including pass binds `levels` and `clusters`.
+// orthonormal. The including pass binds `levels` and `clusters`, and imports `alone` or `together`, which say who sums up a ball.
+//
+// A ball has hundreds of cells, and a device waits longer for one than it takes to add it: four are read at a time, so that
+// their loads are on their way together.
 
 #import levels
 #import eigen
 #import orthonormal
 
-// Balls tried around each point.
+// Balls tried around each point, and how much wider each is than the one before.
 const SCALES = 6u;
+override STEP: f32;
 
 override MOST_LEVELS: u32;
 override CELLS_PER_RADIUS: f32;
@@ -79,12 +83,18 @@ fn ball_around(center: vec3f, radius: f32, cells_per_radius: f32) -> Ball {
     return Ball(center, radius, level, low, high);
 }
 
-// Position of a cluster from the ball's centre in radii, and its weight; 0 if it is not within.
+// Position of a cluster from the ball's centre in radii, and its weight; all 0 if it is not within.
 fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
     let offset = (cluster.xyz - ball.center) * per_radius;
     let rest = 1.0 - (offset.x * offset.x + offset.y * offset.y + offset.z * offset.z);
     let weight = min(rest * (1.0 / (1.0 - FULL)), 1.0) * cluster.w;
-    return vec4f(offset, select(0.0, weight, rest > 0.0));
+    return select(vec4f(0.0), vec4f(offset, weight), rest > 0.0);
+}
+
+// A cluster of a cell, of no points if that is after the last one.
+fn cluster_up_to(cell: u32, last: u32, slab: u32) -> vec4f {
+    let cluster = clusters[min(cell, last) * SLABS + slab];
+    return select(vec4f(0.0), cluster, cell <= last);
 }
 
 // Surface variation.
@@ -98,39 +108,61 @@ fn plane_of(ball: Ball) -> Plane {
     return plane_beside(ball, vec3f(0.0), 0.0);
 }
 
+// Sums over clusters.
+struct PlaneSums {
+    // Weights times positions, and weights.
+    first: vec4f,
+    // Of squares xx, yy, zz, and of products yz, xz, xy.
+    squares: vec3f,
+    products: vec3f,
+    // Clusters.
+    len: f32,
+}
+
+fn add_to_plane(sums: ptr<function, PlaneSums>, p: vec4f, side: vec3f, limit: f32) {
+    let counts = p.w > 0.0 && dot(side, p.xyz) >= limit;
+    let weight = select(0.0, p.w, counts);
+    let wp = weight * p.xyz;
+    (*sums).first += vec4f(wp, weight);
+    (*sums).squares += wp * p.xyz;
+    (*sums).products += wp.yxx * p.zzy;
+    (*sums).len += select(0.0, 1.0, counts);
+}
+
 // The plane through the clusters of a ball that are at least `limit` radii from the centre towards `side`.
 fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
     let per_radius = 1.0 / ball.radius;
-    // Sums of weights and positions; of squares xx, yy, zz, and of products yz, xz, xy.
-    var first = vec4f(0.0);
-    var squares = vec3f(0.0);
-    var products = vec3f(0.0);
-    var len = 0u;
-    for (var row = ball.low.y; row <= ball.high.y; row++) {
+    var own = PlaneSums();
+    let start = own_start();
+    let step = own_step();
+    for (var row = ball.low.y + start.y; row <= ball.high.y; row += step.y) {
         let cells = ball.level.first + row * ball.level.columns;
-        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
+        let last = cells + ball.high.x;
+        for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             for (var slab = 0u; slab < SLABS; slab++) {
-                let cluster = clusters[cell * SLABS + slab];
-                if cluster.w == 0.0 {
+                let a = clusters[cell * SLABS + slab];
+                let b = cluster_up_to(cell + 1u, last, slab);
+                let c = cluster_up_to(cell + 2u, last, slab);
+                let d = cluster_up_to(cell + 3u, last, slab);
+                if a.w + b.w + c.w + d.w == 0.0 {
                     break;
                 }
-                let p = weighed(ball, per_radius, cluster);
-                if p.w > 0.0 && dot(side, p.xyz) >= limit {
-                    let wp = p.w * p.xyz;
-                    first += vec4f(wp, p.w);
-                    squares += wp * p.xyz;
-                    products += wp.yxx * p.zzy;
-                    len++;
-                }
+                add_to_plane(&own, weighed(ball, per_radius, a), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, b), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, c), side, limit);
+                add_to_plane(&own, weighed(ball, per_radius, d), side, limit);
             }
         }
     }
+    let sums = all_of_plane(own);
+    let first = sums.first;
+    let len = u32(sums.len);
     if len < LEAST_OF_PLANE {
         return Plane(vec3f(0.0, 0.0, 1.0), vec3f(0.0), vec3f(0.0), first.w, len);
     }
     let share = 1.0 / first.w;
     let mean = first.xyz * share;
-    let found = eigen(squares * share - mean * mean, products * share - mean.yxx * mean.zzy);
+    let found = eigen(sums.squares * share - mean * mean, sums.products * share - mean.yxx * mean.zzy);
     let variances = vec3f(max(found.values.x, 0.0), found.values.yz);
     return Plane(found.least, mean, variances, first.w, len);
 }
@@ -145,48 +177,77 @@ fn without(row: Row, pivot: Row, factor: f32) -> Row {
     return Row(row.left - factor * pivot.left, row.right - factor * pivot.right);
 }
 
+// Sums over clusters of weight times the following, in radii, with x and y across the axis and h along it.
+struct QuadricSums {
+    // 1, x, y.
+    first: vec3f,
+    // xx, xy, yy.
+    second: vec3f,
+    // xxx, xxy, xyy, yyy.
+    third: vec4f,
+    // xxxx, xxxy, xxyy, xyyy; and yyyy.
+    fourth: vec4f,
+    last: f32,
+    // h, hx, hy, hh.
+    heights: vec4f,
+    // hxx, hxy, hyy.
+    curved: vec3f,
+    // Clusters.
+    len: f32,
+}
+
+fn add_to_quadric(sums: ptr<function, QuadricSums>, p: vec4f, u: vec3f, v: vec3f, axis: vec3f) {
+    let x = dot(u, p.xyz);
+    let y = dot(v, p.xyz);
+    let h = dot(axis, p.xyz);
+    let squares = vec3f(x * x, x * y, y * y);
+    let of_first = p.w * vec3f(1.0, x, y);
+    let of_second = p.w * squares;
+    (*sums).first += of_first;
+    (*sums).second += of_second;
+    (*sums).third += of_second.xxyz * vec4f(x, y, y, y);
+    (*sums).fourth += of_second.xxxy * squares.xyzz;
+    (*sums).last += of_second.z * squares.z;
+    (*sums).heights += p.w * h * vec4f(1.0, x, y, h);
+    (*sums).curved += of_second * h;
+    (*sums).len += select(0.0, 1.0, p.w > 0.0);
+}
+
 // Fits heights along `axis` to the clusters of a ball.
 fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     let u = any_orthonormal(axis);
     let v = cross(axis, u);
     let per_radius = 1.0 / ball.radius;
-    // Sums of weight times: 1, x, y; xx, xy, yy; xxx, xxy, xyy, yyy; xxxx, xxxy, xxyy, xyyy; yyyy; h, hx, hy, hh; hxx, hxy, hyy.
-    var first = vec3f(0.0);
-    var second = vec3f(0.0);
-    var third = vec4f(0.0);
-    var fourth = vec4f(0.0);
-    var last = 0.0;
-    var heights = vec4f(0.0);
-    var curved = vec3f(0.0);
-    var len = 0u;
-    for (var row = ball.low.y; row <= ball.high.y; row++) {
+    var own = QuadricSums();
+    let start = own_start();
+    let step = own_step();
+    for (var row = ball.low.y + start.y; row <= ball.high.y; row += step.y) {
         let cells = ball.level.first + row * ball.level.columns;
-        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
+        let last = cells + ball.high.x;
+        for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             for (var slab = 0u; slab < SLABS; slab++) {
-                let cluster = clusters[cell * SLABS + slab];
-                if cluster.w == 0.0 {
+                let a = clusters[cell * SLABS + slab];
+                let b = cluster_up_to(cell + 1u, last, slab);
+                let c = cluster_up_to(cell + 2u, last, slab);
+                let d = cluster_up_to(cell + 3u, last, slab);
+                if a.w + b.w + c.w + d.w == 0.0 {
                     break;
                 }
-                let p = weighed(ball, per_radius, cluster);
-                if p.w > 0.0 {
-                    let x = dot(u, p.xyz);
-                    let y = dot(v, p.xyz);
-                    let h = dot(axis, p.xyz);
-                    let squares = vec3f(x * x, x * y, y * y);
-                    let of_first = p.w * vec3f(1.0, x, y);
-                    let of_second = p.w * squares;
-                    first += of_first;
-                    second += of_second;
-                    third += of_second.xxyz * vec4f(x, y, y, y);
-                    fourth += of_second.xxxy * squares.xyzz;
-                    last += of_second.z * squares.z;
-                    heights += p.w * h * vec4f(1.0, x, y, h);
-                    curved += of_second * h;
-                    len++;
-                }
+                add_to_quadric(&own, weighed(ball, per_radius, a), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, b), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, c), u, v, axis);
+                add_to_quadric(&own, weighed(ball, per_radius, d), u, v, axis);
             }
         }
     }
+    let sums = all_of_quadric(own);
+    let first = sums.first;
+    let second = sums.second;
+    let third = sums.third;
+    let fourth = sums.fourth;
+    let heights = sums.heights;
+    let curved = sums.curved;
+    let len = u32(sums.len);
     if len < LEAST_CLUSTERS {
         return Quadric(axis, 0.0, axis, 0.0, 0.0, 0.0, len, ball.radius, vec2f(0.0), vec3f(0.0));
     }
@@ -196,7 +257,7 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     // Slopes last, so that what is left of their rows when the others are eliminated is their own.
     let r0 = Row(vec4f(fourth.x + ridge, fourth.y, fourth.z, second.x), vec3f(third.x, third.y, curved.x));
     var r1 = Row(vec4f(fourth.y, fourth.z + ridge, fourth.w, second.y), vec3f(third.y, third.z, curved.y));
-    var r2 = Row(vec4f(fourth.z, fourth.w, last + ridge, second.z), vec3f(third.z, third.w, curved.z));
+    var r2 = Row(vec4f(fourth.z, fourth.w, sums.last + ridge, second.z), vec3f(third.z, third.w, curved.z));
     var r3 = Row(vec4f(second, w), vec3f(first.yz, heights.x));
     var r4 = Row(vec4f(third.xyz, first.y), vec3f(second.xy, heights.y));
     var r5 = Row(vec4f(third.yzw, first.z), vec3f(second.yz, heights.z));

@@ -14,33 +14,55 @@ struct Seen {
 // What is seen on and through a ball's disc square to `axis`, in the ball's cells; what is no further from the plane, on either
 // side, is on it.
 fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
-    let of_plane = dot(axis, ball.center);
-    var sum = Seen(vec2f(0.0), vec2f(0.0));
-    for (var row = ball.low.y; row <= ball.high.y; row++) {
+    let start = own_start();
+    let step = own_step();
+    // Cells and points.
+    var own = vec4f(0.0);
+    for (var row = ball.low.y + start.y; row <= ball.high.y; row += step.y) {
         let cells = ball.level.first + row * ball.level.columns;
-        for (var cell = cells + ball.low.x; cell <= cells + ball.high.x; cell++) {
-            var points = vec2f(0.0);
+        let last = cells + ball.high.x;
+        for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
+            var points = array<vec2f, 4>();
             for (var slab = 0u; slab < SLABS; slab++) {
-                let cluster = clusters[cell * SLABS + slab];
-                if cluster.w == 0.0 {
+                let a = clusters[cell * SLABS + slab];
+                let b = cluster_up_to(cell + 1u, last, slab);
+                let c = cluster_up_to(cell + 2u, last, slab);
+                let d = cluster_up_to(cell + 3u, last, slab);
+                if a.w + b.w + c.w + d.w == 0.0 {
                     break;
                 }
-                let off = of_plane - dot(axis, cluster.xyz);
-                // Where the line of sight meets the plane.
-                let along = select(vec3f(0.0, 0.0, 1.0), cluster.xyz, frame.perspective == 1u);
-                let way = off / dot(axis, along);
-                let apart = cluster.xyz + along * way - ball.center;
-                if dot(apart, apart) < ball.radius * ball.radius {
-                    // Distance from the eye on the plane over that of the point.
-                    let nearer = select(1.0, max(1.0 + way, 0.0), frame.perspective == 1u);
-                    let is_on = abs(off) <= half_thickness;
-                    points.x += select(0.0, cluster.w, is_on);
-                    points.y += select(0.0, cluster.w * (nearer * nearer), !is_on && way < 0.0);
-                }
+                points[0] += seen_of(ball, axis, half_thickness, a);
+                points[1] += seen_of(ball, axis, half_thickness, b);
+                points[2] += seen_of(ball, axis, half_thickness, c);
+                points[3] += seen_of(ball, axis, half_thickness, d);
             }
-            sum.cells += select(vec2f(0.0, select(0.0, 1.0, points.y > 0.0)), vec2f(1.0, 0.0), points.x > 0.0);
-            sum.points += points;
+            own += with_cell(points[0]) + with_cell(points[1]) + with_cell(points[2]) + with_cell(points[3]);
         }
     }
-    return sum;
+    let all = all_of_seen(own);
+    return Seen(all.xy, all.zw);
+}
+
+// Points of a cluster on the disc, and behind it.
+fn seen_of(ball: Ball, axis: vec3f, half_thickness: f32, cluster: vec4f) -> vec2f {
+    let off = dot(axis, ball.center) - dot(axis, cluster.xyz);
+    // Where the line of sight meets the plane.
+    let along = select(vec3f(0.0, 0.0, 1.0), cluster.xyz, frame.perspective == 1u);
+    let way = off / dot(axis, along);
+    let apart = cluster.xyz + along * way - ball.center;
+    let is_within = cluster.w > 0.0 && dot(apart, apart) < ball.radius * ball.radius;
+    // Distance from the eye on the plane over that of the point.
+    let nearer = select(1.0, max(1.0 + way, 0.0), frame.perspective == 1u);
+    let is_on = abs(off) <= half_thickness;
+    let is_behind = is_within && !is_on && way < 0.0;
+    return vec2f(
+        select(0.0, cluster.w, is_within && is_on),
+        select(0.0, cluster.w * (nearer * nearer), is_behind),
+    );
+}
+
+// A cell's points, and before them whether it holds any on the disc, else any behind it.
+fn with_cell(points: vec2f) -> vec4f {
+    let is_on = points.x > 0.0;
+    return vec4f(select(0.0, 1.0, is_on), select(0.0, 1.0, !is_on && points.y > 0.0), points);
 }

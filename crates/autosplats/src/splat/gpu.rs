@@ -65,8 +65,9 @@ const ADD_CENTERS: PassSource = PassSource::new("splat/add_centers", include_str
 const SUM_BLOCKS: PassSource = PassSource::new("splat/sum_blocks", include_str!("sum_blocks.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
-/// Pixels of the bounds of a splat that one invocation draws into the depth map.
-const MOST_PX: u32 = 1024;
+/// Pixels of the bounds of a splat that one invocation draws into the depth map, on hardware, where all others of its kind wait for it,
+/// and on a device that is a program on the processor, where a workgroup costs more.
+const MOST_PX: [u32; 2] = [128, 1024];
 /// Columns and rows of a patch, and splats drawn into it at a time.
 const PATCH: [u32; 2] = [16, 32];
 const BATCH: u32 = 64;
@@ -169,11 +170,12 @@ impl SplatPasses {
     /// [`Error::Device`], [`Error::DeviceMemory`].
     pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
         let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
+        let most_px = ("MOST_PX", MOST_PX[usize::from(gpu.is_software())].into());
         let dot_radius = ("DOT_RADIUS_PX", f64::from(DOT_RADIUS_PX));
         let set_up = |recovered: f64| {
             let constants = [
                 ("RECOVERED_ONLY", recovered),
-                ("MOST_PX", MOST_PX.into()),
+                most_px,
                 dot_radius,
                 ("SUPPORT", SUPPORT.into()),
                 ("GRAZING", GRAZING.into()),
@@ -182,9 +184,7 @@ impl SplatPasses {
             ];
             Pass::new(gpu, &SET_UP, &constants)
         };
-        let depth = |recovered: f64| {
-            Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), dot_radius, ("MOST_PX", MOST_PX.into())])
-        };
+        let depth = |recovered: f64| Pass::new(gpu, &DEPTH, &[("RECOVERED_ONLY", recovered), dot_radius, most_px]);
         let depth_large = |recovered: f64, redrawn: f64| {
             let constants = [("RECOVERED_ONLY", recovered), ("REDRAWN_ONLY", redrawn), dot_radius];
             Pass::new(gpu, &DEPTH_LARGE, &constants)
@@ -259,9 +259,9 @@ impl SplatPasses {
             work: WorkPass::new(gpu)?,
             clear_words: pass(&CLEAR_WORDS)?,
             refine: pass(&REFINE)?,
-            erase: Pass::new(gpu, &ERASE, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
+            erase: Pass::new(gpu, &ERASE, &[dot_radius, most_px])?,
             erase_large: Pass::new(gpu, &ERASE_LARGE, &[dot_radius])?,
-            redraw: Pass::new(gpu, &REDRAW, &[dot_radius, ("MOST_PX", MOST_PX.into())])?,
+            redraw: Pass::new(gpu, &REDRAW, &[dot_radius, most_px])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
             add_centers: Pass::new(gpu, &ADD_CENTERS, &[("STEPS", STEPS.into())])?,
             sum_blocks: pass(&SUM_BLOCKS)?,

@@ -209,6 +209,23 @@ fn the_device_shrinks_what_the_host_does() {
     compare("in a room", &room, &is_stray, 0.2);
 }
 
+/// A device of one kind is there to test on: what those of the other kind run is tested there as well.
+#[test]
+fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
+    let Some(gpu) = test_gpu() else { return };
+    let noisy = noisy(test_clouds::bumpy(20_000), 0.015);
+    let cases = [("noisy bumps", Case::new(&noisy, PROJECTIONS[0], [320, 240])), ("rows", Case::swept())];
+    for together in TOGETHER {
+        let passes = AdaptPasses::with_form(&gpu, together).expect("passes");
+        for (name, case) in &cases {
+            let made = on_device(&gpu, &passes, case);
+            compare_usual(made.usual, case.usual()).unwrap_or_else(|error| panic!("{name}, {together}: {error}"));
+            compare_surfels(&made.surfels, &case.adapted())
+                .unwrap_or_else(|error| panic!("{name}, {together}: {error}"));
+        }
+    }
+}
+
 #[test]
 fn sheets_are_as_large_as_the_host_takes_them_for() {
     let source = crate::gpu::link("#import sheet\n");

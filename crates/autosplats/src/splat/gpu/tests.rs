@@ -183,19 +183,21 @@ fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
     (0..width * height).filter(|pixel| !same(pixel % width, pixel / width)).count()
 }
 
-/// Rounding decides what covers a pixel, what is in front or which of two splats is heavier at some pixels of ten thousand.
-fn assert_few(other: usize, pixels: usize, what: &str) {
-    assert!(other <= pixels / 1000, "{what}: {other} of {pixels} pixels differ");
+/// Rounding decides what covers a pixel, what is in front or which of two splats is heavier at some pixels of ten thousand, and at
+/// more on hardware, which fuses products and sums as it likes.
+fn assert_few(gpu: &Gpu, other: usize, pixels: usize, what: &str) {
+    let allowed = if gpu.is_software() { pixels / 1000 } else { 5 + pixels / 200 };
+    assert!(other <= allowed, "{what}: {other} of {pixels} pixels differ");
 }
 
 fn assert_same(gpu: &Gpu, passes: &SplatPasses, scene: &Scene<'_>, case: &str) {
     let drawn = scene.device(gpu, passes, ALL);
     let pixels = drawn.depth[0].len();
     let (splatter, layers) = Scene { refinement: false, ..*scene }.host(ALL);
-    assert_few(other_depths(&splatter, &drawn.depth[0], scene.view), pixels, &format!("{case}: depth map"));
+    assert_few(gpu, other_depths(&splatter, &drawn.depth[0], scene.view), pixels, &format!("{case}: depth map"));
     let (splatter, layers) = if scene.refinement { scene.host(ALL) } else { (splatter, layers) };
-    assert_few(other_depths(&splatter, &drawn.depth[1], scene.view), pixels, &format!("{case}: last depth map"));
-    assert_few(other_layers(&drawn.layers, &layers), pixels, &format!("{case}: layers"));
+    assert_few(gpu, other_depths(&splatter, &drawn.depth[1], scene.view), pixels, &format!("{case}: last depth map"));
+    assert_few(gpu, other_layers(&drawn.layers, &layers), pixels, &format!("{case}: layers"));
 }
 
 #[test]
@@ -334,7 +336,7 @@ fn layers_that_are_not_wanted_change_no_other() {
         let channels = Channels { color, scalar, measures, backs };
         let passes = SplatPasses::new(&gpu, channels, &data.linear).expect("passes");
         let drawn = scene.device(&gpu, &passes, channels);
-        assert_few(other_layers(&drawn.layers, &scene.host(channels).1), 71 * 50, &format!("{channels:?}"));
+        assert_few(&gpu, other_layers(&drawn.layers, &scene.host(channels).1), 71 * 50, &format!("{channels:?}"));
         let again = scene.device(&gpu, &passes, channels);
         let bits = |layers: &GBuffer| -> Vec<u32> {
             let vectors = layers.normal.iter().chain(&layers.color).flatten();

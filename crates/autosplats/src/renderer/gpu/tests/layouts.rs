@@ -229,8 +229,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
     assert_eq!(in_wgsl, shown, "what is shown in WGSL, and in Rust");
 
     use Work::{
-        Active64, Active256, LargeSplats, LeftActive64, LeftRecovered64, PassiveBlocks, Queries256, Recovered64,
-        Recovered256, Visible256, VisibleBlocks,
+        Active64, Active256, ActiveFew, LargeSplats, LeftActive64, LeftRecovered64, PassiveBlocks, Queries256,
+        Recovered64, Recovered256, RecoveredFew, Visible256, VisibleBlocks,
     };
     let works = [
         Visible256,
@@ -244,6 +244,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
         LargeSplats,
         LeftActive64,
         LeftRecovered64,
+        ActiveFew,
+        RecoveredFew,
     ];
     let works = works.map(|work| (screaming(&work), work as u32));
     let pass = passes().find(|pass| pass.path == "project/work").expect("a pass").module();

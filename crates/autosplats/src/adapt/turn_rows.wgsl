@@ -1,0 +1,90 @@
+// Turns surfels of rows onto areas, or makes them thin, and shrinks those that are no surface: a workgroup for a few surfels, which takes
+// up those of rows together. They are few, but ask for several balls each, and one by one each invocation would wait for those of
+// its neighbours. See the CPU form.
+//
+// Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
+
+#import frame
+#import groups
+#import counters
+#import base_radius
+#import calls
+#import depth_noise
+#import together
+#import rows
+#import shrink
+
+@group(0) @binding(1) var<storage, read_write> counters: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read> density: array<vec2u>;
+@group(0) @binding(3) var<storage, read> levels: array<Level>;
+@group(0) @binding(4) var<storage, read> clusters: array<vec4f>;
+@group(0) @binding(5) var<storage, read> measured: array<f32>;
+@group(0) @binding(6) var<storage, read> depth_noise: array<DepthRun>;
+@group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
+
+// 0: the active points; 1: the recovered ones, which follow them.
+override ROUND: u32;
+// Surfels of a workgroup.
+override FEW: u32;
+
+// Which of the workgroup's surfels are of rows, as bits, and what all need to know of the frame.
+var<workgroup> found_rows: atomic<u32>;
+struct Task {
+    rows: u32,
+    first: u32,
+    cell_px: u32,
+    cell_columns: u32,
+}
+var<workgroup> task: Task;
+// The row that is taken up.
+var<workgroup> shared_surfel: Surfel;
+
+@compute @workgroup_size(TOGETHER)
+fn turn_rows(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    own_place = local;
+    let active_points = atomicLoad(&counters[ACTIVE]);
+    let first_of_round = select(0u, active_points, ROUND == 1u);
+    let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
+    let first = group_index(workgroup) * FEW;
+    if local == 0u {
+        atomicStore(&found_rows, 0u);
+    }
+    workgroupBarrier();
+    for (var index = local; index < FEW && first + index < len; index += TOGETHER) {
+        let surfel = surfels[first_of_round + first + index];
+        if is_row(surfel, known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source).noise) {
+            atomicOr(&found_rows, 1u << index);
+        }
+    }
+    workgroupBarrier();
+    if local == 0u {
+        task.rows = atomicLoad(&found_rows);
+        task.first = first_of_round + first;
+        task.cell_px = atomicLoad(&counters[CELL_PX]);
+        task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+    }
+    let all = workgroupUniformLoad(&task);
+    for (var rows = all.rows; rows != 0u; rows &= rows - 1u) {
+        let place = all.first + firstTrailingBit(rows);
+        if local == 0u {
+            shared_surfel = surfels[place];
+        }
+        let surfel = workgroupUniformLoad(&shared_surfel);
+        let own_radius = initial_radius(surfel, all.cell_px, all.cell_columns);
+        let area = area(surfel, base_radius(surfel, all.cell_px, all.cell_columns));
+        var out = turned(surfel, area);
+        if area.radius == 0.0 {
+            out.radius = shrunk(out, own_radius);
+        }
+        let is_dropped = out.radius == 0.0;
+        if surfel.k_radius > DENSER * own_radius {
+            out.radius = opened(out, 0.0);
+        }
+        if local == 0u {
+            surfels[place] = out;
+            if is_dropped {
+                atomicAdd(&counters[OUTLIERS], 1u);
+            }
+        }
+    }
+}

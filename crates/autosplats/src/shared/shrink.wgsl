@@ -1,0 +1,86 @@
+// Surfels that are no surface, and how small they become: see the CPU form. Imports: frame, surfel, quadric, through. The including
+// pass binds `measured`.
+
+#import through
+
+override SPARSE: f32;
+override LONE: f32;
+override AROUND_SPARSE: f32;
+override ASIDE: f32;
+override OFF_MIDDLE: f32;
+override CROWD: f32;
+override STRAY_DOT: f32;
+override STRAY_DROPPED: f32;
+override DOT_PX: f32;
+override LEAST_ON: f32;
+override ON_DISC: f32;
+override ON_DISC_NOISE: f32;
+override DENSER: f32;
+override GOES_ON: f32;
+override FLAT_AROUND: f32;
+override WIDE_AROUND: f32;
+override ALL_AROUND: f32;
+override CELLS_TO_COUNT: f32;
+override SUPPORT: f32;
+
+// Radius of a surfel that is drawn as a dot.
+fn dot_radius(surfel: Surfel) -> f32 {
+    return min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
+}
+
+// Radius of a surfel that may be no surface, as its neighbours are far away and fill the space between, or are cut off from all
+// others; `initial_radius` is its first search radius. 0 if it is to be dropped.
+fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
+    let usual = measured[2];
+    // A handful of points has nothing that is usual.
+    if usual == 0.0 {
+        return surfel.radius;
+    }
+    let ratio = surfel.k_radius / usual;
+    var stray = surfel.curvature * ratio * ratio;
+    let is_sparse = ratio > SPARSE;
+    let local = surfel.k_radius / initial_radius;
+    if is_sparse || surfel.curvature * local * local > LONE {
+        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius, CELLS_PER_RADIUS));
+        if is_sparse && around.len >= LEAST_CLUSTERS {
+            stray = max(stray, curvature_of(around) * ratio * ratio);
+        } else if is_sparse && around.weight < f32(frame.k) {
+            stray = max(stray, STRAY_DOT);
+        }
+        let is_crowd = around.weight > CROWD * f32(frame.k);
+        let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
+        let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
+        let stands_alone = ((is_crowd || around.len < LEAST_CLUSTERS) && is_aside) || (is_crowd && is_outside);
+        if around.len >= LEAST_OF_PLANE && stands_alone {
+            stray = max(stray, STRAY_DOT);
+        }
+    }
+    if stray > STRAY_DROPPED && frame.keep_outliers == 0u {
+        return 0.0;
+    }
+    return select(surfel.radius, dot_radius(surfel), stray >= STRAY_DOT);
+}
+
+// Radius of a surfel, whose points scatter by `noise`: its share of what is seen where it is, unless it is one of a surface; a dot at
+// least. Of an ellipse the circle within is asked, and the ellipse shrinks.
+fn opened(surfel: Surfel, noise: f32) -> f32 {
+    let least = dot_radius(surfel);
+    if !(surfel.radius > least) {
+        return surfel.radius;
+    }
+    let radius = SUPPORT * surfel.radius;
+    let disc = ball_around(surfel.center, radius, CELLS_TO_COUNT);
+    let points = seen(disc, surfel.normal, max(ON_DISC * radius, ON_DISC_NOISE * noise)).points;
+    // Its own point is on it, and may have moved.
+    let on = max(points.x, 1.0);
+    let share = on / (on + points.y);
+    if !(share < LEAST_ON) {
+        return surfel.radius;
+    }
+    let around = plane_of(ball_around(surfel.center, GOES_ON * surfel.k_radius, CELLS_PER_RADIUS));
+    let is_flat = curvature_of(around) < FLAT_AROUND;
+    let is_wide = around.variances.y > WIDE_AROUND * around.variances.z;
+    let is_all_around = length(around.mean) < ALL_AROUND;
+    let is_surface = around.len >= LEAST_CLUSTERS && is_flat && is_wide && is_all_around;
+    return select(max(surfel.radius * (share / LEAST_ON), least), surfel.radius, is_surface);
+}
