@@ -1,7 +1,7 @@
 // Lays out the levels of cells, whose sizes follow from the density of screen points, and says how many workgroups fill each, and
-// after that how many fit sheets.
+// after that how many fit sheets. Nothing is picked yet for the sample.
 //
-// Reads: counters. Writes: levels, arguments. One invocation.
+// Reads: counters. Writes: levels, arguments, picked. One invocation.
 
 #import frame
 #import groups
@@ -11,9 +11,11 @@
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> levels: array<Level>;
 @group(0) @binding(3) var<storage, read_write> arguments: array<u32>;
+@group(0) @binding(4) var<storage, read_write> picked: array<u32>;
 
 override MOST_LEVELS: u32;
 override MOST_FINEST: u32;
+override MOST_SAMPLED: u32;
 // The finest level whose cells may have sheets, and cells of a workgroup that fits them.
 override FINE_SHEETS: u32;
 override FEW: u32;
@@ -42,6 +44,7 @@ fn finest_side_px() -> u32 {
 
 @compute @workgroup_size(1)
 fn arrange() {
+    picked[MOST_SAMPLED] = 0u;
     var level = Level(finest_side_px(), 0u, 0u, 0u);
     level.columns = cells_across(level.side_px).x;
     level.rows = cells_across(level.side_px).y;

@@ -8,9 +8,9 @@ use super::cpu::{
 };
 use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
 use super::noise::{
-    APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, NOISE_SHARES,
-    QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, SURE_SHARES, THICK_NOISE, THIN,
-    THIN_SHARE,
+    APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, MOST_SAMPLED,
+    NOISE_SHARES, QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, SURE_SHARES, THICK_NOISE,
+    THIN, THIN_SHARE,
 };
 use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
 use super::rows::{
@@ -29,10 +29,11 @@ use crate::project::gpu::{Round, ScreenBuffers, few};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] =
-    &[ARRANGE, FILL, MERGE, FORGET, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ASK, FIT_SHEETS, ADAPT, TURN_ROWS];
+    &[ARRANGE, FILL, MERGE, FORGET, PICK, SAMPLE_PASS, SCATTERS, QUANTILES, NOISE, ASK, FIT_SHEETS, ADAPT, TURN_ROWS];
 const ARRANGE: PassSource = PassSource::new("adapt/arrange", include_str!("arrange.wgsl"));
 const FILL: PassSource = PassSource::new("adapt/fill", include_str!("fill.wgsl"));
 const MERGE: PassSource = PassSource::new("adapt/merge", include_str!("merge.wgsl"));
+const PICK: PassSource = PassSource::new("adapt/pick", include_str!("pick.wgsl"));
 const SAMPLE_PASS: PassSource = PassSource::new("adapt/sample", include_str!("sample.wgsl"));
 const SCATTERS: PassSource = PassSource::new("adapt/scatter", include_str!("scatter.wgsl"));
 const QUANTILES: PassSource = PassSource::new("adapt/quantile", include_str!("quantile.wgsl"));
@@ -72,7 +73,8 @@ pub(crate) struct AdaptBuffers {
     /// Number of surfels that ask for the sheets of a cell, the sum of their k-radii and the first of their points.
     asked: wgpu::Buffer,
     sheets: wgpu::Buffer,
-    /// Places of the surfels of the sample, and their number.
+    /// Places of the surfels of the sample, and their number; first in any order, then by their k-radii.
+    picked: wgpu::Buffer,
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
     /// And after them the steady shares of the first scales.
@@ -100,8 +102,9 @@ impl AdaptBuffers {
             clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size))?,
             asked: gpu.storage::<[u32; 3]>("surfels that ask for sheets", most_sheet_cells(size))?,
             sheets: gpu.storage::<[Sheet; SLABS]>("sheets", most_sheet_cells(size))?,
-            sampled: gpu.storage::<u32>("sampled surfels", SAMPLE + 1)?,
-            scatters: gpu.storage::<u32>("scatter of balls", SCALES * SAMPLE)?,
+            picked: gpu.storage::<u32>("picked surfels", MOST_SAMPLED + 1)?,
+            sampled: gpu.storage::<u32>("sampled surfels", MOST_SAMPLED + 1)?,
+            scatters: gpu.storage::<u32>("scatter of balls", SCALES * MOST_SAMPLED)?,
             quantiles: gpu.storage::<[u32; 2]>("quantiles of scatter", QUANTILES_TAKEN + STEADY_SCALES)?,
             measured: gpu.storage::<f32>("noise", NOISE_FLOATS)?,
             depth_noise: known.runs.clone(),
@@ -172,6 +175,7 @@ pub(crate) struct AdaptPasses {
     merge: Pass,
     /// What tells the pass before each level but the finest.
     which: Vec<wgpu::Buffer>,
+    pick: Pass,
     sample: Pass,
     scatter: Pass,
     quantile: Pass,
@@ -249,7 +253,7 @@ impl AdaptPasses {
             let own = [("ROUND", f64::from(round as u32)), parts, ("MOST_PX", MOST_PX.into())];
             Pass::new(gpu, &ASK, &[&calls[..], &own].concat())
         };
-        let sample = ("SAMPLE", SAMPLE as f64);
+        let most_sampled = ("MOST_SAMPLED", MOST_SAMPLED as f64);
         let scales = ("SCALES", SCALES as f64);
         let shrink = [
             ("SPARSE", SPARSE.into()),
@@ -300,7 +304,7 @@ impl AdaptPasses {
         let sheets = [together, parts, few, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
         let quantile = [
             scales,
-            sample,
+            most_sampled,
             ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
             ("LEAST_SHARE", LEAST_SHARE as f64),
             ("THIN_SHARE", THIN_SHARE.into()),
@@ -319,17 +323,27 @@ impl AdaptPasses {
             arrange: Pass::new(
                 gpu,
                 &ARRANGE,
-                &[("MOST_LEVELS", MOST_LEVELS as f64), ("MOST_FINEST", MOST_FINEST as f64), fine_sheets, few],
+                &[
+                    ("MOST_LEVELS", MOST_LEVELS as f64),
+                    ("MOST_FINEST", MOST_FINEST as f64),
+                    most_sampled,
+                    fine_sheets,
+                    few,
+                ],
             )?,
             fill: Pass::new(gpu, &FILL, &[])?,
             merge: Pass::new(gpu, &MERGE, &[])?,
             which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,
-            sample: Pass::new(gpu, &SAMPLE_PASS, &[sample])?,
+            pick: Pass::new(gpu, &PICK, &[("SAMPLE", SAMPLE as f64), most_sampled])?,
+            sample: Pass::new(gpu, &SAMPLE_PASS, &[most_sampled])?,
             scatter: Pass::new(
                 gpu,
                 &SCATTERS,
-                &[&quadric[..], &[together, sample, least_reach, ("THIN", THIN.into()), ("ROUNDING", ROUNDING.into())]]
-                    .concat(),
+                &[
+                    &quadric[..],
+                    &[together, most_sampled, least_reach, ("THIN", THIN.into()), ("ROUNDING", ROUNDING.into())],
+                ]
+                .concat(),
             )?,
             quantile: Pass::new(gpu, &QUANTILES, &quantile)?,
             noise: Pass::new(
@@ -337,7 +351,7 @@ impl AdaptPasses {
                 &NOISE,
                 &[
                     scales,
-                    sample,
+                    most_sampled,
                     ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
                     ("APART", APART.into()),
                     ("FAR_APART", FAR_APART.into()),
@@ -369,10 +383,10 @@ impl AdaptPasses {
         buffers: &AdaptBuffers,
     ) -> Vec<Step> {
         let ScreenBuffers { counters, cell_start, points, .. } = screen;
-        let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
+        let AdaptBuffers { levels, arguments, clusters, asked, sheets, picked, .. } = buffers;
         let groups = |level: usize| Groups::Counted(arguments.clone(), level as u64 * WORK_BYTES);
         let mut steps = vec![
-            self.arrange.step(gpu, &[frame, counters, levels, arguments], 1),
+            self.arrange.step(gpu, &[frame, counters, levels, arguments, picked], 1),
             self.fill.step(gpu, &[frame, counters, levels, cell_start, points, clusters], groups(0)),
         ];
         let merge = |(level, which)| self.merge.step(gpu, &[frame, levels, clusters, which], groups(level));
@@ -393,13 +407,14 @@ impl AdaptPasses {
     ) -> Vec<Step> {
         let ScreenBuffers { counters, density, .. } = screen;
         let AdaptBuffers { levels, arguments, clusters, asked, sheets, .. } = buffers;
-        let AdaptBuffers { sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
+        let AdaptBuffers { picked, sampled, scatters, quantiles, measured, depth_noise, .. } = buffers;
         let mut steps = Vec::new();
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
             steps.extend([
-                self.sample.step(gpu, &[frame, counters, surfels, sampled], SAMPLE.div_ceil(GROUP) as u32),
-                self.scatter.step(gpu, &balls, (SCALES * SAMPLE) as u32),
+                self.pick.step(gpu, &[frame, counters, surfels, picked], screen.groups(round.work_64())),
+                self.sample.step(gpu, &[frame, surfels, picked, sampled], MOST_SAMPLED.div_ceil(GROUP) as u32),
+                self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),
             ]);

@@ -12,8 +12,10 @@ use crate::camera::View;
 use crate::fit::Surfel;
 use crate::project::DensityGrid;
 
-/// Surfels looked at.
+/// Surfels looked at, about; all if there are no more.
 pub(crate) const SAMPLE: usize = 1024;
+/// And at most: they are as many as chance has it, give or take thirty.
+pub(crate) const MOST_SAMPLED: usize = SAMPLE + SAMPLE / 2;
 /// The densest and the sparsest third of a sample tell how noise grows with the k-radius if the median k-radius is larger in the
 /// one than in the other by this factor, and the more, the further apart they are: points evenly strewn are 1.2 apart by chance,
 /// very noisy ones 1.7.
@@ -142,14 +144,14 @@ impl Noise {
 
 /// Measures what is usual in a frame on a sample of `surfels`.
 pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> Usual {
-    let step = surfels.len().div_ceil(SAMPLE).max(1);
-    // A discarded point has no ball.
-    let kept = surfels.iter().step_by(step).filter(|surfel| surfel.radius > 0.0);
-    let of = |&surfel: &Surfel| {
+    let of = |surfel: Surfel| {
         let radius = first_radius(&surfel, density, view, k);
         Sampled { surfel, radius, scatter: [None; SCALES] }
     };
-    let mut sample: Vec<Sampled> = kept.map(of).collect();
+    let below = picked_below(surfels.len());
+    // A discarded point has no ball.
+    let is_picked = |surfel: &&Surfel| surfel.radius > 0.0 && scrambled(surfel.source) < below;
+    let mut sample: Vec<Sampled> = surfels.iter().filter(is_picked).take(MOST_SAMPLED).copied().map(of).collect();
     sample.sort_by(|a, b| a.surfel.k_radius.total_cmp(&b.surfel.k_radius));
     for scale in 0..SCALES {
         sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
@@ -166,6 +168,20 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
     let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { middle };
     let sheet_level = SHEET_LEVELS[usize::from(noise.at(middle) > THICK_NOISE * k_radius)];
     Usual { noise, k_radius, sheet_level }
+}
+
+/// Of so many surfels those are in the sample whose points' numbers, [`scrambled`], are below this. So nearly the same surfels, as
+/// those of the next frame are, give nearly the same sample. Picked by their places in the list, one surfel more changed all of
+/// it, and with it the noise by up to a fifth.
+fn picked_below(surfels: usize) -> u32 {
+    (u32::MAX / surfels.max(SAMPLE) as u32).saturating_mul(SAMPLE as u32)
+}
+
+/// Another number for each number, in no order [MurmurHash3's finish].
+fn scrambled(number: u32) -> u32 {
+    let number = (number ^ (number >> 16)).wrapping_mul(0x85eb_ca6b);
+    let number = (number ^ (number >> 13)).wrapping_mul(0xc2b2_ae35);
+    number ^ (number >> 16)
 }
 
 /// What all surfels of a sample share.

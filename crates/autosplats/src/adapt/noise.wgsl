@@ -13,7 +13,7 @@
 @group(0) @binding(4) var<storage, read_write> measured: array<f32>;
 
 override SCALES: u32;
-override SAMPLE: u32;
+override MOST_SAMPLED: u32;
 override LEAST_SAMPLE: u32;
 override APART: f32;
 override FAR_APART: f32;
@@ -68,7 +68,7 @@ fn k_radius(rank: u32) -> f32 {
 
 // Its level, power and largest k-radius.
 fn noise_of_sample() -> vec3f {
-    let len = sampled[SAMPLE];
+    let len = sampled[MOST_SAMPLED];
     let all = scatter_level(ALL);
     // Of all, as the ends need not be told by the same scale.
     let by_steady = select(1.0, scatter_level(STEADY_ALL) / all, all > 0.0);
@@ -108,7 +108,7 @@ fn noise() {
     measured[1] = found.y;
     measured[4] = found.z;
     measured[5] = sureness();
-    let len = sampled[SAMPLE];
+    let len = sampled[MOST_SAMPLED];
     var middle = 0.0;
     if len > 0u {
         middle = k_radius(len / 2u);

@@ -13,7 +13,7 @@
 @group(0) @binding(3) var<storage, read_write> quantiles: array<vec2u>;
 
 override SCALES: u32;
-override SAMPLE: u32;
+override MOST_SAMPLED: u32;
 override LEAST_SAMPLE: u32;
 override LEAST_SHARE: u32;
 override THIN_SHARE: f32;
@@ -48,11 +48,11 @@ fn steady_share(size: u32) -> f32 {
 fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let part = workgroup.x / SCALES;
     let scale = workgroup.x % SCALES;
-    let kept = sampled[SAMPLE];
+    let kept = sampled[MOST_SAMPLED];
     let len = select(kept / 3u, kept, part >= ALL);
     let begin = select(0u, kept - len, part == SPARSEST);
-    let first = scale * SAMPLE + begin;
-    let next = min(scale + 1u, SCALES - 1u) * SAMPLE + begin;
+    let first = scale * MOST_SAMPLED + begin;
+    let next = min(scale + 1u, SCALES - 1u) * MOST_SAMPLED + begin;
     if local < 2u {
         atomicStore(&fitted[local], 0u);
         atomicStore(&thin[local], 0u);
@@ -76,7 +76,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         var own_pairs = 0u;
         var own_steady = 0u;
         for (var index = local; index < kept; index += 64u) {
-            let bits = vec2u(scatters[size * SAMPLE + index], scatters[(size + 1u) * SAMPLE + index]);
+            let bits = vec2u(scatters[size * MOST_SAMPLED + index], scatters[(size + 1u) * MOST_SAMPLED + index]);
             if bits.x > 0u && bits.x < THICK && bits.y != TOO_FEW {
                 own_pairs += 1u;
                 let distance = bitcast<vec2f>(bits & vec2u(~THICK));

@@ -1,69 +1,57 @@
-// Picks surfels at even distances in their list and sorts them by k-radius, each by counting those before it.
+// Sorts the sample by k-radius, each surfel by counting those before it.
 //
-// Reads: counters, surfels. Writes: sampled, the places of the surfels, and after them their number.
+// Reads: surfels, picked. Writes: sampled, the places of the surfels, and after them their number.
 
 #import frame
-#import counters
 #import surfel
 
-@group(0) @binding(1) var<storage, read> counters: array<u32>;
-@group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(2) var<storage, read> picked: array<u32>;
 @group(0) @binding(3) var<storage, read_write> sampled: array<u32>;
 
-override SAMPLE: u32;
+override MOST_SAMPLED: u32;
 
-const DISCARDED = 0xffffffffu;
+// Bits of k-radii, which are in their order, and places; four at a time, for fewer rounds of a loop.
+var<workgroup> k_radii: array<vec4u, MOST_SAMPLED / 4u>;
+var<workgroup> places: array<vec4u, MOST_SAMPLED / 4u>;
 
-// Bits of k-radii, which are in their order; four at a time, for fewer rounds of a loop.
-var<workgroup> k_radii: array<vec4u, SAMPLE / 4u>;
+// Beyond all others.
+const NONE = 0xffffffffu;
 
-// Bits of the k-radius of a candidate.
-fn k_radius(index: u32, step: u32, candidates: u32) -> u32 {
-    if index >= candidates {
-        return DISCARDED;
+// Place and bits of the k-radius of the surfel that was picked as number `index`.
+fn one(index: u32, len: u32) -> vec2u {
+    if index >= len {
+        return vec2u(NONE);
     }
-    let place = index * step;
-    // A discarded point has no ball.
-    return select(DISCARDED, bitcast<u32>(surfels[place].k_radius), surfels[place].radius > 0.0);
+    let place = picked[index];
+    return vec2u(place, bitcast<u32>(surfels[place].k_radius));
 }
 
 @compute @workgroup_size(64)
 fn sample(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
-    let len = counters[ACTIVE];
-    let step = max((len + SAMPLE - 1u) / SAMPLE, 1u);
-    let candidates = (len + step - 1u) / step;
-    let fours = (candidates + 3u) / 4u;
+    let len = min(picked[MOST_SAMPLED], MOST_SAMPLED);
+    let fours = (len + 3u) / 4u;
     for (var four = local; four < fours; four += 64u) {
         let at = 4u * four;
-        k_radii[four] = vec4u(
-            k_radius(at, step, candidates),
-            k_radius(at + 1u, step, candidates),
-            k_radius(at + 2u, step, candidates),
-            k_radius(at + 3u, step, candidates),
-        );
+        let a = one(at, len);
+        let b = one(at + 1u, len);
+        let c = one(at + 2u, len);
+        let d = one(at + 3u, len);
+        places[four] = vec4u(a.x, b.x, c.x, d.x);
+        k_radii[four] = vec4u(a.y, b.y, c.y, d.y);
     }
     workgroupBarrier();
-    let own = workgroup.x * 64u + local;
-    if own < candidates {
-        let own_radius = vec4u(k_radius(own, step, candidates));
+    let own = one(workgroup.x * 64u + local, len);
+    if own.x != NONE {
         var before = vec4u(0u);
-        var places = vec4u(0u, 1u, 2u, 3u);
         for (var four = 0u; four < fours; four++) {
             let others = k_radii[four];
-            let is_before = (others < own_radius) | ((others == own_radius) & (places < vec4u(own)));
+            let is_before = (others < vec4u(own.y)) | ((others == vec4u(own.y)) & (places[four] < vec4u(own.x)));
             before += select(vec4u(0u), vec4u(1u), is_before);
-            places += 4u;
         }
-        if own_radius.x != DISCARDED {
-            sampled[before.x + before.y + before.z + before.w] = own * step;
-        }
+        sampled[before.x + before.y + before.z + before.w] = own.x;
     }
-    if own == 0u {
-        var kept = 0u;
-        for (var four = 0u; four < fours; four++) {
-            let is_kept = select(vec4u(0u), vec4u(1u), k_radii[four] != vec4u(DISCARDED));
-            kept += is_kept.x + is_kept.y + is_kept.z + is_kept.w;
-        }
-        sampled[SAMPLE] = kept;
+    if workgroup.x == 0u && local == 0u {
+        sampled[MOST_SAMPLED] = len;
     }
 }

@@ -18,7 +18,7 @@
 @group(0) @binding(6) var<storage, read> sampled: array<u32>;
 @group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
 
-override SAMPLE: u32;
+override MOST_SAMPLED: u32;
 override THIN: f32;
 override ROUNDING: f32;
 
@@ -26,9 +26,9 @@ override ROUNDING: f32;
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     own_place = local;
     let index = group_index(workgroup);
-    let scale = index / SAMPLE;
-    let rank = index % SAMPLE;
-    if scale >= SCALES || rank >= sampled[SAMPLE] {
+    let scale = index / MOST_SAMPLED;
+    let rank = index % MOST_SAMPLED;
+    if scale >= SCALES || rank >= sampled[MOST_SAMPLED] {
         return;
     }
     let surfel = surfels[sampled[rank]];

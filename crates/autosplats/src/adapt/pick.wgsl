@@ -1,0 +1,35 @@
+// Picks the sample: an invocation per surfel. See the CPU form.
+//
+// Reads: counters, surfels. Writes: picked, the places of the surfels in any order, and after them their number.
+
+#import frame
+#import groups
+#import counters
+#import surfel
+
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(3) var<storage, read_write> picked: array<atomic<u32>>;
+
+override SAMPLE: u32;
+override MOST_SAMPLED: u32;
+
+fn scrambled(number: u32) -> u32 {
+    let first = (number ^ (number >> 16u)) * 0x85ebca6bu;
+    let second = (first ^ (first >> 13u)) * 0xc2b2ae35u;
+    return second ^ (second >> 16u);
+}
+
+@compute @workgroup_size(64)
+fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
+    let place = group_index(workgroup) * 64u + local;
+    let len = counters[ACTIVE];
+    let below = (0xffffffffu / max(len, SAMPLE)) * SAMPLE;
+    // A discarded point has no ball.
+    if place < len && scrambled(surfels[place].source) < below && surfels[place].radius > 0.0 {
+        let at = atomicAdd(&picked[MOST_SAMPLED], 1u);
+        if at < MOST_SAMPLED {
+            atomicStore(&picked[at], place);
+        }
+    }
+}
