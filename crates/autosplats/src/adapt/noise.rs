@@ -31,6 +31,8 @@ pub(super) const GROWTH_SURE: f32 = 0.4;
 pub(super) const BEYOND: usize = 8;
 /// Surfels per task.
 const TASK: usize = 32;
+/// And where they are only picked.
+const PICK_TASK: usize = 4096;
 /// Fewer that find anything in a ball say nothing.
 pub(super) const LEAST_SAMPLE: usize = 64;
 /// So does less than one of this many.
@@ -151,7 +153,9 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
     let below = picked_below(surfels.len());
     // A discarded point has no ball.
     let is_picked = |surfel: &&Surfel| surfel.radius > 0.0 && scrambled(surfel.source) < below;
-    let mut sample: Vec<Sampled> = surfels.iter().filter(is_picked).take(MOST_SAMPLED).copied().map(of).collect();
+    let mut sample: Vec<Sampled> =
+        surfels.par_iter().with_min_len(PICK_TASK).filter(is_picked).copied().map(of).collect();
+    sample.truncate(MOST_SAMPLED);
     sample.sort_by(|a, b| a.surfel.k_radius.total_cmp(&b.surfel.k_radius));
     for scale in 0..SCALES {
         sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
