@@ -300,7 +300,6 @@ impl AdaptPasses {
             Ok::<_, Error>(told)
         };
         let fine_sheets = ("FINE_SHEETS", SHEET_LEVELS[0] as f64);
-
         let sheets = [together, parts, few, ("COVERED", COVERED.into()), ("COVERED_REACH", COVERED_REACH.into())];
         let quantile = [
             scales,
@@ -359,7 +358,7 @@ impl AdaptPasses {
                     ("GROWTH_SURE", GROWTH_SURE.into()),
                     ("BEYOND", noise::BEYOND as f64),
                     ("THICK_NOISE", THICK_NOISE.into()),
-                    ("FINE_SHEETS", SHEET_LEVELS[0] as f64),
+                    fine_sheets,
                     ("COARSE_SHEETS", SHEET_LEVELS[1] as f64),
                     ("SURE_FROM", SURE_SHARES[0].into()),
                     ("SURE_TO", SURE_SHARES[1].into()),

@@ -12,7 +12,7 @@ use crate::camera::View;
 use crate::fit::Surfel;
 use crate::project::DensityGrid;
 
-/// Surfels looked at, about; all if there are no more.
+/// Surfels looked at, about; nearly all if there are no more.
 pub(crate) const SAMPLE: usize = 1024;
 /// And at most: they are as many as chance has it, give or take thirty.
 pub(crate) const MOST_SAMPLED: usize = SAMPLE + SAMPLE / 2;

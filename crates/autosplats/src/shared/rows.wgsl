@@ -1,5 +1,5 @@
 // Rows, and the areas that they belong to: see the CPU form. Imports: frame, surfel, quadric. The including pass binds `levels`
-// and `clusters`, and has `STEP`.
+// and `clusters`.
 
 #import quadric
 #import surfel

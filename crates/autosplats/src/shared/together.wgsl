@@ -28,12 +28,12 @@ fn tell(part: u32, own: vec4f) {
     parts[part * PART_ROW + own_place] = own;
 }
 
-// The sums over all invocations of the parts that each has told, in their order.
+// The sums over all invocations of the first parts that each has told, in their order.
 fn sum_up(count: u32) -> array<vec4f, MOST_PARTS> {
     workgroupBarrier();
-    if own_place < count {
+    if own_place < MOST_PARTS {
         var sum = vec4f(0.0);
-        for (var place = 0u; place < TOGETHER; place++) {
+        for (var place = 0u; place < TOGETHER && own_place < count; place++) {
             sum += parts[own_place * PART_ROW + place];
         }
         totals[own_place] = sum;

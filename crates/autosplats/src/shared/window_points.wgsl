@@ -1,6 +1,6 @@
 // Screen points in windows. Imports: frame, window. The including pass binds `cell_start`.
 
-// Strips that the invocation has gone through and half of the screen points it has read: at least the rounds of its loops, of which
+// Strips that the invocation has gone through and half of the screen points it has read: about the rounds of its loops, of which
 // software devices end an invocation silently after 65535.
 var<private> rounds: u32;
 

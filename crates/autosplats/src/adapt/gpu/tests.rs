@@ -209,7 +209,7 @@ fn the_device_shrinks_what_the_host_does() {
     compare("in a room", &room, &is_stray, 0.2);
 }
 
-/// A device of one kind is there to test on: what those of the other kind run is tested there as well.
+/// A device of one kind is there to test on: as many as on those of the other kind sum up a ball there as well.
 #[test]
 fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
