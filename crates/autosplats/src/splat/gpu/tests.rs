@@ -184,7 +184,7 @@ fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
 }
 
 /// Rounding decides what covers a pixel, what is in front or which of two splats is heavier at some pixels of ten thousand, and at
-/// more on hardware, which fuses products and sums as it likes.
+/// more on hardware, which fuses products and sums as it likes: 8 of 1197, of 3550 9 were seen.
 fn assert_few(gpu: &Gpu, other: usize, pixels: usize, what: &str) {
     let allowed = if gpu.is_software() { pixels / 1000 } else { 5 + pixels / 200 };
     assert!(other <= allowed, "{what}: {other} of {pixels} pixels differ");
