@@ -86,11 +86,17 @@ fn colors_that_the_points_do_not_have() {
 #[test]
 fn commands_that_do_not_exist() {
     let folder = Folder::with_sphere();
-    folder.fail(&["none.ply"], 3, &["none.ply", "No such file"]);
     folder.fail(&["sphere.ply", "--wach"], 2, &["--wach", "--watch"]);
     folder.fail(&["rendr", "sphere.ply"], 2, &["did you mean 'render'"]);
     folder.fail(&["render", "sphere.ply"], 2, &["--out"]);
     folder.fail(&["render", "-o", "out.png"], 2, &["INPUT"]);
+}
+
+#[test]
+#[cfg(not(feature = "viewer"))]
+fn builds_without_a_viewer_say_so() {
+    let folder = Folder::with_sphere();
+    folder.fail(&["sphere.ply"], 2, &["no viewer", "autosplats render sphere.ply"]);
 }
 
 /// Tests run without a screen: the command says so, and what to do.
@@ -98,6 +104,7 @@ fn commands_that_do_not_exist() {
 #[cfg(all(feature = "viewer", target_os = "linux"))]
 fn windows_need_a_screen() {
     let folder = Folder::with_sphere();
+    folder.fail(&["none.ply"], 3, &["none.ply", "No such file"]);
     for words in [&["sphere.ply"][..], &["view"], &["scene:herd"], &["sphere.ply", "--watch"]] {
         folder.fail(words, 5, &["no window can be opened", "DISPLAY", "autosplats render"]);
     }

@@ -5,6 +5,7 @@
 
 #import frame
 #import groups
+#import put_work
 #import counters
 #import levels
 
@@ -19,12 +20,6 @@ override MOST_SAMPLED: u32;
 // The finest level whose cells may have sheets, and cells of a workgroup that fits them.
 override FINE_SHEETS: u32;
 override FEW: u32;
-
-fn put(at: u32, groups: u32) {
-    arguments[3u * at] = min(groups, GROUPS_PER_ROW);
-    arguments[3u * at + 1u] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
-    arguments[3u * at + 2u] = 1u;
-}
 
 // Cells in a row and in a column of a picture.
 fn cells_across(side_px: u32) -> vec2u {
@@ -53,9 +48,9 @@ fn arrange() {
         let cells = select(0u, level.columns * level.rows, index <= doublings);
         level.side_px = select(0u, level.side_px, index <= doublings);
         levels[index] = level;
-        put(index, (cells + 63u) / 64u);
+        put_work(index, cells, 64u);
         if index == FINE_SHEETS {
-            put(MOST_LEVELS, (cells + FEW - 1u) / FEW);
+            put_work(MOST_LEVELS, cells, FEW);
         }
         level.side_px *= 2u;
         level.columns = (level.columns + 1u) / 2u;

@@ -411,8 +411,8 @@ impl AdaptPasses {
         if round == Round::Active {
             let balls = [frame, counters, density, surfels, levels, clusters, sampled, scatters];
             steps.extend([
-                self.pick.step(gpu, &[frame, counters, surfels, picked], screen.groups(round.work_64())),
-                self.sample.step(gpu, &[frame, surfels, picked, sampled], MOST_SAMPLED.div_ceil(GROUP) as u32),
+                self.pick.step(gpu, &[counters, surfels, picked], screen.groups(round.work_64())),
+                self.sample.step(gpu, &[surfels, picked, sampled], MOST_SAMPLED.div_ceil(GROUP) as u32),
                 self.scatter.step(gpu, &balls, (SCALES * MOST_SAMPLED) as u32),
                 self.quantile.step(gpu, &[frame, sampled, scatters, quantiles], QUANTILES_TAKEN as u32),
                 self.noise.step(gpu, &[frame, surfels, sampled, quantiles, measured], 1),

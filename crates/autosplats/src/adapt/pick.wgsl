@@ -2,14 +2,13 @@
 //
 // Reads: counters, surfels. Writes: picked, the places of the surfels in any order, and after them their number.
 
-#import frame
 #import groups
 #import counters
 #import surfel
 
-@group(0) @binding(1) var<storage, read> counters: array<u32>;
-@group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
-@group(0) @binding(3) var<storage, read_write> picked: array<atomic<u32>>;
+@group(0) @binding(0) var<storage, read> counters: array<u32>;
+@group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(2) var<storage, read_write> picked: array<atomic<u32>>;
 
 override SAMPLE: u32;
 override MOST_SAMPLED: u32;

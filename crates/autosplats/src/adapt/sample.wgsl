@@ -2,12 +2,11 @@
 //
 // Reads: surfels, picked. Writes: sampled, the places of the surfels, and after them their number.
 
-#import frame
 #import surfel
 
-@group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
-@group(0) @binding(2) var<storage, read> picked: array<u32>;
-@group(0) @binding(3) var<storage, read_write> sampled: array<u32>;
+@group(0) @binding(0) var<storage, read> surfels: array<Surfel>;
+@group(0) @binding(1) var<storage, read> picked: array<u32>;
+@group(0) @binding(2) var<storage, read_write> sampled: array<u32>;
 
 override MOST_SAMPLED: u32;
 

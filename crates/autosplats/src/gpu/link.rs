@@ -6,6 +6,7 @@ const SHARED: &[(&str, &str)] = &[
     ("picture", include_str!("../shared/picture.wgsl")),
     ("gaps", include_str!("../shared/gaps.wgsl")),
     ("groups", include_str!("../shared/groups.wgsl")),
+    ("put_work", include_str!("../shared/put_work.wgsl")),
     ("counters", include_str!("../shared/counters.wgsl")),
     ("rank", include_str!("../shared/rank.wgsl")),
     ("half", include_str!("../shared/half.wgsl")),

@@ -4,6 +4,7 @@
 
 #import frame
 #import groups
+#import put_work
 #import counters
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
@@ -26,26 +27,19 @@ const RECOVERED_FEW = 12u;
 
 override FEW: u32;
 
-fn put(kind: u32, items: u32, per_group: u32) {
-    let groups = (items + per_group - 1u) / per_group;
-    arguments[3u * kind] = min(groups, GROUPS_PER_ROW);
-    arguments[3u * kind + 1u] = (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
-    arguments[3u * kind + 2u] = 1u;
-}
-
 @compute @workgroup_size(1)
 fn work() {
-    put(VISIBLE256, counters[VISIBLE], 256u);
-    put(VISIBLE_BLOCKS, counters[VISIBLE], 2048u);
-    put(PASSIVE_BLOCKS, counters[PASSIVE], 2048u);
-    put(ACTIVE64, counters[ACTIVE], 64u);
-    put(ACTIVE256, counters[ACTIVE], 256u);
-    put(RECOVERED64, counters[RECOVERED], 64u);
-    put(RECOVERED256, counters[RECOVERED], 256u);
-    put(LARGE_SPLATS, counters[LARGE], 1u);
-    put(LEFT_ACTIVE64, counters[LEFT_ACTIVE], 64u);
-    put(LEFT_RECOVERED64, counters[LEFT_RECOVERED], 64u);
-    put(ACTIVE_FEW, counters[ACTIVE], FEW);
-    put(RECOVERED_FEW, counters[RECOVERED], FEW);
-    put(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
+    put_work(VISIBLE256, counters[VISIBLE], 256u);
+    put_work(VISIBLE_BLOCKS, counters[VISIBLE], 2048u);
+    put_work(PASSIVE_BLOCKS, counters[PASSIVE], 2048u);
+    put_work(ACTIVE64, counters[ACTIVE], 64u);
+    put_work(ACTIVE256, counters[ACTIVE], 256u);
+    put_work(RECOVERED64, counters[RECOVERED], 64u);
+    put_work(RECOVERED256, counters[RECOVERED], 256u);
+    put_work(LARGE_SPLATS, counters[LARGE], 1u);
+    put_work(LEFT_ACTIVE64, counters[LEFT_ACTIVE], 64u);
+    put_work(LEFT_RECOVERED64, counters[LEFT_RECOVERED], 64u);
+    put_work(ACTIVE_FEW, counters[ACTIVE], FEW);
+    put_work(RECOVERED_FEW, counters[RECOVERED], FEW);
+    put_work(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
 }

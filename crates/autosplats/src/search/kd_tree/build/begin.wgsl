@@ -4,6 +4,7 @@
 
 #import frame
 #import groups
+#import put_work
 #import half
 #import project_point
 #import range_keys

@@ -5,6 +5,7 @@
 // next level. One workgroup.
 
 #import groups
+#import put_work
 #import range_keys
 #import kd_tree
 #import kd_build

@@ -1,0 +1,9 @@
+// How many workgroups an indirect dispatch starts. The including pass binds `arguments`. Imports: groups.
+
+// `kind` tells which dispatch; workgroups take `per_group` of `items`.
+fn put_work(kind: u32, items: u32, per_group: u32) {
+    let number = (items + per_group - 1u) / per_group;
+    arguments[3u * kind] = min(number, GROUPS_PER_ROW);
+    arguments[3u * kind + 1u] = (number + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW;
+    arguments[3u * kind + 2u] = 1u;
+}
