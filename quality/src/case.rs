@@ -64,7 +64,7 @@ pub fn full() -> Vec<Case> {
     let wide = Sweep::new([-5.7, -0.15, 1.75], [-45.0, 45.0], 64, 2048);
     let behind_nave = Shot::Behind([3.0, 0.9], [3.0, 0.5, 2.6]);
     let case = |recipe, shot| Case::new(recipe, shot, [960, 600]);
-    vec![
+    let mut cases = vec![
         case(figure, Shot::Own).shown().moving(),
         case(figure, Shot::Near(Front, [0.5, 0.2], 5.0)),
         case(figure, Shot::Far(Iso, 5.0)),
@@ -103,10 +103,15 @@ pub fn full() -> Vec<Case> {
         case(horse.noise(0.003), Shot::Whole(Left)),
         case(dancer, Shot::Whole(Front)).shown(),
         case(dancer.noise(0.001).density(Density::Uneven), Shot::Whole(Front)).shown(),
-    ]
+    ];
+    // In a smaller picture one is the same.
+    let small = quick().into_iter().filter(|small| cases.iter().all(|case| case.name() != small.name()));
+    let small: Vec<_> = small.map(|case| Case { sheet: false, ..case }).collect();
+    cases.extend(small);
+    cases
 }
 
-/// Small cases that need nothing but the repository.
+/// Small cases that need nothing but the repository, in small pictures: points are sparser on their surfaces.
 pub fn quick() -> Vec<Case> {
     let scene = |name, count| Recipe::new(Source::Scene(name), count);
     let bumpy = Recipe::new(Source::Bumpy(6), 200_000);

@@ -212,9 +212,8 @@ mod tests {
     use super::*;
     use crate::view::Rays;
 
-    #[test]
-    fn the_other_side_of_an_edge_is_not_flipped() {
-        let sides = [0.9, 0.9, 0.9, -0.9, -0.9].map(|x| DVec3::new(x, 0.0, -0.44).normalize());
+    /// A row of pixels with these normals.
+    fn row(normals: [DVec3; 5]) -> Exact {
         let seen = |normal| Seen { depth: 1.0, normal, spacing_px: 1.0, swept: None, sampled: true, tolerance: 0.1 };
         let camera = Camera {
             eye: DVec3::ZERO,
@@ -223,7 +222,29 @@ mod tests {
             projection: Projection::OrthographicHeight(1.0),
         };
         let rays = Rays::new(&camera, [5, 1]).expect("a view");
-        let exact = Exact { width: 5, rays, seen: sides.map(|normal| Some(seen(normal))).to_vec() };
+        Exact { width: 5, rays, seen: normals.map(|normal| Some(seen(normal))).to_vec() }
+    }
+
+    #[test]
+    fn angles_are_summed_up_as_their_names_say() {
+        let exact = row([DVec3::NEG_Z; 5]);
+        let turned = |degrees: f64| DVec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
+        let shown =
+            [40.0, 1.0, 6.0, 93.0, 4.0].map(|angle| Some(Shown { depth: 1.0, normal: turned(angle), point: 0 }));
+        let band = [true, false, true, false, false];
+        let found = angles(&exact, &band, &Picture { width: 5, shown: shown.to_vec() }).expect("normals");
+        let Angles { mean, median, rms, below_5, below_10, above_90, flipped, band } = found;
+        // √((40² + 1² + 6² + 93² + 4²) / 5)
+        let expected = [28.8, 6.0, (10302.0_f64 / 5.0).sqrt(), 0.4, 0.6, 0.2, 0.2, 23.0];
+        let found = [mean, median, rms, below_5, below_10, above_90, flipped, band];
+        let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{found:?}, not {expected:?}");
+    }
+
+    #[test]
+    fn the_other_side_of_an_edge_is_not_flipped() {
+        let sides = [0.9, 0.9, 0.9, -0.9, -0.9].map(|x| DVec3::new(x, 0.0, -0.44).normalize());
+        let exact = row(sides);
         let shares = |wrong: usize| {
             let mut shown = sides.map(|normal| Some(Shown { depth: 1.0, normal, point: 0 }));
             shown[wrong] = Some(Shown { depth: 1.0, normal: sides[4], point: 0 });

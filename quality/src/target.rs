@@ -58,7 +58,7 @@ pub const TARGETS: [Target; 11] = [
     }),
     Target::most("holes ≤ 0.1 %", 0.1, 3, |outcome, method| Some(100.0 * outcome.of(method)?.cover.holes)),
     Target::most("leaks ≤ 0.1 %", 0.1, 3, |outcome, method| Some(100.0 * outcome.of(method)?.cover.leaks)),
-    Target::least("silhouette IoU ≥ 0.995 where sampled", 0.995, 4, |outcome, method| {
+    Target::least("silhouette IoU ≥ 0.995 where 85 % are sampled", 0.995, 4, |outcome, method| {
         let cover = outcome.of(method)?.cover;
         (cover.sampled >= SAMPLED).then_some(cover.iou)
     }),
@@ -151,6 +151,53 @@ mod tests {
         assert_eq!(wrong, [TARGETS[0].what, TARGETS[1].what, TARGETS[9].what], "normals, and how they turn");
         let dark = missed(&outcome(1.0, 1.0, 22.0));
         assert_eq!(dark, ["PSNR ≥ dots + 4 dB", "PSNR ≥ paper + 1 dB without noise"], "colours");
+    }
+
+    /// Each target is missed by what is bad in its way, and by nothing else.
+    #[test]
+    fn each_is_missed_by_what_it_is_for() {
+        fn angles(measures: &mut Measures) -> &mut Angles {
+            measures.angles.as_mut().expect("normals")
+        }
+        let ours = |spoil: fn(&mut Measures)| {
+            let mut outcome = outcome(1.0, 1.0, 30.0);
+            spoil(&mut outcome.measures[0].1);
+            outcome
+        };
+        let flicker = |spoil: fn(&mut Change)| {
+            let mut outcome = outcome(1.0, 1.0, 30.0);
+            spoil(&mut outcome.motion.as_mut().expect("motion").methods[0].1);
+            outcome
+        };
+        let noisy = |psnr| {
+            let case = quick().into_iter().find(|case| case.recipe.is_noisy()).expect("a noisy case");
+            Outcome { case, ..outcome(1.0, 1.0, psnr) }
+        };
+        assert_eq!(missed(&noisy(34.5)), [""; 0], "6.5 dB ahead of the paper's");
+        let hardly_sampled = ours(|m| (m.cover.iou, m.cover.sampled) = (0.9, 0.84));
+        assert_eq!(missed(&hardly_sampled), [""; 0], "the silhouette of sparse points does not count");
+        let spoiled = [
+            ("mean error of normals", ours(|m| angles(m).mean = 1.16)),
+            ("the same near silhouettes", ours(|m| angles(m).band = 1.21)),
+            ("flipped", ours(|m| angles(m).flipped = 0.0011)),
+            ("holes", ours(|m| m.cover.holes = 0.0011)),
+            ("leaks", ours(|m| m.cover.leaks = 0.0011)),
+            ("silhouette IoU", ours(|m| (m.cover.iou, m.cover.sampled) = (0.9949, 0.86))),
+            ("PSNR ≥ dots", {
+                let mut outcome = ours(|_| ());
+                outcome.measures[2].1.psnr = 26.5;
+                outcome
+            }),
+            ("PSNR ≥ paper + 1 dB without noise", outcome(1.0, 1.0, 28.5)),
+            ("PSNR ≥ paper + 6 dB with noise", noisy(33.5)),
+            ("change of normals", flicker(|change| change.degrees = 1.11)),
+            ("change of lightness", flicker(|change| change.lightness = 1.11)),
+        ];
+        assert_eq!(spoiled.len(), TARGETS.len());
+        for ((what, outcome), target) in spoiled.iter().zip(TARGETS) {
+            assert!(target.what.starts_with(what), "{what}, {}", target.what);
+            assert_eq!(missed(outcome), [target.what]);
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A camera that shows a whole cloud, for those who name none.
 
 use autosplats_cloud::{Axes, Crs, PointCloud, Scan};
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use super::{Camera, Projection};
 use crate::Error;
@@ -44,6 +44,10 @@ const IN_THE_WAY: f64 = 0.15;
 const A_FEW: usize = 500;
 /// A sensor sees one side if the middle of its points is further from it than this part of the distance.
 const ONE_SIDE: f64 = 0.3;
+/// Points not far around their sensors were seen from one side if the mean of the directions to those, on the ground, is longer.
+const ONE_WAY: f64 = 0.6;
+/// How far above the ground an eye on that side is, as a part of how far away.
+const RAISED: f64 = 0.47;
 
 /// Where to stand in relation to the cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,7 +55,8 @@ const ONE_SIDE: f64 = 0.3;
 pub enum ViewDirection {
     /// In perspective, the sensor's own view for points in a camera's frame, and with Z up from behind and above the sensor
     /// for a scan that is far denser near it, as of a lidar on a car: in the middle of several, or at the origin of points
-    /// without a coordinate system where no sensor is known. Otherwise [`Iso`](Self::Iso).
+    /// without a coordinate system where no sensor is known. Where sensors saw one side, from half right of them and above.
+    /// Otherwise [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.
@@ -114,9 +119,11 @@ impl Camera {
         projection: Projection,
     ) -> Result<Self, Error> {
         let [right, front, up] = frame(axes);
+        let iso = front + 0.62 * right + 0.55 * up;
         let (to_viewer, picture_up) = match direction {
             ViewDirection::Auto if axes == Axes::Camera => (front, up),
-            ViewDirection::Auto | ViewDirection::Iso => (front + 0.62 * right + 0.55 * up, up),
+            ViewDirection::Auto => (seen_side(cloud, up).unwrap_or(iso), up),
+            ViewDirection::Iso => (iso, up),
             ViewDirection::Front => (front, up),
             ViewDirection::Back => (-front, up),
             ViewDirection::Left => (-right, up),
@@ -259,12 +266,28 @@ fn from_origin(
     Ok((fov < 120.0).then_some(camera))
 }
 
+/// The way towards an eye that stands on the side of a cloud that its sensors saw: of the other it would see backs; `None` if no
+/// sensor is known or they saw it all around.
+fn seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
+    let sensor = middle_of(cloud.scans())? - cloud.origin();
+    let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
+    let towards = samples.iter().map(|&p| (sensor - p).reject_from(up).normalize_or_zero()).sum::<DVec3>();
+    let mean = towards / samples.len().max(1) as f64;
+    let aside = DQuat::from_axis_angle(up, ASIDE_DEG.to_radians());
+    (mean.length() > ONE_WAY).then(|| aside * mean.normalize() + RAISED * up)
+}
+
+/// Mean place of the sensors of some scans, in the world; `None` of none.
+fn middle_of(scans: &[Scan]) -> Option<DVec3> {
+    (!scans.is_empty()).then(|| scans.iter().map(Scan::position).sum::<DVec3>() / scans.len() as f64)
+}
+
 /// The eye behind and above the sensor of a cloud with Z up, in the middle of several, or at the origin of one without
 /// a coordinate system, and the point ahead of it to look at; `None` if it does not stand among the points. `fov` is upright, in degrees.
 fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]> {
-    let sensor = match cloud.scans() {
-        [] if *cloud.crs() != Crs::default() => return None,
-        scans => scans.iter().map(Scan::position).sum::<DVec3>() / scans.len().max(1) as f64,
+    let sensor = match middle_of(cloud.scans()) {
+        None if *cloud.crs() != Crs::default() => return None,
+        sensor => sensor.unwrap_or_default(),
     };
     let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
     let points: Vec<DVec3> = samples.into_iter().map(|p| p + (cloud.origin() - sensor)).collect();

@@ -119,6 +119,38 @@ fn a_sensor_that_sees_one_side_is_seen_from_behind() {
     }
 }
 
+/// A wall along X that sensors at these places saw, each a part of it.
+fn wall_seen_from(sensors: &[DVec3]) -> PointCloud {
+    let wall: Vec<_> = (0..10_000).map(|i| [0.04 * (i / 100) as f32 - 2.0, 0.0, 0.02 * (i % 100) as f32]).collect();
+    let part = wall.len() / sensors.len().max(1);
+    let scan = |(i, &sensor)| {
+        let world_from_sensor = DMat4::from_translation(sensor);
+        Scan { name: None, world_from_sensor, points: i * part..(i + 1) * part }
+    };
+    let scans = sensors.iter().enumerate().map(scan).collect();
+    PointCloud::new(DVec3::new(7.0, 9.0, 3.0), wall).with_scans(scans)
+}
+
+#[test]
+fn what_sensors_saw_from_one_side_is_seen_from_there() {
+    for projection in [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(1.0)] {
+        let towards_eye = |sensors: &[DVec3], direction| {
+            let camera = Camera::fit(&wall_seen_from(sensors), Axes::ZUp, direction, 1.5, projection).expect("a fit");
+            (camera.eye - camera.look_at).normalize()
+        };
+        let behind = DVec3::new(6.0, 12.0, 4.0);
+        for sensors in [&[behind][..], &[behind, DVec3::new(8.0, 14.0, 4.0)]] {
+            let auto = towards_eye(sensors, ViewDirection::Auto);
+            assert!(auto.y > 0.7 && auto.z > 0.2, "{sensors:?}: {auto}");
+        }
+        for sensors in [&[behind, DVec3::new(8.0, 6.0, 4.0)][..], &[]] {
+            let [auto, iso] =
+                [ViewDirection::Auto, ViewDirection::Iso].map(|direction| towards_eye(sensors, direction));
+            assert!(auto == iso && auto.y < -0.5, "seen from both sides, or from nobody knows where: {auto}, {iso}");
+        }
+    }
+}
+
 #[test]
 fn as_much_is_seen_whatever_the_field_of_view() {
     let cloud = swept(DVec3::ZERO, TAU, []);
