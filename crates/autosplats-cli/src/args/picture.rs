@@ -67,7 +67,7 @@ pub(crate) struct SurfaceArgs {
     /// the fastest that finds 99.9 % of the visible points' neighbourhoods, and keeps the first frame's for all frames
     #[arg(long, value_name = "RADIUS|best", default_value = "best", allow_negative_numbers = true)]
     pub(crate) first_radius: FirstRadius,
-    /// What renders; the picture is the same
+    /// What renders; the picture is the same but for rounding
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) backend: Backend,
     /// Expansions of its first search radius after which a point without a neighbour is dropped as an outlier, 0 to 8

@@ -40,7 +40,7 @@ and PCD files from standard input. None opens an empty window to drop files on."
     /// Read files again when they change
     #[arg(long)]
     pub(crate) watch: bool,
-    /// What renders; the picture is the same [default: as last time, at first auto]
+    /// What renders; the picture is the same but for rounding [default: as last time, at first auto]
     #[arg(long, value_enum)]
     pub(crate) backend: Option<Backend>,
     #[command(flatten)]
