@@ -25,6 +25,8 @@ pub(crate) const FIRST_POINTS: Duration = Duration::from_secs(30);
 
 /// Fields left out, and inputs, that are named.
 const LISTED: usize = 10;
+/// Inputs that lie so many times as far from all others as either is large are a few pixels in a picture of both.
+const FAR_APART: f64 = 200.0;
 
 /// The inputs of one command, known to exist.
 #[derive(Debug)]
@@ -313,6 +315,7 @@ impl Inputs {
         let clouds: Vec<Result<_, Failure>> = clouds.collect();
         let clouds = clouds.into_iter().collect::<Result<Vec<_>, _>>()?;
         tell_disagreements(&clouds, &parts);
+        tell_far_apart(&clouds, &parts);
         Ok(PointCloud::merge(clouds))
     }
 }
@@ -349,6 +352,45 @@ fn tell_disagreements(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
         let what = if units { "coordinate systems and units" } else { "coordinate systems" };
         parts[0].note(&format!("the inputs differ in their {what}; nothing is converted, none is kept"));
     }
+}
+
+/// Tells which inputs lie so far from all others that a picture hardly shows both.
+fn tell_far_apart(clouds: &[(PointCloud, DMat4)], parts: &[Part<'_>]) {
+    if clouds.len() < 2 {
+        return;
+    }
+    let boxes: Vec<[DVec3; 2]> = clouds.par_iter().map(world_box).collect();
+    // How many times as far as either is large.
+    let apart = |[low, high]: [DVec3; 2], [other_low, other_high]: [DVec3; 2]| {
+        let gap = (other_low - high).max(low - other_high).max(DVec3::ZERO).length();
+        let size = (high - low).length().max((other_high - other_low).length());
+        if size > 0.0 { gap / size } else { 0.0 }
+    };
+    let nearest = |at: usize| {
+        let others = boxes.iter().enumerate().filter(|&(other, _)| other != at);
+        others.map(|(_, &other)| apart(boxes[at], other)).fold(f64::INFINITY, f64::min)
+    };
+    let mut far: Vec<_> =
+        (0..boxes.len()).map(|at| (at, nearest(at))).filter(|&(_, apart)| apart > FAR_APART).collect();
+    // Of nothing but loners, all but one are.
+    if far.len() == boxes.len() {
+        far.remove(0);
+    }
+    for (at, apart) in far {
+        parts[at].note(&format!(
+            "lies {apart:.0} times as far from the other inputs as it or they are large; a picture hardly shows both, --pose moves it"
+        ));
+    }
+}
+
+/// The box of all finite points, in the world.
+fn world_box((cloud, world_from_input): &(PointCloud, DMat4)) -> [DVec3; 2] {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let each = cloud
+        .positions()
+        .iter()
+        .map(|&position| world_from_input.transform_point3(cloud.origin() + DVec3::from(position.map(f64::from))));
+    each.filter(|place| place.is_finite()).fold(none, |[low, high], place| [low.min(place), high.max(place)])
 }
 
 impl Input {

@@ -49,6 +49,9 @@ fn frames_are_chosen_and_numbered_as_they_are() {
         "{}",
         out.stderr
     );
+    render(&folder, &["--frames", "2", "-o", "one.png"]);
+    render(&folder, &["--frames", "2", "-o", "one_%d.png"]);
+    assert_eq!(folder.read("one.png"), folder.read("one_2.png"), "one picture has the name that it is given");
     folder.fail(&["render", "sweep", "--frames", "4..", "-o", "f.png"], 2, &["sweep", "4 frames", "0 to 3"]);
     folder.fail(&["render", "sweep", "--frames", "3..2", "-o", "f.png"], 2, &["--frames"]);
 }

@@ -76,6 +76,26 @@ fn messages_name_the_inputs() {
 }
 
 #[test]
+fn inputs_that_lie_far_apart() {
+    let folder = Folder::with_sphere();
+    for (name, x) in [("far.ply", 1e5), ("beside.ply", 1e5 + 5.0), ("near.ply", 9.0)] {
+        folder.write(
+            name,
+            &common::points_ply(&[0, 1, 2, 3].map(|i| &*format!("{} {} 0", x + f64::from(i), i & 1).leak())),
+        );
+    }
+    let notes = |inputs: &[&str]| {
+        let told = folder.succeed(&[&["render"], inputs, &["--size", "32x32", "-o", "out.png"]].concat()).stderr;
+        told.lines().filter(|line| line.contains("a picture hardly shows both")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let told = notes(&["sphere.ply", "far.ply"]);
+    assert!(told.len() == 1 && told[0].contains("far.ply") && told[0].contains("--pose"), "{told:?}");
+    let told = notes(&["sphere.ply", "far.ply", "beside.ply"]);
+    assert!(told.len() == 1 && told[0].contains("sphere.ply"), "the one that is alone: {told:?}");
+    assert_eq!(notes(&["sphere.ply", "near.ply"]), [""; 0]);
+}
+
+#[test]
 fn colors_that_the_points_do_not_have() {
     let folder = Folder::new();
     folder.write("bare.ply", &common::points_ply(&["0 0 0", "1 0 0", "0 1 0", "1 1 0"]));

@@ -23,7 +23,8 @@ pub enum Target {
 pub struct Frames {
     folder: PathBuf,
     before: String,
-    digits: usize,
+    /// At least so many of the number between the two; none if there is one picture, which has no number.
+    digits: Option<usize>,
     after: String,
 }
 
@@ -48,10 +49,24 @@ impl Target {
                 if number(&after).is_some() {
                     return Err(refuse("a name has one number"));
                 }
-                Ok(Self::Frames(Frames { folder, before, digits, after }))
+                Ok(Self::Frames(Frames { folder, before, digits: Some(digits), after }))
             }
             _ => Err(refuse("the name has to end in .png, .mp4, .mkv, .webm or .mov")),
         }
+    }
+
+    /// The same for one picture: a name that tells no place for a number is taken as it is.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn one(path: &Path) -> Result<Self, Error> {
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok(match Self::new(path)? {
+            Self::Frames(frames) if !has_number(&name) => {
+                Self::Frames(Frames { before: name, digits: None, after: String::new(), ..frames })
+            }
+            other => other,
+        })
     }
 
     /// The first file that is there already and would be replaced by so many pictures, counted from 0.
@@ -67,12 +82,16 @@ impl Frames {
     /// The file of a picture.
     pub fn file(&self, number: usize) -> PathBuf {
         let Self { folder, before, digits, after } = self;
-        folder.join(format!("{before}{number:0digits$}{after}"))
+        folder.join(match *digits {
+            Some(digits) => format!("{before}{number:0digits$}{after}"),
+            None => format!("{before}{after}"),
+        })
     }
 
     /// All of them, for a message.
     pub fn pattern(&self) -> PathBuf {
-        self.folder.join(format!("{}…{}", self.before, self.after))
+        let number = if self.digits.is_some() { "…" } else { "" };
+        self.folder.join(format!("{}{number}{}", self.before, self.after))
     }
 }
 
@@ -116,6 +135,12 @@ mod tests {
         assert_eq!(file("%d.png", 12), "12.png", "as wide as it is");
         assert_eq!(file("100%_done.png", 1), "100%_done_00001.png", "a percent sign alone is one");
         assert_eq!(file("f%02d.png", 12345), "f12345.png", "no digit is lost");
+        let one = |name: &str| match Target::one(Path::new(name)) {
+            Ok(Target::Frames(frames)) => [frames.file(7), frames.pattern()].map(|path| path.display().to_string()),
+            other => panic!("{name} is {other:?}"),
+        };
+        assert_eq!(one("a/f.png"), ["a/f.png", "a/f.png"], "as it is");
+        assert_eq!(one("f%02d.png"), ["f07.png", "f….png"], "where it is told");
         assert!(has_number("f%02d.png") && !has_number("50%.png"), "a percent sign alone is none");
         for name in ["film", "film.gif", "a%d_%d.png"] {
             assert!(matches!(Target::new(Path::new(name)), Err(Error::Name { .. })), "{name} is none");

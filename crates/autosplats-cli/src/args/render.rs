@@ -43,7 +43,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "FACTOR", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(crate) supersample: u32,
     /// Frames of what moves to render, from 0, both ends included: 0..99, 50.., ..9 or 7, as far as there are; of what is live,
-    /// updates in the order they come [default: all with a numbered name or a film, else the first]
+    /// updates in the order they come. Several go to numbered files, f_00007.png where --out says f.png [default: all with a
+    /// numbered name or a film, else the first]
     #[arg(long, value_name = "A..B", value_parser = values::frame_range, help_heading = "Points that move")]
     pub(crate) frames: Option<FrameRange>,
     /// Leave out frames whose picture is there already

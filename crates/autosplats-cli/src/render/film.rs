@@ -52,7 +52,10 @@ impl FilmJob {
                 "--out: frames go to one film, or to one name with a number such as f_%05d.png",
             ));
         };
-        let target = Target::new(output).map_err(Failure::usage)?;
+        let all = FrameRange { first: 0, last: None };
+        let frames = frames.unwrap_or(all);
+        let is_one = frames.last == Some(frames.first) && !watch;
+        let target = if is_one { Target::one(output) } else { Target::new(output) }.map_err(Failure::usage)?;
         if matches!(target, Target::Film(_)) {
             if resume {
                 return Err(Failure::usage("--resume: a film is made in one go; have pictures written as f_%05d.png"));
@@ -63,8 +66,7 @@ impl FilmJob {
                 return Err(Failure::usage(format!("{}: {error}", output.display())));
             }
         }
-        let all = FrameRange { first: 0, last: None };
-        Ok(Some(Self { target, frames: frames.unwrap_or(all), resume, fps, watch }))
+        Ok(Some(Self { target, frames, resume, fps, watch }))
     }
 
     /// A file that is going to be written.
