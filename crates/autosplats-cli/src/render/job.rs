@@ -107,6 +107,11 @@ impl Job {
             .map_err(read_failure)?;
         let SurfaceArgs { backend, first_radius, .. } = surface;
         let (backend, quiet) = (backend.into(), run.quiet);
+        let shading = &settings.shading;
+        let is_scaled = shading.legend || shading.range.is_some();
+        if !quiet && is_scaled && shading.color.usual_map().is_none() {
+            eprintln!("note: --legend and --range are for colours that tell a value, as of --color height; not used");
+        }
         let job = Self {
             inputs,
             pictures,
