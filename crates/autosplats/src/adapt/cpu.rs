@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::cells::Cells;
 use super::depth::{DepthNoise, Known};
 use super::noise::{Noise, Usual, measure};
-use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Plane, Quadric};
+use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Quadric};
 use super::rows::{is_row, turn};
 use super::sheets::{Around, Blend, Sheets, Surface};
 use super::through::{DENSER, open};
@@ -396,14 +396,16 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
         } else if is_sparse && gathered.weight() < task.rules.k as f32 {
             stray = stray.max(STRAY_DOT);
         }
-        let stands_alone = |plane: Plane| {
+        if let Some(plane) = plane {
             let is_crowd = plane.weight > CROWD * task.rules.k as f32;
             let is_aside = plane.axis.dot(plane.mean).abs() * AROUND_SPARSE > ASIDE;
             let is_outside = plane.mean.length() * AROUND_SPARSE > OFF_MIDDLE;
-            ((is_crowd | (len < LEAST_CLUSTERS)) & is_aside) | (is_crowd & is_outside)
-        };
-        if plane.is_some_and(stands_alone) {
-            stray = stray.max(STRAY_DOT);
+            if is_crowd & (is_aside | is_outside) {
+                // Beside a surface is an outlier; beside a handful nobody knows.
+                stray = f32::INFINITY;
+            } else if (len < LEAST_CLUSTERS) & is_aside {
+                stray = stray.max(STRAY_DOT);
+            }
         }
     }
     if stray > STRAY_DROPPED && !task.rules.keep_outliers {

@@ -50,8 +50,11 @@ fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
         let is_crowd = around.weight > CROWD * f32(frame.k);
         let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
         let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
-        let stands_alone = ((is_crowd || around.len < LEAST_CLUSTERS) && is_aside) || (is_crowd && is_outside);
-        if around.len >= LEAST_OF_PLANE && stands_alone {
+        // No sum is that large.
+        let beside_crowd = 2.0 * STRAY_DROPPED;
+        if around.len >= LEAST_OF_PLANE && is_crowd && (is_aside || is_outside) {
+            stray = beside_crowd;
+        } else if around.len >= LEAST_OF_PLANE && around.len < LEAST_CLUSTERS && is_aside {
             stray = max(stray, STRAY_DOT);
         }
     }

@@ -26,7 +26,7 @@ fn strewn_points_are_no_surface_however_flat_they_lie() {
 }
 
 #[test]
-fn points_just_before_a_surface_are_dots() {
+fn points_just_before_a_surface_are_dropped() {
     for projection in PROJECTIONS {
         let mut positions = test_clouds::sphere(40_000);
         let surface = positions.len() as u32;
@@ -38,6 +38,8 @@ fn points_just_before_a_surface_are_dots() {
         let [[of_sphere, its_dots], [strays, dots]] = dots(&case, |source| source >= surface);
         assert!(strays > 200 && dots * 3 > strays * 2, "{dots} of {strays} are dots");
         assert!(its_dots * 1000 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
+        let dropped = case.adapted().iter().filter(|surfel| surfel.source >= surface && surfel.radius == 0.0).count();
+        assert!(dropped * 2 > strays, "{dropped} of {strays} are dropped");
     }
 }
 
