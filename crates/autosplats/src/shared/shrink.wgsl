@@ -50,10 +50,9 @@ fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
         let is_crowd = around.weight > CROWD * f32(frame.k);
         let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
         let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
-        // No sum is that large.
-        let beside_crowd = 2.0 * STRAY_DROPPED;
         if around.len >= LEAST_OF_PLANE && is_crowd && (is_aside || is_outside) {
-            stray = beside_crowd;
+            // More than any limit: the host's infinity, which has no literal here.
+            stray = 2.0 * STRAY_DROPPED;
         } else if around.len >= LEAST_OF_PLANE && around.len < LEAST_CLUSTERS && is_aside {
             stray = max(stray, STRAY_DOT);
         }
