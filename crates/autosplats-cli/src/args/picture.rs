@@ -14,8 +14,8 @@ use crate::values::{self, Neighbors, Ortho};
 #[command(next_help_heading = "Camera")]
 pub(crate) struct CameraArgs {
     /// Side to look from, so that everything is in the picture but far outliers [default: iso, from the front, right and above;
-    /// but points in a camera's frame as that camera saw them, and those around a sensor from close behind it. Both are
-    /// for perspective alone]
+    /// but points in a camera's frame as that camera saw them, and those around a sensor from close behind it, both in
+    /// perspective alone; and those that sensors saw from one side from there]
     #[arg(long, value_enum, conflicts_with_all = ["eye", "camera"])]
     pub(crate) view: Option<Side>,
     /// Position of the eye in world coordinates
