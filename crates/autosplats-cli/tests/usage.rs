@@ -76,13 +76,20 @@ fn messages_name_the_inputs() {
 }
 
 #[test]
+fn legends_of_colours_without_a_value() {
+    let folder = Folder::with_sphere();
+    let told =
+        |more: &[&str]| folder.succeed(&[&["render", "sphere.ply", "--size", "32x32", "-o", "out.png"], more].concat());
+    assert!(told(&["--legend"]).stderr.contains("--legend and --range"), "plain points have no scale");
+    assert!(!told(&["--legend", "--color", "height"]).stderr.contains("--legend and --range"), "heights have one");
+}
+
+#[test]
 fn inputs_that_lie_far_apart() {
     let folder = Folder::with_sphere();
-    for (name, x) in [("far.ply", 1e5), ("beside.ply", 1e5 + 5.0), ("near.ply", 9.0)] {
-        folder.write(
-            name,
-            &common::points_ply(&[0, 1, 2, 3].map(|i| &*format!("{} {} 0", x + f64::from(i), i & 1).leak())),
-        );
+    for (name, x) in [("far.ply", 100_000), ("beside.ply", 100_005), ("near.ply", 9)] {
+        let points = [0, 1, 2, 3].map(|i| format!("{} {} 0", x + i, i & 1));
+        folder.write(name, &common::points_ply(&points.each_ref().map(String::as_str)));
     }
     let notes = |inputs: &[&str]| {
         let told = folder.succeed(&[&["render"], inputs, &["--size", "32x32", "-o", "out.png"]].concat()).stderr;
