@@ -11,11 +11,13 @@ use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{ReadFiles, check_target, print_line, write_file, write_png};
 use crate::progress::Bar;
-use crate::render::{render_failure, scene_camera};
+use crate::render::{render_failure, scene_camera, shrink};
 use crate::threads::start_threads;
 
 /// Pixels of each picture, the paper's.
 const SIZE: [u32; 2] = [1760, 900];
+/// How many times as wide and high they are rendered, as `render` does with stills.
+const SUPERSAMPLE: u32 = 2;
 
 /// Renders each scene into the folder and prints where it is.
 pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
@@ -35,10 +37,12 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
         let started = Instant::now();
         let bar = Bar::spinner(&format!("rendering {input}"), run.quiet);
         let camera = scene_camera(scene);
-        let frame = renderer.render(&cloud, &camera, SIZE, &Settings::default()).map_err(render_failure)?;
+        let size = SIZE.map(|side| side * SUPERSAMPLE);
+        let frame = renderer.render(&cloud, &camera, size, &Settings::default()).map_err(render_failure)?;
+        let picture = shrink(frame.image, SUPERSAMPLE);
         drop(bar);
         let seconds = started.elapsed().as_secs_f64();
-        write_file(&path, |writer| write_png(frame.image, false, writer))?;
+        write_file(&path, |writer| write_png(&picture, false, writer))?;
 
         print_line(&path.display().to_string())?;
         if !run.quiet {

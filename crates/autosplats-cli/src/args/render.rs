@@ -13,7 +13,7 @@ const RENDER_EXAMPLES: &str = "\
 Examples:
   autosplats render scan.laz -o scan.png
   autosplats render scan.laz -o scan.png --view top --color height --legend
-  autosplats render scan.laz -o print.png --supersample 2
+  autosplats render scan.laz -o print.png --size 6000x4000 --supersample 2
   autosplats render bunny.ply -o bunny.png -o bunny.exr --size 800x600 --background transparent
   autosplats render a.ply b.ply --pose b.ply=b.txt -o both.png
   autosplats render drive.mcap --decay 1s --frames 0..99 -o drive_%05d.png
@@ -39,9 +39,10 @@ pub(crate) struct RenderArgs {
     /// Width and height of the picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1760x900", value_parser = values::size)]
     pub(crate) size: [u32; 2],
-    /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures
-    #[arg(long, value_name = "FACTOR", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=8))]
-    pub(crate) supersample: u32,
+    /// Render so many times as wide and high and average down, 1 to 8: smoother and finer, for .png pictures [default: 2 for
+    /// one picture of up to 1920x1080 pixels, 1 for larger ones, for layers and for frames of what moves]
+    #[arg(long, value_name = "FACTOR", value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub(crate) supersample: Option<u32>,
     /// Frames of what moves to render, from 0, both ends included: 0..99, 50.., ..9 or 7, as far as there are; of what is live,
     /// updates in the order they come. Several go to numbered files, f_00007.png where --out says f.png [default: all with a
     /// numbered name or a film, else the first]

@@ -17,7 +17,7 @@ use autosplats::{Camera, Counts, Error, Frame, Renderer};
 pub(crate) use self::camera::scene_camera;
 use self::job::Job;
 use self::report::Report;
-use self::shrink::shrink;
+pub(crate) use self::shrink::shrink;
 use crate::args::RenderArgs;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};

@@ -15,6 +15,8 @@ use crate::exit::{Exit, Failure};
 pub(super) struct Report<'a> {
     version: &'static str,
     size: [u32; 2],
+    /// How many times as wide and high the picture is that counts and times are of.
+    supersample: u32,
     counts: Counts,
     device: &'a Device,
     axes: &'static str,
@@ -53,6 +55,7 @@ impl<'a> Report<'a> {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             size: job.size,
+            supersample: job.supersample,
             counts: frame.counts,
             device,
             axes: match axes {

@@ -1,9 +1,10 @@
 //! Pictures averaged down.
 
 use autosplats::Image;
+use rayon::prelude::*;
 
 /// Each pixel the mean of `factor`² pixels, in linear light. The sides of `image` are multiples of `factor`.
-pub(super) fn shrink(image: &Image, factor: u32) -> Image {
+pub(crate) fn shrink(image: &Image, factor: u32) -> Image {
     let linear: [f32; 256] = std::array::from_fn(|step| to_linear(step as f32 / 255.0));
     let [width, height] = [image.width / factor, image.height / factor];
     let samples = |x: u32, y: u32| {
@@ -18,7 +19,8 @@ pub(super) fn shrink(image: &Image, factor: u32) -> Image {
         let channel = |i: usize| if alpha > 0.0 { (to_srgb(sum(i) / alpha) * 255.0).round() as u8 } else { 0 };
         [channel(0), channel(1), channel(2), (alpha / (factor * factor) as f32).round() as u8]
     };
-    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| mean(x, y))).collect();
+    let row = |y: u32| (0..width).map(move |x| mean(x, y));
+    let pixels = (0..height).into_par_iter().flat_map_iter(row).collect();
     Image { width, height, pixels, linear: Vec::new() }
 }
 
