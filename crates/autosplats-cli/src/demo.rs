@@ -3,7 +3,7 @@
 use std::fs::create_dir_all;
 use std::time::Instant;
 
-use autosplats::{Renderer, Settings};
+use autosplats::{Renderer, Settings, still_supersample};
 use autosplats_cloud::Scene;
 
 use crate::args::DemoArgs;
@@ -11,13 +11,11 @@ use crate::exit::{Exit, Failure};
 use crate::input::Inputs;
 use crate::output::{ReadFiles, check_target, print_line, write_file, write_png};
 use crate::progress::Bar;
-use crate::render::{render_failure, scene_camera, shrink};
+use crate::render::{render_failure, scene_camera};
 use crate::threads::start_threads;
 
 /// Pixels of each picture, the paper's.
 const SIZE: [u32; 2] = [1760, 900];
-/// How many times as wide and high they are rendered, as `render` does with stills.
-const SUPERSAMPLE: u32 = 2;
 
 /// Renders each scene into the folder and prints where it is.
 pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
@@ -37,9 +35,10 @@ pub(crate) fn run(args: &DemoArgs) -> Result<(), Failure> {
         let started = Instant::now();
         let bar = Bar::spinner(&format!("rendering {input}"), run.quiet);
         let camera = scene_camera(scene);
-        let size = SIZE.map(|side| side * SUPERSAMPLE);
+        let supersample = still_supersample(SIZE);
+        let size = SIZE.map(|side| side * supersample);
         let frame = renderer.render(&cloud, &camera, size, &Settings::default()).map_err(render_failure)?;
-        let picture = shrink(frame.image, SUPERSAMPLE);
+        let picture = frame.image.averaged(supersample);
         drop(bar);
         let seconds = started.elapsed().as_secs_f64();
         write_file(&path, |writer| write_png(&picture, false, writer))?;

@@ -114,18 +114,7 @@ fn a_session_in_a_window() {
     assert_eq!(code, Some(0), "the window closes as it should: {}", screen.words());
 
     let path = input.to_str().expect("the path is text");
-    let view = [
-        "--camera",
-        "view.json",
-        "--size",
-        "1920x1080",
-        "--supersample",
-        "1",
-        "--backend",
-        "cpu",
-        "-o",
-        "rendered.png",
-    ];
+    let view = ["--camera", "view.json", "--size", "1920x1080", "--backend", "cpu", "-o", "rendered.png"];
     folder.succeed(&[&["render", path][..], &view].concat());
     let [seen, rendered] = ["picture.png", "rendered.png"].map(|name| Picture::read(&folder.path(name)));
     // The same camera to the last bit; what differs is how the two choose what they do not say.

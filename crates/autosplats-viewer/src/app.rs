@@ -201,12 +201,17 @@ impl App {
 
     /// Takes in what came of a picture or a task.
     fn take(&mut self, answer: Answer, now: f64) {
-        self.awaited &= matches!(answer, Answer::Device(_) | Answer::Done(_));
+        self.awaited &= matches!(answer, Answer::Finer(_) | Answer::Device(_) | Answer::Done(_));
         match answer {
             Answer::Picture(picture) => {
                 self.rate.count(now, &picture);
                 self.messages.forget_failure();
                 self.shot = Some(picture);
+            }
+            Answer::Finer(image) => {
+                if let Some(shot) = &mut self.shot {
+                    shot.image = image;
+                }
             }
             Answer::Empty => self.shot = None,
             Answer::Device(device) => self.device = device,

@@ -46,8 +46,8 @@ pub use error::Error;
 pub use gpu::{AdapterSummary, PassTime, adapters};
 pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
 pub use renderer::{
-    Backend, Counts, Frame, MAX_SIDE, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings, Timings,
-    best_first_radius, shade_layers, usual_exposure,
+    BYTES_PER_PIXEL, Backend, Counts, Frame, MAX_SIDE, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings,
+    Timings, best_first_radius, shade_layers, still_supersample, usual_exposure,
 };
 pub use search::SearchEngine;
 pub use shade::{Background, Backs, ColorMap, ColorMode, Image, Shading};

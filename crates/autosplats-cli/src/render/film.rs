@@ -10,7 +10,7 @@ use autosplats_film::{Target, has_ffmpeg, has_number};
 use super::job::Job;
 use super::moving::Moving;
 use super::pictures::{FrameReport, Shot, Style, Writer};
-use super::{camera, live, schedule, shrink};
+use super::{camera, live, schedule};
 use crate::device::Device;
 use crate::exit::Failure;
 use crate::input::Playing;
@@ -190,7 +190,7 @@ pub(super) fn run(job: &mut Job, film: &FilmJob, renderer: &mut Renderer, device
 
 /// The picture that is written of what was rendered.
 pub(super) fn picture(job: &Job, frame: &Frame<'_>, writer: &Writer) -> autosplats::Image {
-    if job.supersample > 1 { shrink(frame.image, job.supersample) } else { writer.copy(frame.image) }
+    if job.supersample > 1 { frame.image.averaged(job.supersample) } else { writer.copy(frame.image) }
 }
 
 /// What became of the frames.

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 
 use autosplats::{
-    Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer, Settings, Shading,
-    usual_exposure,
+    BYTES_PER_PIXEL, Backend, Background, Camera, ColorMap, ColorMode, Frame, MAX_SIDE, Reconstruction, Renderer,
+    Settings, Shading, still_supersample, usual_exposure,
 };
 use autosplats_cloud::{PointCloud, check_memory};
 
@@ -20,14 +20,6 @@ use crate::input::{Inputs, read_failure};
 use crate::output::{Format, Picture, ReadFiles, check_target};
 use crate::threads::start_threads;
 use crate::values::COLOR_MODES;
-
-/// Bytes the stages and the layers of a picture take for each pixel.
-const BYTES_PER_PIXEL: u64 = 100;
-
-/// A still picture of up to so many pixels is rendered twice as wide and high unless told otherwise: it takes two to three times as
-/// long, and nothing else brings it as much nearer to the true surface. In larger ones details are larger as well, and what is
-/// rendered is no larger than pictures that screens show.
-const MOST_SUPERSAMPLED: u64 = 1920 * 1080;
 
 /// A picture to make: everything known but the points.
 #[derive(Debug)]
@@ -77,7 +69,7 @@ impl Job {
         };
         let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
         let is_still = film.is_none() && !needs_layers;
-        let supersample = supersample.unwrap_or(if is_still { usual_supersample(size) } else { 1 });
+        let supersample = supersample.unwrap_or(if is_still { still_supersample(size) } else { 1 });
         if needs_layers && supersample > 1 {
             return Err(Failure::usage(
                 "--supersample: .exr layers are not averaged; write them in a run of their own",
@@ -220,15 +212,6 @@ impl Job {
             suggest(missing, COLOR_MODES.into_iter().filter(|mode| *mode != missing.to_lowercase()).chain(fields()));
         Err(Failure::usage(format!("--color: the points have no field {missing}; {hint}")))
     }
-}
-
-/// What stills are rendered with that are not told otherwise.
-fn usual_supersample(size: [u32; 2]) -> u32 {
-    let [width, height] = size.map(u64::from);
-    let pixels = width * height;
-    let fits =
-        2 * width.max(height) <= u64::from(MAX_SIDE) && check_memory("a picture", 4 * pixels * BYTES_PER_PIXEL).is_ok();
-    if pixels <= MOST_SUPERSAMPLED && fits { 2 } else { 1 }
 }
 
 fn settings(surface: &SurfaceArgs, look: LookArgs, all_layers: bool) -> Settings {

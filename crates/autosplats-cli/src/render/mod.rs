@@ -8,7 +8,6 @@ mod moving;
 mod pictures;
 mod report;
 mod schedule;
-mod shrink;
 
 use std::time::Instant;
 
@@ -17,7 +16,6 @@ use autosplats::{Camera, Counts, Error, Frame, Renderer};
 pub(crate) use self::camera::scene_camera;
 use self::job::Job;
 use self::report::Report;
-pub(crate) use self::shrink::shrink;
 use crate::args::RenderArgs;
 use crate::device::Device;
 use crate::exit::{Exit, Failure};
@@ -84,7 +82,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
 fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Job) -> Result<u64, Failure> {
     write_file(&picture.path, |writer| match picture.format {
         Format::Png if job.supersample > 1 => {
-            write_png(&shrink(frame.image, job.supersample), job.transparent(), writer)
+            write_png(&frame.image.averaged(job.supersample), job.transparent(), writer)
         }
         Format::Png => write_png(frame.image, job.transparent(), writer),
         Format::Exr => write_exr(frame, camera, writer),

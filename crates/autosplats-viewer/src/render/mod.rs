@@ -5,7 +5,7 @@
 //! wanted then, never by a queue. [Tasks](Task) that have to be done, such as finding the point under the cursor, are done in
 //! their order before the next picture. Whatever comes of it arrives as [`Answer`]s, each with a request to draw the window
 //! again. While the eye moves, pictures are made smaller, of fewer points if need be, to come in time (`pace`), and a
-//! whole one in work is given up.
+//! whole one in work is given up. Once nothing more is asked for, the picture at rest is made again, supersampled.
 
 mod depths;
 mod pace;
@@ -66,6 +66,8 @@ pub(crate) struct Picture {
 /// What comes back from the thread.
 pub(crate) enum Answer {
     Picture(Box<Picture>),
+    /// The last picture once more, finer.
+    Finer(Arc<Image>),
     /// There is nothing to show.
     Empty,
     /// The device that pictures are made on, once it is known; `None` is the CPU.
@@ -102,6 +104,12 @@ impl Shared {
         let post = self.lock();
         let moves = || post.wish.as_ref().is_some_and(|newer| newer.budget_ms.is_some());
         post.closed || wish.budget_ms.is_none() && moves()
+    }
+
+    /// Whether anything is asked for: a picture that is there already is not worth making finer now.
+    fn has_news(&self) -> bool {
+        let post = self.lock();
+        post.closed || post.wish.is_some() || !post.tasks.is_empty()
     }
 }
 

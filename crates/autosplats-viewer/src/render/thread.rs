@@ -6,7 +6,8 @@ use std::time::Instant;
 use autosplats::cloud::glam::DVec2;
 use autosplats::cloud::{Axes, PointCloud, check_memory};
 use autosplats::{
-    Backend, ColorMode, Error, Frame, Image, Reconstruction, Renderer, SearchEngine, Settings, usual_exposure,
+    Backend, ColorMode, Error, Frame, GBuffer, Image, Reconstruction, Renderer, SearchEngine, Settings,
+    still_supersample, usual_exposure,
 };
 use rayon::prelude::*;
 
@@ -24,26 +25,29 @@ const SEEN: f32 = 2.0;
 pub(super) fn run(shared: &Shared, outbox: &Outbox) {
     let mut studio = Studio::default();
     loop {
-        let (task, wish) = {
+        let work = {
             let mut post = shared.lock();
             loop {
                 if post.closed {
                     return;
                 }
-                post.working = !post.tasks.is_empty() || post.wish.is_some();
+                post.working = !post.tasks.is_empty() || post.wish.is_some() || studio.finer.is_some();
                 if let Some(task) = post.tasks.pop_front() {
-                    break (Some(task), None);
+                    break Work::Task(task);
                 }
                 if let Some(wish) = post.wish.take() {
-                    break (None, Some(wish));
+                    break Work::Wish(wish);
+                }
+                if let Some(finer) = studio.finer.take() {
+                    break Work::Finer(finer);
                 }
                 post = shared.news.wait(post).unwrap_or_else(PoisonError::into_inner);
             }
         };
-        let work = std::panic::AssertUnwindSafe(|| match (task, wish) {
-            (Some(task), _) => studio.perform(task, outbox).map(Answer::Done),
-            (None, Some(wish)) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)),
-            (None, None) => Ok(Answer::Empty),
+        let work = std::panic::AssertUnwindSafe(|| match work {
+            Work::Task(task) => studio.perform(task, outbox).map(Answer::Done),
+            Work::Wish(wish) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)),
+            Work::Finer(finer) => studio.refine(&finer, &|| !shared.has_news()),
         });
         // A bug in one picture must not end all pictures, with edits in the window that are not saved.
         let Ok(answer) = std::panic::catch_unwind(work) else {
@@ -63,9 +67,25 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
     }
 }
 
+/// What is to be done next.
+enum Work {
+    Task(Task),
+    Wish(Wish),
+    Finer(Finer),
+}
+
+/// A picture at rest that was made, and is to be made once more, supersampled.
+struct Finer {
+    wish: Wish,
+    settings: Settings,
+    supersample: u32,
+}
+
 /// What is kept from picture to picture.
 #[derive(Default)]
 struct Studio {
+    /// What to do once nothing is asked for.
+    finer: Option<Finer>,
     renderer: Option<(Backend, Renderer)>,
     costs: Costs,
     shown: Option<(Option<Axes>, Arc<Shown>)>,
@@ -175,6 +195,7 @@ impl Studio {
     /// Makes a picture, unless `go_on` says that another one is more urgent.
     fn draw(&mut self, wish: &Wish, outbox: &Outbox, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
         let started = Instant::now();
+        self.finer = None;
         let shown = self.shown(wish)?;
         if shown.cloud.len() < 2 {
             self.let_go();
@@ -191,7 +212,7 @@ impl Studio {
             self.sparse = Some(Sparse::new(&shown.cloud, pace.halvings));
         }
         let exposure = self.exposure.of(&wish.document, &shown.cloud);
-        let Self { renderer: Some((_, renderer)), sparse, costs, .. } = self else { return Ok(Answer::Empty) };
+        let Self { renderer: Some((_, renderer)), sparse, costs, finer, .. } = self else { return Ok(Answer::Empty) };
         let part = sparse.as_ref().filter(|_| pace.halvings > 0);
         let cloud = part.map_or(&*shown.cloud, |sparse| &sparse.cloud);
         let size = wish.rendered_size(pace.scale);
@@ -205,20 +226,18 @@ impl Studio {
         let Image { width, height, ref pixels, .. } = *image;
         let mut image = Image { width, height, pixels: pixels.clone(), linear: Vec::new() };
         if let Some(selected) = &selected {
-            let is_selected = |point: u32| {
+            tint(&mut image, layers, |point| {
                 let index = part.map_or(point, |sparse| sparse.indices[point as usize]);
                 selected.get(index as usize)
-            };
-            for y in 0..size[1] as usize {
-                for x in 0..size[0] as usize {
-                    let point = layers.point[layers.index(x, y)];
-                    if point != u32::MAX && is_selected(point) {
-                        let pixel = &mut image.pixels[y * size[0] as usize + x];
-                        let mixed = |i: usize| ((2 * u16::from(pixel[i]) + 3 * SELECTED[i]) / 5) as u8;
-                        *pixel = [mixed(0), mixed(1), mixed(2), u8::MAX];
-                    }
-                }
-            }
+            });
+        }
+        let supersample = still_supersample(wish.size);
+        if wish.budget_ms.is_none() && wish.dots.is_none() && supersample > 1 {
+            settings.all_layers = selected.is_some();
+            // Colours are to mean what they mean in this picture.
+            settings.shading.range =
+                settings.shading.range.or(counts.value_range.map(|range| range.map(|end| end as f32)));
+            *finer = Some(Finer { wish: wish.clone(), settings, supersample });
         }
         let depths = Depths::new(layers);
         costs.learn(cloud.len(), size[0] as usize * size[1] as usize, timings.project, timings.frame - timings.project);
@@ -235,6 +254,29 @@ impl Studio {
             depths,
             shown,
         })))
+    }
+
+    /// Makes a picture once more, supersampled, unless `go_on` says that something is asked for.
+    fn refine(&mut self, finer: &Finer, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
+        let Finer { wish, settings, supersample } = finer;
+        let shown = self.shown(wish)?;
+        let Some((_, renderer)) = &mut self.renderer else { return Err(Error::Cancelled) };
+        let size = wish.size.map(|side| side * supersample);
+        let frame = match renderer.render_while(&shown.cloud, &wish.camera, size, settings, go_on) {
+            // Too large for this device: the picture that is there will do.
+            Err(error) if !matches!(error, Error::DeviceLost(_)) => return Err(Error::Cancelled),
+            frame => frame?,
+        };
+        let selected = shown.selected(&wish.document);
+        let image = if selected.is_empty() {
+            frame.image.averaged(*supersample)
+        } else {
+            let Image { width, height, ref pixels, .. } = *frame.image;
+            let mut image = Image { width, height, pixels: pixels.clone(), linear: Vec::new() };
+            tint(&mut image, frame.layers, |point| selected.get(point as usize));
+            image.averaged(*supersample)
+        };
+        Ok(Answer::Finer(Arc::new(image)))
     }
 
     fn perform(&mut self, task: Task, outbox: &Outbox) -> Result<Outcome, Error> {
@@ -301,11 +343,31 @@ impl Studio {
                 let shown = self.shown(&wish)?;
                 let mut settings = self.settings(&wish, &shown, outbox)?;
                 // But for those of a film, which follow each other.
-                settings.reconstruction.steady = matches!(goal, Goal::Film(_));
-                let size = wish.rendered_size(1.0);
+                let is_film = matches!(goal, Goal::Film(_));
+                settings.reconstruction.steady = is_film;
+                let supersample = if is_film || wish.dots.is_some() { 1 } else { still_supersample(wish.size) };
+                let size = wish.rendered_size(1.0).map(|side| side * supersample);
                 let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
-                let (image, range) = (Box::new(enlarge(frame.image, wish.size)), frame.counts.value_range);
-                Ok(Outcome::Photographed { image, range, goal })
+                let range = frame.counts.value_range;
+                let image = match supersample {
+                    1 => enlarge(frame.image, wish.size),
+                    _ => frame.image.averaged(supersample),
+                };
+                Ok(Outcome::Photographed { image: Box::new(image), range, goal })
+            }
+        }
+    }
+}
+
+/// Mixes the pixels of points that are selected with a colour.
+fn tint(image: &mut Image, layers: &GBuffer, is_selected: impl Fn(u32) -> bool) {
+    let width = image.width as usize;
+    for (y, row) in image.pixels.chunks_mut(width).enumerate() {
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let point = layers.point[layers.index(x, y)];
+            if point != u32::MAX && is_selected(point) {
+                let mixed = |i: usize| ((2 * u16::from(pixel[i]) + 3 * SELECTED[i]) / 5) as u8;
+                *pixel = [mixed(0), mixed(1), mixed(2), u8::MAX];
             }
         }
     }

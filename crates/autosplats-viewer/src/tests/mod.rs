@@ -6,6 +6,7 @@ mod edits;
 mod mouse;
 mod moving;
 mod opening;
+mod rest;
 mod shortcuts;
 mod soak;
 

@@ -7,6 +7,7 @@ mod first_radius;
 mod gpu;
 mod layers;
 mod settings;
+mod still;
 mod surfels;
 mod upward;
 
@@ -26,6 +27,7 @@ pub use exposure::usual_exposure;
 pub use first_radius::{RadiusTrial, best_first_radius};
 pub use layers::shade_layers;
 pub use settings::{Reconstruction, Settings};
+pub use still::{BYTES_PER_PIXEL, still_supersample};
 pub use surfels::PointSurfel;
 
 /// Longest side of an image in pixels.

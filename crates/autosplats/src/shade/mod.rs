@@ -17,6 +17,7 @@
 //! of them at most; on the device it is found before shading, so that no frame waits for the host. The legend is drawn by
 //! the host in any case, into pictures in memory.
 
+mod average;
 mod classes;
 mod color_map;
 mod cpu;

@@ -1,0 +1,50 @@
+//! Pictures while nothing moves.
+
+use autosplats::{Image, Renderer, usual_exposure};
+
+use super::*;
+
+/// What the window shows once nothing is left to do.
+fn at_rest(window: &mut Window) -> Image {
+    window.settle();
+    window.until("all is done", |window| window.app().render.is_idle());
+    window.steps(2);
+    Image::clone(&window.app().shot.as_ref().expect("there is a picture").image)
+}
+
+/// The same picture by the library, so many times as wide and high and averaged.
+fn rendered(window: &Window, supersample: u32) -> Image {
+    let app = window.app();
+    let shot = app.shot.as_ref().expect("there is a picture");
+    let mut settings = app.look.settings.clone();
+    settings.shading.legend = false;
+    settings.shading.exposure.get_or_insert(usual_exposure(&shot.shown.cloud));
+    let size = shot.size.map(|side| side * supersample);
+    let frame =
+        Renderer::new().render(&shot.shown.cloud, &shot.camera, size, &settings).map(|frame| frame.image.clone());
+    frame.expect("it can be rendered").averaged(supersample)
+}
+
+#[test]
+fn a_picture_at_rest_becomes_finer() {
+    let mut window = Window::with_statue();
+    let shown = at_rest(&mut window);
+    assert_eq!(
+        [shown.width, shown.height],
+        window.app().shot.as_ref().expect("a picture").size,
+        "as large as the window's"
+    );
+    assert!(shown.pixels == rendered(&window, 2).pixels, "it is the one that was rendered larger");
+    assert!(shown.pixels != rendered(&window, 1).pixels, "and no other");
+}
+
+#[test]
+fn what_is_selected_is_tinted_in_the_finer_picture() {
+    let mut window = Window::with_statue();
+    let plain = at_rest(&mut window);
+    window.key(CTRL, Key::A);
+    let selected = at_rest(&mut window);
+    let differ = plain.pixels.iter().zip(&selected.pixels).filter(|(one, other)| one != other).count();
+    let covered = window.app().shot.as_ref().expect("a picture").counts.covered;
+    assert!(differ + covered / 50 > covered, "{differ} of {covered} pixels have another colour");
+}
