@@ -46,6 +46,11 @@ const A_FEW: usize = 500;
 const ONE_SIDE: f64 = 0.3;
 /// Points not far around their sensors were seen from one side if the mean of the directions to those, on the ground, is longer.
 const ONE_WAY: f64 = 0.6;
+/// And if the nearest of them are, on the ground, at least this part as far away as half are: what is above or below a sensor has
+/// no side.
+const APART: f64 = 0.3;
+/// The share of points that are the nearest.
+const NEAREST_SHARE: f64 = 0.05;
 /// How far above the ground an eye on that side is, as a part of how far away.
 const RAISED: f64 = 0.47;
 
@@ -267,14 +272,18 @@ fn from_origin(
 }
 
 /// The way towards an eye that stands on the side of a cloud that its sensors saw: of the other it would see backs; `None` if no
-/// sensor is known or they saw it all around.
+/// sensor is known or they saw it all around, or stood among the points.
 fn seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
     let sensor = middle_of(cloud.scans())? - cloud.origin();
     let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
-    let towards = samples.iter().map(|&p| (sensor - p).reject_from(up).normalize_or_zero()).sum::<DVec3>();
-    let mean = towards / samples.len().max(1) as f64;
+    let ways: Vec<DVec3> = samples.iter().map(|&p| (sensor - p).reject_from(up)).collect();
+    let mean = ways.iter().map(|way| way.normalize_or_zero()).sum::<DVec3>() / ways.len().max(1) as f64;
+    let mut ranges: Vec<f64> = ways.iter().map(|way| way.length()).collect();
+    ranges.sort_unstable_by(f64::total_cmp);
+    let range = |share: f64| ranges.get((share * ranges.len() as f64) as usize).copied();
+    let is_apart = range(NEAREST_SHARE)? >= APART * range(0.5)?;
     let aside = DQuat::from_axis_angle(up, ASIDE_DEG.to_radians());
-    (mean.length() > ONE_WAY).then(|| aside * mean.normalize() + RAISED * up)
+    (is_apart && mean.length() > ONE_WAY).then(|| aside * mean.normalize() + RAISED * up)
 }
 
 /// Mean place of the sensors of some scans, in the world; `None` of none.

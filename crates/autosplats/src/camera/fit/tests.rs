@@ -143,10 +143,11 @@ fn what_sensors_saw_from_one_side_is_seen_from_there() {
             let auto = towards_eye(sensors, ViewDirection::Auto);
             assert!(auto.y > 0.7 && auto.z > 0.2, "{sensors:?}: {auto}");
         }
-        for sensors in [&[behind, DVec3::new(8.0, 6.0, 4.0)][..], &[]] {
+        let at_its_end = DVec3::new(9.05, 9.05, 4.0);
+        for sensors in [&[behind, DVec3::new(8.0, 6.0, 4.0)][..], &[at_its_end], &[]] {
             let [auto, iso] =
                 [ViewDirection::Auto, ViewDirection::Iso].map(|direction| towards_eye(sensors, direction));
-            assert!(auto == iso && auto.y < -0.5, "seen from both sides, or from nobody knows where: {auto}, {iso}");
+            assert!(auto == iso && auto.y < -0.5, "{sensors:?}, on both sides, among them or unknown: {auto}, {iso}");
         }
     }
 }
