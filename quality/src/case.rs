@@ -67,7 +67,7 @@ pub fn full() -> Vec<Case> {
     let mut cases = vec![
         case(figure, Shot::Own).shown().moving(),
         case(figure, Shot::Near(Front, [0.5, 0.2], 5.0)),
-        case(figure, Shot::Far(Iso, 5.0)),
+        case(figure, Shot::Far(Iso, 5.0)).moving(),
         case(two_scales, Shot::Own).shown(),
         case(two_scales, Shot::Parallel(Front)),
         case(statue, Shot::Own).shown().moving(),
@@ -94,7 +94,7 @@ pub fn full() -> Vec<Case> {
         case(bunny.noise(0.001), Shot::Whole(Front)).shown().moving(),
         case(noisy, Shot::Whole(Front)).shown().moving(),
         case(noisy, Shot::Near(Front, ear, 5.0)),
-        case(noisy, Shot::Far(Front, 5.0)),
+        case(noisy, Shot::Far(Front, 5.0)).moving(),
         case(bunny.noise(0.01), Shot::Whole(Front)).shown(),
         case(bunny.outliers(0.02), Shot::Whole(Front)).shown(),
         case(bunny.misregistration(0.0015), Shot::Whole(Front)).shown(),

@@ -4,7 +4,8 @@
 //! A *case* is a subject and a view of it ([`case`]). A subject is a surface that is known exactly, and points on it as
 //! good or as bad as scanners make them ([`subject`]), strewn or in the rings of a spinning lidar ([`sweep`]). One ray per
 //! pixel centre tells what is truly there ([`exact`]). Several methods draw the points ([`method`]); each picture is judged
-//! pixel by pixel ([`verdict`]), lit like the truth ([`light`]), and measured ([`measure`]).
+//! pixel by pixel ([`verdict`]), lit like the truth ([`light`]), and measured ([`measure`]). Lit pictures are held against a truth of
+//! many rays besides, stills among them ([`still`]).
 
 pub mod case;
 pub mod exact;
@@ -20,6 +21,7 @@ pub mod picture;
 pub mod random;
 pub mod run;
 pub mod sheet;
+pub mod still;
 pub mod subject;
 pub mod surface;
 pub mod sweep;

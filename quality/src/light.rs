@@ -2,6 +2,7 @@
 
 use autosplats::cloud::glam::DVec3;
 use autosplats::{Background, ColorMode, GBuffer, Shading, shade_layers};
+use rayon::prelude::*;
 
 use crate::picture::Picture;
 use crate::view::Rays;
@@ -53,6 +54,25 @@ impl Lit {
         (0..self.pixels.len()).map(|pixel| self.over_background(pixel)).collect()
     }
 
+    /// The picture whose pixels are means of `factor`² of this one's each, in linear light; covered is what is covered in part.
+    #[must_use]
+    pub fn averaged(&self, factor: usize) -> Self {
+        let [width, height] = [self.width / factor, self.pixels.len() / self.width / factor];
+        let parts = |pixel: usize| {
+            let [x, y] = [pixel % width, pixel / width].map(|at| at * factor);
+            (0..factor).flat_map(move |dy| (0..factor).map(move |dx| (y + dy) * self.width + x + dx))
+        };
+        let mean = |pixel: usize| {
+            let colors = parts(pixel).map(|part| self.over_background(part).map(to_linear));
+            let sum = colors.fold([0.0; 3], |sum, color| [0, 1, 2].map(|i| sum[i] + color[i]));
+            sum.map(|channel| to_srgb(channel / (factor * factor) as f64))
+        };
+        let around: Vec<_> = (0..width * height).into_par_iter().map(mean).collect();
+        let is_covered = |pixel: usize| parts(pixel).any(|part| self.pixels[part].is_some());
+        let pixels = around.iter().enumerate().map(|(pixel, &color)| is_covered(pixel).then_some(color)).collect();
+        Self { width, pixels, around }
+    }
+
     /// The picture with each covered pixel's colour changed.
     #[must_use]
     pub fn changed(&self, change: impl Fn(usize, [f64; 3]) -> [f64; 3]) -> Self {
@@ -87,4 +107,21 @@ pub fn psnr(lit: &Lit, truth: &Lit, pixels: impl Iterator<Item = usize>) -> f64 
 /// The pixels that either picture covers.
 pub fn either<'a>(lit: &'a Lit, truth: &'a Lit) -> impl Iterator<Item = usize> + 'a {
     (0..lit.pixels.len()).filter(|&pixel| lit.pixels[pixel].is_some() || truth.pixels[pixel].is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_are_those_of_light_and_cover_what_any_part_covers() {
+        let [black, white] = [[0.0; 3], [1.0; 3]];
+        let around = vec![black, white, black, black, white, black, black, black];
+        let pixels = around.iter().enumerate().map(|(pixel, &color)| (pixel % 4 < 2).then_some(color)).collect();
+        let small = Lit { width: 4, pixels, around }.averaged(2);
+        // Half the light is 188 of 255 in sRGB.
+        let [mean, rest] = [small.pixels[0].expect("covered"), small.around[1]].map(|color| (color[0] * 255.0).round());
+        assert_eq!([small.width, small.pixels.len()], [2, 2], "size");
+        assert_eq!(([mean, rest], small.pixels[1]), ([188.0, 0.0], None), "means, and what is not covered");
+    }
 }

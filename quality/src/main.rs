@@ -148,7 +148,12 @@ fn print(outcome: &Outcome) {
         format!("{:.3} of k = {k}", ratio(outcome, Method::Ours, value).unwrap_or(f64::NAN))
     };
     println!("    ours / best fit: mean {}, band {}", best(|angles| angles.mean), best(|angles| angles.band));
+    let still = &outcome.still;
+    print!("    against many rays: truth of one {:.2} dB, still {:.2}", still.one_ray, still.still);
+    still.methods.iter().for_each(|(method, psnr)| print!(", {} {psnr:.2}", method.name()));
+    println!();
     if let Some(motion) = &outcome.motion {
+        println!("    in motion, truth of many rays            lightness {:6.2}", motion.smooth);
         let truth = [("truth".to_owned(), motion.truth), ("ours, alone".to_owned(), motion.alone)];
         let methods = motion.methods.iter().map(|(method, change)| (method.name(), *change));
         for (name, change) in truth.into_iter().chain(methods) {

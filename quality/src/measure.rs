@@ -87,9 +87,14 @@ impl Truth {
             swept: swept(&self.exact, picture),
             angles: angles(&self.exact, &self.band, picture),
             depth_px: depth_px(&self.exact, picture),
-            psnr: psnr(lit, &self.lit, self.compared(lit)),
+            psnr: self.psnr_against(lit, &self.lit),
             flip: self.flip(lit),
         }
+    }
+
+    /// PSNR of `lit` with another lit truth of the same view, over the same pixels as [`Measures::psnr`].
+    pub fn psnr_against(&self, lit: &Lit, truth: &Lit) -> f64 {
+        psnr(lit, truth, self.compared(lit))
     }
 
     /// The pixels that either picture covers, but for those that nothing is asked about.

@@ -2,7 +2,9 @@
 
 use crate::measure::{Measures, Swept};
 use crate::method::{FIT_KS, Method};
+use crate::motion::Change;
 use crate::run::Outcome;
+use crate::still::Still;
 use crate::table::{Table, number, percent};
 use crate::target::{TARGETS, ratio};
 
@@ -65,6 +67,16 @@ all tables but that of motion.
 
 ";
 
+const STILLS: &str = "\
+## Lit pictures against many rays
+
+PSNR in decibels with a truth of 16 rays a pixel in place of one, over the same pixels: what is finer than pixels is there \
+with its mean, as a picture should have it. *Still* is ours as `autosplats render` and a window at rest make it, rendered \
+twice as wide and high and averaged; the others are the same pictures as above, and *truth, one ray* is what they are held \
+against there.
+
+";
+
 const CREDITS: &str = "\
 The bunny is from the Stanford 3D Scanning Repository, the horse by Sumner and Popović, the dancer by Vlasic et al. FLIP \
 is that of Andersson et al. 2020, at 67 pixels per degree.
@@ -91,11 +103,14 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         "## Lit pictures\n\nPSNR in decibels, FLIP from 0 to 1, depth in pixels. The best fit is the one with the best \
          normals.\n\n",
         &lit(outcomes),
+        STILLS,
+        &stills(outcomes),
         "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness \
          in 255ths. Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is \
          averaged over about eight pictures, and eight of the same movement go before those that count. All others are \
          made by themselves. *Alone* are ours, each made by itself, and *off* is the mean error of normals in the last \
-         picture.\n\n",
+         picture. *Smooth* are true pictures of 16 rays a pixel, in which detail finer than pixels does not \
+         flicker.\n\n",
         &motion(outcomes),
         CREDITS,
     ]
@@ -351,6 +366,19 @@ fn lit(outcomes: &[Outcome]) -> String {
     table.finish()
 }
 
+fn stills(outcomes: &[Outcome]) -> String {
+    let mut table = Table::new(&["case", "truth, one ray", "still", "ours", "paper", "dots", "known", "still - ours"]);
+    for outcome in outcomes {
+        let Still { one_ray, still, methods } = &outcome.still;
+        let of = |method| methods.iter().find(|(other, _)| *other == method).map_or(f64::NAN, |(_, psnr)| *psnr);
+        let [ours, paper, dots, known] = [Method::Ours, Method::Paper, Method::Dots, Method::Known].map(of);
+        let mut cells = vec![outcome.case.name()];
+        cells.extend([*one_ray, *still, ours, paper, dots, known, still - ours].map(|value| number(value, 2)));
+        table.row(&cells);
+    }
+    table.finish()
+}
+
 fn motion(outcomes: &[Outcome]) -> String {
     let mut table = Table::new(&[
         "case",
@@ -360,6 +388,7 @@ fn motion(outcomes: &[Outcome]) -> String {
         "paper",
         "known",
         "lightness: truth",
+        "smooth",
         "ours",
         "alone",
         "paper",
@@ -375,7 +404,9 @@ fn motion(outcomes: &[Outcome]) -> String {
         let [truth, alone] = [motion.truth, motion.alone].map(Some);
         let mut cells = vec![outcome.case.name()];
         cells.extend([truth, ours, alone, paper, known].map(|c| number(c.map_or(f64::NAN, |c| c.degrees), 2)));
-        cells.extend([truth, ours, alone, paper, dots, known].map(|c| number(c.map_or(f64::NAN, |c| c.lightness), 2)));
+        let lightness = |change: Option<Change>| number(change.map_or(f64::NAN, |change| change.lightness), 2);
+        cells.extend([lightness(truth), number(motion.smooth, 2)]);
+        cells.extend([ours, alone, paper, dots, known].map(lightness));
         cells.extend(motion.degrees_off.map(|degrees| number(degrees, 2)));
         table.row(&cells);
     }

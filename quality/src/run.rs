@@ -10,6 +10,7 @@ use crate::measure::{Angles, Measures, Truth};
 use crate::method::{Method, Painter};
 use crate::motion::{Change, Changes, LEAD_IN, STEP_DEGREES, STEPS, same};
 use crate::picture::Picture;
+use crate::still::{self, Still};
 use crate::subject::Subject;
 use crate::view::orbit;
 
@@ -20,6 +21,8 @@ pub struct Outcome {
     pub case: Case,
     /// For each of [`Method::ALL`].
     pub measures: Vec<(Method, Measures)>,
+    /// Lit pictures against a truth of many rays.
+    pub still: Still,
     /// What changed while the camera moved, if it did.
     pub motion: Option<Motion>,
 }
@@ -29,6 +32,8 @@ pub struct Outcome {
 pub struct Motion {
     /// In the true pictures: what light and pixels do.
     pub truth: Change,
+    /// The lightness in true pictures of many rays a pixel, in which no detail flickers.
+    pub smooth: f64,
     /// In those of each method; ours are steady, as the window has them while the view moves.
     pub methods: Vec<(Method, Change)>,
     /// In ours, each made by itself.
@@ -66,8 +71,10 @@ pub fn measure(
         measures.push((method, truth.measure(&picture, &lit, subject)));
         drawn.push((method, picture, lit));
     }
+    let lit = drawn.iter().map(|(method, _, lit)| (*method, lit));
+    let still = still::measure(case, subject, painter, &truth, lit)?;
     let motion = if case.motion { Some(movement(case, subject, painter, methods)?) } else { None };
-    Ok((Outcome { case: *case, measures, motion }, Pictures { truth, drawn }))
+    Ok((Outcome { case: *case, measures, still, motion }, Pictures { truth, drawn }))
 }
 
 /// Moves the camera of a case around its subject and follows what changes.
@@ -77,7 +84,7 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
     // What is steady follows pictures of its own kind.
     let mut follower = Painter::new(subject);
     let steady = Reconstruction { steady: true, ..Reconstruction::default() };
-    let mut changes = vec![Changes::default(); 2 + methods.len()];
+    let mut changes = vec![Changes::default(); 3 + methods.len()];
     for step in (1..=LEAD_IN).rev() {
         follower.render(steady.clone(), &orbit(&camera, step as f64 * -STEP_DEGREES)?, case.size)?;
     }
@@ -85,14 +92,16 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
     for step in 0..=STEPS {
         let camera = orbit(&camera, step as f64 * STEP_DEGREES)?;
         let exact = Exact::trace_alone(subject, &camera, case.size)?;
-        let mut pictures = vec![Picture::truth(&exact), painter.paint(Method::Ours, &camera, case.size)?];
+        let true_picture = Picture::truth(&exact);
+        let mut pictures = vec![true_picture.clone(), true_picture, painter.paint(Method::Ours, &camera, case.size)?];
         for &method in &methods {
             pictures.push(match method {
                 Method::Ours => follower.render(steady.clone(), &camera, case.size)?,
                 _ => painter.paint(method, &camera, case.size)?,
             });
         }
-        let lit: Vec<_> = pictures.iter().map(|picture| Lit::new(picture, &exact.rays)).collect();
+        let mut lit: Vec<_> = pictures.iter().map(|picture| Lit::new(picture, &exact.rays)).collect();
+        lit[1] = still::smooth(subject, &camera, case.size)?;
         let pictures: Vec<_> = pictures.into_iter().zip(lit).collect();
         if let Some((exact_before, before)) = &before {
             let same = same(exact_before, &exact);
@@ -106,11 +115,19 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
         let angles = picture.and_then(|(picture, lit)| last.measure(picture, lit, subject).angles);
         angles.map_or(f64::NAN, |angles| angles.mean)
     };
-    let ours = 2 + methods.iter().position(|&method| method == Method::Ours).unwrap_or(methods.len());
-    let degrees_off = before.map_or([f64::NAN; 2], |(_, shown)| [1, ours].map(|at| degrees_off(shown.get(at))));
+    let ours = 3 + methods.iter().position(|&method| method == Method::Ours).unwrap_or(methods.len());
+    let degrees_off = before.map_or([f64::NAN; 2], |(_, shown)| [2, ours].map(|at| degrees_off(shown.get(at))));
     let mut means = changes.iter().map(Changes::mean);
-    let (Some(truth), Some(alone)) = (means.next(), means.next()) else { unreachable!("there are two and more") };
-    Ok(Motion { truth, methods: methods.into_iter().zip(means).collect(), alone, degrees_off })
+    let (Some(truth), Some(smooth), Some(alone)) = (means.next(), means.next(), means.next()) else {
+        unreachable!("there are three and more")
+    };
+    Ok(Motion {
+        truth,
+        smooth: smooth.lightness,
+        methods: methods.into_iter().zip(means).collect(),
+        alone,
+        degrees_off,
+    })
 }
 
 impl Outcome {

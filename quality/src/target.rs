@@ -101,6 +101,7 @@ mod tests {
     use crate::measure::{Measures, Swept};
     use crate::page::page;
     use crate::run::Motion;
+    use crate::still::Still;
     use crate::verdict::Cover;
 
     /// A case that we measured like this, the paper and dots worse, and plane fits like this.
@@ -131,11 +132,13 @@ mod tests {
         let change = |degrees| Change { degrees, lightness: 1.0 };
         let motion = Motion {
             truth: change(1.0),
+            smooth: 1.0,
             methods: vec![(Method::Ours, change(ours))],
             alone: change(ours),
             degrees_off: [1.0; 2],
         };
-        Outcome { case: quick()[0], measures: methods, motion: Some(motion) }
+        let still = Still { one_ray: 40.0, still: 33.0, methods: vec![(Method::Ours, psnr)] };
+        Outcome { case: quick()[0], measures: methods, still, motion: Some(motion) }
     }
 
     fn missed(outcome: &Outcome) -> Vec<&'static str> {
