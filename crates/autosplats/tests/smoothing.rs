@@ -149,6 +149,35 @@ fn the_same_points_are_steady_while_the_camera_moves() {
     }
 }
 
+/// Pictures that follow each other are averaged, on both backends alike, in which nothing but rounding differs.
+#[test]
+fn steady_pictures_flicker_less() {
+    let cloud = wave(0.0, 0.004, &mut Random::new(9));
+    let view = |frame: i32| camera(DVec3::new(0.3 + 0.002 * f64::from(frame), 0.2, 3.0));
+    let mut steady_pictures = Vec::new();
+    for mut renderer in renderers() {
+        let adapter = renderer.adapter();
+        let mut shown = |steady: bool| {
+            let reconstruction = Reconstruction { steady, ..Reconstruction::default() };
+            let settings = Settings { reconstruction, ..Settings::default() };
+            let frames = (0..6).map(|frame| {
+                let image = renderer.render(&cloud, &view(frame), SIZE, &settings).expect("a picture").image;
+                image.pixels.iter().map(|pixel| f32::from(pixel[1])).collect()
+            });
+            frames.collect::<Vec<Vec<f32>>>()
+        };
+        let [alone, steady] = [false, true].map(&mut shown);
+        let [alone_change, steady_change] = [&alone, &steady].map(|frames| mean_difference(&frames[4], &frames[5]));
+        assert!(steady_change < 0.6 * alone_change, "{adapter:?}: {steady_change} steps a frame, alone {alone_change}");
+        assert!(alone[0] == steady[0], "{adapter:?}: the first has nothing before it");
+        steady_pictures.push(steady);
+    }
+    for (frame, pictures) in steady_pictures[0].iter().enumerate() {
+        let others = steady_pictures[1..].iter().map(|other| mean_difference(pictures, &other[frame]));
+        assert!(others.clone().all(|off| off < 0.05), "{frame}: off by {:?}", others.collect::<Vec<_>>());
+    }
+}
+
 /// Frames of other settings, another size, another projection or one that was given up have nothing to be averaged with.
 #[test]
 fn what_is_not_alike_begins_anew() {

@@ -36,7 +36,8 @@ pub(crate) struct FrameUniform {
     pub(crate) same_points: u32,
     pub(crate) picture: [u32; 2],
     pub(crate) margin: u32,
-    pub(crate) padding: u32,
+    /// 1 if the last picture was one of the same points, made in the same way, and is to be averaged with.
+    pub(crate) same_picture: u32,
     /// Columns, each padded to four numbers.
     pub(crate) past_rotation: [[f32; 4]; 3],
     pub(crate) past_shift: [f32; 3],
@@ -68,7 +69,7 @@ impl FrameUniform {
             same_points: 0,
             picture: view.picture_size(),
             margin: view.margin,
-            padding: 0,
+            same_picture: 0,
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],
             past_focal_px: 0.0,

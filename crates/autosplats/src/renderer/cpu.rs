@@ -18,6 +18,7 @@ use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
 use crate::search::{Neighborhoods, SearchCounts, SearchEngine, SearchRules, screen_grid};
+use crate::shade::over_time::LastPicture;
 use crate::shade::{Image, Scene, linear_steps, shade};
 use crate::splat::{Attributes, OverTime, PointColors, Splatter};
 
@@ -44,6 +45,7 @@ pub(super) struct CpuRenderer {
     /// Of the last frame.
     view: Option<View>,
     over_time: OverTime<Reconstruction>,
+    last_picture: LastPicture,
 }
 
 impl Default for CpuRenderer {
@@ -65,6 +67,7 @@ impl Default for CpuRenderer {
             linear: linear_steps(),
             view: None,
             over_time: OverTime::default(),
+            last_picture: LastPicture::default(),
         }
     }
 }
@@ -130,6 +133,7 @@ impl CpuRenderer {
             image,
             view: last_view,
             over_time,
+            last_picture,
             ..
         } = self;
         let mut clock = Clock::start(go_on);
@@ -168,7 +172,10 @@ impl CpuRenderer {
             over_time.begin(now, cloud.identity(), settings_splat, settings_splat.averaged());
         } else {
             over_time.forget();
+            last_picture.forget();
         }
+        let seen = Seen { view: picture, origin: cloud.origin() };
+        let following = smooths.then(|| last_picture.begin(seen, cloud.identity(), settings));
         let reconstruct = Reconstruct { screen, view: &view, settings, past, sensors, depth_noise, given };
         let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
         let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
@@ -205,7 +212,7 @@ impl CpuRenderer {
 
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view: &picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
-        let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, image);
+        let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, following, image);
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);
         past.end();

@@ -230,7 +230,7 @@ impl GpuRenderer {
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (Seen { view: *screen, origin: cloud.origin() }, cloud.identity());
+        let now = (Seen { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
         prepared.tell(gpu, frame, now, settings, &uniform);
 
         let waited = Instant::now();
@@ -245,7 +245,7 @@ impl GpuRenderer {
         *times = recorder.finish();
         // What was not submitted left the surfels as they were.
         *last_view = Some(*screen);
-        prepared.seen = Some((now.0, now.1, settings.reconstruction.clone()));
+        prepared.seen = Some((now.0, now.1, (settings.clone(), None)));
         let (counters, value_range) = readback.read(gpu, |parts| {
             let counters: Vec<u32> = bytemuck::pod_collect_to_vec(parts[0]);
             let range = [Counter::RangeLow, Counter::RangeHigh].map(|end| counters[end as usize]);
@@ -308,14 +308,14 @@ impl GpuRenderer {
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (Seen { view: screen, origin: cloud.origin() }, cloud.identity());
+        let now = (Seen { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
         prepared.tell(gpu, frame, now, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
         recorder.finish();
         *last_view = Some(screen);
-        prepared.seen = Some((now.0, now.1, settings.reconstruction.clone()));
+        prepared.seen = Some((now.0, now.1, (settings.clone(), now.2)));
         gpu.check_lost()
     }
 

@@ -42,6 +42,6 @@ pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Res
     let exposure = shading.exposure.unwrap_or(1.0);
     let scene = Scene { view: &view, up: camera.up.normalize(), origin: DVec3::ZERO, exposure };
     let mut image = Image::default();
-    shade(layers, &scene, shading, true, &mut image);
+    shade(layers, &scene, shading, true, None, &mut image);
     Ok(image)
 }

@@ -10,6 +10,7 @@ use super::depths::{Depths, LANES};
 use super::edges::{Edges, INWARD, LESS_TILTED, SEARCH};
 use super::light::{CLAY, SCANNED_LIGHT, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
+use super::over_time::Following;
 use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
 use crate::splat::GBuffer;
@@ -59,13 +60,14 @@ impl Scene<'_> {
     }
 }
 
-/// Shades `layers` into `image`; also in linear light if `keep_linear`. Says between which values the colour map lies, where
+/// Shades `layers` into `image`; also in linear light if `keep_linear`, and as one that follows others. Says between which values the colour map lies, where
 /// the colour mode has one.
 pub(crate) fn shade(
     layers: &GBuffer,
     scene: &Scene<'_>,
     shading: &Shading,
     keep_linear: bool,
+    following: Option<Following<'_>>,
     image: &mut Image,
 ) -> Option<[f64; 2]> {
     let [width, height] = [layers.width as usize, layers.height as usize];
@@ -87,6 +89,9 @@ pub(crate) fn shade(
         );
     } else {
         bands.for_each_init(Band::default, |band, (i, pixels)| band.shade(&shader, inks, i * rows, pixels, &mut []));
+    }
+    if let Some(following) = following {
+        following.average(layers, image);
     }
     if let (true, Some(scale)) = (shading.legend, &shader.scale) {
         let encode = |channel| encode(inks.table, channel);

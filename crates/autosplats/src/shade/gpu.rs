@@ -29,7 +29,7 @@ const SHADE_GROUP: [u32; 2] = [32, 8];
 /// Keys that `range` reads at a time.
 const KEYS: usize = 4096;
 /// Rows of the image begin at multiples of so many pixels: textures are copied in rows of 256 bytes.
-const ROW_PIXELS: u32 = 64;
+pub(super) const ROW_PIXELS: u32 = 64;
 
 /// Pixels from one row of the image to the next.
 pub(crate) const fn pitch(width: u32) -> u32 {
@@ -51,7 +51,7 @@ pub(crate) struct ShadeBuffers {
     /// Linear colours, a `vec4f` a step.
     color_map: wgpu::Buffer,
     /// The table from linear to sRGB, then the background of each row.
-    tables: wgpu::Buffer,
+    pub(super) tables: wgpu::Buffer,
     /// RGBA per pixel, 8 bits a channel, rows [`pitch`] apart.
     pub(crate) image: wgpu::Buffer,
     /// `vec4f` per pixel, rows from the top without gaps: linear light before any rounding. One element if not wanted.

@@ -27,6 +27,7 @@ pub(crate) mod gpu;
 mod legend;
 mod light;
 mod occlusion;
+pub(crate) mod over_time;
 mod settings;
 #[cfg(test)]
 mod tests;

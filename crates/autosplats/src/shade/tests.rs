@@ -40,7 +40,7 @@ fn exposed(layers: &GBuffer, shading: &Shading, exposure: f32) -> Image {
     let view = view([layers.width, layers.height]);
     let mut image = Image::default();
     let scene = Scene { view: &view, up: DVec3::Y, origin: DVec3::ZERO, exposure };
-    let _ = shade(layers, &scene, shading, true, &mut image);
+    let _ = shade(layers, &scene, shading, true, None, &mut image);
     assert_eq!(image.pixels.len(), (layers.width * layers.height) as usize, "size of the image");
     image
 }
@@ -129,6 +129,7 @@ fn the_range_that_was_shown_is_told() {
             &Scene { view: &view, up: DVec3::Y, origin, exposure: 1.0 },
             shading,
             false,
+            None,
             &mut Image::default(),
         )
     };

@@ -102,6 +102,7 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
             &Scene { view: &view, up: DVec3::Z, origin: DVec3::ZERO, exposure: 1.0 },
             &shading,
             true,
+            None,
             &mut image,
         );
         image

@@ -35,7 +35,8 @@ struct Frame {
     // Size of the picture in pixels, and the pixels of the screen on every side of it.
     picture: vec2u,
     margin: u32,
-    padding: u32,
+    // 1 if the last picture was one of the same points, made in the same way, and is to be averaged with.
+    same_picture: u32,
     // Of the last frame, which had the same size and kind of projection: how its view space comes from this one, and its focal
     // length, 0 if nothing is known of it.
     past_rotation: mat3x3f,

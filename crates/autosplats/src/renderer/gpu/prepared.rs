@@ -17,6 +17,7 @@ use crate::search::past::gpu::{PastPasses, past_buffer};
 use crate::search::screen_grid::gpu::neighborhood_buffer;
 use crate::search::{SearchEngine, SearchRules};
 use crate::shade::gpu::{ShadeBuffers, ShadePasses, ShadeUniform, finds_range};
+use crate::shade::over_time::gpu::{LastPictureBuffers, PictureOverTimePasses};
 use crate::shade::{ColorMode, linear_steps};
 use crate::splat::gpu::{LayerRules, SplatBuffers, SplatPasses};
 use crate::splat::over_time::gpu::{OverTimeBuffers, OverTimePasses};
@@ -37,7 +38,7 @@ pub(super) struct Passes {
     /// Compiled when first asked for.
     adapt: Option<AdaptPasses>,
     /// Compiled when first asked for.
-    over_time: Option<OverTimePasses>,
+    over_time: Option<(OverTimePasses, PictureOverTimePasses)>,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
 }
@@ -70,7 +71,7 @@ impl Passes {
             self.adapt = Some(AdaptPasses::new(gpu)?);
         }
         if shape.smooth && self.over_time.is_none() {
-            self.over_time = Some(OverTimePasses::new(gpu)?);
+            self.over_time = Some((OverTimePasses::new(gpu)?, PictureOverTimePasses::new(gpu)?));
         }
         if self.splat.as_ref().is_none_or(|(channels, _)| *channels != shape.channels) {
             self.splat = Some((shape.channels, SplatPasses::new(gpu, shape.channels, &linear_steps())?));
@@ -142,12 +143,15 @@ pub(super) struct OnDevice<'a> {
     pub(super) frame: &'a wgpu::Buffer,
 }
 
+/// How a picture was made, and for a texture of which format.
+pub(super) type Made = (Settings, Option<wgpu::TextureFormat>);
+
 /// A frame ready to be replayed.
 #[derive(Debug)]
 pub(super) struct Prepared {
     shape: Shape,
     /// How the last frame was seen and made, and the identity of its points, if there was one.
-    pub(super) seen: Option<(Seen, u64, Reconstruction)>,
+    pub(super) seen: Option<(Seen, u64, Made)>,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
     pub(super) surfels: wgpu::Buffer,
@@ -181,13 +185,19 @@ impl Prepared {
             Some(passes) => Some((passes, AdaptBuffers::new(gpu, size, depth_noise)?)),
             None => None,
         };
-        let over_time = match over_time.as_ref().filter(|_| shape.smooth) {
-            Some(passes) => Some((passes, OverTimeBuffers::new(gpu, screen.capacity, size)?)),
+        let over_time = over_time.as_ref().filter(|_| shape.smooth);
+        let picture_over_time = over_time.map(|(_, passes)| passes);
+        let over_time = match over_time {
+            Some((passes, _)) => Some((passes, OverTimeBuffers::new(gpu, screen.capacity, size)?)),
             None => None,
         };
         let splats = SplatBuffers::new(gpu, screen.capacity, size)?;
         let layers = LayerBuffers::new(gpu, size, shape.channels)?;
         let picture = ShadeBuffers::new(gpu, picture_size, shape.keep_linear)?;
+        let last_picture = match picture_over_time {
+            Some(passes) => Some((passes, LastPictureBuffers::new(gpu, picture_size)?)),
+            None => None,
+        };
         let (steps, convergence) = gpu.checked(|| {
             let mut steps = project.steps(gpu, frame, cloud, &screen);
             if let Some((passes, buffers)) = &adapt {
@@ -223,6 +233,9 @@ impl Prepared {
             let rules = LayerRules { depth_refinement: shape.depth_refinement, trim: shape.trim, noise };
             steps.extend(splat.steps_layers(gpu, frame, &screen, &surfels, &splats, &layers, rules));
             steps.extend(shade.steps(gpu, frame, &layers, &screen.counters, &picture, &settings.shading)?);
+            if let Some((passes, last)) = &last_picture {
+                steps.extend(passes.steps(gpu, frame, &layers, &picture, last));
+            }
             Ok::<_, Error>((steps, convergence))
         })??;
         Ok(Self { shape, seen: None, screen, surfels, layers, picture, convergence, steps })
@@ -238,7 +251,7 @@ impl Prepared {
         &mut self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
-        (now, identity): (Seen, u64),
+        (now, identity, format): (Seen, u64, Option<wgpu::TextureFormat>),
         settings: &Settings,
         shading: &ShadeUniform,
     ) {
@@ -269,9 +282,13 @@ impl Prepared {
         let reprojected = past.and_then(|(past, points, made)| Some((Reprojection::new(&now, &past)?, points, made)));
         let told = reprojected.map_or(told, |(past, points, made)| {
             let same_points = points == identity;
-            let [of_same, of_others] = if made == *reconstruction { made.averaged() } else { [1; 2] };
+            let (before, format_before) = &made;
+            let is_alike = before.reconstruction == *reconstruction;
+            let [of_same, of_others] = if is_alike { reconstruction.averaged() } else { [1; 2] };
             let frames_averaged = if same_points { of_same } else { of_others } as f32;
-            FrameUniform { frames_averaged, same_points: same_points.into(), ..told.after(&past) }
+            let same_picture = self.shape.smooth && same_points && before == settings && *format_before == format;
+            let (same_points, same_picture) = (same_points.into(), same_picture.into());
+            FrameUniform { frames_averaged, same_points, same_picture, ..told.after(&past) }
         });
         gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
         self.picture.write(gpu, shading, &settings.shading);

@@ -25,6 +25,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
         crate::splat::gpu::PASSES,
         crate::splat::over_time::gpu::PASSES,
         crate::shade::gpu::PASSES,
+        crate::shade::over_time::gpu::PASSES,
     ];
     stages.into_iter().flatten()
 }

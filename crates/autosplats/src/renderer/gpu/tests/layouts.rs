@@ -68,7 +68,7 @@ fn mirrored() -> [Mirrored; 10] {
                 same_points,
                 picture,
                 margin,
-                padding,
+                same_picture,
                 past_rotation,
                 past_shift,
                 past_focal_px,

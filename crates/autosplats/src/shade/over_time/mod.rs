@@ -1,0 +1,138 @@
+//! Temporal smoothing of pictures: what a surface shows now, and showed in the last picture, each by half.
+//!
+//! A far surface has more points than pixels, and each picture shows others of them: detail finer than pixels flickers, as it does in
+//! a picture of one ray a pixel. Pictures that follow each other know more of it together than each alone. So where the surface of a
+//! pixel was seen in the last picture, at the same depth within [`SAME_PX`] pixels, the pixel becomes the mean of both, in linear
+//! light; as the last one was such a mean itself, older pictures fade by half with each. More of the past would be steadier than
+//! the truth, in which light goes with the camera, and blur: the lit picture of a clean bunny lost 4.6 dB with up to seven eighths
+//! of it. Here it gains where detail is fine, and loses 0.1 dB where all is smooth.
+//!
+//! Only pictures of the same points and settings follow each other, and only where those are to be averaged
+//! ([`Reconstruction::steady`](crate::Reconstruction::steady)). Layers, and the image in linear light, stay as they were made.
+
+pub(crate) mod gpu;
+#[cfg(test)]
+mod tests;
+
+use rayon::prelude::*;
+
+use super::{Image, linear_steps};
+use crate::camera::{Reprojection, Seen, View};
+use crate::renderer::Settings;
+use crate::shade::cpu::{encode, encode_table};
+use crate::splat::GBuffer;
+
+/// How much of a pixel is the past.
+pub(super) const SHARE: f32 = 0.5;
+/// Difference in depth, in pixels, up to which a surface is the same.
+pub(super) const SAME_PX: f32 = 3.0;
+/// Of the four pixels around the place where a pixel's surface was, those that showed it must have this much of the weight.
+pub(super) const LEAST_SEEN: f32 = 0.1;
+
+/// How a picture was seen, the identity of its points, and how it was made.
+type Made = (Seen, u64, Settings);
+
+/// The last picture, as far as the next one looks back at it; keeps its buffers.
+#[derive(Debug, Default)]
+pub(crate) struct LastPicture {
+    /// `None` if there is none to look back at.
+    made: Option<Made>,
+    /// Row by row; infinite where no surface is.
+    depths: Vec<f32>,
+    pixels: Vec<[u8; 4]>,
+}
+
+/// A picture that follows others.
+#[derive(Debug)]
+pub(crate) struct Following<'a> {
+    last: &'a mut LastPicture,
+    made: Made,
+    /// Into the last picture, if that is one to be averaged with.
+    past: Option<Reprojection>,
+}
+
+impl LastPicture {
+    /// A picture begins that is seen and made like this, without a margin. What one that is given up leaves is forgotten.
+    pub(crate) fn begin(&mut self, seen: Seen, identity: u64, settings: &Settings) -> Following<'_> {
+        let before = self.made.take().filter(|(_, points, made)| *points == identity && made == settings);
+        let past = before.and_then(|(then, ..)| Reprojection::new(&seen, &then));
+        Following { last: self, made: (seen, identity, settings.clone()), past }
+    }
+
+    /// Nothing is known of pictures before the next.
+    pub(crate) fn forget(&mut self) {
+        *self = Self::default();
+    }
+}
+
+impl Following<'_> {
+    /// Averages a picture with the last one, and keeps it for the next.
+    pub(super) fn average(self, layers: &GBuffer, image: &mut Image) {
+        let Self { last, made, past } = self;
+        if let Some(past) = past {
+            last.mix_into(image, layers, &made.0.view, &past);
+        }
+        last.keep(layers, image);
+        last.made = Some(made);
+    }
+}
+
+impl LastPicture {
+    fn mix_into(&self, image: &mut Image, layers: &GBuffer, view: &View, past: &Reprojection) {
+        let (steps, table) = (linear_steps(), encode_table());
+        let width = image.width as usize;
+        image.pixels.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let index = layers.index(x, y);
+                if !(layers.weight[index] > 0.0) {
+                    continue;
+                }
+                let position =
+                    past.position(view.unproject([x as f32 + 0.5, y as f32 + 0.5], layers.depth[index]).into());
+                let Some(then) = self.shown_at(position.z, past.view.to_pixel(position), &past.view, &steps) else {
+                    continue;
+                };
+                for (channel, then) in pixel.iter_mut().zip(then) {
+                    let now = steps[usize::from(*channel)];
+                    *channel = encode(table, now + SHARE * (then - now));
+                }
+            }
+        });
+    }
+
+    /// The colour, in linear light, of a surface at a depth and a place in the last picture, between the pixels that showed it.
+    #[inline(always)]
+    fn shown_at(&self, depth: f32, [x, y]: [f32; 2], view: &View, steps: &[f32; 256]) -> Option<[f32; 3]> {
+        let [width, height] = [view.width as usize, view.height as usize];
+        let [x, y] = [x - 0.5, y - 0.5];
+        // What is not a number is in no picture.
+        let inside = (x >= 0.0) & (y >= 0.0) & (x < width as f32 - 1.0) & (y < height as f32 - 1.0);
+        if !(inside & (depth > view.near)) {
+            return None;
+        }
+        let first = y as usize * width + x as usize;
+        let [right, below] = [x.fract(), y.fract()];
+        let tolerance = SAME_PX * view.pixel_size(depth);
+        let (mut sum, mut all) = ([0.0; 3], 0.0);
+        let weights = [(1.0 - right) * (1.0 - below), right * (1.0 - below), (1.0 - right) * below, right * below];
+        for (at, weight) in [first, first + 1, first + width, first + width + 1].into_iter().zip(weights) {
+            if (self.depths[at] - depth).abs() < tolerance {
+                let color = self.pixels[at];
+                sum = [0, 1, 2].map(|i| sum[i] + weight * steps[usize::from(color[i])]);
+                all += weight;
+            }
+        }
+        (all >= LEAST_SEEN).then(|| sum.map(|channel| channel / all))
+    }
+
+    fn keep(&mut self, layers: &GBuffer, image: &Image) {
+        let width = image.width as usize;
+        self.pixels.clone_from(&image.pixels);
+        self.depths.resize(image.pixels.len(), 0.0);
+        self.depths.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, depth) in row.iter_mut().enumerate() {
+                *depth = layers.depth[layers.index(x, y)];
+            }
+        });
+    }
+}
