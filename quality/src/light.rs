@@ -1,7 +1,7 @@
 //! The light that pictures are compared in: the renderer's own, over any depths and normals.
 
 use autosplats::cloud::glam::DVec3;
-use autosplats::{Background, ColorMode, GBuffer, Shading, shade_layers};
+use autosplats::{Background, ColorMode, GBuffer, Image, Shading, shade_layers};
 use rayon::prelude::*;
 
 use crate::picture::Picture;
@@ -38,6 +38,12 @@ impl Lit {
         let background = Background::Color(BACKGROUND);
         let shading = Shading { color: ColorMode::Plain, background, ..Shading::default() };
         let image = shade_layers(&layers, &rays.camera, &shading).expect("layers of a picture that was rendered");
+        Self::of(&image, picture)
+    }
+
+    /// What the renderer made of `picture` itself, over [`BACKGROUND`].
+    pub fn of(image: &Image, picture: &Picture) -> Self {
+        let width = picture.width;
         let around: Vec<[f64; 3]> =
             image.pixels.iter().map(|&[r, g, b, _]| [r, g, b].map(|channel| f64::from(channel) / 255.0)).collect();
         let pixels = picture.shown.iter().zip(&around).map(|(shown, &color)| shown.map(|_| color)).collect();

@@ -7,9 +7,12 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use anyhow::Result;
 use autosplats::cloud::PointCloud;
 use autosplats::cloud::glam::{DVec3, Vec3};
-use autosplats::{Camera, ColorMode, Normals, PointSurfel, Reconstruction, Renderer, SearchEngine, Settings, Shading};
+use autosplats::{
+    Background, Camera, ColorMode, Normals, PointSurfel, Reconstruction, Renderer, SearchEngine, Settings, Shading,
+};
 use rayon::prelude::*;
 
+use crate::light::{BACKGROUND, Lit};
 use crate::neighbors::Neighbors;
 use crate::picture::{Picture, Shown};
 use crate::subject::Subject;
@@ -84,7 +87,8 @@ pub fn paper() -> Reconstruction {
 
 /// Settings to look at shapes with.
 pub fn plain(reconstruction: Reconstruction) -> Settings {
-    let shading = Shading { color: ColorMode::Plain, ..Shading::default() };
+    let background = Background::Color(BACKGROUND);
+    let shading = Shading { color: ColorMode::Plain, background, ..Shading::default() };
     Settings { reconstruction, shading, all_layers: true }
 }
 
@@ -174,8 +178,23 @@ impl<'a> Painter<'a> {
     /// # Errors
     /// What the renderer refuses.
     pub fn render(&mut self, reconstruction: Reconstruction, camera: &Camera, size: [u32; 2]) -> Result<Picture> {
+        Ok(self.render_lit(reconstruction, camera, size)?.0)
+    }
+
+    /// The same, and how the renderer itself lights it: what follows other pictures shows something of these.
+    ///
+    /// # Errors
+    /// What the renderer refuses.
+    pub fn render_lit(
+        &mut self,
+        reconstruction: Reconstruction,
+        camera: &Camera,
+        size: [u32; 2],
+    ) -> Result<(Picture, Lit)> {
         let frame = self.renderer.render(&self.subject.cloud, camera, size, &plain(reconstruction))?;
-        Ok(Picture::new(frame.layers, &Rays::new(camera, size)?))
+        let picture = Picture::new(frame.layers, &Rays::new(camera, size)?);
+        let lit = Lit::of(frame.image, &picture);
+        Ok((picture, lit))
     }
 }
 

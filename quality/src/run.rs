@@ -93,16 +93,19 @@ fn movement(case: &Case, subject: &Subject, painter: &mut Painter<'_>, methods: 
         let camera = orbit(&camera, step as f64 * STEP_DEGREES)?;
         let exact = Exact::trace_alone(subject, &camera, case.size)?;
         let true_picture = Picture::truth(&exact);
-        let mut pictures = vec![true_picture.clone(), true_picture, painter.paint(Method::Ours, &camera, case.size)?];
+        let lit = |picture: Picture| {
+            let lit = Lit::new(&picture, &exact.rays);
+            (picture, lit)
+        };
+        let smooth = still::smooth(subject, &camera, case.size)?;
+        let mut pictures = vec![lit(true_picture.clone()), (true_picture, smooth)];
+        pictures.push(lit(painter.paint(Method::Ours, &camera, case.size)?));
         for &method in &methods {
             pictures.push(match method {
-                Method::Ours => follower.render(steady.clone(), &camera, case.size)?,
-                _ => painter.paint(method, &camera, case.size)?,
+                Method::Ours => follower.render_lit(steady.clone(), &camera, case.size)?,
+                _ => lit(painter.paint(method, &camera, case.size)?),
             });
         }
-        let mut lit: Vec<_> = pictures.iter().map(|picture| Lit::new(picture, &exact.rays)).collect();
-        lit[1] = still::smooth(subject, &camera, case.size)?;
-        let pictures: Vec<_> = pictures.into_iter().zip(lit).collect();
         if let Some((exact_before, before)) = &before {
             let same = same(exact_before, &exact);
             let both = before.iter().zip(&pictures).map(|(one, other)| [(&one.0, &one.1), (&other.0, &other.1)]);
