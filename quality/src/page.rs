@@ -107,8 +107,8 @@ pub fn page(outcomes: &[Outcome], sheets: &[String]) -> String {
         &stills(outcomes),
         "## Motion\n\nMean change of a surface point from picture to picture: of its normal in degrees, of its lightness \
          in 255ths. Ours are *steady*, as the window makes them while the view moves: what is fitted to a point is \
-         averaged over about eight pictures, and eight of the same movement go before those that count. All others are \
-         made by themselves. *Alone* are ours, each made by itself, and *off* is the mean error of normals in the last \
+         averaged over about eight pictures, and each picture with the one before; eight of the same movement go before those \
+         that count. All others are made by themselves. *Alone* are ours, each made by itself, and *off* is the mean error of normals in the last \
          picture. *Smooth* are true pictures of 16 rays a pixel, in which detail finer than pixels does not \
          flicker.\n\n",
         &motion(outcomes),

@@ -68,15 +68,16 @@ pub struct Reconstruction {
     pub coherent: bool,
     /// Temporal smoothing while nothing but the camera moves: what is fitted to a point is averaged over about eight frames of
     /// the same [`Renderer`], cloud and settings that follow each other, with weights that fade. Noise shimmers less, and
-    /// normals are nearer to the truth. A frame then depends on those before; one after another that was given up, or had
-    /// another size on a device, begins anew.
+    /// normals are nearer to the truth. The image, but not the layers, is then averaged with the last one where the same
+    /// surface was seen, each by half: so detail finer than pixels shimmers less. A frame then depends on those before; one after
+    /// another that was given up, or had another size on a device, begins anew.
     ///
     /// [`Renderer`]: crate::Renderer
     pub steady: bool,
     /// Temporal smoothing of points that are others in each frame, as live ones are, noisy anew each time: surfaces are averaged
     /// over about so many frames of the same [`Renderer`], 1 to 32, that follow each other with such a setting. 1, the default,
     /// takes each frame by itself. What moves lags behind, unless it moves by more than half its k-radius a frame; a frame then
-    /// depends on those before. Of the same points what is fitted to each is averaged, as if they were to be
+    /// depends on those before. Frames of the same points are averaged as if they were to be
     /// [`steady`](Self::steady).
     ///
     /// [`Renderer`]: crate::Renderer

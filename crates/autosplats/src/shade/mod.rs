@@ -47,8 +47,8 @@ pub struct Image {
     pub height: u32,
     /// sRGB and straight alpha, 8 bits a channel. At edges colours are mixed, and alpha is the part that is covered.
     pub pixels: Vec<[u8; 4]>,
-    /// The same in linear light before any rounding, without legend and background and with nothing mixed at edges: zero
-    /// where no surface is. Filled if all layers are asked for, otherwise empty.
+    /// The same in linear light before any rounding, without legend and background and with nothing mixed at edges or with pictures
+    /// before: zero where no surface is. Filled if all layers are asked for, otherwise empty.
     pub linear: Vec<[f32; 3]>,
 }
 
