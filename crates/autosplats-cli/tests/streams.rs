@@ -195,6 +195,11 @@ fn a_folder_that_is_watched_has_a_picture_of_each_new_file() {
 fn streams_that_show_nothing_say_so() {
     let folder = Folder::new();
     folder.fail(&["render", "-", "-o", "f_%d.png"], 3, &["nothing came that has points"]);
+    let mut child = start(&folder, &["-", "-o", "f_%d.png"]);
+    input(&mut child).write_all(b"1 2 3\n4 5 6\n7 8 9\n").expect("it reads");
+    let (code, _, stderr) = end(child);
+    let last = stderr.lines().last().unwrap_or_default();
+    assert!(code == Some(3) && last.contains("begins no PLY or PCD"), "of another format: {stderr}");
     folder.fail(&["render", "-", "--resume", "-o", "f_%d.png"], 2, &["--resume", "live"]);
     std::fs::create_dir(folder.path("scans")).expect("a folder");
     folder.write("scans/a.ply", &sheet(0));

@@ -47,6 +47,7 @@ fn options_that_do_not_fit() {
         (&["--collor", "rgb"], &["--color"]),
         (&["--color", "hieght"], &["did you mean 'height'"]),
         (&["--color", "banana"], &["no field banana", "rgb", "Intensity"]),
+        (&["--color", "Red"], &["--color rgb"]),
         (&["--color", "classification"], &["no field Classification"]),
         (&["-o", "out.png"], &["two outputs"]),
         (&["-o", "out.jpg"], &[".png or .exr"]),

@@ -208,6 +208,12 @@ impl Job {
         if cloud.field(missing).is_some() {
             return Ok(());
         }
+        let is_channel = ["red", "green", "blue"].contains(&&*missing.to_lowercase());
+        if is_channel && cloud.colors().is_some() {
+            return Err(Failure::usage(format!(
+                "--color {missing}: the points' colours are shown together: --color rgb"
+            )));
+        }
         let hint =
             suggest(missing, COLOR_MODES.into_iter().filter(|mode| *mode != missing.to_lowercase()).chain(fields()));
         Err(Failure::usage(format!("--color: the points have no field {missing}; {hint}")))

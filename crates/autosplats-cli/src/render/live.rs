@@ -97,14 +97,14 @@ pub(super) fn run(
     // What cannot be shown of what comes later takes nothing from what was.
     let written = writer.finish(tally.written > 0);
     rendered.and(written)?;
-    let Statistics { dropped, refused, waiting, .. } = streams.statistics();
+    let Statistics { dropped, refused, last_refusal, waiting, .. } = streams.statistics();
     drop(streams);
     drop(bar);
     if tally.written == 0 {
         if interrupt::ending() {
             return Err(Failure::interrupted());
         }
-        let why = waiting.map_or_else(String::new, |why| format!(": {why}"));
+        let why = waiting.or(last_refusal).map_or_else(String::new, |why| format!(": {why}"));
         return Err(Failure::new(Exit::Input, format!("{}: nothing came that has points{why}", job.inputs.names())));
     }
     if !job.quiet {
@@ -200,6 +200,7 @@ impl<'a> Streams<'a> {
             |sum, own| Statistics {
                 dropped: sum.dropped + own.dropped,
                 refused: sum.refused + own.refused,
+                last_refusal: own.last_refusal.or(sum.last_refusal),
                 waiting: sum.waiting.or(own.waiting),
                 ..sum
             },
