@@ -15,6 +15,7 @@ use autosplats_quality::motion::{Change, Changes, same};
 use autosplats_quality::picture::{Picture, Shown};
 use autosplats_quality::random::Random;
 use autosplats_quality::run::{Pictures, measure};
+use autosplats_quality::still::Still;
 use autosplats_quality::subject::Subject;
 use autosplats_quality::target::ratio;
 
@@ -40,6 +41,8 @@ struct Limits {
     swept: [f64; 3],
     /// Changes of normals and lightness in motion, over those in the true pictures.
     motion: [f64; 2],
+    /// What a still gains at least over a single picture against the truth of many rays, decibels.
+    still: f64,
 }
 
 const NONE: f64 = f64::NAN;
@@ -47,15 +50,15 @@ const NONE: f64 = f64::NAN;
 /// One line for each case. Set anew when pictures got better: what was measured, with a few percent to spare.
 #[rustfmt::skip]
 const LIMITS: [Limits; 9] = [
-    Limits { case: "figure:60K own", normals: [6.3, 7.9], ratios: [1.05, 1.05], flipped: [0.62, 0.07], holes: 0.02, leaks: 0.02, before: 0.25, iou: 0.982, depth_px: 0.39, psnr: 24.6, flip: 0.074, swept: [NONE; 3], motion: [1.18, 1.25] },
-    Limits { case: "two-scales:150K own", normals: [4.65, 8.2], ratios: [1.02, 1.02], flipped: [0.46, 0.02], holes: 0.02, leaks: 0.02, before: 0.47, iou: 0.987, depth_px: 0.28, psnr: 27.5, flip: 0.056, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "statue:150K own", normals: [24.4, 26.1], ratios: [1.25, 1.22], flipped: [1.0, 0.12], holes: 0.045, leaks: 0.03, before: 0.37, iou: 0.975, depth_px: 0.82, psnr: 18.6, flip: 0.248, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "statue:150K near", normals: [16.2, 23.2], ratios: [1.00, 0.99], flipped: [1.57, 0.45], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 1.88, psnr: 20.7, flip: 0.182, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "bumpy:200K front", normals: [0.42, 0.98], ratios: [0.95, 0.90], flipped: [0.02, 0.01], holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.998, depth_px: 0.115, psnr: 43.0, flip: 0.013, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "bumpy:200K-uneven front", normals: [0.68, 1.50], ratios: [0.98, 0.92], flipped: [0.04, 0.02], holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.998, depth_px: 0.100, psnr: 40.2, flip: 0.017, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "bumpy:200K-noise0.3% front", normals: [3.9, 5.8], ratios: [0.75, 0.60], flipped: [0.03, 0.03], holes: 0.03, leaks: 0.02, before: 0.30, iou: 0.991, depth_px: 1.02, psnr: 30.3, flip: 0.082, swept: [NONE; 3], motion: [0.92, 1.32] },
-    Limits { case: "bumpy:200K-outliers2% front", normals: [0.81, 2.22], ratios: [1.40, 1.58], flipped: [0.17, 0.13], holes: 0.02, leaks: 0.02, before: 0.24, iou: 0.995, depth_px: 0.24, psnr: 32.2, flip: 0.021, swept: [NONE; 3], motion: [NONE; 2] },
-    Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.95], flipped: [2.75, 1.6], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NONE; 2] },
+    Limits { case: "figure:60K own", normals: [6.3, 7.9], ratios: [1.05, 1.05], flipped: [0.62, 0.07], holes: 0.02, leaks: 0.02, before: 0.25, iou: 0.982, depth_px: 0.39, psnr: 24.6, flip: 0.074, swept: [NONE; 3], motion: [1.18, 1.01], still: 3.1 },
+    Limits { case: "two-scales:150K own", normals: [4.65, 8.2], ratios: [1.02, 1.02], flipped: [0.46, 0.02], holes: 0.02, leaks: 0.02, before: 0.47, iou: 0.987, depth_px: 0.28, psnr: 27.5, flip: 0.056, swept: [NONE; 3], motion: [NONE; 2], still: 2.7 },
+    Limits { case: "statue:150K own", normals: [24.4, 26.1], ratios: [1.25, 1.22], flipped: [1.0, 0.12], holes: 0.045, leaks: 0.03, before: 0.37, iou: 0.975, depth_px: 0.82, psnr: 18.6, flip: 0.248, swept: [NONE; 3], motion: [NONE; 2], still: 3.9 },
+    Limits { case: "statue:150K near", normals: [16.2, 23.2], ratios: [1.00, 0.99], flipped: [1.57, 0.45], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 1.88, psnr: 20.7, flip: 0.182, swept: [NONE; 3], motion: [NONE; 2], still: 0.1 },
+    Limits { case: "bumpy:200K front", normals: [0.42, 0.98], ratios: [0.95, 0.90], flipped: [0.02, 0.01], holes: 0.02, leaks: 0.02, before: 0.02, iou: 0.998, depth_px: 0.115, psnr: 43.0, flip: 0.013, swept: [NONE; 3], motion: [NONE; 2], still: 1.3 },
+    Limits { case: "bumpy:200K-uneven front", normals: [0.68, 1.50], ratios: [0.98, 0.92], flipped: [0.04, 0.02], holes: 0.02, leaks: 0.02, before: 0.03, iou: 0.998, depth_px: 0.100, psnr: 40.2, flip: 0.017, swept: [NONE; 3], motion: [NONE; 2], still: 0.5 },
+    Limits { case: "bumpy:200K-noise0.3% front", normals: [3.9, 5.8], ratios: [0.75, 0.60], flipped: [0.03, 0.03], holes: 0.03, leaks: 0.02, before: 0.30, iou: 0.991, depth_px: 1.02, psnr: 30.3, flip: 0.082, swept: [NONE; 3], motion: [0.92, 1.27], still: -0.9 },
+    Limits { case: "bumpy:200K-outliers2% front", normals: [0.81, 2.22], ratios: [1.40, 1.58], flipped: [0.17, 0.13], holes: 0.02, leaks: 0.02, before: 0.24, iou: 0.995, depth_px: 0.24, psnr: 32.2, flip: 0.021, swept: [NONE; 3], motion: [NONE; 2], still: 1.4 },
+    Limits { case: "herd:32x1024 behind", normals: [11.2, 37.3], ratios: [0.69, 0.95], flipped: [2.75, 1.6], holes: NONE, leaks: NONE, before: NONE, iou: NONE, depth_px: 3.6, psnr: 19.4, flip: 0.156, swept: [98.6, 92.7, 10.0], motion: [NONE; 2], still: 0.0 },
 ];
 
 /// What of a picture is beyond its limits.
@@ -105,6 +108,19 @@ fn motion_misses(ours: Change, truth: Change, limits: &Limits) -> Vec<String> {
     ])
 }
 
+/// What a still gains over a single picture against the truth of many rays, in decibels, that is beyond its limit.
+fn still_misses(gain: f64, limits: &Limits) -> Vec<String> {
+    beyond(&[("still", -gain, -limits.still)])
+}
+
+#[test]
+fn a_still_that_gains_less_is_found() {
+    for limits in LIMITS {
+        assert_eq!(still_misses(limits.still + 0.01, limits), [""; 0], "{}", limits.case);
+        assert_eq!(still_misses(limits.still - 0.01, limits).len(), 1, "{}", limits.case);
+    }
+}
+
 fn limits_of(case: &Case) -> &'static Limits {
     LIMITS.iter().find(|limits| limits.case == case.name()).expect("limits for each case")
 }
@@ -124,6 +140,8 @@ fn hold(name: &str) {
     println!("{name}: {measures:.3?}\n{ratios:.3?}\n{:.3?}", outcome.motion);
     let mut found = misses(measures, limits);
     found.extend(ratio_misses(ratios, limits));
+    let Still { still, methods, .. } = &outcome.still;
+    found.extend(still_misses(still - methods[0].1, limits));
     if let Some(motion) = &outcome.motion {
         found.extend(motion_misses(motion.methods[0].1, motion.truth, limits));
     }
