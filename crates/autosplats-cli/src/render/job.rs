@@ -33,6 +33,8 @@ pub(super) struct Job {
     pub(super) size: [u32; 2],
     /// How many times as wide and high they are rendered.
     pub(super) supersample: u32,
+    /// Whether it is so because nothing else was asked for.
+    pub(super) supersample_is_usual: bool,
     pub(super) camera: CameraJob,
     pub(super) settings: Settings,
     pub(super) backend: Backend,
@@ -69,6 +71,7 @@ impl Job {
         };
         let needs_layers = pictures.iter().any(|picture| picture.format == Format::Exr);
         let is_still = film.is_none() && !needs_layers;
+        let supersample_is_usual = supersample.is_none();
         let supersample = supersample.unwrap_or(if is_still { still_supersample(size) } else { 1 });
         if needs_layers && supersample > 1 {
             return Err(Failure::usage(
@@ -118,6 +121,7 @@ impl Job {
             read_files,
             size,
             supersample,
+            supersample_is_usual,
             camera,
             settings,
             backend,

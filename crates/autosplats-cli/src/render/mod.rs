@@ -12,6 +12,7 @@ mod schedule;
 use std::time::Instant;
 
 use autosplats::{Camera, Counts, Error, Frame, Renderer};
+use autosplats_cloud::Axes;
 
 pub(crate) use self::camera::scene_camera;
 use self::job::Job;
@@ -45,38 +46,62 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), Failure> {
 
     job.settle_exposure(&cloud);
     job.settle_first_radius(&mut renderer, &cloud, &camera)?;
+    let mut notes = Vec::new();
+    if degrees {
+        notes.push("degrees are shown as metres about the middle of the points, east, north and up".to_owned());
+    }
+    notes.extend(fewer);
+    let placed = Placed { camera, axes, read, notes };
     let bar = Bar::spinner("rendering", job.quiet);
+    match job.render(&mut renderer, &cloud, &camera) {
+        // A device may have no room for what is rendered larger than asked for.
+        Err(failure) if failure.exit == Exit::Memory && job.supersample > 1 && job.supersample_is_usual => {}
+        frame => return placed.conclude(&job, &device, bar, frame?),
+    }
+    job.supersample = 1;
     let frame = job.render(&mut renderer, &cloud, &camera)?;
-    drop(bar);
-    check_visible(&frame, &job)?;
-    if !job.quiet {
-        if degrees {
-            eprintln!("note: degrees are shown as metres about the middle of the points, east, north and up");
-        }
-        if let Some(note) = fewer {
-            eprintln!("note: {note}");
-        }
-    }
+    placed.conclude(&job, &device, bar, frame)
+}
 
-    let started = Instant::now();
-    let mut written = Vec::new();
-    for picture in &job.pictures {
-        let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), job.quiet);
-        written.push((picture.path.clone(), write_picture(picture, &frame, &camera, &job)?));
-    }
-    if let Some(path) = &job.save_camera {
-        written.push((path.clone(), camera::save(path, &camera)?));
-    }
-    let write = milliseconds_since(started);
+/// What is known of a picture before it is rendered.
+struct Placed {
+    camera: Camera,
+    axes: Axes,
+    /// Milliseconds that reading took.
+    read: f64,
+    /// What is to be said of the points.
+    notes: Vec<String>,
+}
 
-    let report = Report::new(&job, &device, camera, axes, &frame, written, [read, write]);
-    if job.json {
-        print_line(&report.to_json()?)?;
+impl Placed {
+    /// Writes the picture that was rendered and says what happened; ends the progress of rendering.
+    fn conclude(self, job: &Job, device: &Device, bar: Bar, frame: Frame<'_>) -> Result<(), Failure> {
+        let Self { camera, axes, read, notes } = self;
+        drop(bar);
+        check_visible(&frame, job)?;
+        if !job.quiet {
+            notes.iter().for_each(|note| eprintln!("note: {note}"));
+        }
+        let started = Instant::now();
+        let mut written = Vec::new();
+        for picture in &job.pictures {
+            let _bar = Bar::spinner(&format!("writing {}", picture.path.display()), job.quiet);
+            written.push((picture.path.clone(), write_picture(picture, &frame, &camera, job)?));
+        }
+        if let Some(path) = &job.save_camera {
+            written.push((path.clone(), camera::save(path, &camera)?));
+        }
+        let write = milliseconds_since(started);
+
+        let report = Report::new(job, device, camera, axes, &frame, written, [read, write]);
+        if job.json {
+            print_line(&report.to_json()?)?;
+        }
+        if !job.quiet {
+            report.summarize();
+        }
+        Ok(())
     }
-    if !job.quiet {
-        report.summarize();
-    }
-    Ok(())
 }
 
 fn write_picture(picture: &Picture, frame: &Frame<'_>, camera: &Camera, job: &Job) -> Result<u64, Failure> {

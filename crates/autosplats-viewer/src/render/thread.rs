@@ -44,9 +44,10 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
                 post = shared.news.wait(post).unwrap_or_else(PoisonError::into_inner);
             }
         };
+        let finer = if let Work::Finer(finer) = &work { Some(finer.clone()) } else { None };
         let work = std::panic::AssertUnwindSafe(|| match work {
-            Work::Task(task) => studio.perform(task, outbox).map(Answer::Done),
-            Work::Wish(wish) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)),
+            Work::Task(task) => studio.perform(task, outbox).map(Answer::Done).map(Some),
+            Work::Wish(wish) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)).map(Some),
             Work::Finer(finer) => studio.refine(&finer, &|| !shared.has_news()),
         });
         // A bug in one picture must not end all pictures, with edits in the window that are not saved.
@@ -55,15 +56,18 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
             outbox.send(Answer::Failed("this picture failed, which is a bug of this program".into()));
             continue;
         };
-        if matches!(answer, Err(Error::Cancelled)) {
-            continue;
-        }
-        outbox.send(answer.unwrap_or_else(|error| {
-            if matches!(error, Error::DeviceLost(_)) {
-                studio.renderer = None;
+        match answer {
+            // What a task came before is made after it; another wish forgets it.
+            Err(Error::Cancelled) => studio.finer = studio.finer.take().or(finer),
+            Ok(None) => {}
+            Ok(Some(answer)) => outbox.send(answer),
+            Err(error) => {
+                if matches!(error, Error::DeviceLost(_)) {
+                    studio.renderer = None;
+                }
+                outbox.send(Answer::Failed(error.to_string()));
             }
-            Answer::Failed(error.to_string())
-        }));
+        }
     }
 }
 
@@ -75,6 +79,7 @@ enum Work {
 }
 
 /// A picture at rest that was made, and is to be made once more, supersampled.
+#[derive(Clone)]
 struct Finer {
     wish: Wish,
     settings: Settings,
@@ -256,15 +261,15 @@ impl Studio {
         })))
     }
 
-    /// Makes a picture once more, supersampled, unless `go_on` says that something is asked for.
-    fn refine(&mut self, finer: &Finer, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
+    /// Makes a picture once more, supersampled, unless `go_on` says that something is asked for; `None` if it is too large for
+    /// the device: the picture that is there will do.
+    fn refine(&mut self, finer: &Finer, go_on: &dyn Fn() -> bool) -> Result<Option<Answer>, Error> {
         let Finer { wish, settings, supersample } = finer;
         let shown = self.shown(wish)?;
-        let Some((_, renderer)) = &mut self.renderer else { return Err(Error::Cancelled) };
+        let Some((_, renderer)) = &mut self.renderer else { return Ok(None) };
         let size = wish.size.map(|side| side * supersample);
         let frame = match renderer.render_while(&shown.cloud, &wish.camera, size, settings, go_on) {
-            // Too large for this device: the picture that is there will do.
-            Err(error) if !matches!(error, Error::DeviceLost(_)) => return Err(Error::Cancelled),
+            Err(Error::DeviceLimit { .. } | Error::DeviceMemory(_)) => return Ok(None),
             frame => frame?,
         };
         let selected = shown.selected(&wish.document);
@@ -276,7 +281,7 @@ impl Studio {
             tint(&mut image, frame.layers, |point| selected.get(point as usize));
             image.averaged(*supersample)
         };
-        Ok(Answer::Finer(Arc::new(image)))
+        Ok(Some(Answer::Finer(Arc::new(image))))
     }
 
     fn perform(&mut self, task: Task, outbox: &Outbox) -> Result<Outcome, Error> {
@@ -345,15 +350,23 @@ impl Studio {
                 // But for those of a film, which follow each other.
                 let is_film = matches!(goal, Goal::Film(_));
                 settings.reconstruction.steady = is_film;
-                let supersample = if is_film || wish.dots.is_some() { 1 } else { still_supersample(wish.size) };
-                let size = wish.rendered_size(1.0).map(|side| side * supersample);
-                let frame = self.renderer(wish.backend, outbox)?.render(&shown.cloud, &wish.camera, size, &settings)?;
-                let range = frame.counts.value_range;
-                let image = match supersample {
-                    1 => enlarge(frame.image, wish.size),
-                    _ => frame.image.averaged(supersample),
+                let size = wish.rendered_size(1.0);
+                let renderer = self.renderer(wish.backend, outbox)?;
+                let mut render = |supersample: u32| {
+                    let size = size.map(|side| side * supersample);
+                    let frame = renderer.render(&shown.cloud, &wish.camera, size, &settings)?;
+                    let image = match supersample {
+                        1 => enlarge(frame.image, wish.size),
+                        _ => frame.image.averaged(supersample),
+                    };
+                    Ok((Box::new(image), frame.counts.value_range))
                 };
-                Ok(Outcome::Photographed { image: Box::new(image), range, goal })
+                let supersample = if is_film || wish.dots.is_some() { 1 } else { still_supersample(wish.size) };
+                let (image, range) = match render(supersample) {
+                    Err(Error::DeviceLimit { .. } | Error::DeviceMemory(_)) if supersample > 1 => render(1)?,
+                    rendered => rendered?,
+                };
+                Ok(Outcome::Photographed { image, range, goal })
             }
         }
     }

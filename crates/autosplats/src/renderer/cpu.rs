@@ -45,7 +45,7 @@ pub(super) struct CpuRenderer {
     /// Of the last frame.
     view: Option<View>,
     over_time: OverTime<Reconstruction>,
-    last_picture: LastPicture,
+    last_picture: LastPicture<Settings>,
 }
 
 impl Default for CpuRenderer {
@@ -213,6 +213,9 @@ impl CpuRenderer {
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view: &picture, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let value_range = shade(layers, &scene, &settings.shading, settings.all_layers, following, image);
+        if smooths {
+            last_picture.end(seen, cloud.identity(), settings.clone());
+        }
         clock.lap(|timings| &mut timings.shade)?;
         *last_view = Some(view);
         past.end();

@@ -18,7 +18,6 @@ use rayon::prelude::*;
 
 use super::{Image, linear_steps};
 use crate::camera::{Reprojection, Seen, View};
-use crate::renderer::Settings;
 use crate::shade::cpu::{encode, encode_table};
 use crate::splat::GBuffer;
 
@@ -29,14 +28,17 @@ pub(super) const SAME_PX: f32 = 3.0;
 /// Of the four pixels around the place where a pixel's surface was, those that showed it must have this much of the weight.
 pub(super) const LEAST_SEEN: f32 = 0.1;
 
-/// How a picture was seen, the identity of its points, and how it was made.
-type Made = (Seen, u64, Settings);
+/// The last picture, made by settings `M`, as far as the next one looks back at it; keeps its buffers.
+#[derive(Debug)]
+pub(crate) struct LastPicture<M> {
+    /// How it was seen, the identity of its points, and how it was made; `None` if there is none to look back at.
+    made: Option<(Seen, u64, M)>,
+    kept: Kept,
+}
 
-/// The last picture, as far as the next one looks back at it; keeps its buffers.
+/// What a picture leaves for the next one.
 #[derive(Debug, Default)]
-pub(crate) struct LastPicture {
-    /// `None` if there is none to look back at.
-    made: Option<Made>,
+struct Kept {
     /// Row by row; infinite where no surface is.
     depths: Vec<f32>,
     pixels: Vec<[u8; 4]>,
@@ -45,18 +47,29 @@ pub(crate) struct LastPicture {
 /// A picture that follows others.
 #[derive(Debug)]
 pub(crate) struct Following<'a> {
-    last: &'a mut LastPicture,
-    made: Made,
+    last: &'a mut Kept,
+    view: View,
     /// Into the last picture, if that is one to be averaged with.
     past: Option<Reprojection>,
 }
 
-impl LastPicture {
-    /// A picture begins that is seen and made like this, without a margin. What one that is given up leaves is forgotten.
-    pub(crate) fn begin(&mut self, seen: Seen, identity: u64, settings: &Settings) -> Following<'_> {
-        let before = self.made.take().filter(|(_, points, made)| *points == identity && made == settings);
-        let past = before.and_then(|(then, ..)| Reprojection::new(&seen, &then));
-        Following { last: self, made: (seen, identity, settings.clone()), past }
+impl<M> Default for LastPicture<M> {
+    fn default() -> Self {
+        Self { made: None, kept: Kept::default() }
+    }
+}
+
+impl<M: PartialEq> LastPicture<M> {
+    /// A picture begins that is seen and `made` like this, without a margin. What one that is given up leaves is forgotten.
+    pub(crate) fn begin(&mut self, now: Seen, identity: u64, made: &M) -> Following<'_> {
+        let last = self.made.take().filter(|(_, points, before)| *points == identity && before == made);
+        let past = last.and_then(|(then, ..)| Reprojection::new(&now, &then));
+        Following { last: &mut self.kept, view: now.view, past }
+    }
+
+    /// The picture that began is whole.
+    pub(crate) fn end(&mut self, now: Seen, identity: u64, made: M) {
+        self.made = Some((now, identity, made));
     }
 
     /// Nothing is known of pictures before the next.
@@ -68,16 +81,15 @@ impl LastPicture {
 impl Following<'_> {
     /// Averages a picture with the last one, and keeps it for the next.
     pub(super) fn average(self, layers: &GBuffer, image: &mut Image) {
-        let Self { last, made, past } = self;
+        let Self { last, view, past } = self;
         if let Some(past) = past {
-            last.mix_into(image, layers, &made.0.view, &past);
+            last.mix_into(image, layers, &view, &past);
         }
         last.keep(layers, image);
-        last.made = Some(made);
     }
 }
 
-impl LastPicture {
+impl Kept {
     fn mix_into(&self, image: &mut Image, layers: &GBuffer, view: &View, past: &Reprojection) {
         let (steps, table) = (linear_steps(), encode_table());
         let width = image.width as usize;

@@ -35,60 +35,57 @@ fn wall(depth: f32) -> GBuffer {
 }
 
 /// Shows `layers` in one colour, after what `last` holds.
-fn show(last: &mut LastPicture, (layers, color): (&GBuffer, [u8; 4]), seen: Seen, settings: &Settings) -> Image {
+fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen: Seen, settings: u32) -> Image {
     let pixels = vec![color; (SIZE[0] * SIZE[1]) as usize];
     let mut image = Image { width: SIZE[0], height: SIZE[1], pixels, linear: Vec::new() };
-    last.begin(seen, 1, settings).average(layers, &mut image);
+    last.begin(seen, 1, &settings).average(layers, &mut image);
+    last.end(seen, 1, settings);
     image
 }
 
-/// What the second row of pixels shows of a wall seen black and then white, further right.
-fn second_row(depths: [f32; 2], right: f64, change: impl Fn(&mut Settings)) -> Vec<[u8; 4]> {
+/// What the second row of pixels shows of a wall seen black and then white, further right, and by which settings: 0 are those of the black one.
+fn second_row(depths: [f32; 2], right: f64, settings: u32) -> Vec<[u8; 4]> {
     let mut last = LastPicture::default();
-    let mut settings = Settings::default();
-    let first = show(&mut last, (&wall(depths[0]), BLACK), seen(0.0), &settings);
+    let first = show(&mut last, (&wall(depths[0]), BLACK), seen(0.0), 0);
     assert!(first.pixels.iter().all(|pixel| *pixel == BLACK), "nothing was before it");
-    change(&mut settings);
-    let second = show(&mut last, (&wall(depths[1]), WHITE), seen(right), &settings);
+    let second = show(&mut last, (&wall(depths[1]), WHITE), seen(right), settings);
     assert!(second.pixels[..SIZE[0] as usize].iter().all(|pixel| *pixel == WHITE), "the background has no past");
     second.pixels[SIZE[0] as usize..][..SIZE[0] as usize].to_vec()
 }
 
 #[test]
 fn a_surface_seen_before_is_the_mean_of_both() {
-    let row = second_row([DEPTH; 2], 2.0, |_| ());
+    let row = second_row([DEPTH; 2], 2.0, 0);
     assert_eq!(row[..5], [HALF; 5], "half the light, where both pictures show it");
     assert_eq!(row[6..], [WHITE; 2], "what was beside the picture has no past");
-    assert_eq!(second_row([DEPTH; 2], 0.5, |_| ())[1..6], [HALF; 5], "between two pixels");
+    assert_eq!(second_row([DEPTH; 2], 0.5, 0)[1..6], [HALF; 5], "between two pixels");
 }
 
 #[test]
 fn another_surface_is_not() {
     let as_deep = DEPTH + 0.9 * SAME_PX;
-    assert_eq!(second_row([DEPTH, as_deep], 0.0, |_| ())[1], HALF, "nearly as deep");
+    assert_eq!(second_row([DEPTH, as_deep], 0.0, 0)[1], HALF, "nearly as deep");
     for depth in [DEPTH + 1.1 * SAME_PX, DEPTH - 1.1 * SAME_PX] {
-        assert_eq!(second_row([DEPTH, depth], 0.0, |_| ()), [WHITE; 8], "{depth}");
+        assert_eq!(second_row([DEPTH, depth], 0.0, 0), [WHITE; 8], "{depth}");
     }
 }
 
 #[test]
 fn pictures_made_in_another_way_do_not_follow() {
-    let row = second_row([DEPTH; 2], 0.0, |settings| settings.shading.lighting = false);
-    assert_eq!(row, [WHITE; 8], "another look");
+    let row = second_row([DEPTH; 2], 0.0, 1);
+    assert_eq!(row, [WHITE; 8], "other settings");
     let mut last = LastPicture::default();
-    let settings = Settings::default();
-    let _ = show(&mut last, (&wall(DEPTH), BLACK), seen(0.0), &settings);
+    let _ = show(&mut last, (&wall(DEPTH), BLACK), seen(0.0), 0);
     last.forget();
-    let after = show(&mut last, (&wall(DEPTH), WHITE), seen(0.0), &settings);
+    let after = show(&mut last, (&wall(DEPTH), WHITE), seen(0.0), 0);
     assert!(after.pixels.iter().all(|pixel| *pixel == WHITE), "nothing is known any more");
 }
 
 #[test]
 fn the_past_fades_by_half() {
     let mut last = LastPicture::default();
-    let settings = Settings::default();
     let layers = wall(DEPTH);
-    let mut shown = |color| show(&mut last, (&layers, color), seen(0.0), &settings).pixels[SIZE[0] as usize + 1][0];
+    let mut shown = |color| show(&mut last, (&layers, color), seen(0.0), 0).pixels[SIZE[0] as usize + 1][0];
     let levels = [BLACK, WHITE, WHITE, WHITE].map(&mut shown);
     // A half, three quarters and seven eighths of the light, each rounded to a step.
     let off = levels.iter().zip([0u8, 188, 225, 240]).map(|(level, expected)| level.abs_diff(expected));
