@@ -16,9 +16,8 @@ const MOST_PIXELS: u64 = 1920 * 1080;
 #[must_use]
 pub fn still_supersample(size: [u32; 2]) -> u32 {
     let [width, height] = size.map(|side| 2 * u64::from(side));
-    let rendered = width * height;
-    let fits = rendered <= 4 * MOST_PIXELS && width.max(height) <= u64::from(MAX_SIDE);
-    if fits && check_memory("a picture", rendered * BYTES_PER_PIXEL).is_ok() { 2 } else { 1 }
+    let fits = width.max(height) <= u64::from(MAX_SIDE) && width * height <= 4 * MOST_PIXELS;
+    if fits && check_memory("a picture", width * height * BYTES_PER_PIXEL).is_ok() { 2 } else { 1 }
 }
 
 #[cfg(test)]
