@@ -142,8 +142,11 @@ impl Kept {
         self.pixels.clone_from(&image.pixels);
         self.depths.resize(image.pixels.len(), 0.0);
         self.depths.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-            for (x, depth) in row.iter_mut().enumerate() {
-                *depth = layers.depth[layers.index(x, y)];
+            let mut x = 0;
+            while x < width {
+                let run = layers.run(x).min(width - x);
+                row[x..x + run].copy_from_slice(&layers.depth[layers.index(x, y)..][..run]);
+                x += run;
             }
         });
     }
