@@ -76,6 +76,21 @@ fn supersampled_pictures_are_the_same_but_smoother() {
 }
 
 #[test]
+fn stills_are_supersampled_unless_they_have_layers() {
+    let folder = Folder::with_sphere();
+    let written = |options: &[&str]| {
+        render(&folder, &[&["-o", "a.png"], options].concat());
+        folder.read("a.png")
+    };
+    let [one, two] = ["1", "2"].map(|factor| written(&["--supersample", factor]));
+    assert!(one != two, "the factor can be seen");
+    assert!(written(&[]) == two, "stills");
+    assert!(written(&["-o", "a.exr"]) == one, "with layers");
+    let frame = render(&folder, &["-o", "f.png", "--frames", "0", "--json"]).stdout;
+    assert!(folder.read("f.png") == one, "a frame: {frame}");
+}
+
+#[test]
 fn layers_hold_the_geometry() {
     let folder = Folder::with_sphere();
     render(&folder, &[&FRONT[..], &["-o", "layers.exr", "-o", "picture.png"]].concat());

@@ -83,7 +83,6 @@ enum Work {
 struct Finer {
     wish: Wish,
     settings: Settings,
-    supersample: u32,
 }
 
 /// What is kept from picture to picture.
@@ -236,13 +235,12 @@ impl Studio {
                 selected.get(index as usize)
             });
         }
-        let supersample = still_supersample(wish.size);
-        if wish.budget_ms.is_none() && wish.dots.is_none() && supersample > 1 {
+        if wish.budget_ms.is_none() && wish.dots.is_none() && still_supersample(wish.size) > 1 {
             settings.all_layers = selected.is_some();
             // Colours are to mean what they mean in this picture.
             settings.shading.range =
                 settings.shading.range.or(counts.value_range.map(|range| range.map(|end| end as f32)));
-            *finer = Some(Finer { wish: wish.clone(), settings, supersample });
+            *finer = Some(Finer { wish: wish.clone(), settings });
         }
         let depths = Depths::new(layers);
         costs.learn(cloud.len(), size[0] as usize * size[1] as usize, timings.project, timings.frame - timings.project);
@@ -264,7 +262,8 @@ impl Studio {
     /// Makes a picture once more, supersampled, unless `go_on` says that something is asked for; `None` if it is too large for
     /// the device: the picture that is there will do.
     fn refine(&mut self, finer: &Finer, go_on: &dyn Fn() -> bool) -> Result<Option<Answer>, Error> {
-        let Finer { wish, settings, supersample } = finer;
+        let Finer { wish, settings } = finer;
+        let supersample = still_supersample(wish.size);
         let shown = self.shown(wish)?;
         let Some((_, renderer)) = &mut self.renderer else { return Ok(None) };
         let size = wish.size.map(|side| side * supersample);
@@ -274,12 +273,12 @@ impl Studio {
         };
         let selected = shown.selected(&wish.document);
         let image = if selected.is_empty() {
-            frame.image.averaged(*supersample)
+            frame.image.averaged(supersample)
         } else {
             let Image { width, height, ref pixels, .. } = *frame.image;
             let mut image = Image { width, height, pixels: pixels.clone(), linear: Vec::new() };
             tint(&mut image, frame.layers, |point| selected.get(point as usize));
-            image.averaged(*supersample)
+            image.averaged(supersample)
         };
         Ok(Some(Answer::Finer(Arc::new(image))))
     }

@@ -11,8 +11,8 @@ pub const BYTES_PER_PIXEL: u64 = 100;
 const MOST_PIXELS: u64 = 1920 * 1080;
 
 /// How many times as wide and high a still picture of `size` pixels is best rendered, to be
-/// [averaged down](crate::Image::averaged): 2 of up to 1920x1080 pixels, if memory is there for it, else 1. It takes two to three
-/// times as long, and nothing else brings pictures as much nearer to the true surface.
+/// [averaged down](crate::Image::averaged): 2 of up to 1920x1080 pixels, if memory is there for it, else 1. It takes two to four
+/// times as long, and nothing else brings pictures without noise as much nearer to the true surface.
 #[must_use]
 pub fn still_supersample(size: [u32; 2]) -> u32 {
     let [width, height] = size.map(|side| 2 * u64::from(side));
