@@ -62,8 +62,8 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
             let cell = row * level.columns + column;
             // Falls to 0 where the next cells come in.
             let apart = 1.0 - abs(at - vec2f(vec2u(column, row)));
-            for (var index = 0u; index < SLABS; index++) {
-                let sheet = sheets[cell * SLABS + index];
+            for (var index = 0u; index < SHEETS; index++) {
+                let sheet = sheets[cell * SHEETS + index];
                 if !(sheet.radius > 0.0) {
                     break;
                 }

@@ -5,11 +5,14 @@ use rayon::prelude::*;
 use crate::camera::View;
 use crate::project::ScreenPoints;
 
-/// Most slabs of depth in a cell, each as thick as a cell is wide: a surface seen at 76° or less from its normal fills no
-/// more. A cell with more to hold has thicker ones.
-pub(crate) const SLABS: usize = 4;
-/// Most finest cells: with the coarser ones they are just below the 128 MiB that every device binds at once. The pictures that
-/// have as many at two pixels are larger than 3200×1800.
+/// Most slabs of depth in a cell, each as thick as a cell is wide: a surface seen at 82° or less from its normal fills no
+/// more. A cell with more to hold has thicker ones, which noise seen from the side does: then clusters are cut along lines of
+/// sight that nearly lie in the surface, and fits lean.
+pub(crate) const SLABS: usize = 8;
+/// Clusters of a cell that lie side by side. Most cells have no more, and those that are after them are not looked at.
+pub(crate) const BUNCH: usize = 4;
+const BUNCHES: usize = SLABS / BUNCH;
+/// Most finest cells: the pictures that have as many at two pixels are larger than 3200×1800.
 pub(crate) const MOST_FINEST: usize = 1_500_000;
 /// Coarser levels are of no use to any ball.
 pub(super) const MOST_LEVELS: usize = 9;
@@ -22,18 +25,18 @@ pub(crate) struct Cluster {
     pub(crate) count: f32,
 }
 
-/// The clusters of a cell by slabs of depth, those that hold points first: a coordinate of all of them side by side, for SIMD.
+/// Some clusters of a cell, by slabs of depth, those that hold points first: a coordinate of all of them side by side, for SIMD.
 /// A cache line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
-pub(crate) struct Cell {
+pub(crate) struct Bunch {
     /// X, y and z of the means.
-    pub(crate) mean: [[f32; SLABS]; 3],
+    pub(crate) mean: [[f32; BUNCH]; 3],
     /// 0 where there is no cluster.
-    pub(crate) count: [f32; SLABS],
+    pub(crate) count: [f32; BUNCH],
 }
 
-impl Cell {
+impl Bunch {
     pub(crate) fn put(&mut self, at: usize, Cluster { mean, count }: Cluster) {
         for axis in 0..3 {
             self.mean[axis][at] = mean[axis];
@@ -41,9 +44,16 @@ impl Cell {
         self.count[at] = count;
     }
 
-    pub(crate) fn clusters(&self) -> impl Iterator<Item = Cluster> {
+    /// Whether others may follow.
+    #[inline(always)]
+    pub(crate) fn is_full(&self) -> bool {
+        self.count[BUNCH - 1] > 0.0
+    }
+
+    #[inline(always)]
+    fn clusters(&self) -> impl Iterator<Item = Cluster> {
         let Self { mean: [x, y, z], count } = *self;
-        let all = (0..SLABS).map(move |at| Cluster { mean: [x[at], y[at], z[at]], count: count[at] });
+        let all = (0..BUNCH).map(move |at| Cluster { mean: [x[at], y[at], z[at]], count: count[at] });
         all.take_while(|cluster| cluster.count > 0.0)
     }
 }
@@ -55,7 +65,31 @@ pub(crate) struct Level {
     pub(crate) side_px: usize,
     pub(crate) columns: usize,
     pub(crate) rows: usize,
-    pub(crate) cells: Vec<Cell>,
+    /// The first clusters of all cells, row by row, then those that follow in cells where the first are full.
+    pub(crate) bunches: [Vec<Bunch>; BUNCHES],
+}
+
+impl Level {
+    /// Of `side_px` wide cells, all empty or as they were.
+    pub(crate) fn resize(&mut self, side_px: usize, [columns, rows]: [usize; 2]) {
+        (self.side_px, self.columns, self.rows) = (side_px, columns, rows);
+        self.bunches.iter_mut().for_each(|bunches| bunches.resize(columns * rows, Bunch::default()));
+    }
+
+    /// The clusters of a cell.
+    #[inline(always)]
+    pub(crate) fn clusters(&self, cell: usize) -> impl Iterator<Item = Cluster> {
+        let [first, more] = &self.bunches;
+        let more = first[cell].is_full().then(|| more[cell].clusters());
+        first[cell].clusters().chain(more.into_iter().flatten())
+    }
+
+    /// Cells that are filled at a time, row by row.
+    fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = [&mut [Bunch]; BUNCHES]> {
+        let [first, more] = &mut self.bunches;
+        let rows = first.par_chunks_mut(self.columns).zip(more.par_chunks_mut(self.columns));
+        rows.map(|(first, more)| [first, more])
+    }
 }
 
 /// All screen points of a frame in cells of several sizes, finest first, each level's twice as wide as those before.
@@ -114,17 +148,21 @@ impl Filling {
         }
     }
 
-    /// Writes what it holds to a cell.
+    /// Writes what it holds to a cell of a row.
     #[inline(always)]
-    fn finish(&self, cell: &mut Cell) {
-        // Most of many pictures is empty, and was in the frame before: that need not be written. A cell whose first count is 0
-        // is all 0.
-        if self.used > 0 || cell.count[0] > 0.0 {
-            *cell = Cell::default();
-        }
-        for at in 0..self.used {
-            let count = self.count[at];
-            cell.put(at, Cluster { mean: self.sum[at].map(|sum| sum / count), count });
+    fn finish(&self, row: &mut [&mut [Bunch]; BUNCHES], column: usize) {
+        for (index, bunches) in row.iter_mut().enumerate() {
+            let bunch = &mut bunches[column];
+            let held = index * BUNCH..self.used.min((index + 1) * BUNCH);
+            // Most of many pictures is empty, and was in the frame before: that need not be written. A bunch whose first count is
+            // 0 is all 0.
+            if !held.is_empty() || bunch.count[0] > 0.0 {
+                *bunch = Bunch::default();
+            }
+            for at in held {
+                let count = self.count[at];
+                bunch.put(at % BUNCH, Cluster { mean: self.sum[at].map(|sum| sum / count), count });
+            }
         }
     }
 }
@@ -164,9 +202,7 @@ impl Cells {
         let levels = 1 + (columns.max(rows) / 4).max(1).ilog2() as usize;
         self.levels.resize_with(levels.min(MOST_LEVELS), Level::default);
         for (index, level) in self.levels.iter_mut().enumerate() {
-            level.side_px = side_px << index;
-            (level.columns, level.rows) = (columns, rows);
-            level.cells.resize(columns * rows, Cell::default());
+            level.resize(side_px << index, [columns, rows]);
             (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
         }
         let Some((finest, coarser)) = self.levels.split_first_mut() else { return };
@@ -181,14 +217,14 @@ impl Cells {
 
 /// Side of the finest cells of a picture: about the distance between its screen points.
 pub(crate) fn finest_side_px(density_cell_px: usize, k: u32, size: [u32; 2]) -> usize {
-    ((density_cell_px as f32 / (k as f32).sqrt()).round() as usize).max(least_side_px(size))
+    ((density_cell_px as f32 / (k as f32).sqrt()).round() as usize).max(least_side_px(size, MOST_FINEST))
 }
 
-/// Least side of the finest cells of a picture: two pixels, more if there would be more than [`MOST_FINEST`].
-pub(crate) fn least_side_px(size: [u32; 2]) -> usize {
+/// Least side of the finest cells of a picture: two pixels, more if there would be more cells than `most`.
+pub(crate) fn least_side_px(size: [u32; 2], most: usize) -> usize {
     let [width, height] = size.map(|side| side as usize);
     let mut side_px = 2;
-    while width.div_ceil(side_px) * height.div_ceil(side_px) > MOST_FINEST {
+    while width.div_ceil(side_px) * height.div_ceil(side_px) > most {
         side_px += 1;
     }
     side_px
@@ -200,7 +236,7 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
     let slabs = Slabs::new(side_px, view);
     let strip_px = screen.cells.strip_px;
     let last_x = screen.cells.columns - 1;
-    level.cells.par_chunks_mut(columns).enumerate().for_each_init(Vec::new, |filling, (row, out)| {
+    level.rows_mut().enumerate().for_each_init(Vec::new, |filling, (row, mut out)| {
         filling.resize(columns, Filling::EMPTY);
         let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
         for strip in y0 / strip_px..=y1 / strip_px {
@@ -211,8 +247,8 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
                 }
             }
         }
-        for (out, filling) in out.iter_mut().zip(filling) {
-            filling.finish(out);
+        for (column, filling) in filling.iter_mut().enumerate() {
+            filling.finish(&mut out, column);
             if filling.used > 0 {
                 *filling = Filling::EMPTY;
             }
@@ -223,17 +259,18 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
 /// Fills a level with what the one below it holds.
 fn merge(below: &Level, view: &View, level: &mut Level) {
     let slabs = Slabs::new(level.side_px, view);
-    level.cells.par_chunks_mut(level.columns).enumerate().for_each(|(row, out)| {
-        for (column, out) in out.iter_mut().enumerate() {
+    let columns = level.columns;
+    level.rows_mut().enumerate().for_each(|(row, mut out)| {
+        for column in 0..columns {
             let mut filling = Filling::EMPTY;
             for y in 2 * row..(2 * row + 2).min(below.rows) {
                 for x in 2 * column..(2 * column + 2).min(below.columns) {
-                    for Cluster { mean, count } in below.cells[y * below.columns + x].clusters() {
+                    for Cluster { mean, count } in below.clusters(y * below.columns + x) {
                         filling.add(mean, count, slabs.of(mean[2]));
                     }
                 }
             }
-            filling.finish(out);
+            filling.finish(&mut out, column);
         }
     });
 }

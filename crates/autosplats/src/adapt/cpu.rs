@@ -32,7 +32,7 @@ pub(super) const MOST_TINY: f32 = 3.0;
 /// Largest standard error of a normal that others are held against.
 pub(super) const RELIABLE: f32 = 0.12;
 /// Most noise, as a part of a ball's radius, with which its points are a surface at all.
-pub(super) const THICKEST: f32 = 0.2;
+pub(super) const THICKEST: f32 = 0.3;
 /// The same of the first neighbourhood, whose plane has no error of its own to tell.
 pub(super) const THICKEST_FIRST: f32 = 0.085;
 /// Least trace, times weight, of what [`Quadric::error`] is the root of, in radii: that of a round ball, evenly filled. Where

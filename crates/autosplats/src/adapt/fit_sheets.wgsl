@@ -1,5 +1,5 @@
-// Fits sheets to the clusters of each cell that surfels ask for, largest first, until each has one or is near one: a workgroup for
-// a few cells, which takes up those that are asked for together. See the CPU form.
+// Fits sheets to the clusters of each cell that surfels ask for, largest first, until each has one or is near one, or there are as
+// many as a cell may have: a workgroup for a few cells, which takes up those that are asked for together. See the CPU form.
 //
 // Reads: levels, clusters, measured, asked, depth_noise. Reads and writes: sheets.
 
@@ -64,7 +64,7 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     workgroupBarrier();
     for (var index = local; index < FEW; index += TOGETHER) {
         let cell = first + index;
-        if cell < level.columns * level.rows && sheets[cell * SLABS].radius == UNKNOWN && asked_around(level, cell).k_radius_px > 0.0 {
+        if cell < level.columns * level.rows && sheets[cell * SHEETS].radius == UNKNOWN && asked_around(level, cell).k_radius_px > 0.0 {
             atomicOr(&found_wanted, 1u << index);
         }
     }
@@ -80,13 +80,13 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
 // All invocations do so together.
 fn fit_cell(level: Level, cell: u32) {
     let around = asked_around(level, cell);
-    let first = (level.first + cell) * SLABS;
+    let first = level.first + cell;
     var left: array<f32, SLABS>;
     for (var index = 0u; index < SLABS; index++) {
-        left[index] = clusters[first + index].w;
+        left[index] = clusters[cluster_at(first, index)].w;
     }
     var len = 0u;
-    loop {
+    while len < SHEETS {
         var largest = 0u;
         for (var index = 1u; index < SLABS; index++) {
             largest = select(largest, index, left[index] > left[largest]);
@@ -95,7 +95,7 @@ fn fit_cell(level: Level, cell: u32) {
             break;
         }
         left[largest] = 0.0;
-        let center = clusters[first + largest].xyz;
+        let center = clusters[cluster_at(first, largest)].xyz;
         let radius = around.k_radius_px * pixel_size(center.z);
         let measured_noise = noise_at(radius);
         let known = known_beyond(measured_noise, center, around.point).noise;
@@ -122,17 +122,17 @@ fn fit_cell(level: Level, cell: u32) {
         );
         for (var index = 0u; index < SLABS; index++) {
             if left[index] > 0.0 {
-                let over = under(sheet, clusters[first + index].xyz);
+                let over = under(sheet, clusters[cluster_at(first, index)].xyz);
                 let is_covered = abs(over.height) < COVERED * noise && over.near > 1.0 - COVERED_REACH;
                 left[index] = select(left[index], 0.0, is_covered);
             }
         }
         if own_place == 0u {
-            sheets[cell * SLABS + len] = sheet;
+            sheets[cell * SHEETS + len] = sheet;
         }
         len++;
     }
     if len == 0u && own_place == 0u {
-        sheets[cell * SLABS].radius = NONE;
+        sheets[cell * SHEETS].radius = NONE;
     }
 }

@@ -21,8 +21,8 @@ fn forget(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         asked[3u * cell] = 0u;
         asked[3u * cell + 1u] = 0u;
         asked[3u * cell + 2u] = 0xffffffffu;
-        for (var index = 0u; index < SLABS; index++) {
-            sheets[cell * SLABS + index].radius = UNKNOWN;
+        for (var index = 0u; index < SHEETS; index++) {
+            sheets[cell * SHEETS + index].radius = UNKNOWN;
         }
     }
 }

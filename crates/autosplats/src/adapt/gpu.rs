@@ -17,7 +17,7 @@ use super::rows::{
     AREA, AREA_NEAR, BESIDE, BEYOND, BEYOND_RADII, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH, ROW,
     ROW_TILT, SEEN_THROUGH, THIN_ROW,
 };
-use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS};
+use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS, SHEETS};
 use super::through::{
     ALL_AROUND, CELLS_TO_COUNT, DENSER, FLAT_AROUND, GOES_ON, LEAST_ON, ON_DISC, ON_DISC_NOISE, WIDE_AROUND,
 };
@@ -92,6 +92,8 @@ impl AdaptBuffers {
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], known: &DepthNoiseBuffer) -> Result<Self, Error> {
+        let most_finest = most_finest(gpu.most_bound());
+        let sheet_cells = most_sheet_cells(size, most_finest);
         Ok(Self {
             levels: gpu.storage::<Level>("levels of cells", MOST_LEVELS)?,
             arguments: gpu.buffer(
@@ -99,9 +101,9 @@ impl AdaptBuffers {
                 (MOST_LEVELS as u64 + 1) * WORK_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
-            clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size))?,
-            asked: gpu.storage::<[u32; 3]>("surfels that ask for sheets", most_sheet_cells(size))?,
-            sheets: gpu.storage::<[Sheet; SLABS]>("sheets", most_sheet_cells(size))?,
+            clusters: gpu.storage::<[Cluster; SLABS]>("clusters", most_cells(size, most_finest))?,
+            asked: gpu.storage::<[u32; 3]>("surfels that ask for sheets", sheet_cells)?,
+            sheets: gpu.storage::<[Sheet; SHEETS]>("sheets", sheet_cells)?,
             picked: gpu.storage::<u32>("picked surfels", MOST_SAMPLED + 1)?,
             sampled: gpu.storage::<u32>("sampled surfels", MOST_SAMPLED + 1)?,
             scatters: gpu.storage::<u32>("scatter of balls", SCALES * MOST_SAMPLED)?,
@@ -149,9 +151,15 @@ impl DepthNoiseBuffer {
     }
 }
 
+/// Most finest cells of a picture on a device that binds so many bytes at once: those of all levels are a third more, and a little
+/// where sides are rounded up. Where it is fewer than on the CPU, large pictures have coarser cells.
+fn most_finest(most_bound: u64) -> usize {
+    (most_bound as usize / size_of::<[Cluster; SLABS]>() / 7 * 5).min(MOST_FINEST)
+}
+
 /// Cells of all levels if they are as small as can be.
-fn most_cells(size: [u32; 2]) -> usize {
-    let side_px = least_side_px(size);
+fn most_cells(size: [u32; 2], most_finest: usize) -> usize {
+    let side_px = least_side_px(size, most_finest);
     let mut sides = size.map(|side| (side as usize).div_ceil(side_px));
     let mut cells = 0;
     for _ in 0..MOST_LEVELS {
@@ -162,8 +170,8 @@ fn most_cells(size: [u32; 2]) -> usize {
 }
 
 /// Cells that have sheets if they are as small as can be.
-fn most_sheet_cells(size: [u32; 2]) -> usize {
-    let side_px = least_side_px(size) << SHEET_LEVELS[0];
+fn most_sheet_cells(size: [u32; 2], most_finest: usize) -> usize {
+    let side_px = least_side_px(size, most_finest) << SHEET_LEVELS[0];
     size.map(|side| (side as usize).div_ceil(side_px)).iter().product()
 }
 
@@ -324,7 +332,7 @@ impl AdaptPasses {
                 &ARRANGE,
                 &[
                     ("MOST_LEVELS", MOST_LEVELS as f64),
-                    ("MOST_FINEST", MOST_FINEST as f64),
+                    ("MOST_FINEST", most_finest(gpu.most_bound()) as f64),
                     most_sampled,
                     fine_sheets,
                     few,

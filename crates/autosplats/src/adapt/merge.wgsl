@@ -27,7 +27,7 @@ fn merge(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         for (var x = low.x; x < high.x; x++) {
             let cell = below.first + y * below.columns + x;
             for (var slab = 0u; slab < SLABS; slab++) {
-                let cluster = clusters[cell * SLABS + slab];
+                let cluster = clusters[cluster_at(cell, slab)];
                 if cluster.w == 0.0 {
                     break;
                 }

@@ -42,12 +42,14 @@ mod tests;
 mod through;
 
 #[cfg(test)]
-pub(crate) use cells::SLABS;
+pub(crate) use cells::{BUNCH, SLABS};
 pub(crate) use cpu::{AdaptRules, Adapter};
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]
 pub(crate) use depth::DepthRun;
 pub(crate) use noise::Noise;
+#[cfg(test)]
+pub(crate) use sheets::SHEETS;
 
 /// Balls tried around each point, beside the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;

@@ -1,11 +1,11 @@
 //! A height field with six coefficients over a ball's points.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{Cell, Cells, Level, SLABS};
+use super::cells::{BUNCH, Bunch, Cells, Cluster, Level, SLABS};
 use crate::camera::View;
 use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
@@ -69,37 +69,52 @@ impl<'a> Window<'a> {
         [&self.columns, &self.rows].map(|range| range.end() - range.start() + 1).iter().product()
     }
 
-    /// Copies the clusters, sixteen to a group, four cells; returns the number of groups.
+    /// Copies the clusters, sixteen to a group; returns the number of groups.
     #[inline(always)]
     fn copy_to(&self, groups: &mut Vec<[Lanes; 4]>) -> usize {
-        let used = (self.len() * SLABS).div_ceil(LANES);
-        if groups.len() < used {
-            groups.resize(used, [Lanes::default(); 4]);
+        let most = (self.len() * SLABS).div_ceil(LANES);
+        if groups.len() < most {
+            groups.resize(most, [Lanes::default(); 4]);
         }
-        let groups = &mut groups[..used];
-        // Of the last group not all is written over.
-        groups[used - 1] = [Lanes::default(); 4];
         let mut at = 0;
-        for row in self.rows() {
-            for cell in row {
-                let [x, y, z, count] = &mut groups[at / LANES];
-                let lanes = at % LANES..at % LANES + SLABS;
-                x.0[lanes.clone()].copy_from_slice(&cell.mean[0]);
-                y.0[lanes.clone()].copy_from_slice(&cell.mean[1]);
-                z.0[lanes.clone()].copy_from_slice(&cell.mean[2]);
-                count.0[lanes].copy_from_slice(&cell.count);
-                at += SLABS;
+        let [first, more] = &self.level.bunches;
+        for row in self.cells() {
+            for (bunch, more) in first[row.clone()].iter().zip(&more[row]) {
+                put(groups, &mut at, bunch);
+                if bunch.is_full() {
+                    put(groups, &mut at, more);
+                }
             }
         }
-        used
+        // Of the last group not all is written over.
+        while at % LANES > 0 {
+            put(groups, &mut at, &Bunch::default());
+        }
+        at / LANES
     }
 
-    /// The cells, row by row.
+    /// The cells, a row at a time.
     #[inline(always)]
-    pub(super) fn rows(&self) -> impl Iterator<Item = &'a [Cell]> {
+    fn cells(&self) -> impl Iterator<Item = Range<usize>> {
         let Self { level, columns, rows } = self;
-        rows.clone().map(|row| &level.cells[row * level.columns..][..level.columns][columns.clone()])
+        rows.clone().map(|row| row * level.columns + columns.start()..row * level.columns + columns.end() + 1)
     }
+
+    /// The clusters of each cell.
+    #[inline(always)]
+    pub(super) fn clusters(&self) -> impl Iterator<Item = impl Iterator<Item = Cluster>> {
+        self.cells().flatten().map(|cell| self.level.clusters(cell))
+    }
+}
+
+/// Copies a bunch to the next lanes.
+#[inline(always)]
+fn put(groups: &mut [[Lanes; 4]], at: &mut usize, Bunch { mean: [x, y, z], count }: &Bunch) {
+    let lanes = *at % LANES..*at % LANES + BUNCH;
+    for (into, from) in groups[*at / LANES].iter_mut().zip([x, y, z, count]) {
+        into.0[lanes.clone()].copy_from_slice(from);
+    }
+    *at += BUNCH;
 }
 
 /// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights, which are 0 in lanes

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use self::blend::Stack;
 pub(super) use self::blend::{Around, Blend, Surface};
-use super::cells::{Cell, Cells, Level, SLABS};
+use super::cells::{Cells, Cluster, Level, SLABS};
 use super::cpu::{Goal, choose};
 use super::quadric::{Gathered, Quadric, tangents};
 use crate::camera::View;
@@ -26,6 +26,8 @@ pub(super) const COVERED: f32 = 2.0;
 /// if it is no further from the sheet's centre than this part of its squared radius: at a grazing angle a cell
 /// is a long strip of surface. The wider, the worse normals are along silhouettes.
 pub(super) const COVERED_REACH: f32 = 0.12;
+/// Most sheets of a cell.
+pub(crate) const SHEETS: usize = 4;
 /// K-radii are summed up in these parts of a pixel, as integers, so that their order does not matter.
 pub(super) const PARTS: f32 = 64.0;
 /// Larger k-radii, in pixels, count as this: of the nine cells of 32 pixels that are summed up, with two points in each pixel,
@@ -126,7 +128,7 @@ pub(super) struct Sheets {
 impl Sheets {
     /// Forgets those of the frame before.
     pub(super) fn clear(&mut self, cells: &Cells) {
-        let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.cells.len());
+        let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.columns * level.rows);
         self.stacks.resize(len, Stack::default());
         self.fitted.clear();
         self.fitted.resize(len, false);
@@ -202,43 +204,45 @@ fn fit_row_with<'a, S: Simd>(
     gathered: &'a mut Gathered,
 ) {
     let level = task.level;
-    for (column, cell) in level.cells[row * level.columns..][..level.columns].iter().enumerate() {
-        if !fitted[column]
-            && cell.count[0] > 0.0
+    for (column, (stack, fitted)) in stacks.iter_mut().zip(fitted).enumerate() {
+        let cell = row * level.columns + column;
+        if !*fitted
+            && level.clusters(cell).next().is_some()
             && let Some(asked) = task.asked_around(row, column)
         {
-            fit_cell(simd, &mut stacks[column], cell, asked, task, gathered);
-            fitted[column] = true;
+            fit_cell(simd, stack, cell, asked, task, gathered);
+            *fitted = true;
         }
     }
 }
 
-/// Fits sheets to a cell's clusters, largest first, until each has one or is near one.
+/// Fits sheets to a cell's clusters, largest first, until each has one or is near one, or there are as many as a cell may have.
 #[inline(always)]
 fn fit_cell<S: Simd>(
     simd: S,
     stack: &mut Stack,
-    cell: &Cell,
+    cell: usize,
     (k_radius_px, point): (f32, u32),
     task: &Task,
     gathered: &mut Gathered,
 ) {
-    let Task { cells, noise, view, .. } = *task;
-    let mut left = cell.count;
+    let Task { cells, level, noise, view, .. } = *task;
+    let mut left = [Cluster { mean: [0.0; 3], count: 0.0 }; SLABS];
+    left.iter_mut().zip(level.clusters(cell)).for_each(|(left, cluster)| *left = cluster);
     *stack = Stack::default();
     let mut len = 0;
-    loop {
+    while len < SHEETS {
         let mut largest = 0;
         for index in 1..SLABS {
-            if left[index] > left[largest] {
+            if left[index].count > left[largest].count {
                 largest = index;
             }
         }
-        if left[largest] == 0.0 {
+        let Cluster { mean: center, ref mut count } = left[largest];
+        if *count == 0.0 {
             return;
         }
-        left[largest] = 0.0;
-        let center = cell.mean.map(|of| of[largest]);
+        *count = 0.0;
         let radius = k_radius_px * view.pixel_size(center[2]);
         let (noise, known) = noise(center.into(), radius, point);
         let goal = Goal::new(noise, known, radius, center[2], view);
@@ -246,11 +250,11 @@ fn fit_cell<S: Simd>(
             continue;
         };
         let sheet = Sheet::new(center.into(), &quadric, noise);
-        for (left, cluster) in left.iter_mut().zip(cell.clusters()) {
-            if *left > 0.0 {
-                let (height, near) = sheet.over(cluster.mean.into());
+        for Cluster { mean, count } in &mut left {
+            if *count > 0.0 {
+                let (height, near) = sheet.over((*mean).into());
                 if height.abs() < COVERED * noise && near > 1.0 - COVERED_REACH {
-                    *left = 0.0;
+                    *count = 0.0;
                 }
             }
         }

@@ -61,9 +61,9 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
     let of_plane = axis.dot(center);
     let mut seen = Seen::default();
     let Some(window) = Window::around(cells, center, radius, cells_per_radius, view) else { return seen };
-    for cell in window.rows().flatten() {
+    for clusters in window.clusters() {
         let mut points = [0.0; 2];
-        for Cluster { mean, count } in cell.clusters() {
+        for Cluster { mean, count } in clusters {
             let place = Vec3::from(mean);
             let off = of_plane - axis.dot(place);
             // Where the line of sight meets the plane.

@@ -16,7 +16,8 @@ impl Gpu {
         (len * size_of::<T>()) as u64 <= self.most_bound()
     }
 
-    fn most_bound(&self) -> u64 {
+    /// Bytes of the largest buffer that the device binds.
+    pub(crate) fn most_bound(&self) -> u64 {
         let limits = self.device.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }

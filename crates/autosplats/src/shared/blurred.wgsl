@@ -11,6 +11,8 @@ override PER_VARIANCE: f32;
 override PER_NOISE: f32;
 // How far a surface is tilted of which all noise counts.
 override TILTED: f32;
+// Of the noise, what blurs a border.
+override BLURS: f32;
 // Radius of the window without noise, and of the widest, in pixels.
 override LEAST_RADIUS_PX: f32;
 override WIDEST_RADIUS_PX: f32;
@@ -44,7 +46,7 @@ fn noise_px(pixel: vec2u, shown: vec4f, reach_px: f32) -> f32 {
     let size = pixel_size(shown.w);
     // As the splat radius comes from it.
     let k_radius = reach_px / SUPPORT * size * (0.5 * sqrt(f32(frame.k)) / frame.splat_scale);
-    return aside * noise_at(k_radius) / size;
+    return BLURS * aside * noise_at(k_radius) / size;
 }
 
 // How far a fringe reaches, in pixels.

@@ -1,6 +1,7 @@
 // Fills a cell with points or with clusters: see the CPU form. Imports: frame, levels, divide. The including pass binds
 // `clusters` to be written.
 
+#import clusters
 #import divide
 
 // How depth is cut into slabs about as thick as a cell is wide.
@@ -72,10 +73,10 @@ fn add(mean: vec3f, count: f32, slab: u32) {
 
 fn finish(cell: u32) {
     for (var index = 0u; index < used; index++) {
-        clusters[cell * SLABS + index] = vec4f(sums[index].xyz / sums[index].w, sums[index].w);
+        clusters[cluster_at(cell, index)] = vec4f(sums[index].xyz / sums[index].w, sums[index].w);
     }
     for (var index = used; index < SLABS; index++) {
-        clusters[cell * SLABS + index] = vec4f(0.0);
+        clusters[cluster_at(cell, index)] = vec4f(0.0);
     }
 }
 

@@ -5,6 +5,7 @@
 // their loads are on their way together.
 
 #import levels
+#import clusters
 #import eigen
 #import orthonormal
 
@@ -93,7 +94,7 @@ fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
 
 // A cluster of a cell, of no points if that is after the last one.
 fn cluster_up_to(cell: u32, last: u32, slab: u32) -> vec4f {
-    let cluster = clusters[min(cell, last) * SLABS + slab];
+    let cluster = clusters[cluster_at(min(cell, last), slab)];
     return select(vec4f(0.0), cluster, cell <= last);
 }
 
@@ -140,7 +141,7 @@ fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
         let last = cells + ball.high.x;
         for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             for (var slab = 0u; slab < SLABS; slab++) {
-                let a = clusters[cell * SLABS + slab];
+                let a = clusters[cluster_at(cell, slab)];
                 let b = cluster_up_to(cell + 1u, last, slab);
                 let c = cluster_up_to(cell + 2u, last, slab);
                 let d = cluster_up_to(cell + 3u, last, slab);
@@ -226,7 +227,7 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
         let last = cells + ball.high.x;
         for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             for (var slab = 0u; slab < SLABS; slab++) {
-                let a = clusters[cell * SLABS + slab];
+                let a = clusters[cluster_at(cell, slab)];
                 let b = cluster_up_to(cell + 1u, last, slab);
                 let c = cluster_up_to(cell + 2u, last, slab);
                 let d = cluster_up_to(cell + 3u, last, slab);

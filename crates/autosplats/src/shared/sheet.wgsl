@@ -1,6 +1,9 @@
-// Quadrics that the surfels around share: see the CPU form, which has `bend` as a matrix. A cell has up to SLABS of them. Imports: orthonormal.
+// Quadrics that the surfels around share: see the CPU form, which has `bend` as a matrix. Imports: orthonormal.
 
 #import orthonormal
+
+// Most sheets of a cell.
+const SHEETS = 4u;
 
 // In place of the radius: no sheet, as nobody has asked for any yet, or as none was found.
 const UNKNOWN = 0.0;

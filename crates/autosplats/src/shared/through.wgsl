@@ -24,7 +24,7 @@ fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
         for (var cell = cells + ball.low.x + start.x; cell <= last; cell += step.x) {
             var points = array<vec2f, 4>();
             for (var slab = 0u; slab < SLABS; slab++) {
-                let a = clusters[cell * SLABS + slab];
+                let a = clusters[cluster_at(cell, slab)];
                 let b = cluster_up_to(cell + 1u, last, slab);
                 let c = cluster_up_to(cell + 2u, last, slab);
                 let d = cluster_up_to(cell + 3u, last, slab);

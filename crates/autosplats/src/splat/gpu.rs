@@ -14,7 +14,7 @@ use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
 use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH};
 use super::trim::blurred::{
-    BEYOND_FRINGE, BLOCK_PX, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
+    BEYOND_FRINGE, BLOCK_PX, BLURS, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
     OFF_BLURRED, OFF_HALF_WAY, PER_NOISE, PER_VARIANCE, SPREAD, SURE_DISTANCES, SURE_NOISE_PX, TILTED,
     WIDEST_RADIUS_PX,
 };
@@ -228,6 +228,7 @@ impl SplatPasses {
                 ("PER_VARIANCE", PER_VARIANCE.into()),
                 ("PER_NOISE", PER_NOISE.into()),
                 ("TILTED", TILTED.into()),
+                ("BLURS", BLURS.into()),
                 ("WIDEST_RADIUS_PX", WIDEST_RADIUS_PX.into()),
                 ("FINE_RADIUS_PX", FINE_RADIUS_PX.into()),
                 ("SPREAD", SPREAD.into()),

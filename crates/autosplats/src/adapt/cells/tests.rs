@@ -15,9 +15,9 @@ fn nothing_is_left_of_the_frame_before() {
         assert_eq!(cells.levels.len(), fresh.levels.len(), "levels");
         for (level, fresh) in cells.levels.iter().zip(&fresh.levels) {
             assert_eq!([level.side_px, level.columns, level.rows], [fresh.side_px, fresh.columns, fresh.rows], "sizes");
-            assert!(level.cells == fresh.cells, "cells of {} pixels", level.side_px);
+            assert!(level.bunches == fresh.bunches, "cells of {} pixels", level.side_px);
         }
     }
-    assert!(cells.levels[0].cells.iter().any(|cell| cell.count[0] > 0.0), "points");
-    assert!(cells.levels[0].cells.iter().any(|cell| cell.count[0] == 0.0), "empty cells");
+    assert!(cells.levels[0].bunches[0].iter().any(|cell| cell.count[0] > 0.0), "points");
+    assert!(cells.levels[0].bunches[0].iter().any(|cell| cell.count[0] == 0.0), "empty cells");
 }

@@ -3,8 +3,8 @@
 use glam::Vec3;
 use pulp::Simd;
 
-use super::{Sheet, Sheets};
-use crate::adapt::cells::{Cells, SLABS};
+use super::{SHEETS, Sheet, Sheets};
+use crate::adapt::cells::Cells;
 use crate::adapt::cpu::{AGREE, FARTHEST, Goal};
 use crate::camera::View;
 use crate::search::{LANES, Lanes};
@@ -36,7 +36,7 @@ const FIELDS: usize = 19;
 
 /// Sheets of a cell, a number of all of them side by side, for SIMD; all 0 where there is none.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stack(pub(super) [[f32; SLABS]; FIELDS]);
+pub(super) struct Stack(pub(super) [[f32; SHEETS]; FIELDS]);
 
 impl Stack {
     pub(super) fn put(&mut self, at: usize, sheet: &Sheet) {
@@ -81,7 +81,7 @@ impl Around {
         self.cells = cells;
         let [x0, x1, y0, y1] = cells;
         for (at, [column, row]) in [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].into_iter().enumerate() {
-            let lanes = at * SLABS..(at + 1) * SLABS;
+            let lanes = at * SHEETS..(at + 1) * SHEETS;
             self.column.0[lanes.clone()].fill(column as f32);
             self.row.0[lanes.clone()].fill(row as f32);
             let cell = row * columns + column;

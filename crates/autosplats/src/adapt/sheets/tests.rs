@@ -4,8 +4,8 @@ use glam::Vec3;
 use pulp::Simd;
 
 use super::blend::{Around, Blend};
-use super::{SHEET_LEVELS, Sheets};
-use crate::adapt::cells::{Cells, SLABS};
+use super::{SHEET_LEVELS, SHEETS, Sheets};
+use crate::adapt::cells::Cells;
 use crate::adapt::cpu::{FARTHEST, Goal};
 use crate::adapt::tests::{Case, PROJECTIONS, angle};
 use crate::camera::View;
@@ -54,7 +54,7 @@ fn blended_one_by_one(sheets: &Sheets, surfel: &Surfel, cells: &Cells, view: &Vi
         if !sheets.fitted[cell] || share == 0.0 {
             continue;
         }
-        for index in 0..SLABS {
+        for index in 0..SHEETS {
             let field = |field: usize| stack.0[field][index];
             let vector = |first: usize| Vec3::new(field(first), field(first + 1), field(first + 2));
             let (center, radius, axis, trust) = (vector(0), field(3), vector(5), field(18));

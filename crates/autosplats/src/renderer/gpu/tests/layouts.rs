@@ -5,7 +5,7 @@ use std::mem::offset_of;
 use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 
 use super::passes;
-use crate::adapt::{DepthRun, SCALES, SLABS};
+use crate::adapt::{BUNCH, DepthRun, SCALES, SHEETS, SLABS};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
@@ -256,6 +256,8 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let trim = passes().find(|pass| pass.path == "splat/trim").expect("a pass");
     assert_eq!(constant(trim.source, "FRINGE_BLOCKS"), FRINGE_BLOCKS as u32, "blocks of a fringe");
     assert_eq!(constant("#import levels\n", "SLABS"), SLABS as u32, "slabs of a cell");
+    assert_eq!(constant("#import levels\n", "BUNCH"), BUNCH as u32, "clusters side by side");
+    assert_eq!(constant("#import sheet\n", "SHEETS"), SHEETS as u32, "sheets of a cell");
     let adapt = passes().find(|pass| pass.path == "adapt/adapt").expect("a pass");
     assert_eq!(constant(adapt.source, "SCALES"), SCALES as u32, "balls around a point");
     assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, BLOCK, "flags that a workgroup ranks");
