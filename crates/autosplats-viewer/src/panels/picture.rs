@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use autosplats::MAX_SIDE;
+use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
 use autosplats::cloud::check_memory;
 use eframe::egui;
 
@@ -13,9 +13,6 @@ use super::target_file::{TargetFile, Words, Write};
 use crate::app::App;
 use crate::output::Goal;
 use crate::render::{Task, Wish};
-
-/// Bytes that stages and layers take for each pixel.
-const BYTES_PER_PIXEL: u64 = 100;
 
 /// What is being asked.
 pub(crate) struct PictureDialog {

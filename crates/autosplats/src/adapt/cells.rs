@@ -151,11 +151,16 @@ impl Filling {
     /// Writes what it holds to a cell of a row.
     #[inline(always)]
     fn finish(&self, row: &mut [&mut [Bunch]; BUNCHES], column: usize) {
+        // What is empty, and was in the frame before, need be neither written nor, but for the first bunch, read: that is most of
+        // many pictures, and of nearly all the second bunches. A bunch whose first count is 0 is all 0.
+        let mut had_some = true;
         for (index, bunches) in row.iter_mut().enumerate() {
-            let bunch = &mut bunches[column];
             let held = index * BUNCH..self.used.min((index + 1) * BUNCH);
-            // Most of many pictures is empty, and was in the frame before: that need not be written. A bunch whose first count is
-            // 0 is all 0.
+            if held.is_empty() && !had_some {
+                return;
+            }
+            let bunch = &mut bunches[column];
+            had_some = bunch.is_full();
             if !held.is_empty() || bunch.count[0] > 0.0 {
                 *bunch = Bunch::default();
             }

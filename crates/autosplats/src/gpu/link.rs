@@ -26,6 +26,7 @@ const SHARED: &[(&str, &str)] = &[
     ("eigen", include_str!("../shared/eigen.wgsl")),
     ("orthonormal", include_str!("../shared/orthonormal.wgsl")),
     ("levels", include_str!("../shared/levels.wgsl")),
+    ("clusters", include_str!("../shared/clusters.wgsl")),
     ("filling", include_str!("../shared/filling.wgsl")),
     ("quadric", include_str!("../shared/quadric.wgsl")),
     ("alone", include_str!("../shared/alone.wgsl")),
