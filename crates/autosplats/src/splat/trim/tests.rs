@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::super::centers::one;
-use super::blurred::{BLOCK_PX, FRINGE_BLOCKS};
+use super::blurred::{BLOCK_PX, BLURS, FRINGE_BLOCKS};
 use super::*;
 use crate::adapt::Noise;
 use crate::camera::{Camera, Projection};
@@ -256,7 +256,7 @@ fn what_noise_has_blurred_ends_about_where_the_surface_does() {
 #[test]
 fn thin_noise_blurs_if_it_is_sure_and_points_are_close() {
     let mean = |per_pixel: usize, sure: f32| {
-        let above = above_the_line(per_pixel, 0.5, Some(sure));
+        let above = above_the_line(per_pixel, 0.5 / BLURS, Some(sure));
         above.iter().sum::<f32>() / above.len() as f32
     };
     let [unsure, sure] = [0.0, 1.0].map(|sure| mean(12, sure));
