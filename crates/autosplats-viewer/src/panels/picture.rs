@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 
-use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
 use autosplats::cloud::check_memory;
+use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
 use eframe::egui;
 
 use super::export::has_extension;

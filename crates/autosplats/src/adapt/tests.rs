@@ -242,6 +242,22 @@ fn normals_of_a_noisy_sphere_are_the_spheres() {
     assert!(before > 15.0 && after < 5.0, "{before} degrees off, then {after}");
 }
 
+/// Noise that is seen from the side lies along lines of sight: cells hold more slabs of it than of a surface, and points that are
+/// pixels apart hide none of it.
+#[test]
+fn normals_of_noise_seen_from_the_side_are_the_surfaces() {
+    let case = Case::new(&noisy(test_clouds::sphere(60_000), 0.035), PROJECTIONS[0], [800, 600]);
+    let normal = |surfel: &Surfel| {
+        let center = Vec3::from(surfel.center);
+        let of_eye = case.view.view_from_world.transpose() * center;
+        let normal = case.view.view_from_world * (of_eye + case.view.eye_local).normalize();
+        let tilt = (normal.dot(case.view.to_eye(center)) / case.view.to_eye(center).length()).acos().to_degrees();
+        (72.0..85.0).contains(&tilt).then_some(normal)
+    };
+    let after = mean_error(&case.adapted(), normal);
+    assert!(after < 2.5, "{after} degrees off");
+}
+
 /// What is finer than the first balls scatters in them as noise does, but the more the larger the ball.
 #[test]
 fn structure_is_no_noise() {
