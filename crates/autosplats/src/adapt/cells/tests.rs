@@ -1,6 +1,6 @@
 //! Cells that are filled again and again.
 
-use super::Cells;
+use super::{Cells, Level};
 use crate::adapt::tests::{Case, PROJECTIONS};
 use crate::test_clouds::{self, noisy};
 
@@ -18,6 +18,8 @@ fn nothing_is_left_of_the_frame_before() {
             assert!(level.bunches == fresh.bunches, "cells of {} pixels", level.side_px);
         }
     }
+    let has_second = |level: &Level| level.bunches[1].iter().any(|bunch| bunch.count[0] > 0.0);
+    assert!(cells.levels.iter().any(has_second), "cells with more than a bunch");
     assert!(cells.levels[0].bunches[0].iter().any(|cell| cell.count[0] > 0.0), "points");
     assert!(cells.levels[0].bunches[0].iter().any(|cell| cell.count[0] == 0.0), "empty cells");
 }
