@@ -228,6 +228,20 @@ fn poses_scans_and_wide_colours_come_back() {
 }
 
 #[test]
+fn what_somebody_could_stand_in_has_z_up() {
+    let scan = Scan { name: None, world_from_sensor: DMat4::from_translation(DVec3::Z), points: 0..9 };
+    for (size, scans, axes) in [(0.9, vec![], None), (1.1, vec![], Some(Axes::ZUp)), (0.9, vec![scan], Some(Axes::ZUp))]
+    {
+        let mut positions = vec![[0.0; 3]; 9];
+        positions[3] = [0.5 * size, f32::NAN, 0.0];
+        positions[7] = [0.1, 0.2, size];
+        let cloud = PointCloud::new(DVec3::new(0.0, 500.0, 0.0), positions).with_scans(scans);
+        let (back, _) = round_trip(&cloud, &ReadOptions::default());
+        assert_eq!(back.axes(), axes, "{size} metres, {} scans", cloud.scans().len());
+    }
+}
+
+#[test]
 fn points_without_position_are_invalid() {
     let mut positions = common::positions(9);
     positions[4] = [f32::NAN; 3];

@@ -4,6 +4,7 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
+use super::alone::{Around, HANDFUL};
 use super::eigen::eigen;
 use super::{Surfel, Surfels};
 use crate::camera::View;
@@ -29,15 +30,6 @@ pub(super) const LONE_RADIUS_PX: f32 = 1.0;
 // the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
 pub(super) const WIDEST_BEHIND: f32 = 3.0;
 
-/// A point whose neighbours' mean is further from it than this part of the k-radius has them all on one side and close
-/// together: they are a surface elsewhere, and the point an outlier. At a straight edge the part is 0.42, at the end of a
-/// line 0.55.
-// Differs from the paper: it takes any neighbour within the radius of e0 expansions, 31 first search radii at k = 10, as a
-// sign of surface, so that a point in the air before a dense scan grows a disc as wide as its distance.
-pub(super) const LOPSIDED: f32 = 0.75;
-/// Fewer neighbours than this are too often on one side by chance.
-pub(super) const LOPSIDED_COUNT: f32 = 6.0;
-
 /// Fewer neighbours than this are a line by chance, and never count as a row of points.
 pub(super) const ROW_COUNT: f32 = 8.0;
 
@@ -50,7 +42,7 @@ pub(crate) struct FitRules {
     pub(crate) longest: f32,
     /// Leave ellipses as long as they are: what adapts them goes by their shape.
     pub(crate) adaptive: bool,
-    /// Keep outliers: points without neighbours as dots, and those apart from all their neighbours.
+    /// Keep outliers: points without neighbours as dots, and those that are no part of their neighbours' surface.
     pub(crate) keep_outliers: bool,
 }
 
@@ -91,10 +83,11 @@ fn fit_blocks_with<'a, S: Simd>(
         }
         for (lane, (surfel, &query)) in out.iter_mut().zip(queries).enumerate() {
             let point = &screen.points[query as usize];
-            *surfel = fitted.surfel(lane, block, point.position_view, view, rules);
+            let first_radius = screen.density.initial_radius(point, rules.k, view);
+            let usual_radius = if screen.points.len() < HANDFUL { f32::INFINITY } else { first_radius };
+            *surfel = fitted.surfel(lane, block, point.position_view, usual_radius, view, rules);
             if screen.density.culls(point) {
-                let widest = WIDEST_BEHIND * screen.density.initial_radius(point, rules.k, view);
-                surfel.radius = surfel.radius.min(splat_radius(widest, rules.k as f32, rules));
+                surfel.radius = surfel.radius.min(splat_radius(WIDEST_BEHIND * first_radius, rules.k as f32, rules));
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
@@ -165,20 +158,22 @@ impl Fitted {
         }
     }
 
+    /// The surfel of a point whose surroundings have a `usual_radius` to the k-th neighbour; infinite if they are not known.
     #[inline(always)]
     fn surfel(
         &self,
         lane: usize,
         block: &NeighborhoodBlock,
         center: [f32; 3],
+        usual_radius: f32,
         view: &View,
         rules: &FitRules,
     ) -> Surfel {
         let [count, k_radius] = [block.count.0[lane], block.k_radius.0[lane]];
         let plane = self.plane(lane, view.to_eye(center.into()).to_array());
-        let offset = of_lane(&block.offset, lane).map(|sum| sum / count);
-        let apart = offset.iter().map(|c| c * c).sum::<f32>() > (LOPSIDED * k_radius) * (LOPSIDED * k_radius);
-        let outlier = apart & (count >= LOPSIDED_COUNT) & !rules.keep_outliers;
+        let mean = of_lane(&block.offset, lane).map(|sum| sum / (count * k_radius.max(f32::MIN_POSITIVE)));
+        let around = Around { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
+        let outlier = !rules.keep_outliers && around.leave_alone(k_radius / usual_radius, rules.k);
         let major_ratio = if rules.adaptive && count >= ROW_COUNT {
             plane.major_ratio
         } else if plane.major_ratio < f32::MAX {

@@ -27,7 +27,14 @@ override ROW_COUNT: f32;
 override LONE_RADIUS_PX: f32;
 override WIDEST_BEHIND: f32;
 override LOPSIDED: f32;
+override LOPSIDED_SPARSE: f32;
+override FAR_SPARSER: f32;
 override LOPSIDED_COUNT: f32;
+override BESIDE: f32;
+override FLAT: f32;
+override FEW: f32;
+override SPARSER: f32;
+override HANDFUL: u32;
 
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
@@ -37,6 +44,8 @@ struct Task {
     len: u32,
     cell_px: u32,
     cell_columns: u32,
+    // Screen points.
+    points: u32,
 }
 
 var<workgroup> task: Task;
@@ -47,6 +56,8 @@ struct Plane {
     major_axis: vec3f,
     major_ratio: f32,
     curvature: f32,
+    // Of the point and its neighbours along the normal, squared k-radii.
+    variance: f32,
 }
 
 fn product(a: vec3f, b: vec3f) -> f32 {
@@ -99,7 +110,7 @@ fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     let least = max(found.values.x, 0.0);
     let sum = least + middle + largest;
     let curvature = select(0.0, least / sum, sum > 0.0);
-    return Plane(select(normal, -normal, product(normal, eye) < 0.0), major_axis, major_ratio, curvature);
+    return Plane(select(normal, -normal, product(normal, eye) < 0.0), major_axis, major_ratio, curvature, found.values.x);
 }
 
 // Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6]; one cut short counts as k neighbours.
@@ -107,10 +118,30 @@ fn splat_radius(k_radius: f32, count: f32) -> f32 {
     return frame.splat_scale * 2.0 * k_radius / sqrt(max(count, f32(frame.k)));
 }
 
+// Whether a point is no part of its neighbours' surface; its k-radius is `sparser` first search radii, 0 where there is nothing to
+// compare with. See `alone.rs`.
+fn is_alone(sums: Neighborhood, face: Plane, sparser: f32) -> bool {
+    let count = sums.count;
+    if count < LOPSIDED_COUNT {
+        return count < min(FEW, f32(frame.k)) && sparser > SPARSER;
+    }
+    let mean = sums.offset / (count * max(sums.k_radius, MIN_POSITIVE));
+    let height = product(mean, face.normal);
+    let beside = height * height;
+    // Without the point itself.
+    let all = count + 1.0;
+    let scatter = (face.variance - count * beside / (all * all)) * (all / count);
+    let is_beside = beside > BESIDE * BESIDE && beside > FLAT * scatter && sparser > 0.0;
+    let lopsided = select(LOPSIDED, LOPSIDED_SPARSE, sparser > FAR_SPARSER);
+    return product(mean, mean) > lopsided * lopsided || is_beside;
+}
+
 fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     let point = points[query];
     let center = point.position_view;
     let face = plane(sums, to_eye(center));
+    let cell = density[density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns)];
+    let first = first_radius(cell.x, task.cell_px, center.z);
 
     var radius = 0.0;
     if sums.count > 0.0 {
@@ -118,15 +149,12 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     } else if frame.keep_outliers == 1u {
         radius = LONE_RADIUS_PX * pixel_size(center.z);
     }
-    let mean = sums.offset / max(sums.count, 1.0);
-    let apart = LOPSIDED * sums.k_radius;
-    if product(mean, mean) > apart * apart && sums.count >= LOPSIDED_COUNT && frame.keep_outliers == 0u {
+    let sparser = select(sums.k_radius / first, 0.0, task.points < HANDFUL);
+    if frame.keep_outliers == 0u && is_alone(sums, face, sparser) {
         radius = 0.0;
     }
-    let cell = density[density_cell(pixel_xy(point.pixel), task.cell_px, task.cell_columns)];
     if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
-        let widest = WIDEST_BEHIND * first_radius(cell.x, task.cell_px, center.z);
-        radius = min(radius, splat_radius(widest, f32(frame.k)));
+        radius = min(radius, splat_radius(WIDEST_BEHIND * first, f32(frame.k)));
     }
     // A line has no width to draw.
     let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MOST);
@@ -154,6 +182,7 @@ fn fit(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
         task.len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
         task.cell_px = atomicLoad(&counters[CELL_PX]);
         task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
+        task.points = atomicLoad(&counters[VISIBLE]);
         atomicStore(&outliers, 0u);
     }
     workgroupBarrier();

@@ -1,7 +1,8 @@
 //! The fit on the GPU: an invocation per point.
 
 use super::Surfel;
-use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, LOPSIDED, LOPSIDED_COUNT, ROW_COUNT, WIDEST_BEHIND};
+use super::alone::{BESIDE, FAR_SPARSER, FEW, FLAT, HANDFUL, LOPSIDED, LOPSIDED_COUNT, LOPSIDED_SPARSE, SPARSER};
+use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, ROW_COUNT, WIDEST_BEHIND};
 use super::eigen::SWEEPS;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -41,7 +42,14 @@ impl FitPasses {
                 ("LONE_RADIUS_PX", LONE_RADIUS_PX.into()),
                 ("WIDEST_BEHIND", WIDEST_BEHIND.into()),
                 ("LOPSIDED", LOPSIDED.into()),
+                ("LOPSIDED_SPARSE", LOPSIDED_SPARSE.into()),
+                ("FAR_SPARSER", FAR_SPARSER.into()),
                 ("LOPSIDED_COUNT", LOPSIDED_COUNT.into()),
+                ("BESIDE", BESIDE.into()),
+                ("FLAT", FLAT.into()),
+                ("FEW", FEW.into()),
+                ("SPARSER", SPARSER.into()),
+                ("HANDFUL", HANDFUL as f64),
             ];
             Pass::new(gpu, &FIT, &constants)
         };

@@ -4,9 +4,11 @@
 //! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, a SIMD vector of matrices at a time:
 //! a fixed number of additions, multiplications and square roots without branches, which converges from any start and
 //! keeps the axes orthogonal. The axis of the least eigenvalue is the normal, turned towards the eye. The splat radius is
-//! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average. If it is known from where a point was
+//! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average. A point that
+//! is no part of its neighbours' surface gets none (`alone`). If it is known from where a point was
 //! scanned, its surfel is then marked if that was on the other side (`orient/`).
 
+mod alone;
 mod cpu;
 mod eigen;
 mod given;

@@ -2,7 +2,8 @@
 
 use autosplats_cloud::glam::{DMat3, DVec3};
 
-use super::cpu::{LONGEST, LOPSIDED, LOPSIDED_COUNT, WIDEST_BEHIND};
+use super::alone::{BESIDE, FAR_SPARSER, FEW, FLAT, HANDFUL, LOPSIDED, LOPSIDED_COUNT, LOPSIDED_SPARSE, SPARSER};
+use super::cpu::{LONGEST, WIDEST_BEHIND};
 use super::{FitRules, Surfel, Surfels, fit};
 use crate::camera::{Camera, Projection, View};
 use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
@@ -58,6 +59,12 @@ fn views() -> [View; 2] {
     })
 }
 
+/// First search radius at a depth in the density grid of [`fitted`], one cell of 200 pixels with one point.
+fn first_radius(depth: f64, view: &View) -> f64 {
+    let pixel = if view.perspective { depth } else { 1.0 } / f64::from(view.focal_px);
+    200.0 * (10.0 / std::f64::consts::PI).sqrt() * pixel
+}
+
 /// Runs the stage on neighbourhoods whose moments are summed here.
 fn fitted(neighborhoods: &[Neighborhood], view: &View, rules: &FitRules, culling: f32) -> Surfels {
     let pixel = 3 << 16 | 5;
@@ -65,7 +72,7 @@ fn fitted(neighborhoods: &[Neighborhood], view: &View, rules: &FitRules, culling
     let screen = ScreenPoints {
         points: neighborhoods.iter().map(at).collect(),
         source: (100..).take(neighborhoods.len()).collect(),
-        // One cell with one point, so that the first search radius is √(k/π) cells.
+        // The first search radius is √(k/π) cells.
         density: DensityGrid { cell_px: 200, columns: 1, count: vec![1], nearest: vec![0.0], culling: vec![culling] },
         ..ScreenPoints::default()
     };
@@ -111,11 +118,17 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
 
     let near = |value: f32, expected: f64, tolerance: f64| (f64::from(value) - expected).abs() <= tolerance;
     let count = n.offsets.len() as f64;
-    let lopsided = (n.mean() * (count + 1.0) / count).length() > f64::from(LOPSIDED) * n.k_radius();
-    let lopsided = lopsided && count >= f64::from(LOPSIDED_COUNT);
+    let neighbors_mean = n.mean() * (count + 1.0) / count;
+    let is_sparse = n.k_radius() > f64::from(FAR_SPARSER) * first_radius(n.center.z, view);
+    let most = if is_sparse { LOPSIDED_SPARSE } else { LOPSIDED };
+    let lopsided = neighbors_mean.length() > f64::from(most) * n.k_radius();
+    let height = neighbors_mean.dot(normal).abs();
+    let scatter = n.offsets.iter().map(|offset| (offset - neighbors_mean).dot(normal).powi(2)).sum::<f64>() / count;
+    let beside = height > f64::from(BESIDE) * n.k_radius() && height * height > f64::from(FLAT) * scatter;
+    let alone = (lopsided || beside) && count >= f64::from(LOPSIDED_COUNT);
     // A neighbourhood cut short counts as k neighbours.
     let radius = f64::from(rules.splat_scale) * 2.0 * n.k_radius() / count.max(f64::from(rules.k)).sqrt();
-    let radius = if lopsided && !rules.keep_outliers { 0.0 } else { radius };
+    let radius = if alone && !rules.keep_outliers { 0.0 } else { radius };
     ensure(near(surfel.radius, radius, 1e-6 * radius), &format!("radius is not {radius}"))?;
     ensure(near(surfel.k_radius, n.k_radius(), 1e-6 * n.k_radius()), "k-radius")?;
     let curvature = least / (least + middle + largest);
@@ -166,7 +179,7 @@ fn random_neighborhoods_are_reconstructed() {
 #[test]
 fn comparison_sees_each_kind_of_error() {
     let view = views()[0];
-    let neighborhoods = random_neighborhoods(22, 12);
+    let neighborhoods = random_neighborhoods(22, HANDFUL);
     let surfels = fitted(&neighborhoods, &view, &RULES, f32::INFINITY);
     let (n, right) = (&neighborhoods[5], surfels[5]);
     let wrong = [
@@ -236,8 +249,7 @@ fn splats_behind_the_culling_plane_are_limited() {
         let limited = fitted(&neighborhoods, &view, &RULES, 0.0);
         let mut narrowed = 0;
         for (free, limited) in free.iter().zip(&limited) {
-            let depth = if view.perspective { free.center[2] } else { 1.0 };
-            let first_radius = 200.0 * (10.0f32 / std::f32::consts::PI).sqrt() * depth / view.focal_px;
+            let first_radius = first_radius(free.center[2].into(), &view) as f32;
             let widest = 2.0 * WIDEST_BEHIND * first_radius / 10f32.sqrt();
             let expected = free.radius.min(widest);
             assert!((limited.radius - expected).abs() <= 1e-6 * expected, "{limited:?} is not {expected} wide");
@@ -247,11 +259,105 @@ fn splats_behind_the_culling_plane_are_limited() {
     }
 }
 
+/// What a point whose surroundings are as dense everywhere keeps, `sparser` times as sparse as they are: the share of a number of
+/// neighbourhoods, each made by `offsets`, that is drawn.
+fn kept(k: u32, sparser: f64, count: usize, mut offsets: impl FnMut(&mut Random) -> Vec<DVec3>) -> f64 {
+    let view = views()[1];
+    let first_radius = first_radius(4.0, &view);
+    let mut random = Random::new(25);
+    let mut one = || {
+        let n = Neighborhood { center: DVec3::new(0.1, 0.2, 4.0), offsets: offsets(&mut random) };
+        let scale = sparser * first_radius / n.k_radius();
+        Neighborhood { offsets: n.offsets.iter().map(|offset| offset * scale).collect(), ..n }
+    };
+    let neighborhoods: Vec<_> = (0..count).map(|_| one()).collect();
+    let surfels = fitted(&neighborhoods, &view, &FitRules { k, ..RULES }, f32::INFINITY);
+    surfels.iter().filter(|surfel| surfel.radius > 0.0).count() as f64 / count as f64
+}
+
+/// Ten points strewn over the unit disc, in a direction of their own each time, moved by `place`, which also gets a
+/// random number between -1 and 1.
+fn strewn(random: &mut Random, place: impl Fn(f64, f64, f64) -> DVec3) -> Vec<DVec3> {
+    let normal = DVec3::from(random.direction().map(f64::from));
+    let (a, b) = normal.any_orthonormal_pair();
+    let one = |_| {
+        let [x, y] = std::iter::repeat_with(|| [0, 1].map(|_| f64::from(random.signed())))
+            .find(|[x, y]| x * x + y * y < 1.0)
+            .expect("endless");
+        let DVec3 { x, y, z } = place(x, y, random.signed().into());
+        a * x + b * y + normal * z
+    };
+    (0..10).map(one).collect()
+}
+
+#[test]
+fn points_beside_a_surface_are_dropped() {
+    let above = |height: f64, rough: f64| {
+        kept(10, 1.0, 1000, |random| strewn(random, |x, y, noise| DVec3::new(x, y, rough * noise - height)))
+    };
+    for (height, rough, expected) in [
+        (0.0, 0.0, 1.0..=1.0),
+        (0.2, 0.0, 0.99..=1.0),
+        (0.2, 0.2, 0.99..=1.0),
+        (0.5, 0.0, 0.0..=0.1),
+        (0.5, 0.05, 0.0..=0.1),
+        (0.5, 0.5, 0.99..=1.0),
+    ] {
+        let share = above(height, rough);
+        assert!(expected.contains(&share), "{height} above a surface, {rough} thick: {share} of the points are kept");
+    }
+    // Where it is the shape that is not flat, its points stay.
+    let cone = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x, y, x.hypot(y)));
+    let ridge = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x, y, x.abs()));
+    let corner = |random: &mut Random| {
+        strewn(random, |x, y, side| {
+            let [x, y] = [x.abs(), y.abs()];
+            if side > 0.3 {
+                DVec3::new(x, y, 0.0)
+            } else if side > -0.3 {
+                DVec3::new(x, 0.0, y)
+            } else {
+                DVec3::new(0.0, x, y)
+            }
+        })
+    };
+    for (name, share) in [
+        ("cone", kept(10, 1.0, 1000, cone)),
+        ("ridge", kept(10, 1.0, 1000, ridge)),
+        ("corner", kept(10, 1.0, 1000, corner)),
+    ] {
+        assert!(share > 0.97, "a {name} keeps {share} of its tips");
+    }
+}
+
+#[test]
+fn points_much_sparser_than_their_surroundings_are_dropped() {
+    // All on one side, their mean 0.67 k-radii away.
+    let aside = |random: &mut Random| {
+        let one = |step: usize| DVec3::new(1.0 - step as f64 * 0.66 / 9.0, 0.1 * f64::from(random.signed()), 0.0);
+        (0..10).map(one).collect::<Vec<_>>()
+    };
+    for (sparser, expected) in [(0.9 * FAR_SPARSER, 1.0), (1.1 * FAR_SPARSER, 0.0)] {
+        assert_eq!(kept(10, sparser.into(), 1000, aside), expected, "{sparser} times as sparse");
+    }
+    for count in [1, 2, 3, FEW as usize] {
+        let few = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x, y, 0.0))[..count].to_vec();
+        let is_few = (count as f32) < FEW;
+        for (sparser, expected) in [(0.9 * SPARSER, 1.0), (1.1 * SPARSER, if is_few { 0.0 } else { 1.0 })] {
+            assert_eq!(kept(10, sparser.into(), 1000, few), expected, "{count} neighbours, {sparser} times as sparse");
+            assert_eq!(kept(10, sparser.into(), HANDFUL - 1, few), 1.0, "a handful has nothing to compare with");
+            assert_eq!(kept(count as u32, sparser.into(), 1000, few), 1.0, "{count} of {count} are not few");
+        }
+    }
+}
+
 /// Whatever the cloud's unit: the same surfels but for their size.
 #[test]
 fn units_do_not_matter() {
-    let view = views()[1];
     let in_unit = |unit: f64| -> Surfels {
+        let projection = Projection::OrthographicHeight(4.0 * unit);
+        let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
+        let view = camera.view(DVec3::ZERO, [100, 80]).expect("a view");
         let mut neighborhoods = random_neighborhoods(24, 500);
         let offsets = neighborhoods.iter_mut().flat_map(|n| &mut n.offsets);
         offsets.for_each(|offset| *offset = offset.as_vec3().as_dvec3() * unit);

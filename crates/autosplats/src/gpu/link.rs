@@ -59,6 +59,7 @@ const SHARED: &[(&str, &str)] = &[
     ("kd_build", include_str!("../shared/kd_build.wgsl")),
     ("kd_work", include_str!("../shared/kd_work.wgsl")),
     ("kd_chunk", include_str!("../shared/kd_chunk.wgsl")),
+    ("srgb", include_str!("../shared/srgb.wgsl")),
     ("shading", include_str!("../shared/shading.wgsl")),
     ("depth_map", include_str!("../shared/depth_map.wgsl")),
     ("hidden", include_str!("../shared/hidden.wgsl")),

@@ -10,6 +10,7 @@
 #import counters
 #import layers
 #import shading
+#import srgb
 
 @group(0) @binding(2) var<storage, read> surface: array<vec4f>;
 @group(0) @binding(3) var<storage, read> cover: array<Cover>;
@@ -46,22 +47,13 @@ fn map_color(value: f32) -> vec3f {
     return color_map[table_step(t, arrayLength(&color_map) - 1u)].rgb;
 }
 
-// The nearest of so many steps from 0 to 1; 0 for what is not a number.
-fn table_step(t: f32, steps: u32) -> u32 {
-    return select(0u, u32(min(t, 1.0) * f32(steps) + 0.5), t > 0.0);
-}
-
-fn from_srgb(value: f32) -> f32 {
-    return select(pow((value + 0.055) / 1.055, 2.4), value / 12.92, value <= 0.04045);
-}
-
 fn base_color(pixel: vec2u, index: u32, surface_here: vec4f) -> vec3f {
     if SHOWN >= SHOW_HEIGHT {
         return map_color(shown_value(pixel, index, surface_here.w));
     }
     if SHOWN == SHOW_NORMAL {
         let normal = 0.5 + 0.5 * to_world(surface_here.xyz);
-        return vec3f(from_srgb(normal.x), from_srgb(normal.y), from_srgb(normal.z));
+        return from_srgb(normal);
     }
     if SHOWN == SHOW_COLOR {
         return extras[index].rgb;
@@ -229,23 +221,14 @@ fn part_of(side: vec2i, pixel: vec2i) -> f32 {
     return part;
 }
 
-fn encode(channel: f32) -> u32 {
-    let step = table_step(channel, shading.encode_steps);
-    return (tables[step / 4u] >> (8u * (step % 4u))) & 255u;
-}
-
-fn encode_color(color: vec3f) -> u32 {
-    return encode(color.r) | (encode(color.g) << 8u) | (encode(color.b) << 16u);
-}
-
 // What a pixel shows of which a part is covered in one colour and the rest is background.
 fn over(color: vec3f, part: f32, background: u32) -> u32 {
     if background == 0u {
-        return encode_color(color) | (u32(part * 255.0 + 0.5) << 24u);
+        return encode_color(color, shading.encode_steps) | (u32(part * 255.0 + 0.5) << 24u);
     }
     let bytes = vec3f(vec3u(background, background >> 8u, background >> 16u) & vec3u(255u)) / 255.0;
-    let behind = vec3f(from_srgb(bytes.r), from_srgb(bytes.g), from_srgb(bytes.b));
-    return encode_color(behind + (color - behind) * part) | 0xff000000u;
+    let behind = from_srgb(bytes);
+    return encode_color(behind + (color - behind) * part, shading.encode_steps) | 0xff000000u;
 }
 
 fn put(pixel: vec2u, color: vec3f, rgba: u32) {
@@ -312,7 +295,7 @@ fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) 
         }
         var rgba = tables[shading.backgrounds + pixel.y];
         if is_surface && (beside_is_surface || part == 0.0) {
-            rgba = encode_color(own + (beside - own) * part) | 0xff000000u;
+            rgba = encode_color(own + (beside - own) * part, shading.encode_steps) | 0xff000000u;
         } else if is_surface {
             rgba = over(own, 1.0 - part, rgba);
         } else if beside_is_surface {

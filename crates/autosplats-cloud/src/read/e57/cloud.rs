@@ -20,6 +20,8 @@ use crate::{Axes, Error, PointCloud, Scan};
 
 /// Points of a preview.
 const CHUNK: usize = 1 << 20;
+/// What is smaller than this, metres, is no place that somebody could stand in.
+const SMALL: f32 = 1.0;
 
 /// A scan's header and its values.
 pub(super) struct Source<'a> {
@@ -228,8 +230,6 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: 
         }
         cloud = cloud.with_field(&field.name, values)?;
     }
-    // The standard does not say which way is up, but those who write the format stand upright.
-    cloud = cloud.with_axes(Axes::ZUp);
     let mut start = 0;
     let scans = sources.iter().filter_map(|source| {
         let points = start..start + source.len();
@@ -237,8 +237,23 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: 
         let scan = || Scan { name: source.header.name.clone(), world_from_sensor: source.pose, points };
         is_of_scanner(source.header, trusted).then(scan)
     });
-    let scans = scans.collect();
+    let scans: Vec<Scan> = scans.collect();
+    // The standard does not say which way is up, but scanners stand upright, and so do those who write the format. What no scanner
+    // saw and is small is a thing that was turned by hand.
+    if !scans.is_empty() || !is_small(&cloud) {
+        cloud = cloud.with_axes(Axes::ZUp);
+    }
     Ok(cloud.with_scans(scans))
+}
+
+/// Whether a cloud fits into a box with sides of [`SMALL`].
+fn is_small(cloud: &PointCloud) -> bool {
+    let none = [f32::INFINITY, f32::NEG_INFINITY];
+    (0..3).all(|axis| {
+        let coordinates = cloud.positions().iter().map(|p| p[axis]);
+        let [low, high] = coordinates.fold(none, |[low, high], at| [low.min(at), high.max(at)]);
+        high - low < SMALL
+    })
 }
 
 /// Whether points come from a scanner, and are not a model or a merged cloud that was saved like a scan. Programs that know

@@ -190,9 +190,13 @@ fn the_device_shrinks_what_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let passes = AdaptPasses::new(&gpu).expect("passes");
     let compare = |name: &str, case: &Case, is_asked: &dyn Fn(u32) -> bool, least: f64| {
-        let of = |surfels: Surfels| -> Surfels { surfels.into_iter().filter(|s| is_asked(s.source)).collect() };
-        let [device, host, fitted] =
-            [on_device(&gpu, &passes, case).surfels, case.adapted(), case.fitted.concat()].map(of);
+        let fitted = case.fitted.concat();
+        // Of those that the fit leaves.
+        let is_left = |surfel: &Surfel| is_asked(surfel.source) && surfel.radius > 0.0;
+        let of = |surfels: Surfels| -> Surfels {
+            surfels.into_iter().zip(&fitted).filter(|(_, fitted)| is_left(fitted)).map(|(surfel, _)| surfel).collect()
+        };
+        let [device, host, fitted] = [on_device(&gpu, &passes, case).surfels, case.adapted(), fitted.clone()].map(of);
         let shrunk = host.iter().zip(&fitted).filter(|(host, fitted)| host.radius < fitted.radius).count();
         assert!(shrunk as f64 > least * host.len() as f64, "{name}: {shrunk} of {}", host.len());
         compare_surfels(&device, &host).unwrap_or_else(|error| panic!("{name}: {error}"));

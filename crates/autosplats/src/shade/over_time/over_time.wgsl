@@ -7,6 +7,7 @@
 #import groups
 #import divide
 #import reproject
+#import srgb
 
 @group(0) @binding(1) var<storage, read> surface: array<vec4f>;
 @group(0) @binding(2) var<storage, read> past_depths: array<f32>;
@@ -22,18 +23,9 @@ override ENCODE_STEPS: u32;
 // Rows of the image begin at multiples of so many pixels.
 override ROW_PIXELS: u32;
 
-fn from_srgb(value: vec3f) -> vec3f {
-    return select(pow((value + 0.055) / 1.055, vec3f(2.4)), value / 12.92, value <= vec3f(0.04045));
-}
-
 // A pixel's channels in linear light.
 fn linear_of(rgba: u32) -> vec3f {
     return from_srgb(unpack4x8unorm(rgba).xyz);
-}
-
-fn encode(channel: f32) -> u32 {
-    let step = u32(clamp(channel, 0.0, 1.0) * f32(ENCODE_STEPS) + 0.5);
-    return (tables[step / 4u] >> (8u * (step % 4u))) & 255u;
 }
 
 @compute @workgroup_size(256)
@@ -75,6 +67,5 @@ fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let word = image[pixel.y * pitch + pixel.x];
     let now = linear_of(word);
     let mean = now + SHARE * (sum / total - now);
-    let rgb = encode(mean.r) | (encode(mean.g) << 8u) | (encode(mean.b) << 16u);
-    image[pixel.y * pitch + pixel.x] = rgb | (word & 0xff000000u);
+    image[pixel.y * pitch + pixel.x] = encode_color(mean, ENCODE_STEPS) | (word & 0xff000000u);
 }
