@@ -197,8 +197,8 @@ fn noise_that_grows_with_distance_is_measured() {
         k_radii.sort_by(f32::total_cmp);
         let ratio = noise.at(k_radii[k_radii.len() / 2]) / (sigma * depth * depth);
         // Noise makes k-radii larger too, which hides some of its growth; at the far end it is half of them, and slabs cut it. There
-        // eight samples told 0.36 to 0.54 of it.
-        assert!((0.33..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
+        // eight samples told 0.36 to 0.54 of it, before points that stand alone in noise had no ball.
+        assert!((0.3..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
     }
 }
 

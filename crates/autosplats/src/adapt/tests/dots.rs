@@ -49,13 +49,14 @@ fn points_too_far_off_for_noise_are_dots() {
     for projection in PROJECTIONS {
         let (case, is_stray) = Case::noisy_with_strays(projection);
         let [[of_sphere, its_dots], [strays, dots]] = dots(&case, is_stray);
-        assert!(strays > 200 && dots * 20 > strays * 19, "{dots} of {strays} are dots");
+        // As many again are dropped by the fit.
+        assert!(strays > 100 && dots * 20 > strays * 19, "{dots} of {strays} are dots");
         assert!(its_dots * 100 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
     }
     let (room, is_stray) = Case::stepped_with_strays();
     // The others have no sheet near enough to be moved to.
     let [[of_room, its_dots], [strays, dots]] = dots(&room, is_stray);
-    assert!(strays > 60 && dots * 2 > strays, "{dots} of {strays} are dots");
+    assert!(strays > 30 && dots * 2 > strays, "{dots} of {strays} are dots");
     assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
 }
 
