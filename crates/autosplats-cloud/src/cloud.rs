@@ -225,6 +225,17 @@ impl PointCloud {
         self.positions.len()
     }
 
+    /// Whether its points, in metres, lie so close together that nobody could stand among them.
+    pub(crate) fn is_small(&self) -> bool {
+        const SMALL: f32 = 1.0;
+        let none = [f32::INFINITY, f32::NEG_INFINITY];
+        (0..3).all(|axis| {
+            let coordinates = self.positions.iter().map(|position| position[axis]);
+            let [low, high] = coordinates.fold(none, |[low, high], at| [low.min(at), high.max(at)]);
+            (0.0..SMALL).contains(&(high - low))
+        })
+    }
+
     /// Whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()

@@ -235,9 +235,11 @@ fn what_somebody_could_stand_in_has_z_up() {
         let mut positions = vec![[0.0; 3]; 9];
         positions[3] = [0.5 * size, f32::NAN, 0.0];
         positions[7] = [0.1, 0.2, size];
-        let cloud = PointCloud::new(DVec3::new(0.0, 500.0, 0.0), positions).with_scans(scans);
-        let (back, _) = round_trip(&cloud, &ReadOptions::default());
+        let cloud = PointCloud::new(DVec3::new(0.0, 500.0, 0.0), positions).with_scans(scans).with_axes(Axes::ZUp);
+        let (back, notes) = round_trip(&cloud, &ReadOptions::default());
         assert_eq!(back.axes(), axes, "{size} metres, {} scans", cloud.scans().len());
+        let is_told = notes.iter().any(|note| note.contains("which way is up"));
+        assert_eq!(is_told, axes.is_none(), "{size} metres: {notes:?}");
     }
 }
 

@@ -79,7 +79,7 @@ pub(crate) struct SurfaceArgs {
         conflicts_with = "keep_outliers"
     )]
     pub(crate) e0: u32,
-    /// Keep points that have no neighbour, or are far from all of them
+    /// Keep points that have no neighbour, or are no part of a surface
     #[arg(long)]
     pub(crate) keep_outliers: bool,
     /// Above 1; less keeps narrower gaps open. A point's neighbours end where the next one is further away than all so far times

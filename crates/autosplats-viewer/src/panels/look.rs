@@ -174,7 +174,7 @@ fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
         reconstruction.points_per_pixel = if two { 2 } else { 1 };
     }
     let mut removed = reconstruction.outlier_expansions.is_some();
-    if ui.checkbox(&mut removed, "Remove outliers").on_hover_text("Points far from all others").changed() {
+    if ui.checkbox(&mut removed, "Remove outliers").on_hover_text("Points that are no part of a surface").changed() {
         reconstruction.outlier_expansions = removed.then(|| given.outlier_expansions.unwrap_or(1));
     }
     let mut open = reconstruction.gap_factor.is_some();

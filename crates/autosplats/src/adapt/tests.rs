@@ -197,7 +197,7 @@ fn noise_that_grows_with_distance_is_measured() {
         k_radii.sort_by(f32::total_cmp);
         let ratio = noise.at(k_radii[k_radii.len() / 2]) / (sigma * depth * depth);
         // Noise makes k-radii larger too, which hides some of its growth; at the far end it is half of them, and slabs cut it. There
-        // eight samples told 0.36 to 0.54 of it, before points that stand alone in noise had no ball.
+        // eight samples told 0.36 to 0.54 of it; without points that stand alone in the noise it is 0.32.
         assert!((0.3..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
     }
 }

@@ -7,7 +7,7 @@
 /// 0.6, at the end of a line 0.55.
 pub(super) const LOPSIDED: f32 = 0.75;
 /// The same of a point that is far sparser than what is around it on the screen,
-pub(super) const LOPSIDED_SPARSE: f32 = 0.6;
+pub(super) const LOPSIDED_SPARSE: f32 = 0.66;
 /// which it is if its k-radius is so many first search radii.
 pub(super) const FAR_SPARSER: f32 = 3.0;
 /// Fewer neighbours than this are too often on one side by chance.
@@ -16,15 +16,15 @@ pub(super) const LOPSIDED_COUNT: f32 = 6.0;
 /// A point that is further from the plane through its neighbours than this part of the k-radius stands beside their surface,
 pub(super) const BESIDE: f32 = 0.25;
 /// if that is flat: they scatter about it by less than the distance, squared, over this. At the tip of a cone it is 8, at a
-/// cube's corner 5; strewn points are seldom above 30.
+/// cube's corner 5; of strewn tips one in a hundred goes. So does a single step of coordinates on a grid.
 pub(super) const FLAT: f32 = 50.0;
 
-/// Fewer neighbours than this, before a gap, are a surface only where others are not much denser,
+/// A point with fewer neighbours than this before a gap is of a surface only where others are not much denser,
 pub(super) const FEW: f32 = 4.0;
 /// as they are if the k-radius is so many first search radii.
 pub(super) const SPARSER: f32 = 1.3;
 
-/// In a picture of fewer points than this there is nothing that the others are.
+/// In a picture of fewer points than this there is nothing to compare with.
 pub(super) const HANDFUL: usize = 64;
 
 /// The neighbours of a point, in k-radii.
@@ -40,10 +40,10 @@ pub(super) struct Around {
 }
 
 impl Around {
-    /// Whether the point is no part of their surface, `k` of which were looked for. Its k-radius is `sparser` first search radii;
-    /// 0 where it has nothing to compare with.
+    /// Whether the point is no part of their surface, where `k` were looked for. Its k-radius is `sparser` first search radii; 0 if
+    /// there is nothing to compare with.
     #[inline(always)]
-    pub(super) fn leave_alone(&self, sparser: f32, k: u32) -> bool {
+    pub(super) fn is_alone(&self, sparser: f32, k: u32) -> bool {
         let &Self { count, mean, normal, variance } = self;
         if count < LOPSIDED_COUNT {
             return (count < FEW.min(k as f32)) & (sparser > SPARSER);

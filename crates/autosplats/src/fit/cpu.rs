@@ -40,7 +40,7 @@ pub(crate) struct FitRules {
     pub(crate) splat_scale: f32,
     /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     pub(crate) longest: f32,
-    /// Leave ellipses as long as they are: what adapts them goes by their shape.
+    /// Leave ellipses as long as they are, as what adapts them goes by their shape, and compare points with what is around them.
     pub(crate) adaptive: bool,
     /// Keep outliers: points without neighbours as dots, and those that are no part of their neighbours' surface.
     pub(crate) keep_outliers: bool,
@@ -84,7 +84,8 @@ fn fit_blocks_with<'a, S: Simd>(
         for (lane, (surfel, &query)) in out.iter_mut().zip(queries).enumerate() {
             let point = &screen.points[query as usize];
             let first_radius = screen.density.initial_radius(point, rules.k, view);
-            let usual_radius = if screen.points.len() < HANDFUL { f32::INFINITY } else { first_radius };
+            let compares = rules.adaptive && screen.points.len() >= HANDFUL;
+            let usual_radius = if compares { first_radius } else { f32::INFINITY };
             *surfel = fitted.surfel(lane, block, point.position_view, usual_radius, view, rules);
             if screen.density.culls(point) {
                 surfel.radius = surfel.radius.min(splat_radius(WIDEST_BEHIND * first_radius, rules.k as f32, rules));
@@ -173,7 +174,7 @@ impl Fitted {
         let plane = self.plane(lane, view.to_eye(center.into()).to_array());
         let mean = of_lane(&block.offset, lane).map(|sum| sum / (count * k_radius.max(f32::MIN_POSITIVE)));
         let around = Around { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
-        let outlier = !rules.keep_outliers && around.leave_alone(k_radius / usual_radius, rules.k);
+        let outlier = !rules.keep_outliers && around.is_alone(k_radius / usual_radius, rules.k);
         let major_ratio = if rules.adaptive && count >= ROW_COUNT {
             plane.major_ratio
         } else if plane.major_ratio < f32::MAX {

@@ -149,7 +149,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     } else if frame.keep_outliers == 1u {
         radius = LONE_RADIUS_PX * pixel_size(center.z);
     }
-    let sparser = select(sums.k_radius / first, 0.0, task.points < HANDFUL);
+    let sparser = select(0.0, sums.k_radius / first, frame.adaptive == 1u && task.points >= HANDFUL);
     if frame.keep_outliers == 0u && is_alone(sums, face, sparser) {
         radius = 0.0;
     }

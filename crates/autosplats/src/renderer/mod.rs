@@ -55,7 +55,7 @@ pub struct Counts {
     pub passive: usize,
     /// Passive points that turned out not to be hidden and were reconstructed in the second pass.
     pub recovered: usize,
-    /// Points discarded because they have no neighbour, or because they are far from all of them and on no surface.
+    /// Points discarded because they have no neighbour, or because they are no part of a surface that their neighbours are.
     pub outliers: usize,
     /// Points that kept fewer than k neighbours, because of a gap or of the bound on search work.
     pub clamped: usize,

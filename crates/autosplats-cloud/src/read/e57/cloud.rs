@@ -20,8 +20,6 @@ use crate::{Axes, Error, PointCloud, Scan};
 
 /// Points of a preview.
 const CHUNK: usize = 1 << 20;
-/// What is smaller than this, metres, is no place that somebody could stand in.
-const SMALL: f32 = 1.0;
 
 /// A scan's header and its values.
 pub(super) struct Source<'a> {
@@ -240,20 +238,10 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: 
     let scans: Vec<Scan> = scans.collect();
     // The standard does not say which way is up, but scanners stand upright, and so do those who write the format. What no scanner
     // saw and is small is a thing that was turned by hand.
-    if !scans.is_empty() || !is_small(&cloud) {
+    if !scans.is_empty() || !cloud.is_small() {
         cloud = cloud.with_axes(Axes::ZUp);
     }
     Ok(cloud.with_scans(scans))
-}
-
-/// Whether a cloud fits into a box with sides of [`SMALL`].
-fn is_small(cloud: &PointCloud) -> bool {
-    let none = [f32::INFINITY, f32::NEG_INFINITY];
-    (0..3).all(|axis| {
-        let coordinates = cloud.positions().iter().map(|p| p[axis]);
-        let [low, high] = coordinates.fold(none, |[low, high], at| [low.min(at), high.max(at)]);
-        high - low < SMALL
-    })
 }
 
 /// Whether points come from a scanner, and are not a model or a merged cloud that was saved like a scan. Programs that know

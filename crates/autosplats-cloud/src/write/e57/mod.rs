@@ -83,7 +83,13 @@ fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
 /// Tells what cannot be held.
 fn notes(job: &Job<'_>, known: &Known<'_>) {
     let cloud = job.cloud;
-    if matches!(cloud.axes(), Some(Axes::YUp | Axes::Camera)) {
+    let is_lost = match cloud.axes() {
+        Some(Axes::YUp | Axes::Camera) => true,
+        // Readers take it that what is larger, or scanned, has Z up.
+        Some(Axes::ZUp) => cloud.is_small() && cloud.scans().is_empty(),
+        None => false,
+    };
+    if is_lost {
         job.note("E57 does not say which way is up");
     }
     for field in cloud.fields() {

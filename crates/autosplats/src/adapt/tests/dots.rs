@@ -14,6 +14,32 @@ fn dots(case: &Case, is_stray: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
     counts
 }
 
+/// How many points the fit saw neighbours of and how many of them it dropped: of those that are not strays, and of those that are.
+fn dropped(case: &Case, is_stray: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
+    let mut counts = [[0; 2]; 2];
+    for surfel in case.fitted.concat().iter().filter(|surfel| surfel.k_radius > 0.0) {
+        let [all, gone] = &mut counts[usize::from(is_stray(surfel.source))];
+        *all += 1;
+        *gone += usize::from(surfel.radius == 0.0);
+    }
+    counts
+}
+
+#[test]
+fn the_fit_drops_strays_and_hardly_anything_of_a_surface() {
+    let of = |case: &Case, is_stray: &dyn Fn(u32) -> bool, least: f64| {
+        let [[surface, its], [strays, gone]] = dropped(case, is_stray);
+        assert!(its * 500 < surface, "{its} of the surface's {surface} are dropped");
+        assert!(gone as f64 > least * strays as f64, "{gone} of {strays} are dropped");
+    };
+    for projection in PROJECTIONS {
+        let (case, is_stray) = Case::noisy_with_strays(projection);
+        of(&case, &is_stray, 0.3);
+    }
+    let (room, is_stray) = Case::stepped_with_strays();
+    of(&room, &is_stray, 0.2);
+}
+
 #[test]
 fn strewn_points_are_no_surface_however_flat_they_lie() {
     let mut positions = test_clouds::sphere(40_000);
@@ -49,7 +75,6 @@ fn points_too_far_off_for_noise_are_dots() {
     for projection in PROJECTIONS {
         let (case, is_stray) = Case::noisy_with_strays(projection);
         let [[of_sphere, its_dots], [strays, dots]] = dots(&case, is_stray);
-        // As many again are dropped by the fit.
         assert!(strays > 100 && dots * 20 > strays * 19, "{dots} of {strays} are dots");
         assert!(its_dots * 100 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
     }

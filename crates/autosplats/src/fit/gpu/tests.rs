@@ -5,6 +5,7 @@ use autosplats_cloud::glam::{DMat3, DVec3};
 
 use super::*;
 use crate::camera::{Camera, Projection, View};
+use crate::fit::alone::FEW;
 use crate::fit::tests::eigenvalues;
 use crate::fit::{FitRules, LONGEST, Surfels, fit};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
@@ -14,7 +15,7 @@ use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::search::past::Past;
 use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
-use crate::test_clouds::{self, EYE};
+use crate::test_clouds::{self, EYE, Random};
 
 const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false };
 
@@ -66,6 +67,7 @@ impl Case {
             splat_scale: rules.splat_scale,
             longest: rules.longest,
             keep_outliers: rules.keep_outliers.into(),
+            adaptive: rules.adaptive.into(),
             ..FrameUniform::new(&self.view, rules.k)
         };
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -153,6 +155,28 @@ fn the_device_fits_what_the_host_fits() {
     assert!(compared > 50_000 && outliers > 50, "there is something to compare: {compared}, {outliers} outliers");
     // Rounding decides what is lopsided, or a line, in few neighbourhoods.
     assert!(different * 10_000 <= compared, "{different} of {compared} differ");
+}
+
+/// Where k adapts more points stand alone, with few neighbours and with many.
+#[test]
+fn the_device_drops_what_the_host_drops() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = FitPasses::new(&gpu).expect("passes");
+    let mut random = Random::new(3);
+    let mut positions = test_clouds::sphere(4000);
+    positions.extend((0..3000).map(|_| random.direction().map(|c| c * (1.0 + 0.5 * random.unit()))));
+    let case = Case::new(&positions, Projection::PerspectiveFovDeg(30.0), Some(4.0));
+    let plain = case.on_host(&RULES);
+    let rules = FitRules { adaptive: true, ..RULES };
+    let host = case.on_host(&rules);
+    let (device, counted) = case.on_device(&gpu, &passes, &rules);
+    let is_dropped = |surfel: &Surfel| surfel.radius == 0.0;
+    let same = host.iter().zip(&device).filter(|(host, device)| is_dropped(host) == is_dropped(device)).count();
+    assert!(host.len() - same <= 1, "{same} of {} are dropped alike", host.len());
+    assert_eq!(counted, device.iter().filter(|surfel| is_dropped(surfel)).count(), "outliers are counted");
+    let more = host.iter().zip(&plain).zip(case.moments()).filter(|((host, plain), _)| host.radius < plain.radius);
+    let (few, many): (Vec<_>, Vec<_>) = more.partition(|(_, moments)| moments.count < FEW);
+    assert!(few.len() >= 5 && many.len() > 20, "{} with few, {} with many neighbours", few.len(), many.len());
 }
 
 #[test]
