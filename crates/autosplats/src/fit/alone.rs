@@ -16,7 +16,7 @@ pub(super) const LOPSIDED_COUNT: f32 = 6.0;
 /// A point that is further from the plane through its neighbours than this part of the k-radius stands beside their surface,
 pub(super) const BESIDE: f32 = 0.25;
 /// if that is flat: they scatter about it by less than the distance, squared, over this. At the tip of a cone it is 8, at a
-/// cube's corner 5; of strewn tips one in a hundred goes. So does a single step of coordinates on a grid.
+/// cube's corner 7; of strewn tips one in a hundred goes. So does a single step of coordinates on a grid.
 pub(super) const FLAT: f32 = 50.0;
 
 /// A point with fewer neighbours than this before a gap is of a surface only where others are not much denser,

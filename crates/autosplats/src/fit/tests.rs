@@ -333,7 +333,7 @@ fn points_much_sparser_than_their_surroundings_are_dropped() {
     for (sparser, expected) in [(0.9 * FAR_SPARSER, 1.0), (1.1 * FAR_SPARSER, 0.0)] {
         assert_eq!(kept(10, sparser.into(), 1000, aside), expected, "{sparser} times as far apart");
     }
-    // Borders of what is sparse stay, and one in three of its corners.
+    // Borders of what is sparse stay, and two in three of its corners.
     let border = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x.abs(), y, 0.0));
     let corner = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x.abs(), y.abs(), 0.0));
     for (name, offsets, least) in [("border", &border as &dyn Fn(&mut Random) -> _, 0.98), ("corner", &corner, 0.6)] {
