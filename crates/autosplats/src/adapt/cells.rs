@@ -1,5 +1,7 @@
 //! Screen points summed up in cells, coarse to fine.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::camera::View;
@@ -9,13 +11,12 @@ use crate::project::ScreenPoints;
 /// more. A cell with more to hold has thicker ones, which noise seen from the side does: then clusters are cut along lines of
 /// sight that nearly lie in the surface, and fits lean.
 pub(crate) const SLABS: usize = 8;
-/// Clusters of a cell that lie side by side. Most cells have no more, and those that are after them are not looked at.
-pub(crate) const BUNCH: usize = 4;
-const BUNCHES: usize = SLABS / BUNCH;
 /// Most finest cells: the pictures that have as many at two pixels are larger than 3200×1800.
 pub(crate) const MOST_FINEST: usize = 1_500_000;
 /// Coarser levels are of no use to any ball.
 pub(super) const MOST_LEVELS: usize = 9;
+/// Values after the last of a row: as many are copied at a time.
+pub(super) const AFTER: usize = 8;
 
 /// The mean of some screen points near each other, view space, and their number.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,70 +26,98 @@ pub(crate) struct Cluster {
     pub(crate) count: f32,
 }
 
-/// Some clusters of a cell, by slabs of depth, those that hold points first: a coordinate of all of them side by side, for SIMD.
-/// A cache line.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(64))]
-pub(crate) struct Bunch {
-    /// X, y and z of the means.
-    pub(crate) mean: [[f32; BUNCH]; 3],
-    /// 0 where there is no cluster.
-    pub(crate) count: [f32; BUNCH],
+/// The clusters of a row of cells, those of a cell after those of the cell before: a coordinate of all of them side by side, for
+/// SIMD. Most cells of a picture are empty, and others have one or two of the clusters that they may have: what is written and
+/// read again goes by clusters, not by cells.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Row {
+    /// Number of clusters in the cells before each of them, and in all.
+    starts: Vec<u32>,
+    /// X, y and z of the means, and the counts; then [`AFTER`] zeros.
+    values: [Vec<f32>; 4],
 }
 
-impl Bunch {
-    pub(crate) fn put(&mut self, at: usize, Cluster { mean, count }: Cluster) {
-        for axis in 0..3 {
-            self.mean[axis][at] = mean[axis];
+impl Row {
+    /// Of cells with these clusters, first to last.
+    #[cfg(test)]
+    pub(crate) fn of(cells: impl Iterator<Item = impl Iterator<Item = Cluster>>) -> Self {
+        let mut row = Self::default();
+        row.fill(|row| {
+            for clusters in cells {
+                clusters.for_each(|cluster| row.push(cluster));
+                row.end_cell();
+            }
+        });
+        row
+    }
+
+    /// Writes the row anew with what `cells` pushes.
+    #[inline(always)]
+    fn fill(&mut self, cells: impl FnOnce(&mut Self)) {
+        self.starts.clear();
+        self.starts.push(0);
+        self.values.iter_mut().for_each(Vec::clear);
+        cells(self);
+        self.values.iter_mut().for_each(|values| values.extend([0.0; AFTER]));
+    }
+
+    #[inline(always)]
+    fn push(&mut self, Cluster { mean: [x, y, z], count }: Cluster) {
+        for (values, value) in self.values.iter_mut().zip([x, y, z, count]) {
+            values.push(value);
         }
-        self.count[at] = count;
     }
 
-    /// Whether others may follow.
+    /// The cell has no more clusters.
     #[inline(always)]
-    pub(crate) fn is_full(&self) -> bool {
-        self.count[BUNCH - 1] > 0.0
+    fn end_cell(&mut self) {
+        self.starts.push(self.values[0].len() as u32);
+    }
+
+    /// Where the clusters of some cells that follow each other are in [`values`](Self::values).
+    #[inline(always)]
+    pub(super) fn run(&self, columns: Range<usize>) -> Range<usize> {
+        self.starts[columns.start] as usize..self.starts[columns.end] as usize
+    }
+
+    /// Copies what is in a run to the same coordinates `at` a place, and up to [`AFTER`] values more.
+    #[inline(always)]
+    pub(super) fn copy(&self, run: Range<usize>, into: &mut [Vec<f32>; 4], at: usize) {
+        for (into, from) in into.iter_mut().zip(&self.values) {
+            for offset in (0..run.len()).step_by(AFTER) {
+                // Of a fixed length, which is a load and a store.
+                let from = &from[run.start + offset..][..AFTER];
+                into[at + offset..][..AFTER].copy_from_slice(from);
+            }
+        }
     }
 
     #[inline(always)]
-    fn clusters(&self) -> impl Iterator<Item = Cluster> {
-        let Self { mean: [x, y, z], count } = *self;
-        let all = (0..BUNCH).map(move |at| Cluster { mean: [x[at], y[at], z[at]], count: count[at] });
-        all.take_while(|cluster| cluster.count > 0.0)
+    fn clusters(&self, columns: Range<usize>) -> impl Iterator<Item = Cluster> {
+        let [x, y, z, count] = &self.values;
+        self.run(columns).map(move |at| Cluster { mean: [x[at], y[at], z[at]], count: count[at] })
     }
 }
 
 /// Cells of one size.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Level {
     /// Side of a cell in pixels.
     pub(crate) side_px: usize,
     pub(crate) columns: usize,
-    pub(crate) rows: usize,
-    /// The first clusters of all cells, row by row, then those that follow in cells where the first are full.
-    pub(crate) bunches: [Vec<Bunch>; BUNCHES],
+    pub(crate) rows: Vec<Row>,
 }
 
 impl Level {
-    /// Of `side_px` wide cells, all empty or as they were.
-    pub(crate) fn resize(&mut self, side_px: usize, [columns, rows]: [usize; 2]) {
-        (self.side_px, self.columns, self.rows) = (side_px, columns, rows);
-        self.bunches.iter_mut().for_each(|bunches| bunches.resize(columns * rows, Bunch::default()));
-    }
-
-    /// The clusters of a cell.
+    /// The clusters of a cell, by slabs of depth.
     #[inline(always)]
-    pub(crate) fn clusters(&self, cell: usize) -> impl Iterator<Item = Cluster> {
-        let [first, more] = &self.bunches;
-        let more = first[cell].is_full().then(|| more[cell].clusters());
-        first[cell].clusters().chain(more.into_iter().flatten())
+    pub(crate) fn clusters(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = Cluster> {
+        self.rows[row].clusters(column..column + 1)
     }
 
-    /// Cells that are filled at a time, row by row.
-    fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = [&mut [Bunch]; BUNCHES]> {
-        let [first, more] = &mut self.bunches;
-        let rows = first.par_chunks_mut(self.columns).zip(more.par_chunks_mut(self.columns));
-        rows.map(|(first, more)| [first, more])
+    #[inline(always)]
+    pub(super) fn is_empty(&self, [column, row]: [usize; 2]) -> bool {
+        self.rows[row].run(column..column + 1).is_empty()
     }
 }
 
@@ -129,11 +158,14 @@ impl Filling {
         if at == SLABS {
             return false;
         }
-        self.used = self.used.max(at + 1);
-        self.slab[at] = slab;
-        self.count[at] += count;
-        for axis in 0..3 {
-            self.sum[at][axis] += sum[axis];
+        if at == self.used {
+            (self.sum[at], self.count[at], self.slab[at]) = (sum, count, slab);
+            self.used += 1;
+        } else {
+            self.count[at] += count;
+            for axis in 0..3 {
+                self.sum[at][axis] += sum[axis];
+            }
         }
         true
     }
@@ -142,33 +174,22 @@ impl Filling {
     #[cold]
     fn double(&mut self) {
         let full = *self;
-        *self = Self { doubled: full.doubled + 1, ..Self::EMPTY };
+        (self.used, self.doubled) = (0, full.doubled + 1);
         for at in 0..full.used {
             self.put(full.sum[at], full.count[at], full.slab[at] >> 1);
         }
     }
 
-    /// Writes what it holds to a cell of a row.
+    /// Writes what it holds to the next cell of a row, and is empty.
     #[inline(always)]
-    fn finish(&self, row: &mut [&mut [Bunch]; BUNCHES], column: usize) {
-        // What is empty, and was in the frame before, need be neither written nor, but for the first bunch, read: that is most of
-        // many pictures, and of nearly all the second bunches. A bunch whose first count is 0 is all 0.
-        let mut had_some = true;
-        for (index, bunches) in row.iter_mut().enumerate() {
-            let held = index * BUNCH..self.used.min((index + 1) * BUNCH);
-            if held.is_empty() && !had_some {
-                return;
-            }
-            let bunch = &mut bunches[column];
-            had_some = bunch.is_full();
-            if !held.is_empty() || bunch.count[0] > 0.0 {
-                *bunch = Bunch::default();
-            }
-            for at in held {
-                let count = self.count[at];
-                bunch.put(at % BUNCH, Cluster { mean: self.sum[at].map(|sum| sum / count), count });
-            }
+    fn finish(&mut self, row: &mut Row) {
+        for at in 0..self.used {
+            let count = self.count[at];
+            row.push(Cluster { mean: self.sum[at].map(|sum| sum / count), count });
         }
+        row.end_cell();
+        // What is beyond those used is not read.
+        (self.used, self.doubled) = (0, 0);
     }
 }
 
@@ -207,7 +228,8 @@ impl Cells {
         let levels = 1 + (columns.max(rows) / 4).max(1).ilog2() as usize;
         self.levels.resize_with(levels.min(MOST_LEVELS), Level::default);
         for (index, level) in self.levels.iter_mut().enumerate() {
-            level.resize(side_px << index, [columns, rows]);
+            (level.side_px, level.columns) = (side_px << index, columns);
+            level.rows.resize_with(rows, Row::default);
             (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
         }
         let Some((finest, coarser)) = self.levels.split_first_mut() else { return };
@@ -241,42 +263,39 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
     let slabs = Slabs::new(side_px, view);
     let strip_px = screen.cells.strip_px;
     let last_x = screen.cells.columns - 1;
-    level.rows_mut().enumerate().for_each_init(Vec::new, |filling, (row, mut out)| {
-        filling.resize(columns, Filling::EMPTY);
-        let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
-        for strip in y0 / strip_px..=y1 / strip_px {
-            for point in &screen.points[screen.cells.run(strip, 0, last_x)] {
-                let [x, y] = point.pixel_xy();
-                if (y0..=y1).contains(&y) {
-                    filling[x / side_px].add(point.position_view, 1.0, slabs.of(point.position_view[2]));
+    level.rows.par_iter_mut().enumerate().for_each_init(
+        || vec![Filling::EMPTY; columns],
+        |filling, (row, out)| {
+            let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
+            for strip in y0 / strip_px..=y1 / strip_px {
+                for point in &screen.points[screen.cells.run(strip, 0, last_x)] {
+                    let [x, y] = point.pixel_xy();
+                    if (y0..=y1).contains(&y) {
+                        filling[x / side_px].add(point.position_view, 1.0, slabs.of(point.position_view[2]));
+                    }
                 }
             }
-        }
-        for (column, filling) in filling.iter_mut().enumerate() {
-            filling.finish(&mut out, column);
-            if filling.used > 0 {
-                *filling = Filling::EMPTY;
-            }
-        }
-    });
+            out.fill(|out| filling.iter_mut().for_each(|filling| filling.finish(out)));
+        },
+    );
 }
 
 /// Fills a level with what the one below it holds.
 fn merge(below: &Level, view: &View, level: &mut Level) {
     let slabs = Slabs::new(level.side_px, view);
     let columns = level.columns;
-    level.rows_mut().enumerate().for_each(|(row, mut out)| {
-        for column in 0..columns {
-            let mut filling = Filling::EMPTY;
-            for y in 2 * row..(2 * row + 2).min(below.rows) {
-                for x in 2 * column..(2 * column + 2).min(below.columns) {
-                    for Cluster { mean, count } in below.clusters(y * below.columns + x) {
+    level.rows.par_iter_mut().zip(below.rows.par_chunks(2)).for_each(|(out, below_rows)| {
+        let mut filling = Filling::EMPTY;
+        out.fill(|out| {
+            for column in 0..columns {
+                for row in below_rows {
+                    for Cluster { mean, count } in row.clusters(2 * column..(2 * column + 2).min(below.columns)) {
                         filling.add(mean, count, slabs.of(mean[2]));
                     }
                 }
+                filling.finish(out);
             }
-            filling.finish(&mut out, column);
-        }
+        });
     });
 }
 

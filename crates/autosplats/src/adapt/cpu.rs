@@ -1,5 +1,7 @@
 //! Surfels turned and moved onto sheets, or onto a quadric of their own; the choice of a quadric's scale.
 
+use std::ops::BitOr;
+
 use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
@@ -138,16 +140,17 @@ impl Adapter {
         sheets.level = usual.sheet_level;
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, rules, usual, known };
-        surfels.par_chunks(TASK).for_each(|surfels| {
-            surfels.iter().filter(|surfel| matches!(task.call(surfel), Call::Noise(_))).for_each(|surfel| {
-                sheets.ask(surfel, cells, view);
-            });
-        });
+        let asks = |surfel: &&Surfel| matches!(task.call(surfel), Call::Noise(_));
+        let is_asked =
+            |surfels: &[Surfel]| surfels.iter().filter(asks).map(|surfel| sheets.ask(surfel, cells, view)).count() > 0;
+        let is_any_asked = surfels.par_chunks(TASK).map(is_asked).reduce(|| false, BitOr::bitor);
         let noise = |place, k_radius, point| {
             let (noise, known) = task.noise(place, k_radius, point);
             (noise, known.is_some())
         };
-        sheets.fit(cells, &noise, view);
+        if is_any_asked {
+            sheets.fit(cells, &noise, view);
+        }
         let sheets = &*sheets;
         surfels.par_chunks_mut(TASK).for_each_init(Default::default, |(gathered, around), surfels| {
             adapt_all(surfels, &task, sheets, gathered, around);
@@ -237,18 +240,19 @@ fn adapt_all_with<'a, S: Simd>(
     let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
         let call = task.call(surfel);
-        let is_sparser = surfel.k_radius > DENSER * initial_radius(surfel, density, view, k);
+        // K-radius in first search radii.
+        let sparser = surfel.k_radius / initial_radius(surfel, density, view, k);
         if !matches!(call, Call::Row) {
             // A line has no width to draw.
             let is_line = surfel.major_ratio == f32::MAX;
             surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
         }
         match call {
-            Call::Nothing => shrink(simd, surfel, task, gathered),
+            Call::Nothing => shrink(simd, surfel, sparser, task, gathered),
             Call::Row => {
                 let radius = first_radius(surfel, density, view, k);
                 if !turn(surfel, (radius, k), (cells, view), gathered) {
-                    shrink(simd, surfel, task, gathered);
+                    shrink(simd, surfel, sparser, task, gathered);
                 }
             }
             Call::Noise(Noisy { goal, known }) => {
@@ -270,16 +274,15 @@ fn adapt_all_with<'a, S: Simd>(
                     Some(surface) => {
                         if known.is_some() {
                             // Between two surfaces the k-radius is the way to one of them.
-                            let widest = WIDEST * initial_radius(surfel, density, view, k);
-                            surfel.radius *= (widest / surfel.k_radius).min(1.0);
+                            surfel.radius *= (WIDEST / sparser).min(1.0);
                         }
                         place(surfel, &surface, goal.noise, known.as_ref(), view);
                     }
-                    None => shrink(simd, surfel, task, gathered),
+                    None => shrink(simd, surfel, sparser, task, gathered),
                 }
             }
         }
-        if is_sparser {
+        if sparser > DENSER {
             let noise = if let Call::Noise(Noisy { goal, .. }) = call { goal.noise } else { 0.0 };
             open(simd, surfel, noise, (cells, view), gathered);
         }
@@ -374,9 +377,9 @@ fn initial_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -
 }
 
 /// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from
-/// all others.
+/// all others. Its k-radius is `sparser` first search radii.
 #[inline(always)]
-fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gathered) {
+fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gathered: &mut Gathered) {
     // A handful of points has nothing that is usual.
     if surfel.radius == 0.0 || task.usual.k_radius == 0.0 {
         return;
@@ -384,8 +387,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, task: &Task, gathered: &mut Gat
     let ratio = surfel.k_radius / task.usual.k_radius;
     let mut stray = surfel.curvature * ratio * ratio;
     let is_sparse = ratio > SPARSE;
-    let local = surfel.k_radius / initial_radius(surfel, task.density, task.view, task.rules.k);
-    if is_sparse | (surfel.curvature * local * local > LONE) {
+    if is_sparse | (surfel.curvature * sparser * sparser > LONE) {
         let len = gathered.read(simd, task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
         let plane = (len >= LEAST_OF_PLANE).then(|| gathered.plane(simd));
         if let Some(plane) = plane

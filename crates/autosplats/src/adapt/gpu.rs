@@ -442,4 +442,4 @@ impl AdaptPasses {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -42,7 +42,7 @@ mod tests;
 mod through;
 
 #[cfg(test)]
-pub(crate) use cells::{BUNCH, SLABS};
+pub(crate) use cells::SLABS;
 pub(crate) use cpu::{AdaptRules, Adapter};
 pub(crate) use depth::DepthNoise;
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! A height field with six coefficients over a ball's points.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{BUNCH, Bunch, Cells, Cluster, Level, SLABS};
+use super::cells::{AFTER, Cells, Cluster, Level};
 use crate::camera::View;
 use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
@@ -60,67 +60,43 @@ impl<'a> Window<'a> {
             let last = (((at + radius_px) / side) as usize).min(count - 1);
             (((at - radius_px) / side) as usize).min(last)..=last
         };
-        Some(Self { level, columns: range(px, level.columns), rows: range(py, level.rows) })
+        Some(Self { level, columns: range(px, level.columns), rows: range(py, level.rows.len()) })
     }
 
-    /// Number of cells.
+    /// Copies the clusters, then some without points; returns the number of groups of sixteen.
     #[inline(always)]
-    fn len(&self) -> usize {
-        [&self.columns, &self.rows].map(|range| range.end() - range.start() + 1).iter().product()
-    }
-
-    /// Copies the clusters, sixteen to a group; returns the number of groups.
-    #[inline(always)]
-    fn copy_to(&self, groups: &mut Vec<[Lanes; 4]>) -> usize {
-        let most = (self.len() * SLABS).div_ceil(LANES);
-        if groups.len() < most {
-            groups.resize(most, [Lanes::default(); 4]);
-        }
-        let mut at = 0;
-        let [first, more] = &self.level.bunches;
-        for row in self.cells() {
-            for (bunch, more) in first[row.clone()].iter().zip(&more[row]) {
-                put(groups, &mut at, bunch);
-                if bunch.is_full() {
-                    put(groups, &mut at, more);
-                }
+    fn copy_to(&self, copied: &mut [Vec<f32>; 4]) -> usize {
+        let columns = *self.columns.start()..self.columns.end() + 1;
+        let mut len = 0;
+        for row in &self.level.rows[self.rows.clone()] {
+            let run = row.run(columns.clone());
+            let end = len + run.len();
+            // What is copied at once may reach over the end, and so may the last group.
+            if copied[0].len() < end + AFTER.max(LANES) {
+                copied.iter_mut().for_each(|values| values.resize(end + 4 * LANES, 0.0));
             }
+            row.copy(run, copied, len);
+            len = end;
         }
-        // Of the last group not all is written over.
-        while at % LANES > 0 {
-            put(groups, &mut at, &Bunch::default());
-        }
-        at / LANES
-    }
-
-    /// The cells, a row at a time.
-    #[inline(always)]
-    fn cells(&self) -> impl Iterator<Item = Range<usize>> {
-        let Self { level, columns, rows } = self;
-        rows.clone().map(|row| row * level.columns + columns.start()..row * level.columns + columns.end() + 1)
+        let groups = len.div_ceil(LANES);
+        copied[3][len..groups * LANES].fill(0.0);
+        groups
     }
 
     /// The clusters of each cell.
     #[inline(always)]
     pub(super) fn clusters(&self) -> impl Iterator<Item = impl Iterator<Item = Cluster>> {
-        self.cells().flatten().map(|cell| self.level.clusters(cell))
+        let columns = move |row| self.columns.clone().map(move |column| self.level.clusters([column, row]));
+        self.rows.clone().flat_map(columns)
     }
-}
-
-/// Copies a bunch to the next lanes.
-#[inline(always)]
-fn put(groups: &mut [[Lanes; 4]], at: &mut usize, Bunch { mean: [x, y, z], count }: &Bunch) {
-    let lanes = *at % LANES..*at % LANES + BUNCH;
-    for (into, from) in groups[*at / LANES].iter_mut().zip([x, y, z, count]) {
-        into.0[lanes.clone()].copy_from_slice(from);
-    }
-    *at += BUNCH;
 }
 
 /// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights, which are 0 in lanes
 /// without a cluster.
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
+    /// X, y, z and counts of what may be in the ball, view space.
+    copied: [Vec<f32>; 4],
     lanes: Vec<[Lanes; 4]>,
     /// How many of `lanes` are filled.
     filled: usize,
@@ -239,24 +215,29 @@ impl Gathered {
         let Some(window) = Window::around(cells, center.into(), radius, CELLS_PER_RADIUS, view) else { return 0 };
         let per_radius = 1.0 / radius;
         self.side = window.level.side_px as f32 * view.pixel_size(center[2]) * per_radius;
-        let groups = window.copy_to(&mut self.lanes);
+        let groups = window.copy_to(&mut self.copied);
+        if self.lanes.len() < groups {
+            self.lanes.resize(groups, [Lanes::default(); 4]);
+        }
         // Of sixteen clusters all stay if one is inside: those outside weigh nothing, which costs less than to close ranks.
         // Loops and no closures, of which not all are inlined.
         let [cx, cy, cz] = [F32s::splat(simd, center[0]), F32s::splat(simd, center[1]), F32s::splat(simd, center[2])];
         let (zero, one) = (F32s::splat(simd, 0.0), F32s::splat(simd, 1.0));
         let (per_radius, per_rest) = (F32s::splat(simd, per_radius), F32s::splat(simd, 1.0 / (1.0 - FULL)));
         let lanes = &mut self.lanes[..groups];
+        let [xs, ys, zs, counts] = &self.copied;
         let mut filled = 0;
         let mut inside = Lanes::default();
         for group in 0..groups {
-            let from = lanes[group];
             let into = &mut lanes[filled];
             let mut is_any = false;
             for vector in 0..LANES / S::F32_LANES {
-                let [x, y, z, count] = load(simd, &from, vector);
+                let at = group * (LANES / S::F32_LANES) + vector;
+                let (x, y) = (F32s::load(simd, xs, at), F32s::load(simd, ys, at));
+                let (z, count) = (F32s::load(simd, zs, at), F32s::load(simd, counts, at));
                 let (x, y, z) = ((x - cx) * per_radius, (y - cy) * per_radius, (z - cz) * per_radius);
                 let rest = one - (x * x + y * y + z * z);
-                // A slab without points weighs nothing.
+                // What is copied without points weighs nothing.
                 let weight = (rest * per_rest).min(one) * count;
                 let is_in = zero.less(weight);
                 is_any |= is_in.any();

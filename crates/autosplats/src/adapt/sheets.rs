@@ -128,7 +128,7 @@ pub(super) struct Sheets {
 impl Sheets {
     /// Forgets those of the frame before.
     pub(super) fn clear(&mut self, cells: &Cells) {
-        let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.columns * level.rows);
+        let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.columns * level.rows.len());
         self.stacks.resize(len, Stack::default());
         self.fitted.clear();
         self.fitted.resize(len, false);
@@ -155,7 +155,7 @@ impl Sheets {
         let task = Task { cells, level, asked, noise, view };
         let rows = (stacks.par_chunks_mut(level.columns), fitted.par_chunks_mut(level.columns));
         // There is room for finer ones.
-        rows.into_par_iter().take(level.rows).enumerate().for_each_init(
+        rows.into_par_iter().take(level.rows.len()).enumerate().for_each_init(
             Gathered::default,
             |gathered, (row, (stacks, fitted))| {
                 fit_row(row, stacks, fitted, &task, gathered);
@@ -181,7 +181,7 @@ impl Task<'_> {
     fn asked_around(&self, row: usize, column: usize) -> Option<(f32, u32)> {
         let level = self.level;
         let (mut sum, mut point) = (0, u32::MAX);
-        for y in row.saturating_sub(1)..=(row + 1).min(level.rows - 1) {
+        for y in row.saturating_sub(1)..=(row + 1).min(level.rows.len() - 1) {
             for x in column.saturating_sub(1)..=(column + 1).min(level.columns - 1) {
                 let asked = &self.asked[y * level.columns + x];
                 sum += asked.k_radii.load(Ordering::Relaxed);
@@ -205,9 +205,9 @@ fn fit_row_with<'a, S: Simd>(
 ) {
     let level = task.level;
     for (column, (stack, fitted)) in stacks.iter_mut().zip(fitted).enumerate() {
-        let cell = row * level.columns + column;
+        let cell = [column, row];
         if !*fitted
-            && level.clusters(cell).next().is_some()
+            && !level.is_empty(cell)
             && let Some(asked) = task.asked_around(row, column)
         {
             fit_cell(simd, stack, cell, asked, task, gathered);
@@ -221,7 +221,7 @@ fn fit_row_with<'a, S: Simd>(
 fn fit_cell<S: Simd>(
     simd: S,
     stack: &mut Stack,
-    cell: usize,
+    cell: [usize; 2],
     (k_radius_px, point): (f32, u32),
     task: &Task,
     gathered: &mut Gathered,

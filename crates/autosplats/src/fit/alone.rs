@@ -40,21 +40,24 @@ pub(super) struct Around {
 }
 
 impl Around {
-    /// Whether the point is no part of their surface, where `k` were looked for. Its k-radius is `sparser` first search radii; 0 if
-    /// there is nothing to compare with.
+    /// Whether the point is no part of their surface, where `k` were looked for. Its k-radius is `sparser` first search radii,
+    /// which few points are asked; `None` if there is nothing to compare with.
     #[inline(always)]
-    pub(super) fn is_alone(&self, sparser: f32, k: u32) -> bool {
+    pub(super) fn is_alone(&self, sparser: Option<impl Fn() -> f32>, k: u32) -> bool {
         let &Self { count, mean, normal, variance } = self;
+        let is_sparser = |than: f32| sparser.as_ref().is_some_and(|sparser| sparser() > than);
         if count < LOPSIDED_COUNT {
-            return (count < FEW.min(k as f32)) & (sparser > SPARSER);
+            return count < FEW.min(k as f32) && is_sparser(SPARSER);
         }
         let dot = |v: [f32; 3]| mean[0] * v[0] + mean[1] * v[1] + mean[2] * v[2];
-        let lopsided = if sparser > FAR_SPARSER { LOPSIDED_SPARSE } else { LOPSIDED };
+        let off = dot(mean);
+        if off > LOPSIDED_SPARSE * LOPSIDED_SPARSE && (off > LOPSIDED * LOPSIDED || is_sparser(FAR_SPARSER)) {
+            return true;
+        }
         let beside = dot(normal) * dot(normal);
         // Without the point itself.
         let all = count + 1.0;
         let scatter = (variance - count * beside / (all * all)) * (all / count);
-        let is_beside = (beside > BESIDE * BESIDE) & (beside > FLAT * scatter) & (sparser > 0.0);
-        (dot(mean) > lopsided * lopsided) | is_beside
+        sparser.is_some() && beside > BESIDE * BESIDE && beside > FLAT * scatter
     }
 }

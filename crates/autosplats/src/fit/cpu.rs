@@ -76,6 +76,7 @@ fn fit_blocks_with<'a, S: Simd>(
     rules: &'a FitRules,
     out: &'a mut [Surfel],
 ) {
+    let compares = rules.adaptive && screen.points.len() >= HANDFUL;
     for ((out, queries), block) in out.chunks_mut(LANES).zip(queries.chunks(LANES)).zip(blocks) {
         let mut fitted = Fitted::default();
         for vector in 0..LANES / S::F32_LANES {
@@ -83,12 +84,11 @@ fn fit_blocks_with<'a, S: Simd>(
         }
         for (lane, (surfel, &query)) in out.iter_mut().zip(queries).enumerate() {
             let point = &screen.points[query as usize];
-            let first_radius = screen.density.initial_radius(point, rules.k, view);
-            let compares = rules.adaptive && screen.points.len() >= HANDFUL;
-            let usual_radius = if compares { first_radius } else { f32::INFINITY };
+            let first_radius = || screen.density.initial_radius(point, rules.k, view);
+            let usual_radius = compares.then_some(first_radius);
             *surfel = fitted.surfel(lane, block, point.position_view, usual_radius, view, rules);
             if screen.density.culls(point) {
-                surfel.radius = surfel.radius.min(splat_radius(WIDEST_BEHIND * first_radius, rules.k as f32, rules));
+                surfel.radius = surfel.radius.min(splat_radius(WIDEST_BEHIND * first_radius(), rules.k as f32, rules));
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];
@@ -159,14 +159,14 @@ impl Fitted {
         }
     }
 
-    /// The surfel of a point whose surroundings have a `usual_radius` to the k-th neighbour; infinite if they are not known.
+    /// The surfel of a point whose surroundings have a `usual_radius` to the k-th neighbour, if they are to be compared.
     #[inline(always)]
     fn surfel(
         &self,
         lane: usize,
         block: &NeighborhoodBlock,
         center: [f32; 3],
-        usual_radius: f32,
+        usual_radius: Option<impl Fn() -> f32>,
         view: &View,
         rules: &FitRules,
     ) -> Surfel {
@@ -174,7 +174,8 @@ impl Fitted {
         let plane = self.plane(lane, view.to_eye(center.into()).to_array());
         let mean = of_lane(&block.offset, lane).map(|sum| sum / (count * k_radius.max(f32::MIN_POSITIVE)));
         let around = Around { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
-        let outlier = !rules.keep_outliers && around.is_alone(k_radius / usual_radius, rules.k);
+        let sparser = usual_radius.map(|usual| move || k_radius / usual());
+        let outlier = !rules.keep_outliers && around.is_alone(sparser, rules.k);
         let major_ratio = if rules.adaptive && count >= ROW_COUNT {
             plane.major_ratio
         } else if plane.major_ratio < f32::MAX {

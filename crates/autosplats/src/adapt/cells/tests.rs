@@ -1,6 +1,6 @@
 //! Cells that are filled again and again.
 
-use super::{Cells, Level};
+use super::{Cells, Level, SLABS};
 use crate::adapt::tests::{Case, PROJECTIONS};
 use crate::test_clouds::{self, noisy};
 
@@ -12,14 +12,15 @@ fn nothing_is_left_of_the_frame_before() {
     for case in [&sphere, &small, &sphere, &small] {
         cells.fill(&case.screen, &case.view, crate::adapt::tests::K);
         let fresh = case.cells();
-        assert_eq!(cells.levels.len(), fresh.levels.len(), "levels");
-        for (level, fresh) in cells.levels.iter().zip(&fresh.levels) {
-            assert_eq!([level.side_px, level.columns, level.rows], [fresh.side_px, fresh.columns, fresh.rows], "sizes");
-            assert!(level.bunches == fresh.bunches, "cells of {} pixels", level.side_px);
-        }
+        assert!(cells.levels == fresh.levels, "cells of {:?}", case.view);
     }
-    let has_second = |level: &Level| level.bunches[1].iter().any(|bunch| bunch.count[0] > 0.0);
-    assert!(cells.levels.iter().any(has_second), "cells with more than a bunch");
-    assert!(cells.levels[0].bunches[0].iter().any(|cell| cell.count[0] > 0.0), "points");
-    assert!(cells.levels[0].bunches[0].iter().any(|cell| cell.count[0] == 0.0), "empty cells");
+    let clusters = |count: usize| {
+        move |level: &Level| {
+            (0..level.rows.len())
+                .any(|row| (0..level.columns).any(|column| level.clusters([column, row]).count() == count))
+        }
+    };
+    for count in [0, 1, 2, SLABS] {
+        assert!(cells.levels.iter().any(clusters(count)), "cells of {count} clusters");
+    }
 }

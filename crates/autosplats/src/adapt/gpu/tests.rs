@@ -1,6 +1,6 @@
 //! The stage on the GPU against that on the CPU, fed with the same surfels.
 
-use super::super::cells::{BUNCH, Bunch, Cells};
+use super::super::cells::{Cells, Cluster, Level, Row};
 use super::super::noise::{Noise, Usual};
 use super::super::tests::{Case, K, PROJECTIONS, angle};
 use super::*;
@@ -10,6 +10,8 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::test_clouds::{self, noisy};
 
+/// Clusters of a cell that lie side by side on the device.
+pub(crate) const BUNCH: usize = 4;
 /// Cells that may differ: rounding puts a few means into the next slab.
 const UNLIKE_CELLS: f64 = 1e-3;
 /// Surfels that may differ: rounding decides whether a ball is the last.
@@ -52,34 +54,26 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
 }
 
 fn read_cells(gpu: &Gpu, buffers: &AdaptBuffers, size: [u32; 2]) -> Cells {
-    use super::super::cells::{Cluster, Level};
     let levels: Vec<[u32; 4]> = read_back(gpu, &buffers.levels, MOST_LEVELS).expect("levels");
     let cells = most_cells(size, most_finest(gpu.most_bound()));
     let clusters: Vec<[[f32; 4]; BUNCH]> = read_back(gpu, &buffers.clusters, cells * SLABS / BUNCH).expect("clusters");
     let of_level = |&[side_px, columns, rows, first]: &[u32; 4]| {
-        let read = |clusters: &[[f32; 4]; BUNCH]| {
-            let mut bunch = Bunch::default();
-            let filled = clusters.iter().take_while(|cluster| cluster[3] > 0.0);
-            for (at, &[x, y, z, count]) in filled.enumerate() {
-                bunch.put(at, Cluster { mean: [x, y, z], count });
-            }
-            bunch
+        let [first, columns, rows] = [first, columns, rows].map(|count| count as usize);
+        let clusters = &clusters;
+        let in_cell = |cell: usize| {
+            let bunches = (0..SLABS / BUNCH).flat_map(move |bunch| &clusters[bunch * cells + first + cell]);
+            bunches.take_while(|cluster| cluster[3] > 0.0).map(|&[x, y, z, count]| Cluster { mean: [x, y, z], count })
         };
-        let bunches = |bunch: usize| {
-            let bunches = &clusters[bunch * cells + first as usize..][..(columns * rows) as usize];
-            bunches.iter().map(read).collect()
-        };
-        let [side_px, columns, rows] = [side_px, columns, rows].map(|count| count as usize);
-        Level { side_px, columns, rows, bunches: std::array::from_fn(bunches) }
+        let row = |row: usize| Row::of((row * columns..(row + 1) * columns).map(in_cell));
+        Level { side_px: side_px as usize, columns, rows: (0..rows).map(row).collect() }
     };
     Cells { levels: levels.iter().filter(|level| level[0] > 0).map(of_level).collect() }
 }
 
 /// Filled cells that differ, and all of them.
 fn unlike_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
-    use super::super::cells::Cluster;
     let layout = |cells: &Cells| -> Vec<_> {
-        cells.levels.iter().map(|level| [level.side_px, level.columns, level.rows]).collect()
+        cells.levels.iter().map(|level| [level.side_px, level.columns, level.rows.len()]).collect()
     };
     let [a, b] = [layout(device), layout(host)];
     if a != b {
@@ -87,7 +81,8 @@ fn unlike_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
     }
     let mut counts = [0, 0];
     for (device, host) in device.levels.iter().zip(&host.levels) {
-        for cell in 0..host.columns * host.rows {
+        for cell in 0..host.columns * host.rows.len() {
+            let cell = [cell % host.columns, cell / host.columns];
             let [device, host] = [device, host].map(|level| level.clusters(cell).collect::<Vec<_>>());
             let points = |clusters: &[Cluster]| clusters.iter().map(|cluster| cluster.count).sum::<f32>();
             if points(&device) != points(&host) {
@@ -323,13 +318,18 @@ fn comparison_sees_what_is_wrong() {
     let case = Case::new(&noisy(test_clouds::sphere(20_000), 0.02), PROJECTIONS[0], [240, 180]);
     let right = case.cells();
     assert!(compare_cells(&right, &right).is_ok(), "nothing is wrong yet");
-    let mut moved = right.clone();
-    moved.levels[1].bunches[0].iter_mut().flat_map(|bunch| &mut bunch.mean[0]).for_each(|x| *x *= 1.001);
+    let changed = |index: usize, change: fn(Cluster) -> Cluster| {
+        let mut cells = right.clone();
+        let level = &mut cells.levels[index];
+        let cell = |column: usize, row: usize| right.levels[index].clusters([column, row]).map(change);
+        let row = |row: usize| Row::of((0..level.columns).map(|column| cell(column, row)));
+        level.rows = (0..level.rows.len()).map(row).collect();
+        cells
+    };
+    let moved = changed(1, |Cluster { mean: [x, y, z], count }| Cluster { mean: [1.001 * x, y, z], count });
     assert!(compare_cells(&moved, &right).is_err(), "means that are off");
-    let mut fewer = right.clone();
-    let filled = fewer.levels[0].bunches[0].iter_mut().find(|bunch| bunch.count[0] > 0.0).expect("one");
-    filled.count[0] += 1.0;
-    assert!(compare_cells(&fewer, &right).is_err(), "a point too many");
+    let mut fewer = changed(0, |Cluster { mean, count }| Cluster { mean, count: count + 1.0 });
+    assert!(compare_cells(&fewer, &right).is_err(), "points too many");
     fewer.levels.pop();
     assert!(compare_cells(&fewer, &right).is_err(), "a level too few");
 

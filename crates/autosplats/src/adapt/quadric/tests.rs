@@ -6,7 +6,7 @@ use pulp::Simd;
 
 use super::{Gathered, Plane, Quadric, tangents};
 use crate::adapt::STEP;
-use crate::adapt::cells::{Cells, Cluster, Level};
+use crate::adapt::cells::{Cells, Cluster, Level, Row};
 use crate::adapt::cpu::{Goal, choose};
 use crate::adapt::tests::angle;
 use crate::camera::{Camera, Projection, View};
@@ -16,13 +16,14 @@ fn cells_on(depth: impl Fn(f32, f32) -> f32) -> (Cells, View) {
     let projection = Projection::OrthographicHeight(2.0);
     let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
     let view = camera.view(DVec3::ZERO, [200, 200]).expect("a view");
-    let mut level = Level::default();
-    level.resize(4, [50, 50]);
-    for cell in 0..level.columns * level.rows {
-        let pixel = [cell % level.columns, cell / level.columns].map(|at| (4 * at + 2) as f32);
+    let side_px = 4;
+    let cluster = |column: usize, row: usize| {
+        let pixel = [column, row].map(|at| (side_px * at + side_px / 2) as f32);
         let [x, y, _] = view.unproject(pixel, 1.0).to_array();
-        level.bunches[0][cell].put(0, Cluster { mean: [x, y, depth(x, y)], count: 1.0 });
-    }
+        Cluster { mean: [x, y, depth(x, y)], count: 1.0 }
+    };
+    let row = |row: usize| Row::of((0..50).map(|column| std::iter::once(cluster(column, row))));
+    let level = Level { side_px, columns: 50, rows: (0..50).map(row).collect() };
     (Cells { levels: vec![level] }, view)
 }
 
@@ -176,7 +177,7 @@ fn any_width_of_vectors_fits_to_the_same_bits() {
         let center = [0.113, -0.237, 4.08];
         let found = read_and_fit(&cells, center, radius, &view, &mut gathered);
         assert_eq!(found, read_and_fit_with(pulp::Scalar, &cells, center, radius, &view, &mut alone), "{radius}");
-        let places = (0..50 * 50).flat_map(|cell| cells.levels[0].clusters(cell));
+        let places = (0..50 * 50).flat_map(|cell| cells.levels[0].clusters([cell % 50, cell / 50]));
         let inside = places.filter(|place| Vec3::from(place.mean).distance(center.into()) < radius);
         assert_eq!(found.0, inside.count(), "clusters within {radius}");
     }

@@ -113,7 +113,7 @@ impl Sheets {
         // Casts from float saturate at 0.
         let [x0, y0] = [x as usize, y as usize];
         let x1 = ((x + 1.0) as usize).min(level.columns - 1);
-        let y1 = ((y + 1.0) as usize).min(level.rows - 1);
+        let y1 = ((y + 1.0) as usize).min(level.rows.len() - 1);
         // Surfels of a strip change from row to row of cells, and back.
         let around = &mut around[y0 & 1];
         around.gather(self, [x0, x1, y0, y1], level.columns);

@@ -48,7 +48,7 @@ fn blended_one_by_one(sheets: &Sheets, surfel: &Surfel, cells: &Cells, view: &Vi
     let place = Vec3::from(surfel.center);
     let at = view.to_pixel(place).map(|at| at / level.side_px as f32 - 0.5);
     let (mut offset, mut normal, mut total) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    for (cell, stack) in sheets.stacks[..level.columns * level.rows].iter().enumerate() {
+    for (cell, stack) in sheets.stacks[..level.columns * level.rows.len()].iter().enumerate() {
         let [x, y] = [cell % level.columns, cell / level.columns].map(|along| along as f32);
         let share = (1.0 - (at[0] - x).abs()).max(0.0) * (1.0 - (at[1] - y).abs()).max(0.0);
         if !sheets.fitted[cell] || share == 0.0 {

@@ -5,7 +5,8 @@ use std::mem::offset_of;
 use wgpu::naga::{self, Expression, Literal, Module, TypeInner};
 
 use super::passes;
-use crate::adapt::{BUNCH, DepthRun, SCALES, SHEETS, SLABS};
+use crate::adapt::gpu::tests::BUNCH;
+use crate::adapt::{DepthRun, SCALES, SHEETS, SLABS};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
