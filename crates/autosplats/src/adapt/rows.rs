@@ -24,7 +24,8 @@ pub(super) const ROW: f32 = 12.0;
 /// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
 pub(super) const AREA: f32 = 0.25;
 /// and has to be that part too in a ball whose radius is this many distances between rows: of three wires it is 0.18 there, of
-/// four rows or the border of many 0.33.
+/// four rows or the border of many 0.33. That ball also holds more points by more than its radius is larger, as areas grow with
+/// its square, but a curve that the first ball held whole does not grow at all.
 pub(super) const BEYOND: f32 = 4.0;
 /// That radius over the first ball's, at least and at most.
 pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];
@@ -115,8 +116,10 @@ fn area(
     })?;
     let [least, most] = BEYOND_RADII.map(|radii| radii * radius);
     let beyond = (BEYOND * k_radius * apart(radius / k_radius, k, first.weight)).clamp(least, most);
-    let goes_on = |plane: Option<Plane>| plane.is_some_and(|plane| is_area(&plane, AREA));
-    let mut found = (is_flat(&first) && goes_on(plane(beyond, None))).then_some(first);
+    let goes_on = |near: &Plane, far: Option<Plane>| {
+        far.is_some_and(|far| is_area(&far, AREA) & (far.weight * radius > near.weight * beyond))
+    };
+    let mut found = (is_flat(&first) && goes_on(&first, plane(beyond, None))).then_some(first);
     if found.is_none() {
         let eye = if view.perspective { Vec3::from(center) } else { Vec3::Z };
         let across = row.cross(eye).normalize_or_zero();
@@ -125,7 +128,7 @@ fn area(
             let beside = plane(radius, side).filter(|plane| is_area(plane, AREA_NEAR) & is_flat(plane));
             let Some(beside) = beside else { continue };
             let bend = beside.variances[0] / beside.variances[1];
-            if (bend < least_bend) && goes_on(plane(beyond, side)) {
+            if (bend < least_bend) && goes_on(&beside, plane(beyond, side)) {
                 // As if the other side were as full.
                 found = Some(Plane { weight: HALVES * beside.weight, ..beside });
                 least_bend = bend;

@@ -418,6 +418,23 @@ fn wires_are_no_area_and_nor_is_what_is_seen_through() {
 }
 
 #[test]
+fn a_closed_curve_is_no_area_however_large_the_ball() {
+    let on_circle = |step: usize| {
+        let (sin, cos) = (step as f32 * std::f32::consts::TAU / 180.0).sin_cos();
+        [sin, cos, 0.3 * sin * cos]
+    };
+    let camera = Camera { eye: DVec3::NEG_Z * 4.0, look_at: DVec3::ZERO, up: DVec3::Y, projection: PROJECTIONS[1] };
+    for size in [300, 600, 900] {
+        let cloud = PointCloud::new(DVec3::ZERO, (0..180).map(on_circle).collect());
+        let case = Case::of(&cloud, &camera, [size; 2]);
+        let (fitted, adapted) = (case.fitted.concat(), case.adapted());
+        let rows = fitted.iter().zip(&adapted).filter(|(fitted, _)| is_row(fitted));
+        let widened = rows.clone().filter(|(fitted, adapted)| adapted.radius >= fitted.radius).count();
+        assert!(rows.count() > 150 && widened == 0, "{widened} are as wide as an area in {size} pixels");
+    }
+}
+
+#[test]
 fn a_noisy_edge_stays_sharp() {
     let points = noisy(test_clouds::edge(30_000), 0.01);
     let case = Case::new(&points, PROJECTIONS[0], [400, 300]);

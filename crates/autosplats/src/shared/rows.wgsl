@@ -40,6 +40,11 @@ fn is_area(plane: Plane, least: f32) -> bool {
     return plane.len >= LEAST_CLUSTERS && plane.variances.y > least * plane.variances.z;
 }
 
+// Whether an area is one in the ball beyond as well, and grows faster than a line.
+fn goes_on(near: Plane, radius: f32, far: Plane, beyond: f32) -> bool {
+    return is_area(far, AREA) && far.weight * radius > near.weight * beyond;
+}
+
 // How far apart rows of points k-radius / (k/2) apart are, k-radii, if a ball of so many k-radii holds points of this `weight`.
 fn rows_apart(in_k_radii: f32, weight: f32) -> f32 {
     return EVEN_WEIGHT * in_k_radii * in_k_radii * f32(frame.k) / (2.0 * weight);
@@ -56,7 +61,7 @@ fn area_beside(ball: Ball, beyond: Ball, row: vec3f) -> Area {
         let bend = plane.variances.x * found.plane.variances.y;
         let is_flatter = found.radius == 0.0 || bend < found.plane.variances.x * plane.variances.y;
         if is_area(plane, AREA_NEAR) && is_flat(plane, row) && is_flatter {
-            if is_area(plane_beside(beyond, side, -BESIDE), AREA) {
+            if goes_on(plane, ball.radius, plane_beside(beyond, side, -BESIDE), beyond.radius) {
                 found = Area(plane, ball.radius);
             }
         }
@@ -89,7 +94,7 @@ fn area(surfel: Surfel, least_radius: f32) -> Area {
         let apart = surfel.k_radius * rows_apart(radius / surfel.k_radius, plane.weight);
         let beyond_radius = clamp(BEYOND * apart, LEAST_BEYOND * radius, MOST_BEYOND * radius);
         let beyond = ball_around(center, beyond_radius, CELLS_PER_RADIUS);
-        if is_flat(plane, row) && is_area(plane_of(beyond), AREA) {
+        if is_flat(plane, row) && goes_on(plane, radius, plane_of(beyond), beyond_radius) {
             found = Area(plane, radius);
         } else {
             found = area_beside(ball, beyond, row);
