@@ -24,8 +24,8 @@ pub(super) const FEW: f32 = 4.0;
 /// as they are if the k-radius is so many first search radii.
 pub(super) const SPARSER: f32 = 1.3;
 
-/// In a picture of fewer points than this there is nothing to compare with.
-pub(super) const HANDFUL: usize = 64;
+/// In a picture of fewer points than this there is nothing to compare with, and so few in all are no surface.
+pub(crate) const HANDFUL: usize = 64;
 
 /// The neighbours of a point, in k-radii.
 #[derive(Clone, Copy, Debug)]

@@ -44,6 +44,8 @@ pub(crate) struct FitRules {
     pub(crate) adaptive: bool,
     /// Keep outliers: points without neighbours as dots, and those that are no part of their neighbours' surface.
     pub(crate) keep_outliers: bool,
+    /// Radius in pixels of the dots that all points are, facing the eye; 0 if they are surface.
+    pub(crate) dot_px: f32,
 }
 
 /// Fits a surfel to the neighbourhood of each of `queries`, indices of screen points, and appends them to `surfels`.
@@ -89,6 +91,14 @@ fn fit_blocks_with<'a, S: Simd>(
             *surfel = fitted.surfel(lane, block, point.position_view, usual_radius, view, rules);
             if screen.density.culls(point) {
                 surfel.radius = surfel.radius.min(splat_radius(WIDEST_BEHIND * first_radius(), rules.k as f32, rules));
+            }
+            if rules.dot_px > 0.0 {
+                let center = point.position_view.into();
+                let normal = view.to_eye(center).normalize();
+                surfel.radius = rules.dot_px * view.pixel_size(center.z);
+                surfel.normal = normal.to_array();
+                surfel.major_axis = normal.any_orthonormal_vector().to_array();
+                surfel.major_ratio = 1.0;
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];

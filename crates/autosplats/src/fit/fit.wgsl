@@ -156,6 +156,13 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
         radius = min(radius, splat_radius(WIDEST_BEHIND * first, f32(frame.k)));
     }
+    if frame.dot_px > 0.0 {
+        let normal = normalize(to_eye(center));
+        let dot_radius = frame.dot_px * pixel_size(center.z);
+        return Surfel(
+            center, dot_radius, normal, sums.k_radius, any_orthonormal(normal), 1.0, face.curvature, point.pixel, source[query], query,
+        );
+    }
     // A line has no width to draw.
     let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MOST);
     // What adapts it goes by its shape.

@@ -10,7 +10,8 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 use crate::search::{LANES, NeighborhoodBlock, Neighborhoods};
 use crate::test_clouds::Random;
 
-const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false };
+const RULES: FitRules =
+    FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
 
 /// A point with its neighbours, view space.
 #[derive(Clone, Debug)]

@@ -43,6 +43,10 @@ pub(crate) struct FrameUniform {
     pub(crate) past_shift: [f32; 3],
     /// 0 if nothing is known of the last frame.
     pub(crate) past_focal_px: f32,
+    /// Radius in pixels of the dots that all points are; 0 if they are surface.
+    pub(crate) dot_px: f32,
+    /// Fills it up to sixteen bytes, as WGSL does.
+    pub(crate) unused: [u32; 3],
 }
 
 impl FrameUniform {
@@ -73,6 +77,8 @@ impl FrameUniform {
             past_rotation: [[0.0; 4]; 3],
             past_shift: [0.0; 3],
             past_focal_px: 0.0,
+            dot_px: 0.0,
+            unused: [0; 3],
         }
     }
 

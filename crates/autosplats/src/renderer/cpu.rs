@@ -176,7 +176,8 @@ impl CpuRenderer {
         }
         let seen = Seen { view: picture, origin: cloud.origin() };
         let following = smooths.then(|| last_picture.begin(seen, cloud.identity(), settings));
-        let reconstruct = Reconstruct { screen, view: &view, settings, past, sensors, depth_noise, given };
+        let points = cloud.len();
+        let reconstruct = Reconstruct { screen, view: &view, points, settings, past, sensors, depth_noise, given };
         let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
         let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
         recovered.clear();
@@ -254,6 +255,8 @@ struct Buffers<'a> {
 struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
+    /// Of the cloud.
+    points: usize,
     settings: &'a Settings,
     past: &'a Past,
     sensors: &'a Sensors,
@@ -269,7 +272,7 @@ impl Reconstruct<'_> {
         Buffers { neighborhoods, surfels, adapter, over_time, splatter }: &mut Buffers<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, settings, past, sensors, depth_noise, given } = *self;
+        let Self { screen, view, points, settings, past, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -301,6 +304,7 @@ impl Reconstruct<'_> {
             longest: settings.longest(),
             adaptive: settings.adaptive,
             keep_outliers: settings.outlier_expansions.is_none(),
+            dot_px: settings.dot_px(points, view.picture_size()),
         };
         fit(screen, queries, neighborhoods, view, &rules, surfels);
         clock.lap(|timings| &mut timings.fit)?;

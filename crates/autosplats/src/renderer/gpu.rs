@@ -231,7 +231,7 @@ impl GpuRenderer {
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (Seen { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
-        prepared.tell(gpu, frame, now, settings, &uniform);
+        prepared.tell(gpu, frame, now, cloud.len(), settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -309,7 +309,7 @@ impl GpuRenderer {
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (Seen { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
-        prepared.tell(gpu, frame, now, settings, &uniform.into_format(texture.format()));
+        prepared.tell(gpu, frame, now, cloud.len(), settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;

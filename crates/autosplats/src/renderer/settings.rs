@@ -1,13 +1,15 @@
 //! What a picture can be asked to be.
 
 use crate::Error;
-use crate::fit::LONGEST;
+use crate::fit::{HANDFUL, LONGEST};
 use crate::search::SearchEngine;
 use crate::shade::Shading;
 use crate::splat::STEADY_FRAMES;
 
 /// A margin is one part in so many of the picture's shorter side.
 const MARGIN_PART: u32 = 12;
+/// Radius of the dots that a handful of points is, as a part of the picture's shorter side. Trim leaves the inner half of them.
+const HANDFUL_DOT: f32 = 0.016;
 
 /// Everything about a picture but the cloud, the camera and the size.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -37,7 +39,8 @@ pub struct Reconstruction {
     /// that reach the next row, where rows make a surface. Points far from their neighbours and on no surface become dots or,
     /// unless outliers are kept, are discarded. A neighbourhood of one ends at wider gaps ([`gap_factor`](Self::gap_factor)). Points in
     /// a margin around the picture count as neighbours, a twelfth of its shorter side wide, where a device has room for it and
-    /// the engine is not [`SearchEngine::SplatCommunication`]. Else a surface without noise or rows is left as it is.
+    /// the engine is not [`SearchEngine::SplatCommunication`]. A cloud of fewer than 64 points is dots. Else a surface without
+    /// noise or rows is left as it is.
     pub adaptive: bool,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
@@ -119,6 +122,12 @@ impl Reconstruction {
     /// Whether frames depend on those before.
     pub(super) fn smooths(&self) -> bool {
         self.averaged() != [1; 2]
+    }
+
+    /// Radius in pixels of the dots that a cloud of so many points is drawn as in a picture of this size; 0 if it is surface. A
+    /// handful tells of none: discs as wide as its points are apart would hide how few they are.
+    pub(super) fn dot_px(&self, points: usize, size: [u32; 2]) -> f32 {
+        if self.adaptive && points < HANDFUL { size[0].min(size[1]) as f32 * HANDFUL_DOT } else { 0.0 }
     }
 
     /// Longest ellipse, semi-major over semi-minor axis.

@@ -42,6 +42,8 @@ struct Frame {
     past_rotation: mat3x3f,
     past_shift: vec3f,
     past_focal_px: f32,
+    // Radius in pixels of the dots that all points are; 0 if they are surface.
+    dot_px: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -393,6 +393,30 @@ fn nothing_to_see_is_no_trouble() {
     assert!(refused(counts([64, 48], &coloured)).contains("no colours"), "and attributes");
 }
 
+/// Round dots where the points are, however far apart these are: neither surface nor nothing.
+#[test]
+fn a_handful_of_points_is_dots() {
+    let places = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.0], [1.0, 0.7, 0.3], [-0.3, -0.15, -4.0], [0.9, -0.6, 2.0]];
+    let cloud = PointCloud::new(DVec3::ZERO, places.to_vec());
+    let projection = Projection::PerspectiveFovDeg(40.0);
+    let camera = Camera { eye: 5.0 * DVec3::NEG_Z, look_at: DVec3::ZERO, up: DVec3::Y, projection };
+    let settings = Settings { all_layers: true, ..Settings::default() };
+    let mut cpu = Renderer::new();
+    let host = cpu.render(&cloud, &camera, SIZE, &settings).expect("a picture");
+    let [width, height] = [host.layers.width as usize, host.layers.height as usize];
+    let pixels = (0..width * height).map(|pixel| host.layers.index(pixel % width, pixel / width));
+    let mut covered = [0; 5];
+    pixels.filter(|&pixel| host.layers.weight[pixel] > 0.0).for_each(|pixel| {
+        covered[host.layers.point[pixel] as usize] += 1;
+        let normal = host.layers.normal[pixel];
+        assert!(-normal[2] > 0.9, "{normal:?} does not face the eye");
+    });
+    assert!(covered.iter().all(|&pixels| (4..60).contains(&pixels)), "pixels of each: {covered:?}");
+    if let Some(mut gpu) = gpu() {
+        compare(&mut gpu, &cloud, &camera, SIZE, &settings, "a handful");
+    }
+}
+
 #[test]
 fn a_picture_of_8192_pixels_a_side() {
     let Some(mut gpu) = gpu() else { return };

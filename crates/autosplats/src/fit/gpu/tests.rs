@@ -17,7 +17,8 @@ use crate::search::screen_grid::gpu::tests::{Moments, host_moments};
 use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, Random};
 
-const RULES: FitRules = FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false };
+const RULES: FitRules =
+    FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
 
 /// Screen points and their neighbourhoods, of the active and of the passive ones.
 struct Case {
@@ -68,6 +69,7 @@ impl Case {
             longest: rules.longest,
             keep_outliers: rules.keep_outliers.into(),
             adaptive: rules.adaptive.into(),
+            dot_px: rules.dot_px,
             ..FrameUniform::new(&self.view, rules.k)
         };
         let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
@@ -155,6 +157,28 @@ fn the_device_fits_what_the_host_fits() {
     assert!(compared > 50_000 && outliers > 50, "there is something to compare: {compared}, {outliers} outliers");
     // Rounding decides what is lopsided, or a line, in few neighbourhoods.
     assert!(different * 10_000 <= compared, "{different} of {compared} differ");
+}
+
+#[test]
+fn the_device_makes_the_dots_that_the_host_makes() {
+    let Some(gpu) = test_gpu() else { return };
+    let passes = FitPasses::new(&gpu).expect("passes");
+    for projection in [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(2.1)] {
+        let case = Case::new(&test_clouds::sphere(40), projection, Some(4.0));
+        let rules = FitRules { dot_px: 7.0, ..RULES };
+        let host = case.on_host(&rules);
+        let (device, dropped) = case.on_device(&gpu, &passes, &rules);
+        assert!(host.len() > 10 && dropped == 0, "{dropped} of {} are dropped", host.len());
+        for (device, host) in device.iter().zip(&host) {
+            let px = host.radius / case.view.pixel_size(host.center[2]);
+            assert!((px - 7.0).abs() < 1e-3 && host.major_ratio == 1.0, "{px} pixels, {host:?}");
+            let [a, b] =
+                [device, host].map(|surfel| [surfel.normal, [surfel.radius, surfel.major_ratio, 0.0]].concat());
+            assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-5), "{a:?}, on the host {b:?}");
+            let to_eye = case.view.to_eye(host.center.into()).normalize();
+            assert!(to_eye.dot(host.normal.into()) > 0.9999, "faces the eye");
+        }
+    }
 }
 
 /// Where k adapts more points stand alone, with few neighbours and with many.

@@ -32,9 +32,9 @@ fn field_size<S, F>(_: impl Fn(&S) -> &F) -> usize {
 }
 
 macro_rules! mirrored {
-    ($name:literal, $rust:ident { $($field:ident),* $(,)? }) => {{
+    ($name:literal, $rust:ident { $($field:ident),* $(,)? } $(, filled up with $unused:ident)?) => {{
         // Fails to compile if one is missing.
-        let $rust { $($field: _),* } = <$rust as bytemuck::Zeroable>::zeroed();
+        let $rust { $($field: _,)* $($unused: _)? } = <$rust as bytemuck::Zeroable>::zeroed();
         let fields = vec![$((
             stringify!($field).to_owned(),
             offset_of!($rust, $field),
@@ -73,7 +73,9 @@ fn mirrored() -> [Mirrored; 10] {
                 past_rotation,
                 past_shift,
                 past_focal_px,
-            }
+                dot_px,
+            },
+            filled up with unused
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
         mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
