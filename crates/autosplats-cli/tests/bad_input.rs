@@ -13,7 +13,6 @@ fn clouds_that_show_nothing() {
     let folder = Folder::new();
     let cases: &[(&str, &[&str])] = &[
         ("no_points", &[]),
-        ("one_point", &["1 2 3"]),
         // Fewer are a dot.
         ("all_equal", &["1 2 3"; 64]),
         ("not_finite", &["nan 0 0", "0 inf 0", "0 0 -inf", "nan nan nan"]),
@@ -32,16 +31,18 @@ fn more_neighbours_than_points() {
     let folder = Folder::new();
     folder.write("four.ply", &points_ply(&["0 0 0", "1 0 0", "0 0 1", "1 0 1"]));
     let front = ["--size", "64x64", "--view", "front"];
-    let fewer = folder.succeed(&[&render("four.ply")[..], &front].concat());
+    let dots = folder.succeed(&[&render("four.ply")[..], &front].concat());
+    assert!(!dots.stderr.contains("neighbours"), "dots have none: {}", dots.stderr);
+    let fewer = folder.succeed(&[&render("four.ply")[..], &front, &["-k", "10"]].concat());
     assert!(fewer.stderr.contains("4 points cannot have 10 neighbours"), "it is told: {}", fewer.stderr);
-    folder.succeed(&[&render("four.ply")[..], &front, &["-k", "10"]].concat());
     let picture = folder.read("out.png");
     folder.succeed(&[&render("four.ply")[..], &front, &["-k", "3"]].concat());
     assert_eq!(folder.read("out.png"), picture, "as many neighbours as there are");
     folder.write("equal.ply", &points_ply(&["1 2 3"; 63]));
     folder.succeed(&render("equal.ply"));
     folder.write("one.ply", &points_ply(&["0 0 0"]));
-    folder.fail(&render("one.ply"), 3, &["one point"]);
+    folder.succeed(&render("one.ply"));
+    folder.fail(&[&render("one.ply")[..], &["-k", "10"]].concat(), 3, &["one point"]);
 }
 
 #[test]

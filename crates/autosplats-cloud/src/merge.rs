@@ -20,8 +20,8 @@ impl PointCloud {
     /// * If any part has colours, the points of the others become mid grey.
     /// * A field is kept if every part has one of that name, letter case included; as `f64` where its widths differ.
     ///   Normals of floats are turned with their points, their lengths kept; other fields stay as they are.
-    /// * Axes, coordinate system and resolution are kept if all parts agree on them; scans stay known, each moved with
-    ///   its part.
+    /// * Axes are kept if all parts that state some agree on them, coordinate system and resolution if all parts do; scans stay
+    ///   known, each moved with its part.
     /// * Residuals are kept if any part has some, and made anew for parts that a pose moves.
     ///
     /// A single part without pose is returned as it is. Parts without points count for nothing.
@@ -84,6 +84,7 @@ impl PointCloud {
             first.fields().iter().filter_map(|field| common_field(parts, &field.name)).collect();
         turn_normals(&mut fields, parts);
         let agreed = |same: fn(&Self, &Self) -> bool| parts.iter().all(|(cloud, _)| same(cloud, first));
+        let stated = || parts.iter().filter_map(|(cloud, _)| cloud.axes());
         let mut scans = Vec::new();
         let mut start = 0;
         for (cloud, pose) in parts {
@@ -100,7 +101,7 @@ impl PointCloud {
             residuals: exact.then_some(residuals),
             colors,
             fields,
-            axes: first.axes().filter(|_| agreed(|a, b| a.axes == b.axes)),
+            axes: stated().next().filter(|&axes| stated().all(|other| other == axes)),
             scans,
             crs: if agreed(|a, b| a.crs == b.crs) { first.crs().clone() } else { Crs::default() },
             resolution: first.resolution().filter(|_| agreed(|a, b| a.resolution == b.resolution)),

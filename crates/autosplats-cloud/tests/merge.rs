@@ -51,7 +51,8 @@ fn attributes_of_unlike_parts() {
     let merged = merge(&bare, &colored);
     let grey = [200; 3];
     assert_eq!(merged.colors().unwrap(), [grey, grey, colors(2)[0], colors(2)[1]], "grey where there is no colour");
-    assert_eq!(merged.axes(), None, "the parts disagree");
+    assert_eq!(merged.axes(), Some(Axes::ZUp), "one part states none");
+    assert_eq!(merge(&colored, &bare.clone().with_axes(Axes::YUp)).axes(), None, "the parts disagree");
     assert_eq!(merge(&colored, &colored).axes(), Some(Axes::ZUp), "the parts agree");
 
     let (bytes, floats) = (field(FieldValues::U8(vec![1, 2])), field(FieldValues::F32(vec![0.5, 3.0])));

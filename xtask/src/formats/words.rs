@@ -63,7 +63,7 @@ pub(super) const WORDS: &[Words] = &[
     Words {
         name: "E57",
         kept: "all scans, cartesian and spherical, placed by their poses; sensor positions, intensity, colours, row and \
-               column, fields of extensions",
+               column, fields of extensions; Z is up, but for things of less than a metre without a sensor's position",
         not_kept: "embedded pictures",
     },
     Words {

@@ -170,10 +170,12 @@ impl Job {
         self.settings.shading.background == Background::Transparent
     }
 
-    /// Lowers k to the neighbours that a small cloud has, with a note of it, and refuses one that has none.
+    /// Lowers k to the neighbours that a small cloud has, with a note of it, and refuses one that has none. With `auto` those are
+    /// dots.
     pub(super) fn fit_neighbors(&mut self, cloud: &PointCloud) -> Result<Option<String>, Failure> {
-        let k = &mut self.settings.reconstruction.k;
+        let Reconstruction { k, adaptive, .. } = &mut self.settings.reconstruction;
         match cloud.len() {
+            1.. if *adaptive => Ok(None),
             0 | 1 => Err(Failure::new(Exit::Input, format!("{}: one point makes no surface", self.inputs.names()))),
             points if points <= *k as usize => {
                 let wanted = std::mem::replace(k, points as u32 - 1);

@@ -201,7 +201,7 @@ impl Studio {
         let started = Instant::now();
         self.finer = None;
         let shown = self.shown(wish)?;
-        if shown.cloud.len() < 2 {
+        if shown.cloud.is_empty() {
             self.let_go();
             return Ok(Answer::Empty);
         }
@@ -287,7 +287,7 @@ impl Studio {
         match task {
             Task::Pick { wish, pixel, purpose } => {
                 let shown = self.shown(&wish)?;
-                if shown.cloud.len() < 2 {
+                if shown.cloud.is_empty() {
                     return Ok(Outcome::Picked { purpose, point: None });
                 }
                 let settings = Settings { all_layers: true, ..self.settings(&wish, &shown, outbox)? };

@@ -30,14 +30,14 @@ pub(crate) struct Cluster {
 /// SIMD. Most cells of a picture are empty, and others have one or two of the clusters that they may have: what is written and
 /// read again goes by clusters, not by cells.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Row {
-    /// Number of clusters in the cells before each of them, and in all.
+pub(crate) struct CellRow {
+    /// Where the clusters of each cell begin, and the number of all.
     starts: Vec<u32>,
     /// X, y and z of the means, and the counts; then [`AFTER`] zeros.
     values: [Vec<f32>; 4],
 }
 
-impl Row {
+impl CellRow {
     /// Of cells with these clusters, first to last.
     #[cfg(test)]
     pub(crate) fn of(cells: impl Iterator<Item = impl Iterator<Item = Cluster>>) -> Self {
@@ -80,7 +80,7 @@ impl Row {
         self.starts[columns.start] as usize..self.starts[columns.end] as usize
     }
 
-    /// Copies what is in a run to the same coordinates `at` a place, and up to [`AFTER`] values more.
+    /// Copies a run of each coordinate to that coordinate of `into`, from `at` on; over the end by less than [`AFTER`] values.
     #[inline(always)]
     pub(super) fn copy(&self, run: Range<usize>, into: &mut [Vec<f32>; 4], at: usize) {
         for (into, from) in into.iter_mut().zip(&self.values) {
@@ -105,7 +105,7 @@ pub(crate) struct Level {
     /// Side of a cell in pixels.
     pub(crate) side_px: usize,
     pub(crate) columns: usize,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<CellRow>,
 }
 
 impl Level {
@@ -182,7 +182,7 @@ impl Filling {
 
     /// Writes what it holds to the next cell of a row, and is empty.
     #[inline(always)]
-    fn finish(&mut self, row: &mut Row) {
+    fn finish(&mut self, row: &mut CellRow) {
         for at in 0..self.used {
             let count = self.count[at];
             row.push(Cluster { mean: self.sum[at].map(|sum| sum / count), count });
@@ -229,7 +229,7 @@ impl Cells {
         self.levels.resize_with(levels.min(MOST_LEVELS), Level::default);
         for (index, level) in self.levels.iter_mut().enumerate() {
             (level.side_px, level.columns) = (side_px << index, columns);
-            level.rows.resize_with(rows, Row::default);
+            level.rows.resize_with(rows, CellRow::default);
             (columns, rows) = (columns.div_ceil(2), rows.div_ceil(2));
         }
         let Some((finest, coarser)) = self.levels.split_first_mut() else { return };

@@ -1,7 +1,5 @@
 //! Surfels turned and moved onto sheets, or onto a quadric of their own; the choice of a quadric's scale.
 
-use std::ops::BitOr;
-
 use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
@@ -141,9 +139,15 @@ impl Adapter {
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, rules, usual, known };
         let asks = |surfel: &&Surfel| matches!(task.call(surfel), Call::Noise(_));
-        let is_asked =
-            |surfels: &[Surfel]| surfels.iter().filter(asks).map(|surfel| sheets.ask(surfel, cells, view)).count() > 0;
-        let is_any_asked = surfels.par_chunks(TASK).map(is_asked).reduce(|| false, BitOr::bitor);
+        let ask_all = |surfels: &[Surfel]| {
+            let mut is_any = false;
+            for surfel in surfels.iter().filter(asks) {
+                sheets.ask(surfel, cells, view);
+                is_any = true;
+            }
+            is_any
+        };
+        let is_any_asked = surfels.par_chunks(TASK).map(ask_all).reduce(|| false, |a, b| a | b);
         let noise = |place, k_radius, point| {
             let (noise, known) = task.noise(place, k_radius, point);
             (noise, known.is_some())

@@ -25,6 +25,8 @@ pub(super) const RIDGE: f32 = 0.003;
 /// Least pivot of the elimination, as a share of the weight.
 pub(super) const LEAST_PIVOT: f32 = 1e-6;
 
+const _: () = assert!(AFTER <= LANES, "what is copied over the end of a run has room");
+
 /// Weight of a ball evenly filled with a point in each square of its radius.
 pub(super) const EVEN_WEIGHT: f32 = 0.5 * std::f32::consts::PI * (1.0 + FULL);
 
@@ -72,8 +74,9 @@ impl<'a> Window<'a> {
             let run = row.run(columns.clone());
             let end = len + run.len();
             // What is copied at once may reach over the end, and so may the last group.
-            if copied[0].len() < end + AFTER.max(LANES) {
-                copied.iter_mut().for_each(|values| values.resize(end + 4 * LANES, 0.0));
+            let needed = (end + LANES).next_multiple_of(LANES);
+            if copied[0].len() < needed {
+                copied.iter_mut().for_each(|values| values.resize(2 * needed, 0.0));
             }
             row.copy(run, copied, len);
             len = end;

@@ -33,6 +33,9 @@ pub(super) const WIDEST_BEHIND: f32 = 3.0;
 /// Fewer neighbours than this are a line by chance, and never count as a row of points.
 pub(super) const ROW_COUNT: f32 = 8.0;
 
+/// Surface variation of a dot, which is no surface: the most there is. So it has no back either.
+pub(super) const DOT_CURVATURE: f32 = 1.0 / 3.0;
+
 /// What the fit may be asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FitRules {
@@ -94,11 +97,12 @@ fn fit_blocks_with<'a, S: Simd>(
             }
             if rules.dot_px > 0.0 {
                 let center = point.position_view.into();
-                let normal = view.to_eye(center).normalize();
+                let normal = view.to_eye(center).normalize_or(Vec3::NEG_Z);
                 surfel.radius = rules.dot_px * view.pixel_size(center.z);
                 surfel.normal = normal.to_array();
                 surfel.major_axis = normal.any_orthonormal_vector().to_array();
                 surfel.major_ratio = 1.0;
+                surfel.curvature = DOT_CURVATURE;
             }
             surfel.pixel = point.pixel;
             surfel.source = screen.source[query as usize];

@@ -25,6 +25,7 @@ override LINE: f32;
 override LEAST_ACROSS: f32;
 override ROW_COUNT: f32;
 override LONE_RADIUS_PX: f32;
+override DOT_CURVATURE: f32;
 override WIDEST_BEHIND: f32;
 override LOPSIDED: f32;
 override LOPSIDED_SPARSE: f32;
@@ -157,10 +158,11 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
         radius = min(radius, splat_radius(WIDEST_BEHIND * first, f32(frame.k)));
     }
     if frame.dot_px > 0.0 {
-        let normal = normalize(to_eye(center));
+        let normal = normalized_or(to_eye(center), vec3f(0.0, 0.0, -1.0));
         let dot_radius = frame.dot_px * pixel_size(center.z);
+        let axis = any_orthonormal(normal);
         return Surfel(
-            center, dot_radius, normal, sums.k_radius, any_orthonormal(normal), 1.0, face.curvature, point.pixel, source[query], query,
+            center, dot_radius, normal, sums.k_radius, axis, 1.0, DOT_CURVATURE, point.pixel, source[query], query,
         );
     }
     // A line has no width to draw.

@@ -2,7 +2,7 @@
 
 use super::Surfel;
 use super::alone::{BESIDE, FAR_SPARSER, FEW, FLAT, HANDFUL, LOPSIDED, LOPSIDED_COUNT, LOPSIDED_SPARSE, SPARSER};
-use super::cpu::{LEAST_ACROSS, LINE, LONE_RADIUS_PX, ROW_COUNT, WIDEST_BEHIND};
+use super::cpu::{DOT_CURVATURE, LEAST_ACROSS, LINE, LONE_RADIUS_PX, ROW_COUNT, WIDEST_BEHIND};
 use super::eigen::SWEEPS;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -40,6 +40,7 @@ impl FitPasses {
                 ("LEAST_ACROSS", LEAST_ACROSS.into()),
                 ("ROW_COUNT", ROW_COUNT.into()),
                 ("LONE_RADIUS_PX", LONE_RADIUS_PX.into()),
+                ("DOT_CURVATURE", DOT_CURVATURE.into()),
                 ("WIDEST_BEHIND", WIDEST_BEHIND.into()),
                 ("LOPSIDED", LOPSIDED.into()),
                 ("LOPSIDED_SPARSE", LOPSIDED_SPARSE.into()),

@@ -45,8 +45,8 @@ pub(crate) struct FrameUniform {
     pub(crate) past_focal_px: f32,
     /// Radius in pixels of the dots that all points are; 0 if they are surface.
     pub(crate) dot_px: f32,
-    /// Fills it up to sixteen bytes, as WGSL does.
-    pub(crate) unused: [u32; 3],
+    /// WGSL fills it up to sixteen bytes by itself.
+    pub(crate) padding: [u32; 3],
 }
 
 impl FrameUniform {
@@ -78,7 +78,7 @@ impl FrameUniform {
             past_shift: [0.0; 3],
             past_focal_px: 0.0,
             dot_px: 0.0,
-            unused: [0; 3],
+            padding: [0; 3],
         }
     }
 

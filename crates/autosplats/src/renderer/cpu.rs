@@ -101,6 +101,9 @@ impl CpuRenderer {
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
+        let dot_px = if given.is_none() { settings.reconstruction.dot_px(cloud.len(), size) } else { 0.0 };
+        let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
+        let settings = of_dots.as_ref().unwrap_or(settings);
         let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };
         let view = picture.with_margin(margin);
         if given.is_none() {
@@ -176,8 +179,7 @@ impl CpuRenderer {
         }
         let seen = Seen { view: picture, origin: cloud.origin() };
         let following = smooths.then(|| last_picture.begin(seen, cloud.identity(), settings));
-        let points = cloud.len();
-        let reconstruct = Reconstruct { screen, view: &view, points, settings, past, sensors, depth_noise, given };
+        let reconstruct = Reconstruct { screen, view: &view, dot_px, settings, past, sensors, depth_noise, given };
         let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };
         let mut search_counts = reconstruct.run(&screen.active, &mut buffers, &mut clock)?;
         recovered.clear();
@@ -255,8 +257,8 @@ struct Buffers<'a> {
 struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
-    /// Of the cloud.
-    points: usize,
+    /// Of all points; 0 if they are surface.
+    dot_px: f32,
     settings: &'a Settings,
     past: &'a Past,
     sensors: &'a Sensors,
@@ -272,7 +274,7 @@ impl Reconstruct<'_> {
         Buffers { neighborhoods, surfels, adapter, over_time, splatter }: &mut Buffers<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<SearchCounts, Error> {
-        let Self { screen, view, points, settings, past, sensors, depth_noise, given } = *self;
+        let Self { screen, view, dot_px, settings, past, sensors, depth_noise, given } = *self;
         let settings = &settings.reconstruction;
         let first = surfels.len();
         if let Some(planes) = given {
@@ -304,7 +306,7 @@ impl Reconstruct<'_> {
             longest: settings.longest(),
             adaptive: settings.adaptive,
             keep_outliers: settings.outlier_expansions.is_none(),
-            dot_px: settings.dot_px(points, view.picture_size()),
+            dot_px,
         };
         fit(screen, queries, neighborhoods, view, &rules, surfels);
         clock.lap(|timings| &mut timings.fit)?;

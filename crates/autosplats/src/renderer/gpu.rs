@@ -218,6 +218,9 @@ impl GpuRenderer {
         settings: &Settings,
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
+        let dot_px = settings.reconstruction.dot_px(cloud.len(), size);
+        let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
+        let settings = of_dots.as_ref().unwrap_or(settings);
         let wanted = Wanted::new(cloud, settings)?;
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| go_on())?;
@@ -231,7 +234,7 @@ impl GpuRenderer {
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (Seen { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
-        prepared.tell(gpu, frame, now, cloud.len(), settings, &uniform);
+        prepared.tell(gpu, frame, now, dot_px, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -300,16 +303,20 @@ impl GpuRenderer {
         texture: &wgpu::Texture,
         settings: &Settings,
     ) -> Result<(), Error> {
+        let size = [texture.width(), texture.height()];
+        let dot_px = settings.reconstruction.dot_px(cloud.len(), size);
+        let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
+        let settings = of_dots.as_ref().unwrap_or(settings);
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
-        let screen = view.with_margin(self.prepare([texture.width(), texture.height()], &wanted, settings)?);
+        let screen = view.with_margin(self.prepare(size, &wanted, settings)?);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
         let prepared = prepared.as_mut().ok_or_else(|| Error::Device("no frame was prepared".into()))?;
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
         let now = (Seen { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
-        prepared.tell(gpu, frame, now, cloud.len(), settings, &uniform.into_format(texture.format()));
+        prepared.tell(gpu, frame, now, dot_px, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;

@@ -8,8 +8,9 @@ use crate::splat::STEADY_FRAMES;
 
 /// A margin is one part in so many of the picture's shorter side.
 const MARGIN_PART: u32 = 12;
-/// Radius of the dots that a handful of points is, as a part of the picture's shorter side. Trim leaves the inner half of them.
-const HANDFUL_DOT: f32 = 0.016;
+/// Radius of the splats that a handful of points is, as a part of the picture's shorter side; what is drawn of them is 1.4 times as
+/// wide.
+const HANDFUL_DOT: f32 = 0.0045;
 
 /// Everything about a picture but the cloud, the camera and the size.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -39,8 +40,8 @@ pub struct Reconstruction {
     /// that reach the next row, where rows make a surface. Points far from their neighbours and on no surface become dots or,
     /// unless outliers are kept, are discarded. A neighbourhood of one ends at wider gaps ([`gap_factor`](Self::gap_factor)). Points in
     /// a margin around the picture count as neighbours, a twelfth of its shorter side wide, where a device has room for it and
-    /// the engine is not [`SearchEngine::SplatCommunication`]. A cloud of fewer than 64 points is dots. Else a surface without
-    /// noise or rows is left as it is.
+    /// the engine is not [`SearchEngine::SplatCommunication`]. Else a surface without noise or rows is left as it is. A cloud of
+    /// fewer than 64 points is drawn as dots, whole and each frame by itself.
     pub adaptive: bool,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
@@ -124,10 +125,13 @@ impl Reconstruction {
         self.averaged() != [1; 2]
     }
 
-    /// Radius in pixels of the dots that a cloud of so many points is drawn as in a picture of this size; 0 if it is surface. A
-    /// handful tells of none: discs as wide as its points are apart would hide how few they are.
+    /// Splat radius in pixels of the dots that a cloud of so many points is drawn as in a picture of this size; 0 if it is
+    /// surface.
+    // Differs from the paper: a handful tells of no surface, and discs as wide as its points are apart would hide each other and
+    // how few they are.
     pub(super) fn dot_px(&self, points: usize, size: [u32; 2]) -> f32 {
-        if self.adaptive && points < HANDFUL { size[0].min(size[1]) as f32 * HANDFUL_DOT } else { 0.0 }
+        let is_handful = self.adaptive && points < HANDFUL;
+        if is_handful { self.splat_scale * HANDFUL_DOT * size[0].min(size[1]) as f32 } else { 0.0 }
     }
 
     /// Longest ellipse, semi-major over semi-minor axis.
@@ -160,6 +164,13 @@ impl Reconstruction {
 }
 
 impl Settings {
+    /// These for dots, which are drawn as they are.
+    pub(super) fn of_dots(&self) -> Self {
+        let reconstruction =
+            Reconstruction { adaptive: false, trim: false, steady: false, frames_averaged: 1, ..self.reconstruction };
+        Self { reconstruction, ..self.clone() }
+    }
+
     /// Checks every value against its range.
     ///
     /// # Errors

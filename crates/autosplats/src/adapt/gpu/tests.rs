@@ -1,6 +1,6 @@
 //! The stage on the GPU against that on the CPU, fed with the same surfels.
 
-use super::super::cells::{Cells, Cluster, Level, Row};
+use super::super::cells::{CellRow, Cells, Cluster, Level};
 use super::super::noise::{Noise, Usual};
 use super::super::tests::{Case, K, PROJECTIONS, angle};
 use super::*;
@@ -64,7 +64,7 @@ fn read_cells(gpu: &Gpu, buffers: &AdaptBuffers, size: [u32; 2]) -> Cells {
             let bunches = (0..SLABS / BUNCH).flat_map(move |bunch| &clusters[bunch * cells + first + cell]);
             bunches.take_while(|cluster| cluster[3] > 0.0).map(|&[x, y, z, count]| Cluster { mean: [x, y, z], count })
         };
-        let row = |row: usize| Row::of((row * columns..(row + 1) * columns).map(in_cell));
+        let row = |row: usize| CellRow::of((row * columns..(row + 1) * columns).map(in_cell));
         Level { side_px: side_px as usize, columns, rows: (0..rows).map(row).collect() }
     };
     Cells { levels: levels.iter().filter(|level| level[0] > 0).map(of_level).collect() }
@@ -318,18 +318,27 @@ fn comparison_sees_what_is_wrong() {
     let case = Case::new(&noisy(test_clouds::sphere(20_000), 0.02), PROJECTIONS[0], [240, 180]);
     let right = case.cells();
     assert!(compare_cells(&right, &right).is_ok(), "nothing is wrong yet");
-    let changed = |index: usize, change: fn(Cluster) -> Cluster| {
+    // The clusters of one cell, or of all.
+    let changed = |index: usize, only: Option<[usize; 2]>, change: fn(Cluster) -> Cluster| {
         let mut cells = right.clone();
         let level = &mut cells.levels[index];
-        let cell = |column: usize, row: usize| right.levels[index].clusters([column, row]).map(change);
-        let row = |row: usize| Row::of((0..level.columns).map(|column| cell(column, row)));
+        let cell = |at: [usize; 2]| {
+            let is_changed = only.is_none_or(|only| only == at);
+            let change = move |cluster| if is_changed { change(cluster) } else { cluster };
+            right.levels[index].clusters(at).map(change)
+        };
+        let row = |row: usize| CellRow::of((0..level.columns).map(|column| cell([column, row])));
         level.rows = (0..level.rows.len()).map(row).collect();
         cells
     };
-    let moved = changed(1, |Cluster { mean: [x, y, z], count }| Cluster { mean: [1.001 * x, y, z], count });
+    let moved = changed(1, None, |Cluster { mean: [x, y, z], count }| Cluster { mean: [1.001 * x, y, z], count });
     assert!(compare_cells(&moved, &right).is_err(), "means that are off");
-    let mut fewer = changed(0, |Cluster { mean, count }| Cluster { mean, count: count + 1.0 });
-    assert!(compare_cells(&fewer, &right).is_err(), "points too many");
+    let finest = &right.levels[0];
+    let mut all = (0..finest.columns * finest.rows.len()).map(|cell| [cell % finest.columns, cell / finest.columns]);
+    let filled = all.find(|&cell| !finest.is_empty(cell));
+    let more = changed(0, filled, |Cluster { mean, count }| Cluster { mean, count: count + 1.0 });
+    assert!(compare_cells(&more, &right).is_err(), "a point too many");
+    let mut fewer = right.clone();
     fewer.levels.pop();
     assert!(compare_cells(&fewer, &right).is_err(), "a level too few");
 

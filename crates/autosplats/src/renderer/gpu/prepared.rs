@@ -252,7 +252,7 @@ impl Prepared {
         gpu: &Gpu,
         frame: &wgpu::Buffer,
         (now, identity, format): (Seen, u64, Option<wgpu::TextureFormat>),
-        points: usize,
+        dot_px: f32,
         settings: &Settings,
         shading: &ShadeUniform,
     ) {
@@ -270,7 +270,7 @@ impl Prepared {
             longest: reconstruction.longest(),
             keep_outliers: reconstruction.outlier_expansions.is_none().into(),
             splat_scale: reconstruction.splat_scale,
-            dot_px: reconstruction.dot_px(points, now.view.picture_size()),
+            dot_px,
             outlier_growth: rules.outlier_radius(1.0),
             gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
             first_radius: match reconstruction.engine {

@@ -75,7 +75,7 @@ fn mirrored() -> [Mirrored; 10] {
                 past_focal_px,
                 dot_px,
             },
-            filled up with unused
+            filled up with padding
         ),
         mirrored!("Chunk", ChunkUniform { first, len, values, padding }),
         mirrored!("Arguments", Arguments { points, queries, clear, boxes, last_clear, last_boxes, count, iterations }),
