@@ -101,7 +101,7 @@ impl CpuRenderer {
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
-        let dot_px = if given.is_none() { settings.reconstruction.dot_px(cloud.len(), size) } else { 0.0 };
+        let dot_px = if given.is_none() { settings.reconstruction.dot_px(cloud, size) } else { 0.0 };
         let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
         let settings = of_dots.as_ref().unwrap_or(settings);
         let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };

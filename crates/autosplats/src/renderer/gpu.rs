@@ -218,7 +218,7 @@ impl GpuRenderer {
         settings: &Settings,
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
-        let dot_px = settings.reconstruction.dot_px(cloud.len(), size);
+        let dot_px = settings.reconstruction.dot_px(cloud, size);
         let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
         let settings = of_dots.as_ref().unwrap_or(settings);
         let wanted = Wanted::new(cloud, settings)?;
@@ -304,7 +304,7 @@ impl GpuRenderer {
         settings: &Settings,
     ) -> Result<(), Error> {
         let size = [texture.width(), texture.height()];
-        let dot_px = settings.reconstruction.dot_px(cloud.len(), size);
+        let dot_px = settings.reconstruction.dot_px(cloud, size);
         let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
         let settings = of_dots.as_ref().unwrap_or(settings);
         let wanted = Wanted::new(cloud, settings)?;

@@ -1,5 +1,7 @@
 //! What a picture can be asked to be.
 
+use autosplats_cloud::PointCloud;
+
 use crate::Error;
 use crate::fit::{HANDFUL, LONGEST};
 use crate::search::SearchEngine;
@@ -41,7 +43,7 @@ pub struct Reconstruction {
     /// unless outliers are kept, are discarded. A neighbourhood of one ends at wider gaps ([`gap_factor`](Self::gap_factor)). Points in
     /// a margin around the picture count as neighbours, a twelfth of its shorter side wide, where a device has room for it and
     /// the engine is not [`SearchEngine::SplatCommunication`]. Else a surface without noise or rows is left as it is. A cloud of
-    /// fewer than 64 points is drawn as dots, whole and each frame by itself.
+    /// fewer than 64 finite points is drawn as dots, whole and each frame by itself.
     pub adaptive: bool,
     /// Implementation of the k-radius search.
     pub engine: SearchEngine,
@@ -125,13 +127,16 @@ impl Reconstruction {
         self.averaged() != [1; 2]
     }
 
-    /// Splat radius in pixels of the dots that a cloud of so many points is drawn as in a picture of this size; 0 if it is
-    /// surface.
+    /// Splat radius in pixels of the dots that a cloud is drawn as in a picture of this size; 0 if it is surface.
     // Differs from the paper: a handful tells of no surface, and discs as wide as its points are apart would hide each other and
     // how few they are.
-    pub(super) fn dot_px(&self, points: usize, size: [u32; 2]) -> f32 {
-        let is_handful = self.adaptive && points < HANDFUL;
-        if is_handful { self.splat_scale * HANDFUL_DOT * size[0].min(size[1]) as f32 } else { 0.0 }
+    pub(super) fn dot_px(&self, cloud: &PointCloud, size: [u32; 2]) -> f32 {
+        let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
+        if self.adaptive && finite.take(HANDFUL).count() < HANDFUL {
+            self.splat_scale * HANDFUL_DOT * size[0].min(size[1]) as f32
+        } else {
+            0.0
+        }
     }
 
     /// Longest ellipse, semi-major over semi-minor axis.

@@ -422,6 +422,12 @@ fn a_handful_of_points_is_dots() {
         assert!(off < 3.0, "{off} pixels from point {point}");
     });
     assert!(covered.iter().all(|&pixels| (4..20).contains(&pixels)), "pixels of each: {covered:?}");
+    let nowhere = PointCloud::new(DVec3::ZERO, [&places[..], &[[f32::NAN; 3]; 100]].concat());
+    let picture = host.image.clone();
+    assert!(
+        *cpu.render(&nowhere, &camera, SIZE, &settings).expect("a picture").image == picture,
+        "points that are nowhere"
+    );
     if let Some(mut gpu) = gpu() {
         compare(&mut gpu, &cloud, &camera, SIZE, &settings, "a handful");
     }
