@@ -70,7 +70,7 @@ fn columns_that_nothing_has() {
 fn messages_name_the_inputs() {
     let folder = Folder::with_sphere();
     folder.write("one.ply", &common::points_ply(&["1 2 3"]));
-    folder.fail(&["render", "one.ply", "-o", "out.png"], 3, &["one.ply: one point"]);
+    folder.fail(&["render", "one.ply", "-k", "10", "-o", "out.png"], 3, &["one.ply: one point"]);
     let away = ["--eye", "0,0,9", "--look-at", "0,0,99"];
     let both = ["render", "sphere.ply", "one.ply", "-o", "out.png", "--quiet"];
     folder.fail(&[&both[..], &away].concat(), 3, &["sphere.ply, one.ply: nothing to show"]);
