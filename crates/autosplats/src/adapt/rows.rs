@@ -25,7 +25,7 @@ pub(super) const ROW: f32 = 12.0;
 pub(super) const AREA: f32 = 0.25;
 /// and has to be that part too in a ball whose radius is this many distances between rows: of three wires it is 0.18 there, of
 /// four rows or the border of many 0.33. That ball also holds more points by more than its radius is larger, as areas grow with
-/// its square, but a curve that the first ball held whole does not grow at all.
+/// its square, but a curve that the first ball held whole by less.
 pub(super) const BEYOND: f32 = 4.0;
 /// That radius over the first ball's, at least and at most.
 pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];

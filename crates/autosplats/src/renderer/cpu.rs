@@ -1,5 +1,6 @@
 //! The frame on the CPU.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
@@ -101,9 +102,11 @@ impl CpuRenderer {
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let picture = check(cloud, camera, size, settings)?;
-        let dot_px = if given.is_none() { settings.reconstruction.dot_px(cloud, size) } else { 0.0 };
-        let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
-        let settings = of_dots.as_ref().unwrap_or(settings);
+        let (settings, dot_px) = match given {
+            Some(_) => (Cow::Borrowed(settings), 0.0),
+            None => settings.of_cloud(cloud, size),
+        };
+        let settings = &*settings;
         let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };
         let view = picture.with_margin(margin);
         if given.is_none() {

@@ -218,9 +218,8 @@ impl GpuRenderer {
         settings: &Settings,
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
-        let dot_px = settings.reconstruction.dot_px(cloud, size);
-        let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
-        let settings = of_dots.as_ref().unwrap_or(settings);
+        let (settings, dot_px) = settings.of_cloud(cloud, size);
+        let settings = &*settings;
         let wanted = Wanted::new(cloud, settings)?;
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| go_on())?;
@@ -304,9 +303,8 @@ impl GpuRenderer {
         settings: &Settings,
     ) -> Result<(), Error> {
         let size = [texture.width(), texture.height()];
-        let dot_px = settings.reconstruction.dot_px(cloud, size);
-        let of_dots = (dot_px > 0.0).then(|| settings.of_dots());
-        let settings = of_dots.as_ref().unwrap_or(settings);
+        let (settings, dot_px) = settings.of_cloud(cloud, size);
+        let settings = &*settings;
         let wanted = Wanted::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
         let screen = view.with_margin(self.prepare(size, &wanted, settings)?);

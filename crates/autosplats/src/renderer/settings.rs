@@ -1,5 +1,7 @@
 //! What a picture can be asked to be.
 
+use std::borrow::Cow;
+
 use autosplats_cloud::PointCloud;
 
 use crate::Error;
@@ -127,18 +129,6 @@ impl Reconstruction {
         self.averaged() != [1; 2]
     }
 
-    /// Splat radius in pixels of the dots that a cloud is drawn as in a picture of this size; 0 if it is surface.
-    // Differs from the paper: a handful tells of no surface, and discs as wide as its points are apart would hide each other and
-    // how few they are.
-    pub(super) fn dot_px(&self, cloud: &PointCloud, size: [u32; 2]) -> f32 {
-        let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
-        if self.adaptive && finite.take(HANDFUL).count() < HANDFUL {
-            self.splat_scale * HANDFUL_DOT * size[0].min(size[1]) as f32
-        } else {
-            0.0
-        }
-    }
-
     /// Longest ellipse, semi-major over semi-minor axis.
     pub(super) fn longest(&self) -> f32 {
         if self.ellipses { LONGEST } else { 1.0 }
@@ -169,11 +159,20 @@ impl Reconstruction {
 }
 
 impl Settings {
-    /// These for dots, which are drawn as they are.
-    pub(super) fn of_dots(&self) -> Self {
+    /// What a cloud is drawn with in a picture of this size, and the splat radius in pixels of the dots that it is; 0 if it is
+    /// surface. Dots are drawn as they are.
+    // Differs from the paper: a handful tells of no surface, and discs as wide as its points are apart would hide each other and
+    // how few they are.
+    pub(super) fn of_cloud(&self, cloud: &PointCloud, size: [u32; 2]) -> (Cow<'_, Self>, f32) {
+        let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
+        let Reconstruction { adaptive, splat_scale, .. } = self.reconstruction;
+        if !adaptive || finite.take(HANDFUL).count() == HANDFUL {
+            return (Cow::Borrowed(self), 0.0);
+        }
         let reconstruction =
             Reconstruction { adaptive: false, trim: false, steady: false, frames_averaged: 1, ..self.reconstruction };
-        Self { reconstruction, ..self.clone() }
+        let dot_px = splat_scale * HANDFUL_DOT * size[0].min(size[1]) as f32;
+        (Cow::Owned(Self { reconstruction, ..self.clone() }), dot_px)
     }
 
     /// Checks every value against its range.
