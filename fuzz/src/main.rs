@@ -12,10 +12,10 @@
 mod meter;
 mod mutate;
 #[allow(clippy::unwrap_used, reason = "it was written for tests")]
-#[path = "../../crates/autosplats-cloud/tests/common/recording.rs"]
+#[path = "../../crates/autosplats-cloud/tests/it/common/recording.rs"]
 mod recording;
 #[allow(dead_code, reason = "tests use the rest")]
-#[path = "../../crates/autosplats-cloud/tests/common/ros.rs"]
+#[path = "../../crates/autosplats-cloud/tests/it/common/ros.rs"]
 mod ros;
 mod seeds;
 mod target;

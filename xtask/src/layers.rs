@@ -1,35 +1,276 @@
-//! The rule between the renderer's stages: a stage may import what comes before it in the frame, never what comes after.
+//! The rules of import, for every crate: a room (a folder or file directly below `src`) uses rooms before it, and no circle
+//! closes. Names are resolved: `crate::Name` counts as the room that `Name` is re-exported from, and so does `super::`.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{read_dir, read_to_string};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, ensure};
+use syn::visit::{self, Visit};
 
-/// The stages in the order of a frame; the renderer uses them all. Normals of whole clouds are no stage, but stand on the
-/// search and the fit.
-const ORDER: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "splat", "shade", "renderer"];
+/// The stages of `autosplats` in the order of a frame. Its other rooms come before all stages.
+const STAGES: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "splat", "shade", "renderer"];
 
-/// Checks every Rust file below `source`, the renderer's `src` folder.
-pub(crate) fn check(source: &Path) -> Result<()> {
-    let mut files = Vec::new();
-    collect(source, &mut files)?;
-    ensure!(!files.is_empty(), "there is no Rust file in {}", source.display());
+/// The crates whose folders are checked, and the circles between rooms that are known and to be cut.
+const CRATES: [(&str, &[&[&str]]); 8] = [
+    ("crates/autosplats", &[]),
+    ("crates/autosplats-cloud", &[]),
+    ("crates/autosplats-film", &[]),
+    ("crates/autosplats-viewer", &[]),
+    ("crates/autosplats-cli", &[]),
+    ("quality", &[]),
+    ("fuzz", &[]),
+    ("xtask", &[]),
+];
+
+/// Which room uses which, with one file as the witness of each arrow.
+type Arrows = BTreeMap<(String, String), PathBuf>;
+
+/// Checks every crate below `root`.
+pub(crate) fn check(root: &Path) -> Result<()> {
     let mut wrong = Vec::new();
-    for path in &files {
-        let room = path.strip_prefix(source)?.components().next().context("a file has a name")?;
-        let room = room.as_os_str().to_string_lossy().trim_end_matches(".rs").to_owned();
-        if room == "lib" {
-            continue;
+    for (name, known) in CRATES {
+        let house = House::read(&root.join(name).join("src"))?;
+        let arrows = house.arrows();
+        if name == "crates/autosplats" {
+            wrong.extend(against_the_frame(&arrows));
         }
-        let text = read_to_string(path).with_context(|| path.display().to_string())?;
-        wrong.extend(forbidden(&room, &text).map(|import| format!("{} imports {import}", path.display())));
+        let circles = circles(&arrows);
+        let known: Vec<Vec<&str>> = known.iter().map(|circle| circle.to_vec()).collect();
+        for circle in &circles {
+            if !known.iter().any(|known| known == circle) {
+                let files = arrows
+                    .iter()
+                    .filter(|((from, to), _)| [from, to].iter().all(|room| circle.contains(&room.as_str())));
+                let files: Vec<_> =
+                    files.map(|((from, to), file)| format!("{from} -> {to} ({})", file.display())).collect();
+                wrong.push(format!("{name}: a circle of rooms {}:\n    {}", circle.join(", "), files.join("\n    ")));
+            }
+        }
+        for known in known.iter().filter(|known| !circles.iter().any(|circle| circle == *known)) {
+            wrong.push(format!("{name}: the circle {} is cut: take it off the list in xtask", known.join(", ")));
+        }
+        println!("{name}: {} files, {} arrows between rooms", house.files.len(), arrows.len());
     }
-    ensure!(wrong.is_empty(), "against the order {}:\n  {}", ORDER.join(" < "), wrong.join("\n  "));
-    println!("{} files", files.len());
+    ensure!(wrong.is_empty(), "imports against the rules:\n  {}", wrong.join("\n  "));
     Ok(())
 }
 
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+/// The arrows of `autosplats` that lead from a stage to a later one, or from what is no stage to a stage.
+fn against_the_frame(arrows: &Arrows) -> Vec<String> {
+    let rank = |name: &str| STAGES.iter().position(|stage| *stage == name);
+    let later = |from: &str, to: &str| rank(to).is_some_and(|to| rank(from).is_none_or(|from| to > from));
+    arrows
+        .iter()
+        .filter(|((from, to), _)| later(from, to))
+        .map(|((from, to), file)| format!("{} ({from}) uses {to}, against {}", file.display(), STAGES.join(" < ")))
+        .collect()
+}
+
+/// The sets of rooms that reach each other, each sorted.
+fn circles(arrows: &Arrows) -> Vec<Vec<&str>> {
+    let mut reached: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (from, to) in arrows.keys() {
+        reached.entry(from).or_default().insert(to);
+        reached.entry(to).or_default();
+    }
+    let rooms: Vec<&str> = reached.keys().copied().collect();
+    // Warshall: rooms are few.
+    for &middle in &rooms {
+        let beyond = reached[middle].clone();
+        for &from in &rooms {
+            if reached[from].contains(middle) {
+                reached.get_mut(from).expect("every room is a key").extend(&beyond);
+            }
+        }
+    }
+    let mut circles: Vec<Vec<&str>> = Vec::new();
+    for &room in &rooms {
+        let circle: Vec<&str> = rooms
+            .iter()
+            .copied()
+            .filter(|other| reached[room].contains(other) && reached[other].contains(room))
+            .collect();
+        if circle.len() > 1 && !circles.contains(&circle) {
+            circles.push(circle);
+        }
+    }
+    circles
+}
+
+/// The path of a module from the crate's root.
+type Module = Vec<String>;
+
+/// A crate's modules, with what each uses and hands on.
+struct House {
+    /// File, module, and the paths named in it.
+    files: Vec<(PathBuf, Module, Vec<Vec<String>>)>,
+    /// What a module calls by a name that is defined elsewhere: `use` lines, those that hand a name on among them.
+    aliases: BTreeMap<(Module, String), Vec<String>>,
+    modules: BTreeSet<Module>,
+}
+
+impl House {
+    fn read(source: &Path) -> Result<Self> {
+        let mut paths = Vec::new();
+        collect(source, &mut paths)?;
+        ensure!(!paths.is_empty(), "there is no Rust file in {}", source.display());
+        let mut house = Self { files: Vec::new(), aliases: BTreeMap::new(), modules: BTreeSet::from([Vec::new()]) };
+        for path in paths {
+            let module = module_of(path.strip_prefix(source)?);
+            let text = read_to_string(&path).with_context(|| path.display().to_string())?;
+            house.add(path, module, &text)?;
+        }
+        Ok(house)
+    }
+
+    fn add(&mut self, path: PathBuf, module: Module, text: &str) -> Result<()> {
+        let file = syn::parse_file(text).with_context(|| path.display().to_string())?;
+        let mut named = Named::default();
+        named.visit_file(&file);
+        for (name, path) in named.aliases {
+            self.aliases.insert((module.clone(), name), path);
+        }
+        self.modules.insert(module.clone());
+        self.files.push((path, module, named.paths));
+        Ok(())
+    }
+
+    fn arrows(&self) -> Arrows {
+        let mut arrows = Arrows::new();
+        for (file, module, paths) in &self.files {
+            // The crate's root holds the rooms; it is none of them.
+            let Some(from) = module.first() else { continue };
+            for path in paths {
+                if let Some(to) = self.resolve(module, path, 0).and_then(|module| module.first().cloned())
+                    && to != *from
+                {
+                    arrows.entry((from.clone(), to)).or_insert_with(|| file.clone());
+                }
+            }
+        }
+        arrows
+    }
+
+    /// The module in which the thing at `path`, as written in `module`, is defined; `None` for other crates' things.
+    fn resolve(&self, module: &Module, path: &[String], depth: usize) -> Option<Module> {
+        // A name that is handed on in a circle is no name.
+        if depth > 16 {
+            return None;
+        }
+        let mut at = module.clone();
+        let mut rest = path;
+        match path.first()?.as_str() {
+            "crate" => at.clear(),
+            "self" => {}
+            "super" => {
+                at.pop()?;
+            }
+            first => {
+                let child = [&at[..], &[first.to_owned()]].concat();
+                if self.modules.contains(&child) {
+                    at = child;
+                } else {
+                    let target = self.aliases.get(&(at.clone(), first.to_owned()))?;
+                    // `use name::…` of another crate is an alias of itself.
+                    if target.first().is_some_and(|start| start == first) {
+                        return None;
+                    }
+                    let target = [&target[..], &path[1..]].concat();
+                    return self.resolve(module, &target, depth + 1);
+                }
+            }
+        }
+        rest = &rest[1..];
+        while let Some(name) = rest.first() {
+            if name == "super" {
+                at.pop()?;
+            } else {
+                let child = [&at[..], std::slice::from_ref(name)].concat();
+                if self.modules.contains(&child) {
+                    at = child;
+                } else {
+                    return match self.aliases.get(&(at.clone(), name.clone())) {
+                        Some(target) => self.resolve(&at, &[&target[..], &rest[1..]].concat(), depth + 1).or(Some(at)),
+                        None => Some(at),
+                    };
+                }
+            }
+            rest = &rest[1..];
+        }
+        Some(at)
+    }
+}
+
+/// The module that a file, relative to `src`, is.
+fn module_of(file: &Path) -> Module {
+    let mut module: Module =
+        file.with_extension("").components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+    if module.last().is_some_and(|name| ["mod", "lib", "main"].contains(&name.as_str())) {
+        module.pop();
+    }
+    module
+}
+
+/// Every path of two names and more that a file writes down, and what its `use` lines call by which name.
+#[derive(Default)]
+struct Named {
+    paths: Vec<Vec<String>>,
+    aliases: Vec<(String, Vec<String>)>,
+}
+
+impl Named {
+    fn tree(&mut self, before: &[String], tree: &syn::UseTree) {
+        match tree {
+            syn::UseTree::Path(path) => self.tree(&[before, &[path.ident.to_string()]].concat(), &path.tree),
+            syn::UseTree::Name(name) if name.ident == "self" => self.alias(before.last().cloned(), before.to_vec()),
+            syn::UseTree::Name(name) => {
+                let name = name.ident.to_string();
+                self.alias(Some(name.clone()), [before, &[name]].concat());
+            }
+            syn::UseTree::Rename(name) => {
+                self.alias(Some(name.rename.to_string()), [before, &[name.ident.to_string()]].concat());
+            }
+            syn::UseTree::Glob(_) => self.paths.push(before.to_vec()),
+            syn::UseTree::Group(group) => group.items.iter().for_each(|tree| self.tree(before, tree)),
+        }
+    }
+
+    fn alias(&mut self, name: Option<String>, path: Vec<String>) {
+        self.aliases.extend(name.map(|name| (name, path.clone())));
+        self.paths.push(path);
+    }
+}
+
+impl<'ast> Visit<'ast> for Named {
+    fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
+        self.tree(&[], &item.tree);
+    }
+
+    /// What a macro is given is text to the parser.
+    fn visit_macro(&mut self, item: &'ast syn::Macro) {
+        let text: String = item.tokens.to_string().replace(" :: ", "::");
+        let in_path = |character: char| character.is_alphanumeric() || "_:".contains(character);
+        for path in text.split(|character| !in_path(character)) {
+            let names: Vec<String> = path.split("::").map(str::to_owned).collect();
+            if names.len() > 1 && names.iter().all(|name| !name.is_empty() && !name.contains(':')) {
+                self.paths.push(names);
+            }
+        }
+        visit::visit_macro(self, item);
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        let names: Vec<String> = path.segments.iter().map(|segment| segment.ident.to_string()).collect();
+        if names.len() > 1 && path.leading_colon.is_none() {
+            self.paths.push(names);
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+/// The Rust files below a folder, in order.
+pub(crate) fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     for entry in read_dir(folder).with_context(|| folder.display().to_string())? {
         let path = entry?.path();
         if path.is_dir() {
@@ -42,65 +283,64 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// The stages that a file of `room` names although they come after it. What is no stage comes before all.
-fn forbidden(room: &str, text: &str) -> impl Iterator<Item = String> {
-    let rank = |name: &str| ORDER.iter().position(|stage| *stage == name);
-    let own = rank(room);
-    imported(text).into_iter().filter(move |name| rank(name).is_some_and(|stage| own.is_none_or(|own| stage > own)))
-}
-
-/// The modules named right after each `crate::`, in comments not.
-fn imported(text: &str) -> Vec<String> {
-    let code: String =
-        text.lines().filter(|line| !line.trim_start().starts_with("//")).map(|line| format!("{line}\n")).collect();
-    let word = |text: &str| text.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect::<String>();
-    let mut names = Vec::new();
-    for (at, prefix) in code.match_indices("crate::") {
-        let path = &code[at + prefix.len()..];
-        let Some(group) = path.strip_prefix('{') else {
-            names.push(word(path));
-            continue;
-        };
-        // The first words between the commas of the outermost braces.
-        let mut depth = 0;
-        let mut start = 0;
-        for (position, character) in group.char_indices() {
-            match character {
-                '{' => depth += 1,
-                '}' if depth > 0 => depth -= 1,
-                ',' | '}' if depth == 0 => {
-                    names.push(word(group[start..position].trim_start()));
-                    start = position + 1;
-                    if character == '}' {
-                        break;
-                    }
-                }
-                _ => {}
-            }
-        }
-    }
-    names.retain(|name| !name.is_empty());
-    names
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn arrows(files: &[(&str, &str)]) -> Vec<String> {
+        let mut house = House { files: Vec::new(), aliases: BTreeMap::new(), modules: BTreeSet::from([Vec::new()]) };
+        for (file, text) in files {
+            house.add(PathBuf::from(file), module_of(Path::new(file)), text).expect("Rust");
+        }
+        house.arrows().into_keys().map(|(from, to)| format!("{from} {to}")).collect()
+    }
+
     #[test]
-    fn finds_every_form_of_import() {
-        let text = "use crate::Error;\nuse crate::fit::{Surfels, Axes};\nuse crate::{\n    splat::{GBuffer, cpu::{A, B}},\n    \
-                    project,\n};\n// use crate::shade\nlet x = crate::search::f();\n";
-        assert_eq!(imported(text), ["Error", "fit", "splat", "project", "search"], "and none in comments");
+    fn every_form_of_import_is_an_arrow() {
+        let rooms =
+            [("project/mod.rs", ""), ("search.rs", ""), ("splat/cpu.rs", "pub fn f() {}"), ("splat/mod.rs", "")];
+        let found = |text: &str| arrows(&[&rooms[..], &[("fit/mod.rs", "pub mod a;"), ("fit/a.rs", text)]].concat());
+        assert_eq!(found("use crate::splat::{GBuffer, cpu::{A, B}};"), ["fit splat"], "a group");
+        assert_eq!(found("use super::super::search::A;"), ["fit search"], "by the parent of the parent");
+        assert_eq!(found("fn f() { crate::splat::cpu::f() }"), ["fit splat"], "a call");
+        assert_eq!(found("fn f(a: &crate::project::A) {}"), ["fit project"], "a type");
+        assert_eq!(found("use crate::{splat as other}; fn f() { other::g() }"), ["fit splat"], "another name");
+        assert_eq!(found("use crate::search::*;"), ["fit search"], "a glob");
+        assert_eq!(found("fn f() { assert!(g(crate::splat::cpu::f()), \"{}\", 1) }"), ["fit splat"], "in a macro");
+        assert_eq!(found("// use crate::splat::A;\nuse std::search::B; use super::C;"), [""; 0], "none of these");
+    }
+
+    #[test]
+    fn names_handed_on_count_as_where_they_are_from() {
+        let files = [
+            ("lib.rs", "pub use renderer::MAX_SIDE; pub use fit::{Surfels as Discs, inner};"),
+            ("renderer/mod.rs", "mod settings; pub use settings::MAX_SIDE;"),
+            ("renderer/settings.rs", "pub const MAX_SIDE: u32 = 1;"),
+            ("fit/mod.rs", "pub mod inner;"),
+            ("fit/inner.rs", ""),
+            ("error.rs", "use crate::MAX_SIDE;"),
+            ("shade.rs", "use crate::Discs;"),
+            ("splat.rs", "fn f() { crate::inner::g() }"),
+        ];
+        assert_eq!(arrows(&files), ["error renderer", "shade fit", "splat fit"], "through the root");
+    }
+
+    #[test]
+    fn circles_are_found_whole() {
+        let arrow = |from: &str, to: &str| ((from.to_owned(), to.to_owned()), PathBuf::new());
+        let arrows =
+            Arrows::from([arrow("a", "b"), arrow("b", "c"), arrow("c", "a"), arrow("c", "d"), arrow("d", "e")]);
+        assert_eq!(circles(&arrows), [["a", "b", "c"]], "and d and e are in none");
     }
 
     #[test]
     fn later_stages_are_forbidden() {
-        let text = "use crate::project::A;\nuse crate::splat::B;";
-        let wrong = |room| forbidden(room, text).collect::<Vec<_>>();
-        assert_eq!(wrong("fit"), ["splat"], "fit comes before splat");
-        assert_eq!(wrong("normals"), ["splat"], "normals need no picture");
-        assert_eq!(wrong("shade"), Vec::<String>::new(), "shade comes after both");
-        assert_eq!(wrong("camera"), ["project", "splat"], "what is no stage uses none");
+        let arrow = |from: &str, to: &str| ((from.to_owned(), to.to_owned()), PathBuf::from(from));
+        let wrong = |from, to| !against_the_frame(&Arrows::from([arrow(from, to)])).is_empty();
+        assert!(wrong("fit", "splat"), "fit comes before splat");
+        assert!(wrong("normals", "splat"), "normals need no picture");
+        assert!(wrong("camera", "project"), "what is no stage uses none");
+        assert!(!wrong("shade", "splat"), "shade comes after splat");
+        assert!(!wrong("shade", "camera"), "what is no stage comes before all");
     }
 }

@@ -2,7 +2,9 @@
 
 mod formats;
 mod layers;
+mod lengths;
 mod peers;
+mod pictures;
 
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -19,7 +21,11 @@ usage: cargo xtask test               format, lints, build, tests, a minute of b
        cargo xtask quality [OPTIONS]  docs/QUALITY.md, from pictures held against the exact surface, in some ten minutes;
                                   --quick and --only NAME take some of them, --out DIR writes elsewhere
        cargo xtask formats            docs/FORMATS.md, from what the program says of its formats and of the test data;
-                                  with --check only whether it is what this build makes";
+                                  with --check only whether it is what this build makes
+       cargo xtask pictures OUT [--program PATH]
+                                  a fixed list of pictures, layers and normals in the empty folder OUT, with a hash of each
+       cargo xtask pictures --compare BEFORE AFTER
+                                  whether two such folders hold the same";
 
 /// What everything is built with, so that what Zenoh needs is built once, and nothing beside it twice.
 const FEATURES: [&str; 2] = ["--features", "autosplats-cli/zenoh"];
@@ -33,6 +39,17 @@ fn main() -> ExitCode {
         ["quality", options @ ..] => root().and_then(|root| quality(root, options)),
         ["formats"] => root().and_then(|root| formats::run(root, false)),
         ["formats", "--check"] => root().and_then(|root| formats::run(root, true)),
+        ["pictures", "--compare", before, after] => {
+            root().and_then(|root| pictures::run(root, &pictures::Task::Compare([before.as_ref(), after.as_ref()])))
+        }
+        ["pictures", out, rest @ ..] if !out.starts_with('-') => root().and_then(|root| {
+            let program = match rest {
+                [] => None,
+                ["--program", program] => Some(Path::new(program)),
+                _ => bail!("pictures takes no {}\n{USAGE}", rest.join(" ")),
+            };
+            pictures::run(root, &pictures::Task::Render { out: out.as_ref(), program })
+        }),
         [] | ["help" | "-h" | "--help"] => {
             println!("{USAGE}");
             Ok(())
@@ -81,7 +98,8 @@ fn test(root: &Path) -> Result<()> {
         python.borrow().as_ref().err().into_iter().for_each(left_out);
         Ok(())
     })?;
-    step("stages import in one direction", &|| layers::check(&root.join("crates/autosplats/src")))?;
+    step("imports", &|| layers::check(root))?;
+    step("lengths of files, comments and documents", &|| lengths::check(root))?;
     step("autosplats-cloud never reaches wgpu", &|| check_dependencies(root))?;
     step("format", &|| {
         component("fmt", "rustfmt")?;

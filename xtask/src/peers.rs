@@ -79,10 +79,13 @@ fn quiet(command: &mut Command) -> Result<(), String> {
 /// The tests that hear and read these programs; by `which` all of them, or those alone that need a Python.
 pub(crate) fn test(root: &Path, python: &Path, which: &[&str]) -> Result<()> {
     let mut command = cargo_command(root);
-    command
-        .args(["test", "--locked", "--workspace"])
-        .args(FEATURES)
-        .args(["--test", "remote", "--test", "interop", "--"]);
+    command.args(["test", "--locked", "--workspace"]).args(FEATURES).args([
+        "--test",
+        "it",
+        "--",
+        "remote::",
+        "interop::",
+    ]);
     command.args(which).args(["--skip", NEEDS_MULTICAST]);
     run(command.env("AUTOSPLATS_PYTHON", python))
 }

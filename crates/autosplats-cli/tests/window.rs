@@ -5,6 +5,7 @@
 #![cfg(all(target_os = "linux", feature = "viewer"))]
 #![allow(missing_docs, reason = "a test")]
 
+#[path = "it/common/mod.rs"]
 mod common;
 mod screen;
 

@@ -10,7 +10,7 @@
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot run should say so and stop")]
 
 #[allow(dead_code, reason = "tests use the rest")]
-#[path = "../tests/common/ros.rs"]
+#[path = "../tests/it/common/ros.rs"]
 mod ros;
 
 use std::{

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+#[path = "it/common/mod.rs"]
 mod common;
 
 use autosplats_cloud::{FieldValues, PointCloud, glam::DVec3, write};

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
+#[path = "it/common/mod.rs"]
 mod common;
 
 use std::{

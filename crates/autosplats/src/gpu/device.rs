@@ -42,7 +42,7 @@ pub fn adapters() -> Vec<AdapterSummary> {
 
 fn summary(info: wgpu::AdapterInfo, features: wgpu::Features, limits: &wgpu::Limits) -> AdapterSummary {
     AdapterSummary {
-        software: info.device_type == wgpu::DeviceType::Cpu,
+        software: is_software(&info),
         driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
         name: info.name,
         backend: format!("{:?}", info.backend),
@@ -51,6 +51,11 @@ fn summary(info: wgpu::AdapterInfo, features: wgpu::Features, limits: &wgpu::Lim
         timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
         points_per_binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size) / 12,
     }
+}
+
+/// Whether the device is a program on the CPU.
+fn is_software(info: &wgpu::AdapterInfo) -> bool {
+    info.device_type == wgpu::DeviceType::Cpu
 }
 
 /// What one 64-bit atomic minimum needs.
@@ -88,6 +93,19 @@ impl Gpu {
                     .into(),
             )
         })?;
+        Self::open(&adapter)
+    }
+
+    /// The best device that is hardware, or `None`. A software device is never opened: its adapter already says what it is.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device does not start.
+    pub(crate) fn hardware() -> Result<Option<Self>, Error> {
+        let adapter = usable_adapters().into_iter().next();
+        adapter.filter(|adapter| !is_software(&adapter.get_info())).map(|adapter| Self::open(&adapter)).transpose()
+    }
+
+    fn open(adapter: &wgpu::Adapter) -> Result<Self, Error> {
         let optional = INT64_ATOMICS | wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::FLOAT32_BLENDABLE;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("autosplats"),
@@ -118,7 +136,7 @@ impl Gpu {
 
     /// Whether the device is a program on the CPU.
     pub(crate) fn is_software(&self) -> bool {
-        self.device.adapter_info().device_type == wgpu::DeviceType::Cpu
+        is_software(&self.device.adapter_info())
     }
 
     /// Whether depth and index of a point fit one atomic operation.
@@ -154,11 +172,13 @@ impl Gpu {
     }
 }
 
-/// The device to test on. Where there is none tests say that they check nothing, and where `CI` is set they fail.
+/// The device to test on, opened once for all tests of the process. Without a device a test says that it checks nothing;
+/// where `CI` is set, it fails.
 #[cfg(test)]
 pub(crate) fn test_gpu() -> Option<Gpu> {
-    match Gpu::new() {
-        Ok(gpu) => Some(gpu),
+    static GPU: std::sync::LazyLock<Result<Gpu, Error>> = std::sync::LazyLock::new(Gpu::new);
+    match &*GPU {
+        Ok(gpu) => Some(gpu.clone()),
         Err(error) => {
             assert!(std::env::var_os("CI").is_none(), "{error}");
             eprintln!("nothing checked: {error}");

@@ -146,9 +146,9 @@ impl Renderer {
         match backend {
             Backend::Cpu => Ok(Self::new()),
             Backend::Gpu => Gpu::new().and_then(on),
-            Backend::Auto => match Gpu::new() {
-                // A driver that does not do what it should leaves the CPU.
-                Ok(gpu) if !gpu.is_software() => on(gpu).or_else(|_: Error| Ok(Self::new())),
+            Backend::Auto => match Gpu::hardware() {
+                // If the driver of a GPU fails, the CPU renders.
+                Ok(Some(gpu)) => on(gpu).or_else(|_: Error| Ok(Self::new())),
                 _ => Ok(Self::new()),
             },
         }

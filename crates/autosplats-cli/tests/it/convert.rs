@@ -1,0 +1,81 @@
+//! `convert` and `demo`.
+
+use crate::common::{Folder, SPHERE_POINTS};
+
+/// The number of points that a PLY file claims.
+fn points(file: &[u8]) -> usize {
+    let text = String::from_utf8_lossy(file);
+    let line = text.lines().find_map(|line| line.strip_prefix("element vertex "));
+    line.expect("a PLY file counts its points").parse().expect("the count is a number")
+}
+
+#[test]
+fn a_converted_cloud_renders_the_same() {
+    let folder = Folder::with_sphere();
+    folder.succeed(&["convert", "sphere.ply", "copy.ply"]);
+    let copy = folder.read("copy.ply");
+    assert!(copy.starts_with(b"ply\nformat binary_little_endian 1.0\n"), "it is a binary PLY file");
+    assert_eq!(points(&copy), SPHERE_POINTS, "all points are in it");
+    for (input, output) in [("sphere.ply", "a.png"), ("copy.ply", "b.png")] {
+        folder.succeed(&["render", input, "-o", output, "--size", "160x120", "--color", "intensity"]);
+    }
+    assert_eq!(folder.read("a.png"), folder.read("b.png"), "nothing was lost");
+}
+
+#[test]
+fn an_existing_file_is_kept_unless_forced() {
+    let folder = Folder::with_sphere();
+    folder.write("out.ply", "precious");
+    folder.fail(&["convert", "sphere.ply", "out.ply"], 4, &["--force"]);
+    assert_eq!(folder.read("out.ply"), b"precious", "it was not touched");
+    folder.succeed(&["convert", "sphere.ply", "out.ply", "--force"]);
+    assert_eq!(points(&folder.read("out.ply")), SPHERE_POINTS, "now it was");
+}
+
+#[test]
+fn several_inputs_become_one_file() {
+    let folder = Folder::with_sphere();
+    folder.write("aside.txt", "1 0 0 3  0 1 0 0  0 0 1 0");
+    let arguments = ["convert", "sphere.ply", "scene:figure:5K", "all.ply", "--pose", "sphere.ply=aside.txt"];
+    let outcome = folder.succeed(&[&arguments[..], &["--quiet"]].concat());
+    assert_eq!([outcome.stdout, outcome.stderr], ["", ""], "quietly");
+    assert_eq!(points(&folder.read("all.ply")), SPHERE_POINTS + 5000, "all points are in it");
+}
+
+#[test]
+fn points_are_taken_out_in_order() {
+    let folder = Folder::with_sphere();
+    let count = |options: &[&str]| {
+        folder.succeed(&[&["convert", "sphere.ply", "out.ply", "--force"], options].concat());
+        points(&folder.read("out.ply"))
+    };
+    let half = count(&["--bounds", "-2,-2,0,2,2,2"]);
+    assert!((half as f64 - SPHERE_POINTS as f64 / 2.0).abs() < 100.0, "{half} in the upper half of the sphere");
+    assert_eq!(count(&["--every", "4"]), SPHERE_POINTS / 4, "a quarter");
+    let thin = count(&["--voxel", "0.25"]);
+    assert!((200..500).contains(&thin), "{thin} cubes of a quarter radius touch the sphere: about 1.5 x 4 pi x 16");
+    assert_eq!(count(&["--noise", "0.01", "--every", "2"]), SPHERE_POINTS / 2, "shaken, but all there");
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--bounds", "5,5,5,6,6,6"], 3, &["none of the 6000", "--bounds"]);
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--bounds", "1,1,1,0,0,0"], 2, &["lower"]);
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--voxel", "-1"], 2, &["above 0"]);
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--every", "0"], 2, &["above 0"]);
+}
+
+#[test]
+fn a_mesh_is_strewn_with_points() {
+    let folder = Folder::with_sphere();
+    folder.write("square.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n");
+    folder.succeed(&["convert", "square.obj", "out.ply", "--sample", "5K"]);
+    assert_eq!(points(&folder.read("out.ply")), 5000, "as many as asked for");
+    folder.fail(&["convert", "sphere.ply", "b.ply", "--sample", "5K"], 3, &["sphere.ply", "no surface"]);
+    folder.fail(&["convert", "scene:statue", "b.ply", "--sample", "5K"], 2, &["scene:statue:1M"]);
+    folder.fail(&["convert", "square.obj", "b.ply", "--sample", "0"], 2, &["number of points"]);
+}
+
+#[test]
+fn only_known_formats_are_written() {
+    let folder = Folder::with_sphere();
+    folder.fail(&["convert", "sphere.ply", "out.doc"], 2, &["out.doc", ".ply"]);
+    folder.fail(&["convert", "sphere.ply"], 2, &["sphere.ply", "the file to write is missing"]);
+    folder.fail(&["convert", "missing.las", "out.ply"], 3, &["missing.las"]);
+}
