@@ -1,4 +1,4 @@
-// Empties what the frame before left: keys, density cells, counters and sixteenths.
+// Empties keys, density cells, counters and sixteenths for a new frame.
 //
 // Writes: keys, density, counters, sixteenths.
 

@@ -1,4 +1,4 @@
-// Lists the owners of slots in cell order, and where each cell begins.
+// Lists the owners of slots in cell order, and stores the start of each cell.
 //
 // Reads: keys, counters, block_sums. Writes: source, pixels, cell_start.
 

@@ -1,5 +1,5 @@
-// Counts the screen points of each block of 2048 slots in cell order, and of each density cell, whose nearest depth it
-// finds too [Paper, §5.1].
+// Counts the screen points of each block of 2048 slots in cell order. Counts the screen points of each density cell
+// and finds its nearest depth [Paper, §5.1].
 //
 // Reads: keys, counters. Writes: block_sums, density.
 

@@ -16,22 +16,22 @@ use crate::camera::View;
 const CHUNK: usize = 16 * 1024;
 /// Points transformed at a time.
 const LANES: usize = 16;
-/// Key of a slot that no point projects to.
+/// Key of a slot that no point falls into.
 const EMPTY: u64 = u64::MAX;
-/// A strip is this many mean distances between screen points high: with one strip more above and below, sixteen points
-/// of a strip see their ten nearest neighbours among about a hundred candidates.
+/// Height of a strip in mean distances between screen points. Sixteen points of a strip then find their ten nearest
+/// neighbours among about a hundred candidates, in this strip and the ones above and below.
 pub(super) const STRIP_SPACINGS: f32 = 3.0;
-/// The second point of a pixel is no further behind the first than this many pixels are wide: a surface seen at 83° from its
-/// normal. What is further away is another surface, hidden most of the time.
-// Differs from the paper: it keeps the nearest point of each pixel.
+/// Largest depth, in widths of a pixel, of the second point of a pixel behind the first: a surface seen at 83° from
+/// its normal. A point further behind belongs to another surface, which is usually hidden.
+// Differs from the paper: the paper keeps the nearest point of each pixel only.
 pub(super) const GATE_PX: f32 = 8.0;
-/// Side in pixels of the blocks that tell covered from empty screen when the density is measured.
+/// Side in pixels of the blocks that separate covered from empty screen when the density is measured.
 const OCCUPANCY_PX: usize = 16;
 
-/// Projects clouds; keeps its buffers from frame to frame, but for two lists.
+/// Projects clouds. All buffers but the two lists `active` and `passive` are reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Projector {
-    /// Per pixel, or half of one, `depth bits << 32 | point index`: positive floats order as their bits do.
+    /// Per pixel or half pixel, `depth bits << 32 | point index`. The bits of positive floats order like the floats.
     keys: Vec<AtomicU64>,
     screen: ScreenPoints,
 }
@@ -51,18 +51,20 @@ impl Projector {
     }
 }
 
-/// The points of each pixel, in one slot or two, and where there are any: most of many pictures is empty.
+/// The keys of each pixel, in one slot or two, and the number of points per block. Most blocks of many pictures are
+/// empty and are skipped.
 struct Keys<'a> {
     slots: &'a [AtomicU64],
     per_pixel: usize,
-    /// Of the picture, in pixels.
+    /// Width of the screen in pixels.
     width: usize,
-    /// Points in each square of [`OCCUPANCY_PX`] pixels.
+    /// Points in each block of [`OCCUPANCY_PX`] × [`OCCUPANCY_PX`] pixels.
     occupied: Vec<u32>,
 }
 
 impl<'a> Keys<'a> {
-    /// Empties slots of points far behind the other one of their pixel, and counts the rest.
+    /// Empties the slots of points far behind the other point of their pixel, and counts the remaining points per
+    /// block.
     fn settle(slots: &'a mut [AtomicU64], view: &View, halves: bool) -> Self {
         let per_pixel = 1 + usize::from(halves);
         let width = view.width as usize;
@@ -85,17 +87,17 @@ impl<'a> Keys<'a> {
         Self { slots, per_pixel, width, occupied }
     }
 
-    /// Squares of pixels in a row.
+    /// Blocks in a row of blocks.
     fn columns(&self) -> usize {
         self.width.div_ceil(OCCUPANCY_PX)
     }
 
-    /// Whether there is a point in the square in this column of squares that holds a row of pixels.
+    /// Whether the block in column `column` that contains pixel row `y` holds a point.
     fn is_occupied(&self, column: usize, y: usize) -> bool {
         self.occupied[y / OCCUPANCY_PX * self.columns() + column] > 0
     }
 
-    /// Pixel columns of a column of squares.
+    /// Pixel columns of a column of blocks.
     fn columns_px(&self, column: usize) -> Range<usize> {
         column * OCCUPANCY_PX..((column + 1) * OCCUPANCY_PX).min(self.width)
     }
@@ -105,8 +107,8 @@ impl<'a> Keys<'a> {
         &self.slots[(y * self.width + x) * self.per_pixel..][..self.per_pixel]
     }
 
-    /// Mean distance in pixels between screen points where there are any.
-    // Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
+    /// Mean distance in pixels between screen points, over blocks that hold any.
+    // Differs from the paper: the paper divides by the whole screen, and its cells are too large for a small object.
     fn mean_spacing(&self) -> f32 {
         let blocks = self.occupied.iter().filter(|&&points| points > 0).count();
         let points = self.occupied.iter().sum::<u32>();
@@ -114,7 +116,7 @@ impl<'a> Keys<'a> {
     }
 }
 
-/// Fills `keys` with the nearest point of each pixel, or each half of one, and `sixteenths` with all points.
+/// Fills `keys` with the nearest point of each pixel or half pixel, and `sixteenths` with all points.
 fn nearest_per_pixel(
     positions: &[[f32; 3]],
     view: &View,
@@ -140,12 +142,12 @@ fn nearest_per_pixel(
     Dropped { not_finite, behind, outside }
 }
 
-/// Where a point goes: the index of a slot of the keys, or why nowhere.
+/// Values in place of a slot index for points that own no slot.
 const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
-/// Compiled for any processor: with the widest vectors of one projection took 6 % longer.
+/// Projects up to [`CHUNK`] points. Compiled for the baseline processor: wider vectors make projection slower.
 fn project_chunk(
     positions: &[[f32; 3]],
     first: u32,
@@ -168,7 +170,7 @@ fn project_chunk(
                 (slot[lane], depth[lane], part[lane]) = project_point(position, view, halves);
             }
         }
-        // Plain loads of all lanes first, which wait for memory together: atomic writes let nothing overtake them.
+        // Load all lanes first: plain loads wait for memory together, while atomic writes keep later loads waiting.
         let mut before = [0u64; LANES];
         let mut held = [0u16; LANES];
         for lane in 0..positions.len() {
@@ -185,7 +187,8 @@ fn project_chunk(
                 slot => {
                     let index = first + (group * LANES + lane) as u32;
                     let key = u64::from(depth[lane].to_bits()) << 32 | u64::from(index);
-                    // Most points lose, and find others in their sixteenth: they take no cache line from other threads.
+                    // Most points lose, and their sixteenth is already marked. Skipping the write spares other
+                    // threads' cache lines.
                     if key < before[lane] {
                         keys[slot as usize].fetch_min(key, Ordering::Relaxed);
                     }
@@ -199,12 +202,12 @@ fn project_chunk(
     dropped
 }
 
-/// Slot and depth of one point and the sixteenth of its pixel, without branches.
+/// Slot and depth of a point, and its sixteenth within the pixel, without branches.
 #[inline(always)]
 fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u32) {
     let [x, y, z] = view.to_view(position).to_array();
     let [px, py] = view.to_pixel(Vec3::new(x, y, z));
-    // Inside the image the coordinates are positive, so that truncation is rounding down.
+    // Inside the image coordinates are positive, so truncation rounds down.
     let inside = (px >= 0.0) & (py >= 0.0) & (px < view.width as f32) & (py < view.height as f32);
     let [x4, y4] = sixteenths_at([px, py]);
     let [column, row] = [x4 >> 2, y4 >> 2];
@@ -212,7 +215,7 @@ fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u3
     let slot = if halves { half(pixel, [x4, y4]) } else { pixel };
     let slot = if inside { slot } else { OUTSIDE };
     let slot = if z > view.near { slot } else { BEHIND };
-    // Finite coordinates so large that their transform is not count as not finite too.
+    // Finite coordinates count as not finite too if their transform overflows.
     #[allow(clippy::eq_op, reason = "three subtractions vectorise, is_finite does not")]
     let finite = (x - x == 0.0) & (y - y == 0.0) & (z - z == 0.0);
     (if finite { slot } else { NOT_FINITE }, z, sixteenth([x4, y4]))
@@ -227,7 +230,7 @@ fn depth_of(key: u64) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 
-/// Empties the slot of the farther one of a pixel's two points if it is far behind the other.
+/// Empties the slot of a pixel's farther point if it lies far behind the nearer.
 #[inline(always)]
 fn erase_far_second(pair: &mut [AtomicU64], view: &View) {
     let [one, other] = [0, 1].map(|half| *pair[half].get_mut());
@@ -238,7 +241,7 @@ fn erase_far_second(pair: &mut [AtomicU64], view: &View) {
     }
 }
 
-/// Lists the owners of pixels in cell order.
+/// Lists the owners of slots in cell order.
 fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, screen: &mut ScreenPoints) {
     let [width, height] = [view.width as usize, view.height as usize];
     let strip_px = ((STRIP_SPACINGS * spacing_px).round() as usize).clamp(1, 256);
@@ -247,7 +250,7 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
     *cells = ScreenCells { strip_px, columns: width, start: std::mem::take(&mut cells.start) };
     cells.start.resize(strips * width + 1, 0);
 
-    // Points of each cell first, then where each cell begins.
+    // Count the points of each cell first, then sum the counts into the starts of cells.
     let strip_rows = |strip: usize| strip * strip_px..height.min((strip + 1) * strip_px);
     let strip_len: Vec<u32> = cells.start[..strips * width]
         .par_chunks_mut(width)
@@ -287,7 +290,7 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
         start.iter_mut().for_each(|cell| *cell += first);
         let mut next = 0;
         let rows = strip_rows(strip);
-        // A row of each square that the strip meets: every sixteenth, and the last.
+        // Visit one pixel row per block that the strip meets: every sixteenth, and the last.
         let is_occupied = |&column: &usize| {
             rows.clone().step_by(OCCUPANCY_PX).chain([rows.end - 1]).any(|y| keys.is_occupied(column, y))
         };
@@ -301,14 +304,14 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
                 }
             }
         }
-        // In a loop of their own, in which nothing branches, positions anywhere in memory are waited for together.
+        // A separate loop without branches lets reads of scattered positions wait for memory together.
         for (point, &index) in points.iter_mut().zip(&*source) {
             point.position_view = view.to_view(positions[index as usize]).to_array();
         }
     });
 }
 
-/// Counts screen points and finds the nearest depth per cell of about `k` points.
+/// Counts the screen points and finds the nearest depth of each cell of about `k` points.
 fn measure_density(screen: &mut ScreenPoints, view: &View, spacing_px: f32, k: u32) {
     let ScreenPoints { points, cells, density, .. } = screen;
     let [width, height] = [view.width as usize, view.height as usize];
@@ -339,7 +342,8 @@ fn measure_density(screen: &mut ScreenPoints, view: &View, spacing_px: f32, k: u
     density.culling.extend(density.nearest.iter().map(|&depth| depth + cell_px * view.pixel_size(depth)));
 }
 
-/// Puts back the points behind the culling plane of their cell [Paper, §7, Grid Culling], and those that do not matter.
+/// Splits the screen points into active and passive. Passive are points behind the culling plane of their cell [Paper,
+/// §7, Grid Culling] and points too far beside the picture.
 fn split(&ProjectRules { k, grid_culling, .. }: &ProjectRules, view: &View, screen: &mut ScreenPoints) {
     let ScreenPoints { points, density, active, passive, .. } = screen;
     (*active, *passive) = (0..points.len() as u32).into_par_iter().partition_map(|index| {

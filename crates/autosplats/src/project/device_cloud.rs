@@ -1,4 +1,4 @@
-//! A cloud on the device: split where one binding cannot hold it, and uploaded piece by piece.
+//! A cloud on the device, in chunks where one binding cannot hold it, uploaded piece by piece.
 
 use autosplats_cloud::{FieldValues, PointCloud};
 use bytemuck::{Pod, Zeroable};
@@ -9,12 +9,12 @@ use crate::gpu::Gpu;
 
 /// Points uploaded at a time.
 const PIECE: usize = 1 << 18;
-/// Staging buffers, of a piece of positions each: one is filled while others are on their way.
+/// Number of staging buffers, each of one piece of positions. The host fills one while others are in transit.
 const RING: usize = 8;
-/// Room is given back when less than one in so many points of it is used.
+/// Buffers are reallocated when a cloud uses less than one in this many of their points.
 const LEAST_USED: usize = 4;
 
-/// Values that splats carry, per point.
+/// Per-point values that splats carry.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PointValues<'a> {
     /// sRGB.
@@ -23,7 +23,7 @@ pub(crate) struct PointValues<'a> {
 }
 
 impl PointValues<'_> {
-    /// Words per point: a colour in the low three bytes of one, then the bits of a number.
+    /// Words per point: a colour in the low three bytes of one word, then the bits of a number.
     pub(crate) fn words(&self) -> usize {
         usize::from(self.colors.is_some()) + usize::from(self.scalar.is_some())
     }
@@ -44,7 +44,7 @@ impl PointValues<'_> {
     }
 }
 
-/// A run of points, as `shared/project_point.wgsl` has it.
+/// A chunk of points, laid out as in `shared/project_point.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ChunkUniform {
@@ -55,10 +55,10 @@ pub(crate) struct ChunkUniform {
     pub(crate) padding: u32,
 }
 
-/// A run of points in buffers of its own.
+/// A chunk of points in buffers of its own.
 #[derive(Debug)]
 pub(crate) struct Chunk {
-    /// Points there is room for.
+    /// Number of points that fit.
     pub(crate) capacity: u32,
     pub(crate) uniform: wgpu::Buffer,
     pub(crate) positions: wgpu::Buffer,
@@ -69,7 +69,7 @@ pub(crate) struct Chunk {
 #[derive(Debug, Default)]
 pub(crate) struct DeviceCloud {
     points: usize,
-    /// Points there is room for.
+    /// Number of points that fit.
     capacity: usize,
     /// Words of values per point.
     words: usize,
@@ -77,12 +77,12 @@ pub(crate) struct DeviceCloud {
 }
 
 impl DeviceCloud {
-    /// Runs of points, in order.
+    /// The chunks, in the order of points.
     pub(crate) fn chunks(&self) -> &[Chunk] {
         &self.chunks
     }
 
-    /// Points there is room for.
+    /// Number of points that fit.
     pub(crate) fn capacity(&self) -> usize {
         self.capacity
     }
@@ -92,18 +92,18 @@ impl DeviceCloud {
         self.words
     }
 
-    /// Whether so many points would go where the points before are: a cloud of about their number does.
+    /// Whether `points` points can go into the present buffers: they fit and do not leave most of the room unused.
     pub(crate) fn fits(&self, points: usize) -> bool {
         points <= self.capacity && points >= self.capacity / LEAST_USED
     }
 
-    /// Makes room for `points` points; their positions and values are lost unless they [fit](Self::fits).
+    /// Makes room for `points` points. Positions and values are lost unless the points [fit](Self::fits).
     ///
     /// # Errors
-    /// [`Error::DeviceMemory`] if the device has no room; then it holds nothing.
+    /// [`Error::DeviceMemory`] if the device has no room; the cloud is then empty.
     pub(crate) fn resize(&mut self, gpu: &Gpu, points: usize) -> Result<(), Error> {
         if !self.fits(points) {
-            // A cloud that has grown once will grow again.
+            // A cloud that has grown once is likely to grow again.
             let grown = if self.capacity > 0 && points > self.capacity { points + points / 4 } else { points };
             *self = Self::default();
             let mut chunks = Vec::new();
@@ -124,13 +124,13 @@ impl DeviceCloud {
         Ok(())
     }
 
-    /// Makes room for `words` words of values per point; values are lost if it was another number.
+    /// Makes room for `words` words of values per point. Values are lost if the number of words changes.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
     pub(crate) fn resize_values(&mut self, gpu: &Gpu, words: usize) -> Result<(), Error> {
         if words != self.words {
-            // None, should one of the buffers fail.
+            // Stays 0 if an allocation fails.
             self.words = 0;
             for chunk in &mut self.chunks {
                 chunk.values = gpu.storage::<u32>("values of points", chunk.capacity as usize * words)?;
@@ -141,7 +141,7 @@ impl DeviceCloud {
         Ok(())
     }
 
-    /// Tells the passes what each run holds.
+    /// Writes the uniform of each chunk.
     fn tell(&self, gpu: &Gpu) {
         let mut first = 0;
         for chunk in &self.chunks {
@@ -153,7 +153,7 @@ impl DeviceCloud {
     }
 }
 
-/// Copies clouds to the device, through a ring of staging buffers: what is on its way takes no more memory than that.
+/// Copies clouds to the device through a ring of staging buffers, which bounds the memory in transit.
 #[derive(Debug)]
 pub(crate) struct Uploader {
     ring: Vec<Staging>,
@@ -165,7 +165,7 @@ pub(crate) struct Uploader {
 #[derive(Debug)]
 struct Staging {
     buffer: wgpu::Buffer,
-    /// When it was last copied from.
+    /// Submission that last copied from the buffer.
     submitted: Option<wgpu::SubmissionIndex>,
 }
 
@@ -177,8 +177,8 @@ impl Uploader {
     /// Uploads positions.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`], [`Error::DeviceMemory`], and [`Error::Cancelled`] if `report`, told the fraction done, says
-    /// no.
+    /// [`Error::DeviceLost`], [`Error::DeviceMemory`], and [`Error::Cancelled`] if `report` returns false; its
+    /// argument is the fraction done.
     pub(crate) fn positions(
         &mut self,
         gpu: &Gpu,
@@ -229,7 +229,7 @@ impl Uploader {
         gpu.check_lost()
     }
 
-    /// Copies bytes, a piece's at most, through the next staging buffer of the ring.
+    /// Copies up to a piece of bytes through the next staging buffer of the ring.
     fn write(&mut self, gpu: &Gpu, to: &wgpu::Buffer, at: usize, bytes: &[u8]) -> Result<(), Error> {
         let lost = || gpu.check_lost().err().unwrap_or_else(|| Error::DeviceLost("it takes no points".into()));
         if self.ring.len() < RING {
@@ -241,7 +241,7 @@ impl Uploader {
         let Staging { buffer, submitted } = &mut self.ring[self.next];
         self.next = (self.next + 1) % RING;
         let size = bytes.len() as u64;
-        // The device is long done with it, but where it is slower than the host.
+        // The next buffer is the oldest of the ring, so this waits only if the device is slower than the host.
         buffer.map_async(wgpu::MapMode::Write, 0..size, |_| {});
         let poll = match submitted.take() {
             Some(submitted) => wgpu::PollType::Wait { submission_index: Some(submitted), timeout: None },
@@ -258,7 +258,10 @@ impl Uploader {
     }
 }
 
-/// Asks whether to go on.
+/// Reports the fraction done.
+///
+/// # Errors
+/// [`Error::Cancelled`] if `report` returns false.
 fn go_on(report: &dyn Fn(f32) -> bool, done: usize, points: usize) -> Result<(), Error> {
     if report(done as f32 / points as f32) { Ok(()) } else { Err(Error::Cancelled) }
 }

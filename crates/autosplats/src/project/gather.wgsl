@@ -1,4 +1,4 @@
-// Collects what is known of the screen points that come from one chunk of the cloud.
+// Stores the position and the values of the screen points that come from one chunk of the cloud.
 //
 // Reads: a chunk of the cloud; source, pixels, counters. Writes: points, values.
 
@@ -25,7 +25,7 @@ fn gather(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         return;
     }
     let at = source[index] - chunk.first;
-    // Points before the chunk wrap around to far behind it.
+    // The index of a point of an earlier chunk wraps around, and is far too large.
     if at >= chunk.len {
         return;
     }

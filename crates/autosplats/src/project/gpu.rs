@@ -1,4 +1,4 @@
-//! Projection on the GPU: the CPU form's steps, a pass each.
+//! Projection on the GPU: the steps of the CPU form, one pass each.
 
 use super::cpu::{GATE_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
@@ -23,8 +23,8 @@ const SPLIT_COUNT: PassSource = PassSource::new("project/split_count", include_s
 const SPLIT: PassSource = PassSource::new("project/split", include_str!("split.wgsl"));
 const WORK: PassSource = PassSource::new("project/work", include_str!("work.wgsl"));
 
-/// Numbers of workgroups that depend on counts, as `work.wgsl` has them: by what there is one invocation each for, and
-/// the invocations of a workgroup; or blocks of [`BLOCK`].
+/// Indirect dispatches whose number of workgroups depends on counters, in the order of `work.wgsl`. A variant names
+/// the items and how many a workgroup takes; `Blocks` are blocks of [`BLOCK`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Work {
     Visible256,
@@ -42,46 +42,46 @@ pub(crate) enum Work {
     RecoveredFew,
 }
 
-/// Which queries the search, the fit and the splatting take up.
+/// Set of queries that the search, the fit and the splatting process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Round {
-    /// The active points.
+    /// The passive points that proved visible.
     Active,
     /// The passive points that turned out not to be hidden.
     Recovered,
 }
 
 impl Round {
-    /// In workgroups that take up [`few`] of them together.
+    /// Dispatch with [`few`] queries per workgroup.
     pub(crate) fn work_few(self) -> Work {
         [Work::ActiveFew, Work::RecoveredFew][self as usize]
     }
 
-    /// In workgroups of 64 invocations.
+    /// Dispatch with 64 queries per workgroup.
     pub(crate) fn work_64(self) -> Work {
         [Work::Active64, Work::Recovered64][self as usize]
     }
 
-    /// Those that one pass of the search left to another, in workgroups of 64 invocations.
+    /// Dispatch for the queries that one pass of the search leaves to another, 64 per workgroup.
     pub(crate) fn left_64(self) -> Work {
         [Work::LeftActive64, Work::LeftRecovered64][self as usize]
     }
 
-    /// In workgroups of 256 invocations.
+    /// Dispatch with 256 queries per workgroup.
     pub(crate) fn work_256(self) -> Work {
         [Work::Active256, Work::Recovered256][self as usize]
     }
 }
 
-/// Things that a workgroup takes up together, one after the other: the fewer, the more evenly a device is at work; but where it is
-/// a program on the processor each workgroup costs more than most things. Up to 32.
+/// Queries that a workgroup processes together, one after the other; at most 32. Small groups keep a GPU evenly busy.
+/// A software device pays more for each workgroup than for most queries, so it takes larger groups.
 pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }
 
-/// Bytes of the arguments of a dispatch.
+/// Bytes of the arguments of an indirect dispatch.
 const WORK_BYTES: u64 = 12;
-/// How many of them there are.
+/// Number of indirect dispatches.
 const WORKS: u64 = Work::RecoveredFew as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
@@ -89,7 +89,7 @@ const GROUP: u32 = 256;
 /// Flags that one workgroup ranks.
 pub(crate) const BLOCK: u32 = 2048;
 
-/// Indices into [`ScreenBuffers::counters`], as `shared/counters.wgsl` has them.
+/// Indices into [`ScreenBuffers::counters`], in the order of `shared/counters.wgsl`.
 #[derive(Clone, Copy, Debug)]
 #[allow(dead_code, reason = "those that only the device uses have their place all the same")]
 pub(crate) enum Counter {
@@ -122,47 +122,46 @@ pub(crate) const COUNTERS: usize = Counter::LeftRecovered as usize + 1;
 #[derive(Debug)]
 pub(crate) struct ScreenBuffers {
     pub(crate) size: [u32; 2],
-    /// Whether halves of pixels keep a point each.
+    /// Whether each half of a pixel keeps a point.
     pub(crate) halves: bool,
-    /// Most screen points that there can be.
+    /// Largest possible number of screen points.
     pub(crate) capacity: u32,
-    /// `u32` per [`Counter`].
+    /// One `u32` per [`Counter`].
     pub(crate) counters: wgpu::Buffer,
     keys: wgpu::Buffer,
-    /// Count and bits of the nearest depth per density cell.
+    /// Count and bits of the nearest depth, per density cell.
     pub(crate) density: wgpu::Buffer,
-    /// First screen point of each cell.
+    /// Index of the first screen point of each cell.
     pub(crate) cell_start: wgpu::Buffer,
-    /// Which sixteenths of each pixel hold points, two pixels to a `u32`.
+    /// Bits of the sixteenths that hold points, two pixels to a `u32`.
     pub(crate) sixteenths: wgpu::Buffer,
     /// Index in the cloud of each screen point.
     pub(crate) source: wgpu::Buffer,
     pixels: wgpu::Buffer,
     /// [`ScreenPoint`]s in cell order.
     pub(crate) points: wgpu::Buffer,
-    /// Of each screen point, what [`DeviceCloud`] has of its values.
+    /// Values of each screen point, packed as in [`DeviceCloud`].
     pub(crate) values: wgpu::Buffer,
-    /// Screen points to reconstruct: the active ones, and after them those recovered.
+    /// Indices of the screen points to reconstruct: the active points, then the recovered.
     pub(crate) queries: wgpu::Buffer,
     pub(crate) passive: wgpu::Buffer,
     /// Queries of a round that one pass of the search leaves to another.
     pub(crate) left: wgpu::Buffer,
     pub(crate) block_sums: wgpu::Buffer,
-    /// Workgroups of each [`Work`], three `u32`.
+    /// Workgroup counts of each [`Work`], three `u32` each.
     arguments: wgpu::Buffer,
 }
 
 impl ScreenBuffers {
-    /// Whether the device binds the keys of a screen's pixels, or of two halves of each, and a `T` for each screen point that there
-    /// can be then.
+    /// Whether the device can bind the keys of all slots of a screen, and a `T` for each possible screen point.
     pub(crate) fn has_room<T>(gpu: &Gpu, size: [u32; 2], halves: bool, points: usize) -> bool {
         gpu.binds::<[u32; 2]>(capacity(size, halves, usize::MAX)) && gpu.binds::<T>(capacity(size, halves, points))
     }
 
-    /// Room for a screen of `size` and a cloud of `points` points with `values` values each.
+    /// Allocates buffers for a screen of `size` and a cloud of `points` points with `values` words each.
     ///
     /// # Errors
-    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    /// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
     pub(crate) fn new(gpu: &Gpu, size: [u32; 2], halves: bool, points: usize, values: usize) -> Result<Self, Error> {
         let [width, height] = size.map(|side| side as usize);
         let pixels = width * height;
@@ -194,18 +193,18 @@ impl ScreenBuffers {
         })
     }
 
-    /// As many workgroups as [`WorkPass`] found last.
+    /// Number of workgroups of `work` that [`WorkPass`] computed last.
     pub(crate) fn groups(&self, work: Work) -> Groups {
         Groups::Counted(self.arguments.clone(), work as u64 * WORK_BYTES)
     }
 }
 
-/// Most screen points that a screen of this size can have.
+/// Largest possible number of screen points on a screen of this size.
 fn capacity([width, height]: [u32; 2], halves: bool, points: usize) -> usize {
     points.min((width as usize * height as usize) << u32::from(halves))
 }
 
-/// Finds how many workgroups there are of each [`Work`].
+/// Computes the number of workgroups of each [`Work`].
 #[derive(Debug)]
 pub(crate) struct WorkPass(Pass);
 
@@ -216,13 +215,14 @@ impl WorkPass {
         Pass::new(gpu, &WORK, &[("FEW", few(gpu).into())]).map(Self)
     }
 
-    /// To be run after counters have changed.
+    /// The step to run after counters have changed.
     pub(crate) fn step(&self, gpu: &Gpu, frame: &wgpu::Buffer, screen: &ScreenBuffers) -> Step {
         self.0.step(gpu, &[frame, &screen.counters, &screen.arguments], 1)
     }
 }
 
-/// The scan of the sums of blocks: of all blocks, or of those of `scanned` things.
+/// The pass that scans the sums of blocks: of all blocks, or of the blocks of as many items as counter `scanned` says.
+/// The sum goes to counter `total`.
 ///
 /// # Errors
 /// [`Error::Device`].
@@ -231,12 +231,12 @@ pub(crate) fn scan_pass(gpu: &Gpu, total: Counter, scanned: Option<Counter>) -> 
     Pass::new(gpu, &SCAN, &[("TOTAL", f64::from(total as u32)), ("SCANNED", f64::from(scanned as u32))])
 }
 
-/// How each pixel finds its nearest point.
+/// The way each pixel finds its nearest point.
 #[derive(Debug)]
 enum NearestPass {
     /// With 64-bit atomics.
     Once(Pass),
-    /// With 32 bits: the pass, and what tells it each turn.
+    /// With 32-bit atomics: the pass, and the uniform of each turn.
     Twice(Pass, [wgpu::Buffer; 2]),
 }
 
@@ -288,7 +288,7 @@ pub(crate) struct ProjectPasses {
 }
 
 impl ProjectPasses {
-    /// Compiles them; `int64` asks for 64-bit atomics, instead of a pass with 32 bits that runs twice.
+    /// Compiles the passes, with 64-bit atomics if `int64`, else with a 32-bit pass that runs twice.
     ///
     /// # Errors
     /// [`Error::Device`].

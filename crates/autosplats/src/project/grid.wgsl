@@ -1,14 +1,14 @@
-// Chooses the sizes of cells from the mean distance between screen points where there are any [Paper, §5.1].
+// Chooses the sizes of cells from the mean distance between screen points in covered blocks [Paper, §5.1].
 //
 // Reads and writes: counters. One invocation.
-// Differs from the paper: it divides by the whole screen, which makes cells too large for an object that covers little.
+// Differs from the paper: the paper divides by the whole screen, and its cells are too large for a small object.
 
 #import frame
 #import counters
 
 @group(0) @binding(1) var<storage, read_write> counters: array<u32>;
 
-// A strip is this many mean distances high: see the CPU form.
+// Height of a strip in mean distances between screen points: see the CPU form.
 override STRIP_SPACINGS: f32;
 
 @compute @workgroup_size(1)

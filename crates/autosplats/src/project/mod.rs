@@ -1,21 +1,22 @@
-//! Project: every point to its pixel, the nearest wins [Paper, §3, §5.1, §7].
+//! Project: every point goes to its pixel, and the nearest point of a pixel wins [Paper, §3, §5.1, §7].
 //!
 //! # How it works
-//! A pixel, or each half of one, keeps the smallest of (depth, point index), so ties go to the lower index. Halves lie side by
-//! side and one below the other in turn, and of two points far apart in depth only the nearer counts. The paper has one
-//! point a pixel and names as a weakness what that loses: at silhouettes, in thin parts and where points are denser than
-//! pixels, the neighbours that the fit would need.
+//! A pixel, or each of its two halves, keeps the smallest pair (depth, point index), so a tie goes to the lower index.
+//! Pixels are split left/right and top/bottom like the squares of a chessboard. If the two points of a pixel lie far
+//! apart in depth, only the nearer counts. The paper keeps one point a pixel and names the loss as a weakness:
+//! silhouettes, thin parts and dense regions lack neighbours for the fit.
 //!
-//! What survives, the *screen points*, is compacted into a list ordered by screen cell, for the search to read its
-//! surroundings in few contiguous runs: the screen is cut into strips a few pixels high, a cell is one pixel wide and a
-//! strip high, and cells follow each other along the strip. Any sixteen neighbours in that list lie close together on the
-//! screen, whatever the local density.
+//! The surviving *screen points* are compacted into a list in cell order, so that the search reads the surroundings of
+//! a point in a few contiguous runs. The screen is cut into strips a few pixels high. A cell is one pixel wide and one
+//! strip high, and the cells of a strip follow each other. Any sixteen consecutive points of the list lie close
+//! together on the screen, whatever the local density.
 //!
-//! A coarser grid, about k screen points to a cell, counts points for the first search radius (§5.1) and holds the
-//! nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
+//! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The same
+//! grid holds the nearest depth of each cell for grid culling (§7): points well behind the nearest of their cell are
+//! *passive*.
 //!
-//! Of all other points nothing is kept but the sixteenth of a pixel that they fall into: a bit, for the splatting to tell where
-//! surfaces end.
+//! All other points leave one bit each: the sixteenth of a pixel that they fall into. The splatting finds the borders
+//! of surfaces from these bits.
 
 mod cpu;
 mod device_cloud;
@@ -34,16 +35,18 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::camera::View;
 
-/// How far beside the picture points get splats, in first search radii. Those further out are neighbours, and no more.
-// Differs from the paper: it ends with the picture.
+/// Largest distance beside the picture, in first search radii, at which a screen point gets a splat. Points further
+/// out serve as neighbours only.
+// Differs from the paper: the paper's points end with the picture.
 pub(crate) const MARGIN_REACH: f32 = 1.5;
 
-/// What projection keeps.
+/// Settings of the projection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ProjectRules {
-    /// Screen points that a cell of the density grid holds by mean.
+    /// Mean number of screen points in a cell of the density grid.
     pub(crate) k: u32,
-    /// Whether each half of a pixel keeps its nearest point, instead of each pixel.
+    /// Whether each half of a pixel keeps its nearest point, instead of each pixel. See
+    /// docs/decisions/0001-two-points-a-pixel.md.
     pub(crate) halves: bool,
     /// Whether points well behind the nearest of their cell become passive.
     pub(crate) grid_culling: bool,
@@ -51,24 +54,24 @@ pub(crate) struct ProjectRules {
 
 #[cfg(test)]
 impl ProjectRules {
-    /// As pictures have it by default.
+    /// Default rules.
     pub(crate) fn usual(k: u32) -> Self {
         Self { k, halves: true, grid_culling: true }
     }
 }
 
-/// A projected point: one that owns its pixel, or half of it.
+/// A projected point: the owner of a pixel or of half a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ScreenPoint {
-    /// View space (x right, y down, z forward), world units.
+    /// Position in view space (x right, y down, z forward), world units.
     pub(crate) position_view: [f32; 3],
     /// Pixel column in the low, row in the high 16 bits.
     pub(crate) pixel: u32,
 }
 
 impl ScreenPoint {
-    /// Pixel column and row.
+    /// Column and row of the pixel.
     #[inline(always)]
     pub(crate) fn pixel_xy(&self) -> [usize; 2] {
         [(self.pixel & 0xffff) as usize, (self.pixel >> 16) as usize]
@@ -83,15 +86,15 @@ pub(crate) struct ScreenPoints {
     pub(crate) source: Vec<u32>,
     pub(crate) cells: ScreenCells,
     pub(crate) density: DensityGrid,
-    /// Screen points to reconstruct first, ascending.
+    /// Indices of the screen points to reconstruct first, ascending.
     pub(crate) active: Vec<u32>,
-    /// The others, ascending: probably hidden, if there is grid culling, or too far beside the picture to matter to it.
+    /// Indices of the other screen points, ascending: culled by the grid, or too far beside the picture to matter.
     pub(crate) passive: Vec<u32>,
     pub(crate) sixteenths: Sixteenths,
     pub(crate) dropped: Dropped,
 }
 
-/// Points that own no pixel because they cannot, by reason.
+/// Numbers of points that own no pixel, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Dropped {
     pub(crate) not_finite: usize,
@@ -99,19 +102,19 @@ pub(crate) struct Dropped {
     pub(crate) outside: usize,
 }
 
-/// Where in the list of screen points each cell begins.
+/// Start of each cell in the list of screen points.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ScreenCells {
     /// Height of a strip in pixels.
     pub(crate) strip_px: usize,
-    /// Image width: cells in a strip.
+    /// Cells in a strip: the screen's width in pixels.
     pub(crate) columns: usize,
-    /// First screen point of each cell, strip by strip, and the number of points at the end.
+    /// Index of the first screen point of each cell, strip by strip, then the number of points.
     pub(crate) start: Vec<u32>,
 }
 
 impl ScreenCells {
-    /// The screen points of strip `strip` in pixel columns `x0..=x1`: they are contiguous.
+    /// Range of the screen points of strip `strip` in pixel columns `x0..=x1`, which are contiguous.
     #[inline(always)]
     pub(crate) fn run(&self, strip: usize, x0: usize, x1: usize) -> std::ops::Range<usize> {
         let row = strip * self.columns;
@@ -127,9 +130,9 @@ pub(crate) struct DensityGrid {
     pub(crate) columns: usize,
     /// Screen points in each cell.
     pub(crate) count: Vec<u32>,
-    /// Depth of the nearest point in each cell; infinite in an empty one.
+    /// Depth of the nearest point in each cell, infinite in an empty cell.
     pub(crate) nearest: Vec<f32>,
-    /// Depth beyond which points of a cell are probably hidden: the nearest, and the width of the cell in world units
+    /// Depth beyond which a cell's points are probably hidden: its nearest depth plus the cell's width in world units
     /// there [Paper, §7, Grid Culling].
     pub(crate) culling: Vec<f32>,
 }
@@ -146,21 +149,22 @@ impl DensityGrid {
         point.position_view[2] > self.culling[self.cell(point.pixel_xy())]
     }
 
-    /// Whether a point's splat may matter to the picture: it lies in it, or not far beside for how dense points are there.
+    /// Whether a point's splat can matter to the picture: the point lies inside, or at most `MARGIN_REACH` first
+    /// search radii beside.
     #[inline(always)]
     pub(crate) fn matters(&self, point: &ScreenPoint, k: u32, view: &View) -> bool {
         let beside_px = view.beside_picture(point.pixel_xy());
         beside_px == 0 || beside_px as f32 <= MARGIN_REACH * self.initial_radius_px(point, k)
     }
 
-    /// First search radius of a point in world units: that of the circle which holds k points at the density of the
+    /// First search radius of a point in world units: the radius of a circle that holds k points at the density of the
     /// point's cell [Paper, §5.1].
     #[inline(always)]
     pub(crate) fn initial_radius(&self, point: &ScreenPoint, k: u32, view: &View) -> f32 {
         self.initial_radius_px(point, k) * view.pixel_size(point.position_view[2])
     }
 
-    /// The same in pixels.
+    /// First search radius in pixels; see [`initial_radius`](Self::initial_radius).
     #[inline(always)]
     pub(crate) fn initial_radius_px(&self, point: &ScreenPoint, k: u32) -> f32 {
         let area_px = (self.cell_px * self.cell_px) as f32;

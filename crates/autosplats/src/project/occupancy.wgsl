@@ -1,5 +1,5 @@
-// Erases points far behind the other one of their pixel. Counts screen points, and the blocks of 16² pixels that hold any:
-// the covered part of the screen, whose density says how large cells must be.
+// Erases points far behind the other point of their pixel. Counts the screen points, and the blocks of 16 × 16 pixels
+// that hold any. These blocks are the covered part of the screen, whose density determines the sizes of cells.
 //
 // Reads and writes: keys. Writes: counters. One workgroup per block.
 
@@ -12,7 +12,7 @@
 @group(0) @binding(1) var<storage, read_write> keys: array<vec2u>;
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
 
-// The second point of a pixel is no further behind the first than this many pixels are wide.
+// Largest depth, in widths of a pixel, of the second point of a pixel behind the first.
 override GATE_PX: f32;
 
 var<workgroup> owned: atomic<u32>;
@@ -44,7 +44,7 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     }
 }
 
-// Empties the farther one of two slots if it is too far; whether it is.
+// Empties the slot of a pixel's farther point if it lies too far behind the nearer; returns whether it does.
 fn erase_far(slot: u32) -> bool {
     let depth = vec2f(bitcast<f32>(keys[slot].y), bitcast<f32>(keys[slot + 1u].y));
     let near = min(depth.x, depth.y);

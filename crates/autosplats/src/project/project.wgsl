@@ -1,4 +1,5 @@
-// Every point to its pixel, or half of one, the nearest wins [Paper, §3]: depth and index in one 64-bit atomic minimum.
+// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3]: depth and index in a 64-bit atomic
+// minimum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths. `project_32` does the same with 32 bits.
 

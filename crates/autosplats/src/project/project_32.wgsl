@@ -1,6 +1,6 @@
-// What `project` does, where there are no 64-bit atomics: run twice, it finds the nearest depth of each slot, then the lowest
-// index among the points at that depth. One pass that is told which turn it is and not two, because no device owes two
-// programs the same bits: a point whose depth differed between them would leave a hole.
+// Like `project`, for devices without 64-bit atomics. The first turn finds the nearest depth of each slot, the second
+// the lowest index among the points at that depth. Both turns share one program, because two programs need not compute
+// the same bits: a depth that differed between them would leave a hole.
 //
 // Reads: a chunk of the cloud, turn. Writes: keys, as pairs of atomics; counters, sixteenths.
 

@@ -1,6 +1,6 @@
-// Turns the sums of blocks into what goes before each block; their total becomes a counter.
+// Replaces the sums of blocks by the sum of all blocks in front of each; the total goes to a counter.
 //
-// Reads and writes: block_sums. Writes: counters. One workgroup, each invocation takes a run of blocks.
+// Reads and writes: block_sums, counters. One workgroup; each invocation takes a run of blocks.
 
 #import frame
 #import counters
@@ -8,9 +8,9 @@
 @group(0) @binding(1) var<storage, read_write> block_sums: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counters: array<u32>;
 
-// Which counter becomes the total.
+// Index of the counter that receives the total.
 override TOTAL: u32;
-// Which counter says of how many things blocks of 2048 have sums; the total itself if all blocks have one.
+// Index of the counter of items in blocks of 2048 that have sums. Equal to TOTAL if all blocks have sums.
 override SCANNED: u32;
 
 var<workgroup> before: array<u32, 257>;

@@ -1,5 +1,6 @@
-//! Which sixteenths of each pixel hold points, those that own no pixel among them: a surface ends where its outermost points
-//! lie, and where many fall into a pixel those are seldom the nearest.
+//! Bits that say which sixteenths of each pixel hold points, whether or not these own a pixel. A surface ends at its
+//! outermost points, and where points are dense the outermost are seldom the nearest of a pixel. See
+//! docs/decisions/0002-borders-by-sixteenths.md.
 
 use std::sync::atomic::{AtomicU16, Ordering};
 
@@ -7,10 +8,10 @@ use rayon::prelude::*;
 
 use crate::camera::View;
 
-/// Sixteenths of pixels in a row of a pixel, and rows.
+/// Sixteenths along each side of a pixel.
 pub(super) const PER_SIDE: u32 = 4;
 
-/// For each pixel, row by row, a bit for each of its sixteenths, row by row as well, the upper left one the lowest.
+/// Sixteen bits per pixel, pixels row by row. A pixel's sixteenths are row by row too, the upper left the lowest bit.
 #[derive(Debug, Default)]
 pub(crate) struct Sixteenths {
     width: usize,
@@ -18,28 +19,28 @@ pub(crate) struct Sixteenths {
 }
 
 impl Sixteenths {
-    /// Sizes it for `view` and leaves no point in it.
+    /// Resizes to `view` and clears all bits.
     pub(crate) fn clear(&mut self, view: &View) {
         self.width = view.width as usize;
         self.pixels.resize_with(self.width * view.height as usize, AtomicU16::default);
         self.pixels.par_chunks_mut(1 << 16).for_each(|pixels| pixels.iter_mut().for_each(|pixel| *pixel.get_mut() = 0));
     }
 
-    /// Adds a point in a sixteenth of a pixel.
+    /// Marks a sixteenth of a pixel as holding a point.
     #[inline(always)]
     pub(crate) fn add(&self, pixel: u32, sixteenth: u32) {
         self.pixels[pixel as usize].fetch_or(1 << sixteenth, Ordering::Relaxed);
     }
 
-    /// Those of a pixel, which counts row by row.
+    /// The sixteen bits of a pixel, by its row-by-row index.
     pub(crate) fn of(&self, pixel: usize) -> u16 {
         self.pixels[pixel].load(Ordering::Relaxed)
     }
 
-    /// Those no farther than a pixel from the middle of pixel (x, y), which lies not at the edge of the picture: eight rows of
-    /// eight, a bit each, the upper left one the lowest.
+    /// The 8 × 8 sixteenths within one pixel of the middle of pixel (x, y), row by row, the upper left the lowest bit.
+    /// The pixel must not lie at the edge of the screen.
     pub(crate) fn around(&self, [x, y]: [usize; 2]) -> u64 {
-        // Each row of a pixel's in a byte.
+        // Spread each row of four bits to a byte.
         let bytes = |x: usize, y: usize| {
             let pixel = u32::from(self.of(y * self.width + x));
             let pairs = (pixel | pixel << 8) & 0x00ff_00ff;
@@ -55,7 +56,7 @@ impl Sixteenths {
 
 #[cfg(test)]
 impl Sixteenths {
-    /// Those with points at these places, given in pixels, in a picture of this size.
+    /// Sixteenths of a screen of this size with points at `places`, in pixels.
     pub(crate) fn with([width, height]: [usize; 2], places: impl IntoIterator<Item = [f32; 2]>) -> Self {
         let mut sixteenths = Self { width, pixels: Vec::new() };
         sixteenths.pixels.resize_with(width * height, AtomicU16::default);
@@ -65,7 +66,7 @@ impl Sixteenths {
         sixteenths
     }
 
-    /// As the device has them.
+    /// The bits as the device stores them: two pixels to a word, the first in the low half.
     pub(crate) fn words(&self) -> Vec<u32> {
         let of = |pixel: &AtomicU16| u32::from(pixel.load(Ordering::Relaxed));
         self.pixels.chunks(2).map(|pair| of(&pair[0]) | pair.get(1).map_or(0, of) << 16).collect()
@@ -79,28 +80,28 @@ impl Clone for Sixteenths {
     }
 }
 
-/// Column and row of sixteenths in which a place lies, given in pixels.
+/// Column and row, in sixteenths of the screen, of a place in pixels.
 #[inline(always)]
 pub(crate) fn sixteenths_at(place: [f32; 2]) -> [u32; 2] {
     place.map(|at| (PER_SIDE as f32 * at) as u32)
 }
 
-/// Which of its pixel's that is.
+/// Index of a sixteenth, by column and row on the screen, within its pixel.
 #[inline(always)]
 pub(crate) fn sixteenth([column, row]: [u32; 2]) -> u32 {
     PER_SIDE * (row % PER_SIDE) + column % PER_SIDE
 }
 
-/// The half of `pixel`, which counts row by row, that such a place falls into; halves count two a pixel. They lie side by side
-/// and one below the other in turn, like the black and the white squares of a chessboard: so no direction is seen better than
-/// another.
+/// Index of the half of `pixel` that holds the sixteenth at column `x4` and row `y4`. Pixels count row by row, and
+/// halves count two a pixel. Pixels are split left/right and top/bottom like the squares of a chessboard, so that no
+/// direction is favoured.
 #[inline(always)]
 pub(crate) fn half(pixel: u32, [x4, y4]: [u32; 2]) -> u32 {
     let along = if (x4 >> 2).wrapping_add(y4 >> 2) & 1 == 1 { x4 } else { y4 };
     (pixel << 1) | (along >> 1 & 1)
 }
 
-/// The half of a pixel at a place, given in pixels; `None` beside the picture.
+/// Index of the half pixel at a place in pixels; `None` outside the screen.
 #[inline(always)]
 pub(crate) fn half_at([x, y]: [f32; 2], view: &View) -> Option<usize> {
     let inside = (x >= 0.0) & (y >= 0.0) & (x < view.width as f32) & (y < view.height as f32);
@@ -122,7 +123,7 @@ mod tests {
         for (x, y) in (1..size[0] - 1).flat_map(|x| (1..size[1] - 1).map(move |y| (x, y))) {
             let mut expected = 0u64;
             for [px, py] in &places {
-                // From the corner of the eight by eight.
+                // Offset from the corner of the eight by eight.
                 let [column, row] = [px - (x as f32 - 0.5), py - (y as f32 - 0.5)].map(|at| (4.0 * at).floor());
                 if (0.0..8.0).contains(&column) && (0.0..8.0).contains(&row) {
                     expected |= 1 << (8 * row as usize + column as usize);

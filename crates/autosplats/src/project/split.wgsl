@@ -1,4 +1,4 @@
-// Lists active and passive screen points, both ascending [Paper, §7, Grid Culling].
+// Lists the active and the passive screen points, both ascending [Paper, §7, Grid Culling].
 //
 // Reads: points, density, block_sums. Writes: queries, passive, counters.
 

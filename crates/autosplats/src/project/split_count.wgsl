@@ -1,4 +1,4 @@
-// Counts the active points of each block of 2048 screen points: those that matter and grid culling does not put back.
+// Counts the active points of each block of 2048 screen points: points that matter and that grid culling keeps.
 //
 // Reads: points, density, counters. Writes: block_sums.
 

@@ -17,7 +17,7 @@ fn cameras() -> [Camera; 2] {
     [camera(Projection::PerspectiveFovDeg(30.0)), camera(Projection::OrthographicHeight(2.1))]
 }
 
-/// Where a point goes, in `f64`.
+/// Projection of a point in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Place {
     NotFinite,
@@ -47,17 +47,17 @@ fn place(camera: &Camera, size: [u32; 2], position: [f32; 3]) -> Place {
     }
 }
 
-/// What projection must find.
+/// Expected result of a projection.
 #[derive(Default)]
 struct Oracle {
-    /// Index and view-space position of the owner of each pixel, or of its halves.
+    /// Index and view-space position of the owner of each pixel or half pixel.
     owners: HashMap<([usize; 2], usize), (usize, DVec3)>,
-    /// Of each pixel that holds points, a bit for each of its sixteenths that does.
+    /// For each pixel that holds points, the bits of the sixteenths that hold any.
     sixteenths: HashMap<[usize; 2], u16>,
     dropped: Dropped,
 }
 
-/// Left and right halves, or upper and lower ones.
+/// Index of the half of a pixel that a place falls into: left or right, upper or lower.
 fn half([x, y]: [f64; 2]) -> usize {
     let along = if (x as usize + y as usize) % 2 == 1 { x } else { y };
     usize::from(along.fract() >= 0.5)
@@ -68,7 +68,7 @@ fn gate(camera: &Camera, size: [u32; 2], near: f64) -> f64 {
     near + f64::from(GATE_PX) * unit(camera, size, near)
 }
 
-/// World units in a pixel at a depth.
+/// Size of a pixel in world units at a depth.
 fn unit(camera: &Camera, [_, height]: [u32; 2], depth: f64) -> f64 {
     match camera.projection {
         Projection::PerspectiveFovDeg(fov) => 2.0 * (0.5 * fov.to_radians()).tan() * depth / f64::from(height),
@@ -104,9 +104,9 @@ fn oracle(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]], halves: bool)
     oracle
 }
 
-/// The points that `f32` cannot put elsewhere than `f64`: not within 2e-3 px of the border of a pixel or of a quarter of one
-/// (rounding of positions and of the rotation reaches 1e-4 px here), and not within 1e-5 of another point's depth in the same
-/// pixel but for copies, or of where such a point would not count.
+/// The points whose result `f32` and `f64` must agree on. They lie more than 2e-3 px from the border of a pixel or of
+/// a quarter of a pixel; rounding of positions and of the rotation reaches 1e-4 px here. In depth they lie more than
+/// 1e-5 from the other points of their pixel, copies excepted, and from the gate of the second point.
 fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions {
     let mut taken: HashMap<[i64; 2], Vec<([f32; 3], f64)>> = HashMap::new();
     let mut settled = Positions::new();
@@ -127,7 +127,7 @@ fn settled(camera: &Camera, size: [u32; 2], positions: &[[f32; 3]]) -> Positions
     settled
 }
 
-/// Owners, drops, sixteenths, order, start table, density grid and the split by depth.
+/// Checks owners, drops, sixteenths, order, starts of cells, density grid and the split by depth.
 fn compare(screen: &ScreenPoints, oracle: &Oracle, camera: &Camera, size: [u32; 2]) -> Result<(), String> {
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(what.to_owned()) };
     let ScreenPoints { points, source, cells, density, active, passive, sixteenths, dropped } = screen;
@@ -237,7 +237,7 @@ fn comparison_sees_each_kind_of_error() {
     }
 }
 
-/// Looks along z from the origin, so that transforms are exact.
+/// A camera that looks along z from the origin, so that transforms are exact.
 fn straight(projection: Projection) -> Camera {
     Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection }
 }
@@ -285,7 +285,7 @@ fn each_drop_is_counted_for_its_reason() {
     }
 }
 
-/// Points that have no place, wherever they stand in the list, leave the others as they are.
+/// Points without a place leave the others unchanged, wherever they stand in the list.
 #[test]
 fn poison_harms_nobody() {
     let poison = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e38, 1e38];
@@ -300,7 +300,7 @@ fn poison_harms_nobody() {
                 point
             })
             .collect();
-        // Huge points that are seen lie behind everything else.
+        // Huge points on the screen lie behind everything else.
         mixed.extend(&healthy);
         random.shuffle(&mut mixed);
         let (mut clean, mut mixed_projector) = (Projector::default(), Projector::default());
@@ -349,12 +349,12 @@ fn equal_points_go_to_the_lower_index() {
     assert_eq!(screen.source, [100], "the first of the nearest");
 }
 
-/// A pixel keeps two points of one surface, also a steep one, and no second one of what is behind it.
+/// A pixel keeps two points of one surface, even a steep one, but no second point of a surface behind.
 #[test]
 fn halves_keep_a_point_each_of_one_surface() {
     let camera = straight(Projection::OrthographicHeight(4.0));
     let view = camera.view(DVec3::ZERO, [4, 4]).expect("a view");
-    // A pixel is 1 wide. In that right of and below the centre halves are one below the other, in the next side by side.
+    // A pixel is 1 wide. The pixel right of and below the centre is split top/bottom, the next left/right.
     let kept = |positions: &[[f32; 3]]| -> Vec<u32> {
         let mut projector = Projector::default();
         let mut source = projector.project(&cloud(positions), &view, &ProjectRules::usual(10)).source.clone();
@@ -369,7 +369,7 @@ fn halves_keep_a_point_each_of_one_surface() {
     assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 4.9 + GATE_PX]]), [0, 1], "steep surfaces are one");
 }
 
-/// What is around the picture is there for those in it, and changes nothing of what is in it.
+/// Points in the margin serve as neighbours of points in the picture, and leave the picture's own points unchanged.
 #[test]
 fn a_margin_adds_neighbours_and_few_queries() {
     const SIZE: [u32; 2] = [121, 90];
@@ -404,7 +404,7 @@ fn a_margin_adds_neighbours_and_few_queries() {
     }
 }
 
-/// The density grid is as coarse as promised: about k points to a cell where there are points.
+/// A density cell holds about k points where there are points.
 #[test]
 fn density_cells_hold_about_k_points() {
     let camera = straight(Projection::OrthographicHeight(1.8));

@@ -1,4 +1,4 @@
-// Says how many workgroups the passes after it take, for as many points as there are: so none is started in vain.
+// Computes the number of workgroups of the indirect dispatches from the counters, so that no workgroup starts in vain.
 //
 // Reads: counters. Writes: arguments. One invocation.
 
@@ -10,7 +10,7 @@
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> arguments: array<u32>;
 
-// Which arguments are where: workgroups of so many invocations, or of so many flags, a row of them after the other.
+// Index of each dispatch in `arguments`. The number in a name is the items per workgroup; a block is 2048 flags.
 const VISIBLE256 = 0u;
 const VISIBLE_BLOCKS = 1u;
 const PASSIVE_BLOCKS = 2u;
@@ -25,6 +25,7 @@ const LEFT_RECOVERED64 = 10u;
 const ACTIVE_FEW = 11u;
 const RECOVERED_FEW = 12u;
 
+// Queries that a workgroup processes together.
 override FEW: u32;
 
 @compute @workgroup_size(1)

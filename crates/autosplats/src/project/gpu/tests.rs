@@ -11,7 +11,7 @@ use crate::test_clouds::{self, EYE};
 
 const K: u32 = 10;
 
-/// A screen as the device has it, brought into the host's form.
+/// A device's screen in the host's form, and its counters.
 pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, Vec<u32>) {
     let counters: Vec<u32> = read_back(gpu, &screen.counters, COUNTERS).expect("counters");
     let counter = |counter: Counter| counters[counter as usize] as usize;
@@ -42,8 +42,7 @@ pub(crate) fn read_screen(gpu: &Gpu, screen: &ScreenBuffers) -> (ScreenPoints, V
     (read, counters)
 }
 
-/// A screen as the host has it, brought into the device's form; all active points are queries, those passive recovered
-/// ones.
+/// A host's screen in the device's form: active points are queries, passive points are recovered queries.
 pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> ScreenBuffers {
     let buffers = ScreenBuffers::new(gpu, [view.width, view.height], true, screen.points.len(), 0).expect("room");
     let mut counters = [0u32; COUNTERS];
@@ -74,7 +73,7 @@ pub(crate) fn upload_screen(gpu: &Gpu, screen: &ScreenPoints, view: &View) -> Sc
     buffers
 }
 
-/// Finds how many workgroups there are of each kind of work, after the host has written the counters.
+/// Computes the number of workgroups of each kind of work, after the host has written the counters.
 pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
     let frame = gpu.uniform::<FrameUniform>("frame").expect("room");
     let mut recorder = Recorder::new(gpu, &Clock::Off);
@@ -82,7 +81,7 @@ pub(crate) fn find_work(gpu: &Gpu, screen: &ScreenBuffers) {
     recorder.finish();
 }
 
-/// What is on the screen, and the words of its sixteenths.
+/// Projects a cloud on the device; returns the screen and the words of its sixteenths.
 fn project(
     gpu: &Gpu,
     passes: &ProjectPasses,
@@ -111,7 +110,7 @@ fn project(
     (read_screen(gpu, &screen).0, sixteenths)
 }
 
-/// Points of the first that own another pixel, or none, in the second, relative to all.
+/// Fraction of the points of `a` that own another pixel, or none, in `b`.
 fn moved(a: &ScreenPoints, b: &ScreenPoints) -> f64 {
     let owners = |screen: &ScreenPoints| -> std::collections::HashSet<(u32, u32)> {
         screen.source.iter().copied().zip(screen.points.iter().map(|point| point.pixel)).collect()
@@ -145,8 +144,8 @@ fn the_device_finds_what_the_host_finds() {
                     let (device, sixteenths) = project(&gpu, passes, &cloud, &view, &rules);
                     let case = format!("{name} {projection:?} {size:?} {rules:?} {int64}");
                     assert_eq!(device.dropped, host.dropped, "{case}");
-                    // Divisions may be off by some units in the last place on a device, which moves a few points of ten
-                    // thousand over a pixel's border.
+                    // Divisions on a device can be off by some units in the last place, which moves a few of ten
+                    // thousand points over the border of a pixel.
                     let moved = moved(host, &device);
                     assert!(moved < 2e-3, "{case}: {moved} of the points own another pixel");
                     let words = host.sixteenths.words();
@@ -173,7 +172,7 @@ fn assert_same(host: &ScreenPoints, device: &ScreenPoints, case: &str) {
     for (a, b) in device.points.iter().zip(&host.points) {
         let near = (0..3).all(|axis| {
             let [a, b] = [a.position_view[axis], b.position_view[axis]];
-            // Sums of three products about the eye, whose distance is 4: some units in its last place.
+            // Sums of three products about the eye, whose distance is 4: some units in the last place.
             (a - b).abs() <= 4e-6 * b.abs().max(4.0)
         });
         assert!(near && a.pixel == b.pixel, "{case}: {a:?} is not {b:?}");
