@@ -1,4 +1,4 @@
-//! The engines on the GPU, behind one interface.
+//! The search engines on the GPU, behind one interface.
 
 use std::fmt::Debug;
 
@@ -11,43 +11,44 @@ use crate::gpu::{Gpu, Step};
 use crate::project::DeviceCloud;
 use crate::project::gpu::{Round, ScreenBuffers};
 
-/// What an engine may read, and where it leaves what it finds.
+/// The buffers that an engine reads and writes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchBuffers<'a> {
     /// [`FrameUniform`](crate::gpu::FrameUniform).
     pub(crate) frame: &'a wgpu::Buffer,
     pub(crate) cloud: &'a DeviceCloud,
     pub(crate) screen: &'a ScreenBuffers,
-    /// `Neighborhood` of `shared/surfel.wgsl` for each query, in the order of the queries.
+    /// `Neighborhood` of `shared/surfel.wgsl` for each query, in query order.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
-    /// Of each pixel of the last frame the bits of a k-radius, 0 for none; of no use unless `frame` tells of that frame.
+    /// Bits of a k-radius for each pixel of the last frame, 0 for none. Valid only if `frame` describes the last
+    /// frame.
     pub(crate) past: &'a wgpu::Buffer,
 }
 
-/// An engine's compiled passes, good for one k.
+/// The compiled passes of an engine, for one k.
 pub(crate) trait EnginePasses: Debug {
-    /// Makes the buffers that the engine needs of its own, and the steps of each [`Round`].
+    /// Allocates the engine's own buffers and returns the steps of each [`Round`].
     ///
     /// # Errors
-    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    /// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
     fn steps(&self, gpu: &Gpu, buffers: SearchBuffers<'_>) -> Result<EngineSteps, Error>;
 }
 
-/// What an engine does in a frame.
+/// The work of an engine in a frame.
 #[derive(Debug)]
 pub(crate) struct EngineSteps {
     /// The steps of each [`Round`].
     pub(crate) rounds: [Vec<Step>; 2],
-    /// Of an engine that iterates: for each round a run of `u32`, the points that had not converged before the first
-    /// iteration and after each.
+    /// For an engine that iterates: a run of `u32` per round, the unconverged points before the first iteration and
+    /// after each.
     pub(crate) convergence: Option<wgpu::Buffer>,
 }
 
-/// The points of both rounds that had not converged before the first iteration and after each, as far as there were any.
+/// Sums the unconverged points of both rounds, before the first iteration and after each, without the constant end.
 pub(crate) fn convergence(runs: &[u32]) -> Vec<u32> {
     let (active, recovered) = runs.split_at(runs.len() / 2);
     let mut curve: Vec<u32> = active.iter().zip(recovered).map(|(a, b)| a + b).collect();
-    // After the last iteration the numbers stay.
+    // After the last iteration the numbers stay the same.
     while let [.., before, last] = curve[..]
         && before == last
     {
@@ -56,7 +57,7 @@ pub(crate) fn convergence(runs: &[u32]) -> Vec<u32> {
     curve
 }
 
-/// Checks whether an engine runs here, before anything is compiled.
+/// Checks whether the device can run an engine, before anything is compiled.
 ///
 /// # Errors
 /// [`Error::Device`] if the device cannot run it.

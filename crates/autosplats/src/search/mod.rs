@@ -1,22 +1,23 @@
 //! Search: the k nearest screen points of each screen point, summed up in moments [Paper, §4, §5].
 //!
-//! The question is stated here without iterations, so that the answer depends on the screen points alone. The screen grid and
-//! splat communication answer it; the kd-tree answers another, as the paper's rival does: its neighbours are all points of the
-//! cloud, seen or not, it knows no gap, and its bound is its own. For point P with first search radius r̃₀ (§5.1) and the
-//! distances d₁ ≤ d₂ ≤ … to the other screen points:
+//! The rules below have no iterations, so that the result depends on the screen points alone. The screen grid and
+//! splat communication follow these rules. The kd-tree, the paper's baseline, answers another question: its neighbours
+//! are all points of the cloud, visible or not, it has no gap rule, and its bound is its own.
 //!
-//! - *outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions that met nothing; with
-//!   adaptive rules, if d₁ is more than [`STEEP`] times that, or no more but a gap ends the neighbourhood;
-//! - *gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood: the circle's area grew by λ, from r̃₀
-//!   on, without a new neighbour. P is *clamped* to κ = j neighbours, its k-radius is dⱼ; with adaptive rules
-//!   d₂ > λ·d₁ is asked of a gap after one neighbour;
-//! - otherwise the k-radius is d₍ₖ₎, the neighbourhood all points at that distance or nearer;
-//! - *bound*: a search need not look further than the largest of the radii r̃₀·1.25ⁱ, i any whole number, whose sphere
-//!   projects to a rectangle with at most [`MAX_CANDIDATES`] screen points. If no rule ended the neighbourhood and its k-th
-//!   neighbour lies beyond, P keeps the neighbours within that radius and is counted as bounded. So a cloud of nothing but
-//!   outliers costs a bounded time per point. An engine may go without the rectangle, and so without the bound, where it
-//!   reads less than [`CROWDED`] screen points. Splat communication goes without it: what bounds it is the number of its
-//!   iterations.
+//! For a point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to the other screen points:
+//!
+//! - *Outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions without a neighbour.
+//!   With adaptive rules P is discarded if d₁ is more than [`STEEP`] times that radius, or if d₁ exceeds that radius
+//!   and a gap ends the neighbourhood.
+//! - *Gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood. The area of the circle has then
+//!   grown by λ, from r̃₀ on, without a new neighbour. P is *clamped* to κ = j neighbours, and its k-radius is dⱼ.
+//!   With adaptive rules a gap after one neighbour needs d₂ > λ·d₁.
+//! - Otherwise the k-radius is d₍ₖ₎, and the neighbourhood is all points at that distance or nearer.
+//! - *Bound*: a search ends at the largest radius r̃₀·1.25ⁱ, for whole i, whose sphere projects to a rectangle with at
+//!   most [`MAX_CANDIDATES`] screen points. If no rule ends the neighbourhood and the k-th neighbour lies beyond, P
+//!   keeps the neighbours within that radius and counts as *bounded*. The bound limits the time per point, even in a
+//!   cloud of outliers only. An engine may skip the bound where it reads fewer than [`CROWDED`] screen points. Splat
+//!   communication has no such bound; its number of iterations is limited instead.
 
 pub(crate) mod gpu;
 pub(crate) mod kd_tree;
@@ -33,31 +34,32 @@ mod tests;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum SearchEngine {
-    /// Buckets of screen points read outwards from each point; exact, in one pass.
+    /// Reads buckets of screen points outwards from each point. Exact, in one pass.
     #[default]
     ScreenGrid,
-    /// The paper's own: points draw splats onto each other's pixels, on a GPU only. Slower, and exact for at least 99.9 % of
-    /// the points.
+    /// The paper's engine: points draw splats onto each other's pixels. Runs on a GPU only. Slower than the screen
+    /// grid; exact for at least 99.9 % of the points.
     SplatCommunication,
-    /// The paper's rival (Zhou et al. 2008): a kd-tree over all points of the cloud, built anew in each frame, and the
-    /// k-radius of each of them. On a GPU only. Its neighbours are those in the cloud, seen or not; it knows no gaps.
+    /// The paper's baseline (Zhou et al. 2008): a kd-tree over all points of the cloud, rebuilt in each frame. Runs on
+    /// a GPU only. Neighbours are points of the cloud, visible or not, and gaps do not end a neighbourhood.
     KdTree {
-        /// Within it, in world units, a point's k neighbours must lie: those beyond are not found. Much too large a radius
-        /// costs time, and exactness.
+        /// Radius in world units within which a point's k neighbours must lie; further neighbours are not found. A
+        /// much too large radius costs time and exactness.
         first_radius: f32,
     },
 }
 
-/// Neighbourhoods that share a [`NeighborhoodBlock`].
+/// Number of neighbourhoods in a [`NeighborhoodBlock`].
 pub(crate) const LANES: usize = 16;
 
-/// Added to projected bounds in pixels, against the rounding of projected coordinates.
+/// Margin in pixels around projected bounds, against the rounding of projected coordinates.
 pub(crate) const MARGIN_PX: f32 = 0.02;
-/// Screen points in the projection of the largest sphere that is searched.
+/// Most screen points in the projection of the largest sphere that is searched.
 pub(crate) const MAX_CANDIDATES: usize = 4096;
-/// Screen points in a window from which on its points may meet the bound: densities do not rise eightfold in one step.
+/// Number of screen points in a window from which on its points may meet the bound: density does not rise eightfold in
+/// one step.
 pub(crate) const CROWDED: usize = MAX_CANDIDATES / 8;
-/// Step between the radii among which the bound is found.
+/// Ratio of successive radii among which the bound is chosen.
 pub(crate) const BOUND_STEP: f32 = 1.25;
 
 /// One value per neighbourhood of a block.
@@ -69,7 +71,7 @@ pub(crate) struct Lanes(pub(crate) [f32; LANES]);
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub(crate) struct NeighborhoodBlock {
-    /// Neighbours; 0 if the point is an outlier.
+    /// Number of neighbours; 0 if the point is an outlier.
     pub(crate) count: Lanes,
     /// Distance to the furthest neighbour, world units.
     pub(crate) k_radius: Lanes,
@@ -92,15 +94,15 @@ impl Default for NeighborhoodBlock {
     }
 }
 
-/// Neighbourhoods of a list of screen points, in that list's order.
+/// Neighbourhoods of a list of screen points, in the order of the list.
 #[derive(Debug, Default)]
 pub(crate) struct Neighborhoods {
-    /// Lanes of the last block beyond the end of the list hold nothing of use.
+    /// Blocks of sixteen. Lanes of the last block beyond the end of the list are undefined.
     pub(crate) blocks: Vec<NeighborhoodBlock>,
     pub(crate) counts: SearchCounts,
 }
 
-/// What became of the points searched for.
+/// Numbers of points whose search ended early, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SearchCounts {
     pub(crate) outliers: usize,
@@ -119,52 +121,53 @@ impl std::ops::Add for SearchCounts {
     }
 }
 
-/// How much further than the radius after e0 expansions the nearest neighbour may be, with adaptive rules, of a point that has all k.
-/// Where a surface is steep, or others stand behind it, density is told too high and first search radii too short: with noise
-/// such a surface lost most of its points. Outliers have gaps around them.
+/// Factor on the outlier radius up to which adaptive rules keep a point that has k neighbours without a gap. On a
+/// steep surface, or in front of another surface, density is overestimated and first search radii are too short: with
+/// noise, a surface would lose most of its points. Outliers have gaps around them.
 pub(crate) const STEEP: f32 = 1.2;
 
-/// The question put to an engine.
+/// Rules that define the neighbourhoods; an engine implements them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchRules {
     pub(crate) k: u32,
-    /// e0; `None` keeps points without neighbours.
+    /// Number of expansions e0 after which a point without a neighbour is an outlier; `None` keeps such points.
     pub(crate) outlier_expansions: Option<u32>,
-    /// λ; `None` bridges any gap.
+    /// Gap factor λ; `None` bridges any gap.
     pub(crate) gap_factor: Option<f32>,
-    /// Whether a gap after one neighbour has to be wider, so that strewn points have it no more often than one after two.
+    /// Whether a gap after one neighbour must be wider, so that random samples have it no more often than a gap after
+    /// two neighbours, and whether [`STEEP`] applies.
     pub(crate) adaptive: bool,
 }
 
-/// How a neighbourhood ends before its k-th neighbour.
+/// Rule that ends a neighbourhood before its k-th neighbour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum EarlyEnd {
-    /// No neighbour is near enough.
+    /// The nearest neighbour is too far.
     Outlier,
     /// A gap follows this many neighbours.
     Gap(usize),
 }
 
 impl SearchRules {
-    /// Radius within which a point must have a neighbour, but for [`STEEP`].
+    /// Outlier radius in world units: a point needs a neighbour within, apart from [`STEEP`].
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
-        // Differs from the paper, whose expansion by √k would be none at k = 1, and discard surface below the usual k.
+        // Differs from the paper: an expansion by √k alone would be none at k = 1, and discard surfaces below the
+        // usual k.
         let growth = self.k.max(10) as f32;
         self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * growth.powf(0.5 * e0 as f32))
     }
 
-    /// How much further than its furthest neighbour a neighbourhood of so many may go without another.
-    // Differs from the paper: of strewn points the second is more than √λ times as far as the first in one neighbourhood of λ.
-    // The first search radius is to keep that from being a gap, but it is too short where a surface is steep, or the back of a
-    // thing is seen through its front, in close-ups.
+    /// Largest ratio between the next neighbour's distance and the furthest of `neighbors` neighbours that is no gap.
+    // Differs from the paper: of random samples, the second neighbour is more than √λ times as far as the first in one
+    // neighbourhood of λ. The first search radius should prevent such gaps. It is too short where a surface is steep,
+    // or where a close-up shows the back of an object through its front.
     fn gap_growth(&self, gap_factor: f32, neighbors: usize) -> f32 {
         if self.adaptive && neighbors == 1 { gap_factor } else { gap_factor.sqrt() }
     }
 
-    /// Applies the rules to the squared distances, ascending and complete up to distance `known`.
-    ///
-    /// `None` says that no rule ends the neighbourhood within `known`.
+    /// Applies the rules to squared distances in ascending order, complete up to distance `known`. `None` means that
+    /// no rule ends the neighbourhood within `known`.
     pub(crate) fn early_end(&self, squared: &[f32], initial_radius: f32, known: f32) -> Option<EarlyEnd> {
         let nearest = squared.first().map_or(known, |d| d.sqrt());
         let outlier_radius = self.outlier_radius(initial_radius);

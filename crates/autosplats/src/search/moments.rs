@@ -1,4 +1,4 @@
-//! Distances and moments: what sixteen points have in common with a shared list of candidates.
+//! Squared distances and moments of sixteen points over a shared list of candidates.
 
 use pulp::Simd;
 
@@ -6,7 +6,7 @@ use super::select::vectors;
 use super::{LANES, Lanes, NeighborhoodBlock};
 use crate::simd::F32s;
 
-/// Squared distances from each candidate to each of the sixteen points.
+/// Computes the squared distances from each candidate to each of the sixteen points.
 #[inline(always)]
 pub(crate) fn squared_distances<S: Simd>(
     simd: S,
@@ -27,7 +27,7 @@ pub(crate) fn squared_distances<S: Simd>(
     }
 }
 
-/// Sums the candidates up to the threshold, a squared distance, of each lane in `done`.
+/// Sums the candidates up to the squared distance `threshold`, for each lane in `done`.
 #[inline(always)]
 pub(crate) fn sum_moments<S: Simd>(
     simd: S,
@@ -42,7 +42,7 @@ pub(crate) fn sum_moments<S: Simd>(
     for vector in 0..vectors::<S>() {
         let [x, y, z] = [0, 1, 2].map(|axis: usize| F32s::load(simd, &position[axis].0, vector));
         let threshold = F32s::load(simd, &threshold.0, vector);
-        // The point itself adds nothing but to the count.
+        // The point itself adds to the count only.
         let mut count = F32s::splat(simd, -1.0);
         let mut offset = [F32s::splat(simd, 0.0); 3];
         let mut second = [F32s::splat(simd, 0.0); 6];

@@ -5,22 +5,22 @@ use pulp::Simd;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
-/// Candidates counted at a time, each into a sum of its own: one sum would wait for itself.
+/// Candidates counted at a time, each into its own sum: additions to one sum would wait for each other.
 pub(crate) const GROUP: usize = 4;
-/// A threshold with no more than this many candidates too many is near enough: the largest distances below it are listed.
+/// Most candidates beyond the k-th below an accepted threshold. The k-th is then found in a list of the largest
+/// distances below the threshold.
 const SURPLUS: usize = 3;
-/// Threshold moves after which the k-th smallest distance is given up to the interval's upper end. Every other move
-/// halves the interval of floats, so that this many always suffice.
+/// Most moves of a threshold; then the interval's upper end is taken. Every other move halves the interval of floats,
+/// so that this number always suffices.
 const MOST_MOVES: usize = 80;
 
-/// Vectors that sixteen lanes take.
+/// Number of SIMD vectors in sixteen lanes.
 pub(crate) const fn vectors<S: Simd>() -> usize {
     LANES / S::F32_LANES
 }
 
-/// Moves the threshold of each lane in `group` to its k-th smallest squared distance, the point itself not counted.
-///
-/// `threshold` holds first guesses; there are more than `k` candidates.
+/// Moves the threshold of each lane in `group` to its k-th smallest squared distance, the point itself not counted. On
+/// entry `threshold` holds first guesses. There must be more than `k` candidates.
 #[inline(always)]
 pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &[bool; LANES], threshold: &mut Lanes) {
     // The point itself is among the candidates, at distance 0.
@@ -53,13 +53,14 @@ pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &
             let [below, above] = [low[lane], high[lane]];
             let [below_bits, above_bits] = [below.to_bits(), above.to_bits()];
             if above_bits - below_bits <= 1 {
-                // Several candidates at the same distance: all of them belong.
+                // Several candidates at the same distance all belong.
                 at.0[lane] = above;
                 open[lane] = false;
                 continue;
             }
             any_open = true;
-            // On a surface the count grows with the area, so with the squared distance; in odd steps it need not.
+            // On a surface the count grows with the area, hence with the squared distance. Odd steps bisect, for other
+            // shapes.
             let next = if above == f32::INFINITY {
                 t * (target / n * 1.1).clamp(1.2, 4.0)
             } else if step < 4 || step % 2 == 0 {
@@ -81,7 +82,7 @@ pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &
     }
 }
 
-/// How many candidates lie at or below each lane's threshold.
+/// Number of candidates at or below each lane's threshold.
 #[inline(always)]
 fn count_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> Lanes {
     let mut count = Lanes::default();

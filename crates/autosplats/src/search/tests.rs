@@ -13,7 +13,7 @@ type Search = fn(&ScreenPoints, &[u32], &View, &SearchRules, &Past, &mut Neighbo
 const ENGINES: [(&str, Search); 1] = [("screen grid", screen_grid::search)];
 
 const KS: [u32; 5] = [1, 3, 10, 16, 64];
-/// Thresholds this near, relative, may fall to either side: f32 rounding of a distance and of a radius.
+/// Relative distance to a threshold within which f32 rounding of a distance and a radius may decide.
 const ROUNDING: f64 = 2e-6;
 
 fn rules(k: u32) -> SearchRules {
@@ -31,7 +31,7 @@ fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (S
     (Projector::default().project(&cloud, &view, &ProjectRules::usual(k)).clone(), view)
 }
 
-/// The other screen points by distance, for each screen point.
+/// The other screen points and their distances, ascending, for each screen point.
 struct Oracle {
     others: Vec<Vec<(f64, usize)>>,
     positions: Vec<DVec3>,
@@ -44,15 +44,15 @@ enum Fate {
     Whole,
 }
 
-/// What the search must answer for one point.
+/// Expected result for one point.
 #[derive(Debug)]
 struct Expected {
     fate: Fate,
-    /// Number of neighbours, but for others at the same distance as the last.
+    /// Number of neighbours, without others at the same distance as the last.
     count: usize,
-    /// 0 for outliers.
+    /// K-radius; 0 for outliers.
     radius: f64,
-    /// A threshold of the rules is so near that rounding decides.
+    /// Whether a threshold of the rules is so near that rounding decides.
     unsure: bool,
 }
 
@@ -68,7 +68,7 @@ impl Oracle {
         Self { others: (0..positions.len()).map(others).collect(), positions }
     }
 
-    /// r̃₀ of §5.1, from the screen points in the cell.
+    /// First search radius r̃₀ of §5.1, from the number of screen points in the cell.
     fn initial_radius(&self, screen: &ScreenPoints, view: &View, k: u32, point: usize) -> f64 {
         let side = screen.density.cell_px;
         let cell = |i: usize| screen.points[i].pixel_xy().map(|c| c / side);
@@ -78,7 +78,7 @@ impl Oracle {
         radius_px * depth / f64::from(view.focal_px)
     }
 
-    /// The rules as the stage states them.
+    /// Applies the rules of the search stage.
     fn expect(&self, rules: &SearchRules, initial_radius: f64, point: usize) -> Expected {
         let k = rules.k as usize;
         let distance = |j: usize| self.others[point].get(j - 1).map_or(f64::INFINITY, |&(d, _)| d);
@@ -109,7 +109,7 @@ impl Oracle {
         Expected { fate, count: end, radius: distance(end), unsure }
     }
 
-    /// Those within `radius` of a point.
+    /// The other points within `radius` of a point.
     fn within(&self, point: usize, radius: f64) -> &[(f64, usize)] {
         let others = &self.others[point];
         &others[..others.partition_point(|&(d, _)| d <= radius)]
@@ -136,12 +136,12 @@ fn found(neighborhoods: &Neighborhoods, index: usize) -> Found {
     }
 }
 
-/// Compares the sums of one neighbourhood with those over all points within its radius.
+/// Compares the sums of one neighbourhood with the sums over all points within its radius.
 fn compare_sums(oracle: &Oracle, point: usize, found: &Found, expected: &Expected) -> Result<(), String> {
     let Expected { count: least, radius, .. } = *expected;
     let most = oracle.within(point, radius * (1.0 + ROUNDING)).len();
     let count = found.count as usize;
-    // Points at the k-th distance belong; rounding may tell apart those at nearly the same distance.
+    // Points at the k-th distance belong; rounding may separate points at nearly the same distance.
     if !(least..=most).contains(&count) || found.count.fract() != 0.0 {
         return Err(format!("point {point}: {count} neighbours, not {least} to {most}"));
     }
@@ -166,7 +166,7 @@ fn compare_sums(oracle: &Oracle, point: usize, found: &Found, expected: &Expecte
     }
 }
 
-/// Compares all answers; returns how many had to be left out because rounding decides.
+/// Compares all neighbourhoods. Returns the number of points left out because rounding decides.
 fn compare(
     oracle: &Oracle,
     initial_radii: &[f64],
@@ -234,7 +234,7 @@ fn every_cloud_with_every_rule() {
         }
     }
     assert!(compared > 100_000, "there is something to compare: {compared}");
-    // The seeds leave next to nothing to rounding.
+    // The seeds leave almost no point to rounding.
     assert!(left_out * 5000 < compared, "{left_out} of {compared} are left to rounding");
 }
 
@@ -276,7 +276,7 @@ fn comparison_sees_each_kind_of_error() {
     }
 }
 
-/// What stands behind a wall, denser than that, makes the wall's first search radii too short.
+/// A denser surface behind a wall makes the wall's first search radii too short.
 #[test]
 fn a_surface_before_a_denser_one_is_no_outlier() {
     let camera = Camera {
@@ -298,7 +298,7 @@ fn a_surface_before_a_denser_one_is_no_outlier() {
         screen_grid::search(&screen, &queries, &view, &rules, &Past::default(), &mut neighborhoods);
         neighborhoods.counts.outliers
     };
-    // How many of what is behind fall into a cell differs a little.
+    // The number of points of the surface behind in a cell varies a little.
     let [without, with] = [false, true].map(outliers);
     assert!(without > 350 && with < 100, "first search radii are those of what is behind: {without}, {with}");
 }
@@ -330,7 +330,7 @@ fn ties_belong() {
     }
 }
 
-/// A search that meets its bound keeps fewer neighbours, but all there are up to its k-radius.
+/// A bounded search keeps fewer neighbours, but all points up to its k-radius.
 #[test]
 fn bounded_searches_stay_exact_as_far_as_they_go() {
     let camera = cameras()[1];
@@ -369,7 +369,7 @@ fn huge_coordinates_reach_no_sum() {
         for huge in [0, 1, 40] {
             let mut positions = test_clouds::sphere(near);
             let forward = (EYE / EYE.z).as_vec3();
-            // Within f32's steps there; on the screen at random.
+            // Depths in steps of f32 that fall on random pixels.
             positions.extend((0..huge).map(|i| (forward * (1e38 * (1.0 + 0.01 * i as f32))).to_array()));
             let (screen, view) = screen(&positions, &camera, [90, 70], k);
             let queries: Vec<u32> = (0..screen.points.len() as u32).collect();

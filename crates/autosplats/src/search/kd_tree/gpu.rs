@@ -1,4 +1,4 @@
-//! The kd-tree on the GPU: built level by level, then searched.
+//! The kd-tree on the GPU: passes that build the tree level by level, then search it.
 
 use crate::Error;
 use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
@@ -18,31 +18,30 @@ const SMALL_TREE: PassSource =
 const SEARCH: PassSource = PassSource::new("search/kd_tree/search", include_str!("search.wgsl"));
 const MOMENTS: PassSource = PassSource::new("search/kd_tree/moments", include_str!("moments.wgsl"));
 
-/// Points of a small node at most.
+/// Most points of a small node.
 const SMALL: usize = 64;
-/// Points of a leaf at least, where there are more.
+/// Fewest points of a leaf, where there are more.
 const LEAST: usize = 8;
-/// Points whose reading costs as much as a step down the tree: with 4, 8, 24 and 40 searches took longer on software Vulkan,
-/// as did building with less.
+/// Number of points whose reading costs as much as a step down the tree. See docs/decisions/0015-search-engines.md.
 const STEP_COST: f64 = 16.0;
-/// Points of a large node that one workgroup takes up.
+/// Points of a large node that one workgroup processes.
 const CHUNK: usize = 256;
-/// Nodes and points that a walk through the tree sees at most: software devices end an invocation silently after 65535
-/// rounds of its loops, and a search is two walks.
+/// Most nodes and points that one walk through the tree visits. Software devices end an invocation silently after
+/// 65535 rounds of its loops, and a search is two walks.
 const MOST_SEEN: u32 = 12_000;
 
 /// `KdPoint` of `shared/kd_tree.wgsl`.
 type Point = [u32; 4];
-/// `KdNode`: a corner, a child or a point, the other corner, a number of points.
+/// `KdNode` of `shared/kd_tree.wgsl`: a corner, a child or a point, the other corner, a number of points.
 type Node = [u32; 8];
 /// `KdLarge` of `shared/kd_build.wgsl`.
 type Large = [u32; 16];
-/// `KdSmall`.
+/// `KdSmall` of `shared/kd_build.wgsl`.
 type Small = [u32; 4];
-/// `KdState`.
+/// `KdState` of `shared/kd_build.wgsl`.
 type State = [u32; 6];
 
-/// Numbers of workgroups, as `shared/kd_work.wgsl` has them.
+/// Indirect dispatches of the engine, in the order of `shared/kd_work.wgsl`.
 #[derive(Clone, Copy, Debug)]
 enum Work {
     Large,
@@ -51,43 +50,44 @@ enum Work {
     Points,
 }
 
-/// How many of them there are.
+/// Number of indirect dispatches.
 const WORKS: u64 = Work::Points as u64 + 1;
-/// Bytes of the arguments of a dispatch.
+/// Bytes of the arguments of an indirect dispatch.
 const WORK_BYTES: u64 = 12;
 
-/// Levels of large nodes that there is time for: for each halving of the points 5/2, since a split that leaves three quarters
-/// to one side is not lopsided yet, and takes 1/log₂(4/3) = 2.41 of them; a lopsided one and the median after it take two.
-/// And some for sampled medians that are off. An even number, so that all points end in the first list.
+/// Number of levels of large nodes to record: 5/2 per halving of the points, and some for inexact sampled medians. A
+/// split that leaves three quarters on one side is not yet lopsided and takes 1/log₂(4/3) = 2.41 levels per halving. A
+/// lopsided split and the median after it take two. The number is even, so that all points end in the first list.
 fn levels(capacity: usize) -> usize {
     let halvings = capacity.div_ceil(SMALL).next_power_of_two().ilog2() as usize;
     (5 * halvings).div_ceil(4) * 2 + 6
 }
 
-/// A tree of up to so many points, and what building it takes: 52 bytes a point.
+/// Buffers of a tree of up to `capacity` points, 52 bytes a point.
 #[derive(Debug)]
 struct TreeBuffers {
     capacity: u32,
-    /// Points before and after a level in turn; those of the finished tree are in the first.
+    /// Points before and after a level, in turn; the finished tree's points are in the first.
     points: [wgpu::Buffer; 2],
     nodes: wgpu::Buffer,
-    /// Large nodes of a level and of the next in turn, and so the next two.
+    /// Large nodes of a level and of the next, in turn, like `state` and `arguments`.
     large: [wgpu::Buffer; 2],
     state: [wgpu::Buffer; 2],
     arguments: [wgpu::Buffer; 2],
     small: wgpu::Buffer,
     chunk_sums: wgpu::Buffer,
-    /// Of each point of the cloud, in its order: the k-radius or a little more; negative if it is not in the tree.
+    /// For each point of the cloud, in its order, the k-radius or a little more; negative if the point is not in the
+    /// tree.
     radii: wgpu::Buffer,
 }
 
 impl TreeBuffers {
     /// # Errors
-    /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+    /// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
     fn new(gpu: &Gpu, capacity: usize) -> Result<Self, Error> {
-        // Large nodes of a level have more than `SMALL` points each, but for the root.
+        // Large nodes of a level have more than `SMALL` points each, apart from the root.
         let large = capacity / (SMALL + 1) + 1;
-        // Nodes above the small ones: twice as many as there would be if all small ones were half full.
+        // Nodes above the small nodes: twice the number with all small nodes half full.
         let upper = capacity / 8 + 64;
         let lower = capacity / (LEAST / 2) + 1;
         let points = |_| gpu.storage::<Point>("points of the kd-tree", capacity);
@@ -108,13 +108,13 @@ impl TreeBuffers {
         })
     }
 
-    /// As many workgroups as a level of this parity has of `work`.
+    /// Number of workgroups of `work` at a level of this parity.
     fn groups(&self, parity: usize, work: Work) -> Groups {
         Groups::Counted(self.arguments[parity].clone(), work as u64 * WORK_BYTES)
     }
 }
 
-/// One for each parity of levels.
+/// Makes one value for each parity of levels.
 fn both<T>(make: impl Fn(usize) -> Result<T, Error>) -> Result<[T; 2], Error> {
     Ok([make(0)?, make(1)?])
 }
@@ -177,7 +177,7 @@ impl KdTreePasses {
         for _ in 0..levels(tree.capacity as usize) / 2 {
             steps.extend(two_levels.iter().cloned());
         }
-        // What is large after the last level becomes a leaf.
+        // Nodes that are still large after the last level become leaves.
         steps.push(split);
         let small_tree = [frame, &state[0], small, &points[0], &points[1], nodes];
         steps.push(self.small_tree.step(gpu, &small_tree, tree.groups(0, Work::Small)));
@@ -187,7 +187,7 @@ impl KdTreePasses {
     /// Builds the tree and searches it.
     fn steps_in(&self, gpu: &Gpu, buffers: SearchBuffers<'_>, tree: &TreeBuffers) -> [Vec<Step>; 2] {
         let SearchBuffers { frame, cloud, screen, neighborhoods, .. } = buffers;
-        // Room for the tree's points is room for one chunk of the cloud; an empty cloud has none.
+        // A tree that fits one binding has one chunk of the cloud; an empty cloud has no chunk.
         let [chunk] = cloud.chunks() else { return [Vec::new(), Vec::new()] };
         let mut first = self.build(gpu, frame, chunk, tree);
         let TreeBuffers { points: [points, _], nodes, state: [state, _], radii, .. } = tree;

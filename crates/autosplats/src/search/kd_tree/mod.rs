@@ -1,52 +1,54 @@
-//! The kd-tree engine: the paper's rival, Zhou, Hou, Wang, Guo, *Real-Time KD-Tree Construction on Graphics Hardware*, 2008
-//! [ZHWG08], as [Paper, §8] uses it. It finds the k-radius of every point of the cloud, seen or not, in a tree that each
-//! frame builds anew, from a first radius that the user sets.
+//! The kd-tree engine, the paper's baseline [Paper, §8]: Zhou, Hou, Wang, Guo, *Real-Time KD-Tree Construction on
+//! Graphics Hardware*, 2008 [ZHWG08]. The engine builds a tree of all points of the cloud in each frame, and finds the
+//! k-radius of each point, visible or not, from a first radius that the user sets.
 //!
 //! # How it works
-//! *Large nodes*, of more than 64 points, are split breadth-first, a level at a time: each at the spatial median of the
-//! longest axis of its box (`split`); chunks of 256 points count what goes left (`count`); sums over the chunks make the
-//! children and the lists of the next level (`place`); then points move to the halves of their node's run, in order, and
-//! the boxes of the children are found on the way (`scatter`). The first level parts the finite points from the others.
-//! The number of levels is recorded in advance, each of its passes dispatched for as many nodes as there are.
+//! *Large nodes* of more than 64 points are split breadth-first, one level at a time. `split` splits each at the
+//! spatial median of the longest axis of its box. `count` counts the points of each chunk of 256 that go left. `place`
+//! sums over the chunks and makes the children and the lists of the next level. `scatter` moves the points to the
+//! halves of their node's run, in order, and finds the boxes of the children. The first level separates the finite
+//! points from the others. The number of levels is recorded in advance; each pass of a level is dispatched for the
+//! nodes there are.
 //!
-//! *Small nodes* become trees by themselves, a workgroup each (`small_tree`), by the voxel volume heuristic over the planes
-//! through their points, sets of points being masks of 64 bits.
+//! *Small nodes* become trees of their own, one workgroup each (`small_tree`), by the voxel volume heuristic over the
+//! planes through their points. Sets of points are masks of 64 bits.
 //!
-//! `search` takes the points in the order of the tree. A range search of the first radius counts the neighbours in 32 bins
-//! of distance, another does so within the bin in which the k-th falls (n_hist = 32, n_iter = 2, [Paper, §8.1]); the upper
-//! end of the bin found then is the k-radius, or a little more. `moments` sums up what lies within it for the points that
-//! are seen. Nearer children come first in all walks.
+//! `search` processes the points in the order of the tree. A range search of the first radius counts the neighbours in
+//! 32 bins of distance, and a second search splits the bin of the k-th (n_hist = 32, n_iter = 2, [Paper, §8.2]). The
+//! upper end of the last bin is the k-radius or a little more. `moments` sums the neighbours within that radius for
+//! the visible points. All walks visit the nearer child first.
 //!
-//! # What is remembered, and what is not
-//! From [ZHWG08] as remembered: the two phases, chunks of 256, large nodes of more than 64 points, spatial medians and empty
-//! space, masks and bit counts in small nodes, `VVH(x) = C_L·V(L ± R) + C_R·V(R ± R)`, and the histogram search. Chosen
-//! here: R is the first radius; a step down the tree costs as much as 16 points (with VVH alone each split pays);
-//! leaves have eight points at least.
+//! # What is from [ZHWG08]
+//! Recalled from [ZHWG08], without the text at hand: the two phases, chunks of 256, large nodes of more than 64
+//! points, spatial medians and empty space, masks and bit counts in small nodes, the histogram search, and
+//! `VVH(x) = C_L·V(L ± R) + C_R·V(R ± R)`. Chosen here: R is the first radius, a step down the tree costs as much as
+//! 16 points (with VVH alone each split pays), and leaves have at least eight points.
 //!
-//! # Where it differs from [ZHWG08], and what that costs
-//! - Every node keeps the tight box of its points, which cuts off all empty space, not only parts above a share of it, and
-//!   leaves no empty nodes. A node takes 32 bytes for it instead of 8.
-//! - Boxes of children are found by atomic minima as the points move, not by a segmented reduction of its own: the order
-//!   does not matter to minima. A pass less for each level.
-//! - A node that got more than three quarters of its parent's points is split at the median of 15 of them, so that the
-//!   number of levels is bounded by the number of points, not by the space between clusters. What is large after the last
-//!   level is a leaf of any size, as are points in one place.
-//! - A small node's tree is made by one workgroup in its own memory, not by a level at a time. Trees stay as they are made,
-//!   siblings side by side: no pass rewrites them in preorder.
-//! - A range search sees 12,000 nodes and points at most, the nearest first. What it saw bounds the k-radius from above: a
-//!   first radius far too large costs a bounded time, not the whole cloud for each point. The neighbourhoods are then too
-//!   large, for a bin is a thousandth of that radius.
-//! - Of one neighbour more than k in the last bin the furthest is left out: 99.8 % of the k-radii are exact at k = 10 with a
-//!   first radius of two to four k-radii, not 97 %; at k = 64, with more points in each bin, 97 %, not 84 %. Other points
-//!   have a few neighbours more than k.
+//! # Where the engine differs from [ZHWG08]
+//! - Every node keeps the tight box of its points. This cuts off all empty space, not only large parts, and leaves no
+//!   empty nodes. A node takes 32 bytes instead of 8.
+//! - Boxes of children are found by atomic minima as the points move, whose order does not matter. This saves the pass
+//!   of a segmented reduction at each level.
+//! - A node with more than three quarters of its parent's points is split at the median of 15 of them. The number of
+//!   levels is thus bounded by the number of points, not by the space between clusters. A node still large after the
+//!   last level is a leaf of any size, and so are coincident points.
+//! - A small node's tree is made by one workgroup in its own memory, not one level at a time. Trees stay as made,
+//!   siblings side by side; no pass rewrites them in preorder.
+//! - A range search visits at most 12,000 nodes and points, the nearest first. The points visited bound the k-radius
+//!   from above, so a much too large first radius costs a bounded time. The neighbourhoods are then too large, as a
+//!   bin is a thousandth of that radius.
+//! - If the last bin holds one neighbour more than k, the furthest is left out, which makes more k-radii exact. Other
+//!   points have a few neighbours more than k. See docs/decisions/0015-search-engines.md.
 //!
-//! # Where it differs from the other engines
-//! - Neighbours are those in the whole cloud: hidden ones behind the silhouette, and others in the same pixel.
-//! - A point with fewer than k neighbours in the first radius keeps those; one with none is an outlier. The outlier and gap
-//!   rules of [`search`](super) need a radius from the density on the screen, which is not known of points not seen.
-//! - Points whose k nearest are all in the same place have no surface, where the screen shows one of them.
+//! # Where the engine differs from the other engines
+//! - Neighbours come from the whole cloud: hidden points behind the silhouette, and other points in the same pixel.
+//! - A point with fewer than k neighbours in the first radius keeps these; a point with none is an outlier. The
+//!   outlier and gap rules of [`search`](super) need a radius from the density on the screen, which is unknown for
+//!   invisible points.
+//! - A point whose k nearest are all coincident has no surface, where the other engines see just one of these points.
 //! - Points beyond ±1e18 are left out, as for [normals](crate::estimate_normals).
 //!
-//! It takes 52 bytes a point; a binding must hold 16 of them, so 128 MiB bindings end at 8.4 million points.
+//! The engine takes 52 bytes a point. A binding must hold 16 of these, so bindings of 128 MiB allow 8.4 million
+//! points.
 
 pub(crate) mod gpu;

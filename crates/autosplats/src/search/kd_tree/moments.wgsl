@@ -1,7 +1,7 @@
-// Sums up the neighbours of each query within its k-radius [Paper, §4]: all points of the cloud there, seen or not.
+// Sums the neighbours of each query within its k-radius [Paper, §4]: all points of the cloud there, visible or not.
 //
-// The radius found is the upper end of a bin, in which one point more than the k-th may lie: the furthest is kept apart and
-// left out if there are k without it. So the k-radius is exact unless the bin holds two more.
+// The radius is the upper end of a bin, which may hold one point more than the k-th. The furthest point is kept apart
+// and left out if there are k without it. So the k-radius is exact unless the bin holds two more.
 //
 // Reads: counters, source, queries, positions, radii, nodes, points. Writes: neighborhoods, counters.
 
@@ -20,9 +20,9 @@
 @group(0) @binding(7) var<storage, read> points: array<KdPoint>;
 @group(0) @binding(8) var<storage, read_write> neighborhoods: array<Neighborhood>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-// Nodes and points that a walk sees at most.
+// Most nodes and points that a walk visits.
 override MOST_SEEN: u32;
 
 struct Task {
@@ -56,12 +56,12 @@ fn find(own: u32) -> Found {
         return Found(nothing(0.0, 0.0), false);
     }
     if radius == 0.0 {
-        // k others in the same place, or more: they add nothing to any sum.
+        // At least k coincident points, which add nothing to any sum.
         return Found(nothing(f32(frame.k), 0.0), false);
     }
     let center = vec3f(positions[3u * own], positions[3u * own + 1u], positions[3u * own + 2u]);
     var sums = nothing(0.0, 0.0);
-    // The furthest neighbour, and the squared distance of the one before it.
+    // The furthest neighbour, and the squared distance of its predecessor.
     var furthest = vec3f(0.0);
     var furthest_squared = -1.0;
     var next_squared = 0.0;

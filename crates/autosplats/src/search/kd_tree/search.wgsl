@@ -1,10 +1,10 @@
-// The k-radius of every point of the tree, by range searches whose histograms of distances narrow the radius [ZHWG08, §5].
+// The k-radius of every point of the tree, narrowed by range searches with histograms of distances [ZHWG08, §5].
 //
-// Each of N_ITER searches counts the neighbours between two radii in N_HIST bins; the bin in which the k-th falls is between
-// the next two. Where a point has fewer than k neighbours within the first radius, that stays.
+// Each of N_ITER searches counts the neighbours between two radii in N_HIST bins. The next search is between the ends
+// of the bin that holds the k-th. With fewer than k neighbours the first radius stays.
 //
-// Reads: state, points, nodes. Writes: radii. One invocation per point, in the order of the tree: neighbouring invocations
-// then walk much the same way.
+// Reads: state, points, nodes. Writes: radii. One invocation per point, in the order of the tree, so that neighbouring
+// invocations walk alike.
 
 #import frame
 #import groups
@@ -19,10 +19,10 @@
 
 const N_HIST = 32u;
 const N_ITER = 2u;
-// Rounding of a distance and of its bin.
+// For the rounding of a distance and of its bin.
 const ROUNDING = 1.000001;
 
-// Nodes and points that one range search sees at most.
+// Most nodes and points that one range search visits.
 override MOST_SEEN: u32;
 
 @compute @workgroup_size(64)
@@ -33,11 +33,11 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     }
     let own = points[at].w;
     let center = kd_position(points[at]);
-    // The k-th neighbour lies between these; so many lie nearer.
+    // Bounds of the k-radius, and the number of points nearer than the lower bound.
     var low = 0.0;
     var high = frame.first_radius;
     var nearer = 0u;
-    // Neighbours in the same place: k of them leave nothing to search for.
+    // Number of coincident points; with k of them the k-radius is 0.
     var coincident = 0u;
     for (var iteration = 0u; iteration < N_ITER && coincident < frame.k; iteration++) {
         var bins = array<u32, N_HIST>();
@@ -64,7 +64,8 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
             }
             leaf = kd_next_leaf(&walk);
         }
-        // Differs from [ZHWG08]: a search that saw too much ends. What it saw still bounds the radius from above.
+        // Differs from [ZHWG08]: a search that visits too much ends. The points visited still bound the radius from
+        // above.
         let is_whole = walk.seen < MOST_SEEN;
         var so_far = nearer;
         var bin = 0u;

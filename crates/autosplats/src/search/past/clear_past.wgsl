@@ -1,4 +1,4 @@
-// Forgets the k-radii of the frame before, once nothing is searched for any more.
+// Clears the k-radii of the last frame, after the last search.
 //
 // Writes: past.
 

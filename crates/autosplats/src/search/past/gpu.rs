@@ -9,15 +9,15 @@ pub(crate) const PASSES: &[PassSource] = &[CLEAR_PAST, KEEP_PAST];
 const CLEAR_PAST: PassSource = PassSource::new("search/past/clear_past", include_str!("clear_past.wgsl"));
 const KEEP_PAST: PassSource = PassSource::new("search/past/keep_past", include_str!("keep_past.wgsl"));
 
-/// Room for the k-radii of pictures of `size`; for none if it is `None`.
+/// Allocates a buffer for the k-radii of pictures of `size`, empty if `None`.
 ///
 /// # Errors
-/// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+/// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
 pub(crate) fn past_buffer(gpu: &Gpu, size: Option<[u32; 2]>) -> Result<wgpu::Buffer, Error> {
     gpu.storage::<u32>("k-radii of the last frame", size.map_or(0, |[width, height]| width as usize * height as usize))
 }
 
-/// The passes that keep what was found.
+/// The passes that store the k-radii of a frame.
 #[derive(Debug)]
 pub(crate) struct PastPasses {
     clear: Pass,
@@ -25,7 +25,7 @@ pub(crate) struct PastPasses {
 }
 
 impl PastPasses {
-    /// Compiles them.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -33,7 +33,7 @@ impl PastPasses {
         Ok(Self { clear: Pass::new(gpu, &CLEAR_PAST, &[])?, keep: Pass::new(gpu, &KEEP_PAST, &[])? })
     }
 
-    /// Keeps the k-radii of both rounds in `past`; to be run after the last search.
+    /// Stores the k-radii of both rounds in `past`; to be run after the last search of a frame.
     pub(crate) fn steps(
         &self,
         gpu: &Gpu,

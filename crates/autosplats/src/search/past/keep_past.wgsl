@@ -1,4 +1,5 @@
-// Keeps the k-radii found, for the next frame to start from: the greatest of each pixel, so that it is always the same one.
+// Stores the k-radii found, as starting radii of the next frame. The maximum picks the same one of a pixel's points in
+// every run.
 //
 // Reads: counters, points, queries, neighborhoods. Writes: past.
 

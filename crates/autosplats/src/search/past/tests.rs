@@ -1,4 +1,4 @@
-//! Whatever is known of the past, the same is found.
+//! The past changes only the work of a search, never its result.
 
 use autosplats_cloud::glam::DVec3;
 
@@ -15,7 +15,7 @@ fn seen(view: &View) -> Seen {
     Seen { view: *view, origin: DVec3::ZERO }
 }
 
-/// A past that was seen by this view.
+/// A past with these radii, seen by `view`.
 fn past(view: &View, k: u32, radii: &[f32]) -> Past {
     let pixels = radii.iter().map(|radius| AtomicU32::new(radius.to_bits())).collect();
     let mut past = Past { last: Radii { seen: Some((seen(view), k)), pixels }, ..Past::default() };
@@ -23,7 +23,7 @@ fn past(view: &View, k: u32, radii: &[f32]) -> Past {
     past
 }
 
-/// What the search of this very frame leaves for each pixel.
+/// The radii that a search of this frame stores for each pixel.
 pub(crate) fn found(screen: &ScreenPoints, view: &View, k: u32) -> Vec<f32> {
     let rules = SearchRules { k, outlier_expansions: None, gap_factor: None, adaptive: true };
     let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
@@ -36,7 +36,7 @@ pub(crate) fn found(screen: &ScreenPoints, view: &View, k: u32) -> Vec<f32> {
     past.last.pixels.iter().map(|radius| f32::from_bits(radius.load(Ordering::Relaxed))).collect()
 }
 
-/// Radii that have nothing to do with the points, but for their order of magnitude.
+/// Random radii of about the right order of magnitude.
 pub(crate) fn garbage(screen: &ScreenPoints, view: &View, k: u32, random: &mut Random) -> Vec<f32> {
     let depth = screen.points.first().map_or(1.0, |point| screen.density.initial_radius(point, k, view));
     (0..view.width * view.height).map(|_| depth * 10_f32.powf(1.5 * random.signed())).collect()
@@ -71,7 +71,7 @@ fn the_past_changes_nothing() {
     }
 }
 
-/// Sparse points beside a crowd may meet the bound on search work, whatever radius their search started from.
+/// Sparse points beside a crowd may meet the bound on search work. The starting radius must not matter there either.
 #[test]
 fn the_past_changes_nothing_at_the_bound() {
     let mut random = Random::new(6);
@@ -95,7 +95,7 @@ fn the_past_changes_nothing_at_the_bound() {
     assert!(bounded > 0, "some meet the bound");
 }
 
-/// The radius of a point is known again after a step aside, unless it was not in the picture.
+/// After a step aside the radius of a point is found again, unless the point was outside the picture.
 #[test]
 fn radii_are_found_again_from_elsewhere() {
     let camera = cameras()[0];

@@ -17,18 +17,18 @@ use crate::search::{
     SearchRules,
 };
 
-/// Blocks per task: enough to hide its start, few enough to share out evenly.
+/// Blocks per task: enough to hide the start of a task, few enough for an even distribution.
 const TASK_BLOCKS: usize = 64;
-/// The first window holds spheres of the k-radius expected, that of the block before in first search radii, times this:
-/// most points find their k neighbours in it.
+/// Factor on the expected k-radius for the spheres of the first window, in which most points find their k neighbours.
+/// The expected k-radius, in first search radii, is the mean of the block before.
 pub(super) const FIRST_REACH: f32 = 1.3;
-/// Least and most that is expected.
+/// Range of the expected k-radius, in first search radii.
 const REACH: [f32; 2] = [0.8, 4.0];
-/// A radius that has to grow grows at least by this factor.
+/// Least growth factor of a radius that is too small.
 pub(super) const LEAST_GROWTH: f32 = 1.3;
 
-/// Finds the neighbourhoods of `queries`, indices of screen points, ascending. What is known of the `past` decides what is
-/// read first, not what is found.
+/// Finds the neighbourhoods of `queries`, ascending indices of screen points. The `past` decides what is read first,
+/// but does not change the result.
 pub(crate) fn search(
     screen: &ScreenPoints,
     queries: &[u32],
@@ -43,7 +43,7 @@ pub(crate) fn search(
         .par_chunks_mut(TASK_BLOCKS)
         .zip(queries.par_chunks(TASK_BLOCKS * LANES))
         .map_init(Scratch::default, |scratch, (blocks, queries)| {
-            // Tasks are cut the same for any number of threads, and so must be what they start from.
+            // Tasks do not depend on the number of threads, so neither may the guesses that a task starts from.
             scratch.reach = 1.0;
             scratch.trust = Trust::default();
             search_blocks(&Task { screen, view, rules, past }, queries, blocks, scratch)
@@ -51,7 +51,7 @@ pub(crate) fn search(
         .reduce(SearchCounts::default, |a, b| a + b);
 }
 
-/// What all blocks share.
+/// Inputs that all blocks share.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     screen: &'a ScreenPoints,
@@ -60,17 +60,18 @@ struct Task<'a> {
     past: &'a Past,
 }
 
-/// Memory of one thread.
+/// Buffers and guesses of one thread.
 struct Scratch {
-    /// The current window's screen points.
+    /// Screen points of the present window.
     candidates: Vec<[f32; 3]>,
     /// Squared distance of each candidate to each of the sixteen points.
     squared: Vec<Lanes>,
     /// Squared distances of one lane, sorted.
     sorted: Vec<f32>,
-    /// Mean k-radius of the block before, in first search radii. A guess: it decides what is read first, not what is found.
+    /// Mean k-radius of the block before, in first search radii: a guess that decides what is read first, not the
+    /// result.
     reach: f32,
-    /// In the radii of the last frame.
+    /// Trust in the radii of the last frame.
     trust: Trust,
 }
 
@@ -80,16 +81,16 @@ impl Default for Scratch {
     }
 }
 
-/// Sixteen points and how far each has got.
+/// Sixteen points and the state of their searches.
 struct Block {
     position: [Lanes; 3],
-    /// r̃₀ [Paper, §5.1].
+    /// First search radius r̃₀ [Paper, §5.1].
     initial_radius: Lanes,
-    /// The window holds every point within this radius, once it has been read.
+    /// Radius up to which the window, once read, holds every point.
     radius: Lanes,
-    /// Neighbours up to this squared distance are summed.
+    /// Squared distance up to which neighbours are summed.
     threshold: Lanes,
-    /// K-radius by the last frame; 0 if it does not tell.
+    /// K-radius in the last frame; 0 if unknown.
     likely: Lanes,
     pending: [bool; LANES],
 }
@@ -139,10 +140,11 @@ fn search_block<S: Simd>(
             kth_smallest(simd, &scratch.squared, rules.k, &group, &mut block.threshold);
             let spheres = block.spheres(view);
             for lane in 0..LANES {
-                // Points so far away that their squared distance overflows are nobody's neighbours.
+                // Points whose squared distance overflows are nobody's neighbours.
                 let inside = window.contains(&spheres[lane]) | everything;
                 exact[lane] = group[lane] & inside & block.threshold.0[lane].is_finite();
-                // Where few points were read as well, if there are many a little further out: then it does not matter what was.
+                // The bound applies where few points were read too, if there are many a little further out. The result
+                // then does not depend on what was read.
                 if exact[lane] & !crowded && !spheres[lane].is_small() && block.meets_bound(lane, task) {
                     bound[lane] = block.bound_radius(lane, task);
                 }
@@ -182,7 +184,7 @@ fn search_block<S: Simd>(
                 Verdict::Outlier => counts.outliers += 1,
                 Verdict::Clamped(_) => counts.clamped += 1,
                 Verdict::Bounded(neighbors) => {
-                    // Without any neighbour there is nothing to keep.
+                    // A point without any neighbour has nothing to keep.
                     *(if neighbors == 0 { &mut counts.outliers } else { &mut counts.clamped }) += 1;
                     counts.bounded += 1;
                 }
@@ -203,34 +205,34 @@ fn search_block<S: Simd>(
     }
 }
 
-/// What is to be done with a point whose window was read.
+/// What to do with a point after its window was read.
 #[derive(Clone, Copy)]
 enum Verdict {
-    /// No rule ends its neighbourhood early.
+    /// No rule ends the neighbourhood early.
     Exact,
     Outlier,
     /// A gap, or the end of the points, follows this many neighbours.
     Clamped(usize),
-    /// The next window would be too much to read; this many neighbours are certain.
+    /// The bound on search work ends the search; this many neighbours are certain.
     Bounded(usize),
-    /// A window for this radius is needed.
+    /// A window for this radius must be read.
     Grow(f32),
 }
 
-/// What reading a window told of a point.
+/// Knowledge of a point's neighbours after a window was read.
 #[derive(Clone, Copy)]
 struct Known {
-    /// All neighbours up to this distance are known.
+    /// Distance up to which all neighbours are known.
     radius: f32,
-    /// The k-th neighbour is among them.
+    /// Whether the k-th neighbour is among the known.
     exact: bool,
-    /// The k-th neighbour is no further than this.
+    /// Upper bound of the k-radius.
     upper: f32,
-    /// The bound on search work may be near.
+    /// Whether the bound on search work may be near.
     crowded: bool,
 }
 
-/// Applies the rules to a point one by one, whose squared distances up to the known radius are given ascending.
+/// Applies the rules to one point; `squared` holds its squared distances up to the known radius, ascending.
 fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known) -> Verdict {
     let Task { screen, view, rules, .. } = *task;
     let Known { radius, exact, upper, crowded } = known;
@@ -244,7 +246,7 @@ fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known)
         return if squared.is_empty() { Verdict::Outlier } else { Verdict::Clamped(squared.len()) };
     }
     let growth = (rules.k as f32 / squared.len().max(1) as f32).sqrt().max(LEAST_GROWTH);
-    // What was read bounds the k-radius, but across a depth step only loosely.
+    // The candidates bound the k-radius, but only loosely across a depth step.
     let next = upper.min(2.0 * radius * growth);
     if !crowded && Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) <= CROWDED {
         return Verdict::Grow(next);
@@ -256,11 +258,11 @@ fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known)
     Verdict::Bounded(squared.partition_point(|&d| d <= bound * bound))
 }
 
-/// Those lanes of `exact` whose neighbourhoods no rule can end early; the others need to be looked at one by one.
+/// Lanes of `exact` whose neighbourhoods no rule can end early; the other lanes are judged one by one.
 ///
-/// A gap starts at some b from r̃₀ on and is an annulus (b, √λ·b] without a point. So from b = r̃₀ the furthest point
-/// within √λ·b becomes the next b, until the k-radius is within reach; where there is none, there is a gap, or nothing near.
-/// Adaptive rules have fewer gaps than these.
+/// A gap is an annulus (b, √λ·b] without a point, with b ≥ r̃₀. Starting at b = r̃₀, the furthest point within √λ·b
+/// becomes the next b, until the k-radius is within reach. If there is no such point, there may be a gap, or no point
+/// near. Adaptive rules have no further gaps.
 #[inline(always)]
 fn unruled<S: Simd>(
     simd: S,
@@ -278,7 +280,8 @@ fn unruled<S: Simd>(
     let mut open = *exact;
     let mut base = block.initial_radius;
     for lane in 0..LANES {
-        // The first step below finds a neighbour within √λ·r̃₀, or none: too far for the outlier rule only if that is.
+        // The first step below finds a neighbour within √λ·r̃₀ or fails. The neighbour breaks no outlier rule if that
+        // distance does not exceed the outlier radius.
         open[lane] &= growth.sqrt() * base.0[lane] <= rules.outlier_radius(base.0[lane]);
         base.0[lane] *= base.0[lane];
     }
@@ -328,7 +331,7 @@ impl Block {
                     (likely, slack) = (past_radius, past_slack);
                 }
             }
-            // A radius that rounds to nothing would never grow.
+            // A radius that rounds to 0 would never grow.
             block.radius.0[lane] = (slack * likely).max(f32::MIN_POSITIVE);
             block.threshold.0[lane] = likely * likely;
             block.pending[lane] = lane < queries.len();
@@ -336,7 +339,7 @@ impl Block {
         block
     }
 
-    /// Mean k-radius of the first `lanes` lanes in first search radii, for those that found k neighbours.
+    /// Mean k-radius, in first search radii, of those of the first `lanes` lanes that found k neighbours.
     #[inline(always)]
     fn reach(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> f32 {
         let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32);
@@ -346,7 +349,8 @@ impl Block {
         (sum / f32::max(count, 1.0)).clamp(least, most)
     }
 
-    /// By what factor the likely radii would have had to be larger for all of the first `lanes` lanes; `None` if there is none.
+    /// Largest factor by which the last frame's radii fell short in the first `lanes` lanes; `None` if no lane has
+    /// any.
     #[inline(always)]
     fn missed(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> Option<f32> {
         let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32 && self.likely.0[lane] > 0.0);
@@ -362,7 +366,7 @@ impl Block {
         screen.points.len() > MAX_CANDIDATES && window.candidates(&screen.cells) > MAX_CANDIDATES
     }
 
-    /// How far the search of a point goes at most.
+    /// Largest radius that the search of a point may reach.
     #[cold]
     fn bound_radius(&self, lane: usize, task: &Task) -> f32 {
         let Task { screen, view, .. } = *task;
@@ -375,7 +379,7 @@ impl Block {
         while !fits(radius) && radius > f32::MIN_POSITIVE {
             radius /= BOUND_STEP;
         }
-        // At the latest the whole picture does not.
+        // Ends at the whole picture at the latest, which does not fit.
         while fits(radius * BOUND_STEP) {
             radius *= BOUND_STEP;
         }
@@ -387,7 +391,7 @@ impl Block {
         [self.position[0].0[lane], self.position[1].0[lane], self.position[2].0[lane]]
     }
 
-    /// The window to read next and the lanes it serves.
+    /// The window to read next, and the lanes that the window serves.
     #[inline(always)]
     fn next_window(&self, task: &Task) -> (Window, [bool; LANES]) {
         let Task { screen, view, .. } = *task;
@@ -399,7 +403,7 @@ impl Block {
             first = first.or(Some((lane, window)));
         }
         let union = union.grown(&screen.cells, view);
-        // Points far apart share a block where the screen is sparse; what lies between them concerns none of them.
+        // On a sparse screen a block's points may be far apart, with many points of no use between them.
         if let Some((lane, window)) = first
             && union.candidates(&screen.cells) > 2 * MAX_CANDIDATES
         {
@@ -410,10 +414,10 @@ impl Block {
         (union, self.pending)
     }
 
-    /// Where the spheres up to the thresholds can be seen.
+    /// Windows of the spheres with the threshold radii.
     #[inline(always)]
     fn spheres(&self, view: &View) -> [Window; LANES] {
-        // A loop: what `from_fn` calls is not compiled for the processor's vectors.
+        // A loop, because the closure of `from_fn` would not be compiled for the processor's vectors.
         let mut spheres = [Window::EMPTY; LANES];
         for lane in 0..LANES {
             spheres[lane] = Window::of_sphere(self.center(lane), self.threshold.0[lane].sqrt(), view);
@@ -422,8 +426,8 @@ impl Block {
     }
 }
 
-/// Lists the screen points in `window` at the front of `candidates` and returns their number; a group of points infinitely
-/// far follows.
+/// Lists the screen points in `window` at the front of `candidates`, followed by a group of points at infinity.
+/// Returns their number.
 #[inline(always)]
 fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>) -> usize {
     let most = window.candidates(&screen.cells);
@@ -433,7 +437,7 @@ fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>
     let mut len = 0;
     for run in window.runs(&screen.cells) {
         for point in &screen.points[run] {
-            // Written first and counted after: whether a point lies within the depths is anybody's guess.
+            // Write first and count afterwards: the test of depths is unpredictable for a branch.
             candidates[len] = point.position_view;
             let depth = point.position_view[2];
             len += usize::from((window.near <= depth) & (depth <= window.far));
@@ -443,7 +447,7 @@ fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>
     len
 }
 
-/// Finite squared distances of `lane` up to distance `known`, the point itself left out, ascending.
+/// Collects the finite squared distances of `lane` up to distance `known`, ascending, without the point itself.
 fn sort_lane(squared: &[Lanes], lane: usize, known: f32, sorted: &mut Vec<f32>) {
     sorted.clear();
     let most = (known * known).min(f32::MAX);

@@ -1,4 +1,4 @@
-//! The screen-grid search on the GPU: an invocation per point, or for larger k one for four points.
+//! The screen-grid search on the GPU: one invocation per point, or per four points for larger k.
 
 use super::cpu::{FIRST_REACH, LEAST_GROWTH};
 use crate::Error;
@@ -12,22 +12,21 @@ pub(crate) const PASSES: &[PassSource] = &[SEARCH, SEARCH_FOUR];
 const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_str!("search.wgsl"));
 const SEARCH_FOUR: PassSource = PassSource::new("search/screen_grid/search_four", include_str!("search_four.wgsl"));
 
-/// The least k with which four points at a time are searched for. On software Vulkan they took 3.3 to 5 times the CPU form's
-/// time at k = 17, where one by one took 4 to 7.7; up to 10 one by one, in a single pass, is within 4 times already.
+/// Least k for which four points are searched at a time. See docs/decisions/0015-search-engines.md.
 const FOUR_FROM: u32 = 11;
 
 /// `Neighborhood` of `shared/surfel.wgsl`.
 type Neighborhood = [f32; 12];
 
-/// Room for the neighbourhoods of `capacity` queries.
+/// Allocates the neighbourhoods of `capacity` queries.
 ///
 /// # Errors
-/// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+/// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
 pub(crate) fn neighborhood_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buffer, Error> {
     gpu.storage::<Neighborhood>("neighbourhoods", capacity as usize)
 }
 
-/// The passes of the search, of each round.
+/// The passes of the search, for each round.
 #[derive(Debug)]
 pub(crate) struct SearchPasses {
     rounds: [RoundPasses; 2],
@@ -36,7 +35,7 @@ pub(crate) struct SearchPasses {
 
 #[derive(Debug)]
 struct RoundPasses {
-    /// Four queries at a time, if k is large enough for that. It leaves some to the other.
+    /// Searches four queries at a time, if k is large enough, and leaves some queries to `one`.
     four: Option<Pass>,
     one: Pass,
 }
@@ -70,7 +69,7 @@ impl RoundPasses {
 }
 
 impl SearchPasses {
-    /// Compiles them for frames with this k, which is the length of the list that each invocation keeps in registers.
+    /// Compiles the passes for one k, the length of the list that each invocation keeps in registers.
     ///
     /// # Errors
     /// [`Error::Device`].

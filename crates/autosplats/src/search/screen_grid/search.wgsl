@@ -1,8 +1,9 @@
-// The k nearest screen points of each query, summed up in moments [Paper, §4, §5]; the rules are stated in search/mod.rs.
+// The k nearest screen points of each query, summed up in moments [Paper, §4, §5]. The rules are in search/mod.rs.
 //
-// A query reads a window about its first search sphere and lists the k nearest in order. They are exact if the sphere up to
-// the k-th lies inside the window; if not, and no rule ended the neighbourhood, the window grows. Unlike on the CPU no two
-// queries share a window, and a window has no depths: nothing is gained by leaving out what has been read.
+// A query reads a window about its first search sphere and lists the k nearest points in order. The list is exact if
+// the sphere up to the k-th point lies inside the window. Otherwise, unless a rule ends the neighbourhood, the window
+// grows. Unlike on the CPU, queries share no window, and a window has no range of depths: skipping points already read
+// saves nothing.
 //
 // Reads: counters, density, cell_start, points, queries, left, past. Writes: neighborhoods, counters.
 
@@ -31,49 +32,50 @@
 
 override LEAST_GROWTH: f32;
 override STEEP: f32;
-// Whether only those queries are searched for that `search_four` left.
+// Whether to search only the queries that `search_four` left.
 override LEFT_ONLY: bool;
 
-// Rounds of loops after which a query counts as bounded. Much less than a software device allows: it runs several invocations
-// at once, as many rounds as the longest of them in each loop.
+// Rounds of loops after which a query counts as bounded. The limit is far below a software device's: such a device
+// runs several invocations together, each loop as long as the longest of them.
 const MOST_ROUNDS = 25000u;
 
 var<workgroup> clamped: atomic<u32>;
 var<workgroup> bounded: atomic<u32>;
 
-// What a window shows of a point's neighbours.
+// A window's points as seen by one query.
 struct Seen {
-    // Distance to the nearest.
+    // Distance to the nearest neighbour.
     nearest: f32,
-    // How many lie within the radius that the window is sure to hold, and the squared distance to the last of them.
+    // Number of neighbours within the radius that the window certainly holds, and squared distance to the last of
+    // them.
     sure: u32,
     sure_squared: f32,
-    // The first gap: squared distance to the neighbour before it, MOST if there is none; how far the gap has to reach, and
-    // how far it does.
+    // The first gap: squared distance to the neighbour before it (MOST without a gap), the length at which it counts,
+    // and its end.
     gap_squared: f32,
     gap_reach: f32,
     gap_end: f32,
 }
 
 struct Found {
-    // Neighbours are the points up to this squared distance.
+    // Squared distance up to which points are neighbours.
     squared: f32,
     is_clamped: bool,
     is_bounded: bool,
 }
 
-// Fused, so that both passes over a window get the same bits whatever the compiler makes of sums and products.
+// Fused, so that both passes over a window get the same bits whatever the compiler does with sums and products.
 fn squared_length(v: vec3f) -> f32 {
     return fma(v.z, v.z, fma(v.y, v.y, v.x * v.x));
 }
 
-// Squared distance of a candidate; MOST if it is the query itself, or after the last.
+// Squared distance of a candidate; MOST for the query itself and after the end of the run.
 fn squared_from(center: vec3f, at: u32, end: u32, query: u32) -> f32 {
     let squared = squared_length(points[min(at, end - 1u)].position_view - center);
     return select(squared, MOST, at == query || at >= end);
 }
 
-// The k nearest of a window.
+// Lists the k nearest points of a window.
 fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
     var list = nearest_none();
     let strips = window_strips(window, task.strip_px);
@@ -81,13 +83,13 @@ fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);
         rounds += (run.y - run.x) / 2u;
-        // Four at a time: the loads of all are on their way together.
+        // Four at a time, so that their loads overlap.
         for (var at = run.x; at < run.y; at += 4u) {
             let a = squared_from(center, at, run.y, query);
             let b = squared_from(center, at + 1u, run.y, query);
             let c = squared_from(center, at + 2u, run.y, query);
             let d = squared_from(center, at + 3u, run.y, query);
-            // Of a long window few still come in, of which the others need not wait.
+            // Few points of a long window enter the list; the others skip the insertion.
             if min(min(a, b), min(c, d)) < nearest_last(&list) {
                 nearest_add(&list, a);
                 nearest_add(&list, b);
@@ -108,7 +110,7 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
     var neighbors = 0u;
     for (var place = 0u; place < 4u * QUADS; place++) {
         let squared = nearest_take(&list);
-        // Points in the same place tell nothing of distances.
+        // Coincident points say nothing about distances.
         if !(squared > 0.0) {
             continue;
         }
@@ -142,25 +144,26 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     let outlier_radius = frame.outlier_growth * initial_radius;
     let farthest_first = select(1.0, STEEP, frame.adaptive == 1u) * outlier_radius;
     let likely = past_radius(center, initial_radius);
-    // A radius that rounds to nothing would never grow.
+    // A radius that rounds to 0 would never grow.
     var radius = max(select(FIRST_REACH * initial_radius, SLACK * likely, likely > 0.0), MIN_POSITIVE);
     var window = window_grown(window_of_sphere(center, radius), strip_px);
     var len = window_len(window, task.strip_px, CROWDED);
-    // A point alone in its cell may look into a crowd; a smaller window will do there.
+    // A point alone in its cell may look into a crowd, where a smaller window suffices.
     for (var halving = 0u; halving < 40u && len > MAX_CANDIDATES; halving++) {
         radius *= 0.5;
         window = window_grown(window_of_sphere(center, radius), strip_px);
         len = window_len(window, task.strip_px, CROWDED);
     }
     var seen: Seen;
-    // How far the search goes at most, once that is found.
+    // Largest radius that the search may reach; 0 until computed.
     var farthest = 0.0;
     for (var step = 0u; step < 256u; step++) {
         var nearest = read_window(query, center, window);
         let kth_squared = nearest_last(&nearest);
         let kth_radius = sqrt(kth_squared);
         let is_all = window_contains(window, picture());
-        // Where there are few points as well, if a little further out there are many: then it does not matter what was read.
+        // The bound applies where few points were read too, if there are many a little further out. The result then
+        // does not depend on what was read.
         let is_crowded = len > CROWDED || (kth_squared < MOST && !is_unbounded(center, kth_radius));
         if is_crowded && farthest == 0.0 {
             farthest = bound_radius(center, initial_radius);
@@ -168,12 +171,12 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let bound = select(MOST, farthest, is_crowded);
         let is_exact = kth_squared < MOST && kth_radius <= bound
             && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
-        // No gap begins before the first search radius.
+        // No gap begins within the first search radius.
         if is_exact && kth_radius <= min(frame.gap_growth * initial_radius, outlier_radius) {
             return Found(kth_squared, false, false);
         }
 
-        // Up to here all neighbours are known.
+        // All neighbours up to this distance are known.
         let sure = min(select(radius, MOST, is_all), bound);
         seen = look_through(nearest, initial_radius, min(sure * sure, MOST));
         let known = select(sure, kth_radius, is_exact);
@@ -194,7 +197,7 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         }
 
         let growth = max(sqrt(f32(K) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
-        // What was read bounds the k-radius, but across a depth step only loosely.
+        // The points read bound the k-radius, but only loosely across a depth step.
         let upper = select(MOST, kth_radius, kth_squared < MOST);
         radius = min(upper, 2.0 * sure * growth);
         if is_crowded || window_len(window_of_sphere(center, radius), task.strip_px, CROWDED) > CROWDED {
@@ -217,7 +220,7 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
     return Found(seen.sure_squared, seen.sure > 0u, true);
 }
 
-// How far the search of a point goes at most: search/mod.rs states it.
+// Largest radius that the search of a point may reach, as defined in search/mod.rs.
 fn bound_radius(center: vec3f, initial_radius: f32) -> f32 {
     if task.visible <= MAX_CANDIDATES {
         return MOST;
@@ -226,19 +229,19 @@ fn bound_radius(center: vec3f, initial_radius: f32) -> f32 {
     while window_len(window_of_sphere(center, radius), task.strip_px, MAX_CANDIDATES) > MAX_CANDIDATES && radius > MIN_POSITIVE {
         radius /= BOUND_STEP;
     }
-    // At the latest the whole picture holds too many.
+    // Ends at the whole picture at the latest, which holds too many points.
     while window_len(window_of_sphere(center, radius * BOUND_STEP), task.strip_px, MAX_CANDIDATES) <= MAX_CANDIDATES {
         radius *= BOUND_STEP;
     }
     return radius;
 }
 
-// Sums the points up to the squared distance, about the point itself.
+// Sums the points up to a squared distance, about the point itself.
 fn moments(center: vec3f, squared: f32) -> Neighborhood {
     let radius = sqrt(squared);
     let window = window_of_sphere(center, radius);
     let strips = window_strips(window, task.strip_px);
-    // The point itself adds nothing but to the count.
+    // The point itself adds to the count only.
     var sums = Neighborhood(vec3f(0.0), -1.0, vec3f(0.0), radius, vec3f(0.0), 0u);
     for (var strip = strips.x; strip <= strips.y; strip++) {
         let run = window_run(window, strip);

@@ -1,12 +1,12 @@
-// The k nearest screen points of four queries at a time, summed up in moments [Paper, §4, §5], for larger k; the rules are
-// stated in search/mod.rs.
+// The k nearest screen points of four queries at a time, summed up in moments [Paper, §4, §5], for larger k. The rules
+// are stated in search/mod.rs.
 //
-// How it works: queries that follow each other lie side by side on the screen. Four are the components of vectors and share a
-// window, so that what is read of a candidate serves all four. The window is read a few times. First, candidates are counted
-// below eight thresholds, evenly spaced in squared distance, with which counts on a surface grow evenly; then below eight
-// between the two on either side of the k-th, until there are few in between. These are listed, which tells the k-th. A
-// neighbourhood that none of the rules can end early is settled so. What is left is for `search`, which knows all the rules:
-// gaps, outliers, crowds, many points in the same place.
+// How it works: four consecutive queries lie side by side on the screen, so they share a window and are the components
+// of vectors. The window is read several times. First, candidates are counted below eight thresholds, evenly spaced in
+// squared distance, in which counts on a surface grow evenly. Counting repeats with eight thresholds between the two
+// around the k-th, until few candidates lie in between. These are listed to find the k-th. The pass settles
+// neighbourhoods that no rule can end early. All others are left to `search`, which applies all rules: gaps, outliers,
+// crowds and coincident points.
 //
 // Reads: counters, density, cell_start, points, queries, past. Writes: neighborhoods, left, counters.
 
@@ -33,15 +33,15 @@
 
 override K: u32;
 
-// Windows that are read before the queries not settled are left to `search`, and screen points and strips in them at most: with
-// all their readings less than half of the 65535 rounds after which software devices end an invocation.
+// Most windows per invocation, most screen points plus strips in a window, and most counting passes over a window. All
+// passes together take less than half of the 65535 rounds after which software devices end an invocation.
 const MOST_WINDOWS = 3u;
 const MOST_SHARED = 1536u;
 const MOST_COUNTS = 3u;
-// Candidates between two thresholds that the list of eight can tell the k-th of: from below or from above.
+// Most candidates in a bracket for which a list of eight finds the k-th, from below or from above.
 const FEW = 15u;
 
-// Queries of a workgroup that are left.
+// Number of queries of the workgroup that are left to `search`.
 var<workgroup> left_len: atomic<u32>;
 var<workgroup> left_first: u32;
 
@@ -55,7 +55,7 @@ struct Four {
 alias Eight = array<vec4f, 8>;
 alias EightCounts = array<vec4u, 8>;
 
-// Squared distances on either side of the k-th, and how many candidates lie there or nearer, the query itself included.
+// Squared distances on either side of the k-th, and the number of candidates up to each, the query itself included.
 struct Bracket {
     low: vec4f,
     high: vec4f,
@@ -64,9 +64,9 @@ struct Bracket {
 }
 
 struct Listed {
-    // Squared distance to the k-th.
+    // Squared distance to the k-th neighbour.
     kth: vec4f,
-    // The largest squared distance up to a limit.
+    // Largest squared distance up to a limit.
     furthest: vec4f,
 }
 
@@ -74,7 +74,7 @@ fn center(four: Four, lane: u32) -> vec3f {
     return vec3f(four.x[lane], four.y[lane], four.z[lane]);
 }
 
-// The same bits as those of `search`.
+// The same bits as `squared_length` in `search`.
 fn squared_lengths(four: Four, at: u32) -> vec4f {
     let candidate = points[at].position_view;
     let x = candidate.x - four.x;
@@ -83,7 +83,7 @@ fn squared_lengths(four: Four, at: u32) -> vec4f {
     return fma(z, z, fma(y, y, x * x));
 }
 
-// Where points within a radius of each query are, of those `wanted`.
+// The window of the points within a radius of each `wanted` query.
 fn window_of_four(four: Four, radius: vec4f, wanted: vec4<bool>) -> Window {
     var window = picture();
     var low = window.high;
@@ -114,8 +114,8 @@ fn lower(bracket: ptr<function, Bracket>, threshold: vec4f, count: vec4u) {
     (*bracket).high_count = select((*bracket).high_count, count, is_high);
 }
 
-// Counts at eight thresholds, the upper end of the bracket the last, and chooses the two next to the k-th. Where even the last has
-// fewer than k neighbours the bracket shrinks to it.
+// Counts candidates at eight thresholds, the last at the upper end of the bracket, and narrows the bracket to the two
+// around the k-th. With fewer than k neighbours up to the last threshold the bracket shrinks to the last.
 fn narrow(four: Four, window: Window, bracket: ptr<function, Bracket>) {
     let low = (*bracket).low;
     let step = 0.125 * ((*bracket).high - low);
@@ -163,9 +163,9 @@ fn narrow(four: Four, window: Window, bracket: ptr<function, Bracket>) {
     lower(bracket, t[0], n[0]);
 }
 
-// Lists what lies in the brackets, those with at most FEW candidates.
+// Lists the candidates in the brackets of at most FEW candidates.
 fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
-    // From whichever end of the bracket the k-th is nearer to: distances from above are listed by their negatives.
+    // Count from the end of the bracket that is nearer to the k-th. Distances from above are listed as negatives.
     let from_low = vec4u(K) - bracket.low_count;
     let from_high = bracket.high_count - vec4u(K + 1u);
     let is_upward = from_low <= from_high;
@@ -180,7 +180,7 @@ fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
             let squared = squared_lengths(four, at);
             furthest = max(furthest, select(vec4f(0.0), squared, squared <= limit));
             let key = select(m, sign * squared, (squared > bracket.low) & (squared <= bracket.high));
-            // Each place takes the lesser of its own and the greater of the one before and the new one.
+            // Each place takes the lesser of its own value and of the greater of its predecessor and the new value.
             least[7] = min(least[7], max(least[6], key));
             least[6] = min(least[6], max(least[5], key));
             least[5] = min(least[5], max(least[4], key));
@@ -203,7 +203,7 @@ fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
     return Listed(sign * kth, furthest);
 }
 
-// Squared distances to the k-th neighbours; MOST for those that are left.
+// Squared distances to the k-th neighbours; MOST for queries that are left to `search`.
 fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
     var found = vec4f(MOST);
     var open = valid;
@@ -214,7 +214,7 @@ fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
     }
     radius = max(radius, vec4f(MIN_POSITIVE));
     let outlier_radius = frame.outlier_growth * initial_radius;
-    // Up to here no gap begins and nothing is an outlier.
+    // Up to this radius no gap begins and no point is an outlier.
     let unruled = min(frame.gap_growth * initial_radius, outlier_radius);
     let is_gap_first = frame.gap_growth * initial_radius <= outlier_radius;
     for (var step = 0u; step < MOST_WINDOWS && any(open); step++) {
@@ -239,7 +239,7 @@ fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
             let listed = list(four, window, bracket, min(unruled * unruled, vec4f(MOST)));
             let kth = sqrt(listed.kth);
             let furthest = sqrt(listed.furthest);
-            // From the furthest within reach of the first radius on the next gap would begin.
+            // A gap would begin at the furthest point within reach of the first radius.
             let is_bridged = is_gap_first & (furthest > initial_radius) & (kth <= frame.gap_growth * furthest);
             var is_settled = is_listed & ((kth <= unruled) | is_bridged);
             for (var lane = 0u; lane < 4u; lane++) {
@@ -263,7 +263,7 @@ fn sum_moments(four: Four, found: vec4f, first: u32) {
     let radius = sqrt(found);
     let window = window_of_four(four, radius, is_found);
     let strips = window_strips(window, task.strip_px);
-    // The query itself adds nothing but to the count.
+    // The query itself adds to the count only.
     var count = vec4f(-1.0);
     var x = vec4f(0.0);
     var y = x;
@@ -333,7 +333,7 @@ fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
         found = find(four, initial_radius, valid);
         sum_moments(four, found, first);
     }
-    // The others go to a list, whose order does not matter.
+    // The other queries go to a list, whose order does not matter.
     let is_left = one_if(valid & (found == vec4f(MOST)));
     let own = is_left.x + is_left.y + is_left.z + is_left.w;
     var place = atomicAdd(&left_len, own);

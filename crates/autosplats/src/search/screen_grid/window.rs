@@ -1,4 +1,4 @@
-//! Windows: rectangles of the screen with a range of depths, and the screen points in them.
+//! Windows: rectangles of the screen with a range of depths.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use crate::camera::View;
 use crate::project::ScreenCells;
 use crate::search::{MARGIN_PX, MAX_CANDIDATES};
 
-/// A rectangle of pixels and a range of depths, all sides included.
+/// A rectangle of pixels and a range of depths, all ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub(super) x0: f32,
@@ -18,11 +18,11 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Contains nothing; the neutral element of [`union`](Self::union).
+    /// The empty window, the neutral element of [`union`](Self::union).
     pub(super) const EMPTY: Self =
         Self { x0: f32::MAX, x1: -1.0, y0: f32::MAX, y1: -1.0, near: f32::INFINITY, far: f32::NEG_INFINITY };
 
-    /// Where points within `radius` of `center` (view space) can be.
+    /// The window that holds all points within `radius` of `center` (view space).
     #[inline(always)]
     pub(super) fn of_sphere(center: [f32; 3], radius: f32, view: &View) -> Self {
         let [x, y, z] = center;
@@ -38,7 +38,7 @@ impl Window {
         x1 = (x1 * view.focal_px + 0.5 * view.width as f32 + MARGIN_PX).floor();
         y0 = (y0 * view.focal_px + 0.5 * view.height as f32 - MARGIN_PX).floor();
         y1 = (y1 * view.focal_px + 0.5 * view.height as f32 + MARGIN_PX).floor();
-        // A sphere around the eye's plane projects everywhere.
+        // A sphere around the plane of the eye projects everywhere.
         let bounded = !view.perspective | (z > 1.0001 * radius);
         Self {
             x0: if bounded & (x0 > 0.0) { x0 } else { 0.0 },
@@ -50,7 +50,8 @@ impl Window {
         }
     }
 
-    /// Whether a sphere [`BOUND_STEP`](crate::search::BOUND_STEP) times as large, with two points in each pixel, is far from the bound on search work.
+    /// Whether a sphere [`BOUND_STEP`](crate::search::BOUND_STEP) times as large, with two points in each pixel, stays
+    /// within the bound on search work.
     #[inline(always)]
     pub(super) fn is_small(&self) -> bool {
         let side = |low: f32, high: f32| 1.5 * (high - low + 1.0) + 4.0;
@@ -79,7 +80,7 @@ impl Window {
         (self.x0 <= other.x0) & (self.x1 >= other.x1) & (self.y0 <= other.y0) & (self.y1 >= other.y1)
     }
 
-    /// The window grown to what is read anyway: whole strips, and all depths if it is the whole picture.
+    /// Grows the window to what is read anyway: whole strips, and all depths if it covers the whole picture.
     #[inline(always)]
     pub(super) fn grown(mut self, cells: &ScreenCells, view: &View) -> Self {
         let [right, bottom] = [view.width as f32 - 1.0, view.height as f32 - 1.0];
@@ -93,12 +94,12 @@ impl Window {
         self
     }
 
-    /// Whether it holds every screen point.
+    /// Whether the window holds every screen point.
     pub(super) fn is_all(&self) -> bool {
         self.far == f32::INFINITY
     }
 
-    /// The runs of screen points in the window, strip by strip.
+    /// The runs of screen points in the window's rectangle, strip by strip.
     pub(super) fn runs<'a>(&self, cells: &'a ScreenCells) -> impl Iterator<Item = Range<usize>> + use<'a> {
         let [x0, x1, y0, y1] = [self.x0, self.x1, self.y0, self.y1].map(|pixel| pixel as usize);
         (y0 / cells.strip_px..=y1 / cells.strip_px).map(move |strip| cells.run(strip, x0, x1))
@@ -110,7 +111,8 @@ impl Window {
     }
 }
 
-/// Slopes of the two lines through the eye that touch the circle of `radius` about (x, z), which lies in front of it.
+/// Slopes of the two lines through the eye that touch the circle of `radius` about (x, z). The circle must lie in
+/// front of the eye.
 #[inline(always)]
 fn tangents(x: f32, z: f32, radius: f32) -> [f32; 2] {
     let length = (x * x + z * z - radius * radius).max(0.0).sqrt();

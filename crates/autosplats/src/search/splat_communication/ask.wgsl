@@ -1,4 +1,4 @@
-// Every query draws its pixel: its search begins. All others keep the 0 that the texture was cleared to, and only answer.
+// Every query draws its pixel, to begin its search. All other points keep the cleared 0 and only answer.
 //
 // Reads: points, queries, counters. Writes: the second radius texture.
 
@@ -13,7 +13,7 @@
 @group(0) @binding(2) var<storage, read> queries: array<u32>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 
 @vertex

@@ -1,4 +1,4 @@
-// Says how much a round's passes have to draw before the first iteration. One invocation.
+// Sets the amounts that a round's passes draw, before the first iteration. One invocation.
 //
 // Reads: counters. Writes: arguments, convergence.
 
@@ -11,7 +11,7 @@
 @group(0) @binding(2) var<storage, read_write> arguments: Arguments;
 @group(0) @binding(3) var<storage, read_write> convergence: array<u32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 
 @compute @workgroup_size(1)
@@ -27,7 +27,7 @@ fn begin() {
     let groups = (queries + 255u) / 256u;
     arguments.count = vec3u(min(groups, GROUPS_PER_ROW), (groups + GROUPS_PER_ROW - 1u) / GROUPS_PER_ROW, 1u);
     arguments.iterations = 0u;
-    // Of each round the number before the first iteration, and after each.
+    // Unconverged queries of each round, before the first iteration and after each.
     let curve = arrayLength(&convergence) / 2u;
     convergence[ROUND * curve] = queries;
     for (var at = 1u; at < curve; at++) {

@@ -1,9 +1,9 @@
-// Empties what points draw into, where there are points. Where nothing is to be done any more nothing is emptied either: so the
-// last results stay where they are.
+// Clears the textures at the pixels of points. Draws no instance once iterations end, so that the last results stay.
 
 @vertex
 fn clear_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
-    // One triangle about the picture, as far away as the mask has empty pixels: only those of points are nearer.
+    // One triangle around the picture, as far away as empty pixels of the mask: only pixels of points are nearer and
+    // pass.
     return vec4f(f32(4u * (vertex & 1u)) - 1.0, f32(2u * (vertex & 2u)) - 1.0, 1.0, 1.0);
 }
 

@@ -1,6 +1,6 @@
-// Counts the queries that have not converged, an invocation for each.
+// Counts the queries that have not converged, one invocation each.
 //
-// Differs from the paper, which counts by an occlusion query [Paper, §5.2]: WebGPU's tell only whether there were any.
+// Differs from the paper, which uses an occlusion query [Paper, §5.2]: WebGPU's only tell whether there are any.
 //
 // Reads: points, queries, counters, arguments, the position texture and both radius textures. Writes: convergence.
 
@@ -20,7 +20,7 @@
 @group(0) @binding(7) var counts: texture_2d<f32>;
 @group(0) @binding(8) var radii: texture_2d<f32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 
 var<workgroup> unconverged: atomic<u32>;

@@ -1,7 +1,7 @@
-// Covariance accumulation [Paper, §6]: every point adds the products of its offset's coordinates at each point that has it in
-// its neighbourhood.
+// Covariance accumulation [Paper, §6]: every point adds the products of its offset's coordinates at each point whose
+// neighbourhood holds it.
 //
-// Differs from the paper: about the point itself instead of the mean, which the fit makes up for.
+// Differs from the paper: taken about the point itself instead of the mean; the fit corrects for the mean.
 //
 // Reads: points, the position and the feedback texture. Writes: both radius textures.
 

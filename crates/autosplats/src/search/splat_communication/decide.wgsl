@@ -1,4 +1,4 @@
-// Says after an iteration whether there is to be another: passes that have nothing to draw cost next to nothing. One
+// Decides after an iteration whether another follows: passes with nothing to draw cost next to nothing. One
 // invocation.
 //
 // Reads: counters. Writes: arguments, convergence.
@@ -11,9 +11,9 @@
 @group(0) @binding(2) var<storage, read_write> arguments: Arguments;
 @group(0) @binding(3) var<storage, read_write> convergence: array<u32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-// Part of the points that need not converge: 1 - t_conv [Paper, §5.2].
+// Fraction of the points that need not converge: 1 - t_conv [Paper, §5.2].
 override UNCONVERGED: f32;
 
 @compute @workgroup_size(1)

@@ -1,5 +1,5 @@
-// The distribution pass [Paper, §4, §5.2]: every point that still searches draws its search radius; a point within it keeps the
-// distance to the furthest that asks, its feedback radius. MAX blending in alpha; colours pass the bounds along.
+// The distribution pass [Paper, §4, §5.2]: every searching point draws its search radius. A point within keeps the
+// distance to the furthest searching point, its feedback radius, by MAX blending in alpha. Colours hand the bounds on.
 //
 // Reads: points, counters, the position texture and both radius textures. Writes: the feedback texture.
 
@@ -17,7 +17,7 @@
 @group(0) @binding(4) var counts: texture_2d<f32>;
 @group(0) @binding(5) var radii: texture_2d<f32>;
 
-// Whether searches end here, and the radius found is what points draw.
+// Whether searches end here: points then draw the radius found.
 override IS_LAST: bool;
 
 struct Splat {
@@ -41,7 +41,7 @@ fn distribute_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
         radius = select(0.0, max(search.high, LEAST_DISTANCE), has_neighbors(search));
     } else {
         search = advance(known, initial_radius, others);
-        // A converged point covers its own pixel and passes along what it found.
+        // A converged point covers its own pixel and hands on the radius found.
         radius = select(search.high, 0.0, has_ended(search));
     }
     var position = no_vertex();
@@ -54,7 +54,7 @@ fn distribute_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
 @fragment
 fn distribute_fragment(splat: Splat) -> @location(0) vec4f {
     let at = vec2u(splat.position.xy);
-    // A pixel holds one point, so the pixel tells the point itself.
+    // A pixel holds one point, so the pixel identifies the point itself.
     if all(at == pixel_xy(splat.pixel)) {
         return vec4f(splat.search, 0.0);
     }

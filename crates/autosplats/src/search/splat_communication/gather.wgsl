@@ -1,6 +1,6 @@
-// The gathering pass [Paper, §4, §5.2]: every point draws its feedback radius, and counts at each point that has it in its
-// delta region, for all of the four radii that it lies within. ADD blending; in the alpha of the second texture MAX, for
-// the distance to the furthest neighbour. The point itself passes its bounds along.
+// The gathering pass [Paper, §4, §5.2]: every point draws its feedback radius. At each point whose delta region holds
+// it, it counts for those of the four radii that reach it, by ADD blending. MAX blending in the alpha of the second
+// texture keeps the distance to the furthest neighbour. The point itself hands its bounds on.
 //
 // Reads: points, the position and the feedback texture. Writes: both radius textures.
 

@@ -32,19 +32,19 @@ const DECIDE: PassSource = source!(new, "decide");
 const KEEP_MEAN: PassSource = source!(new, "keep_mean");
 const KEEP_COVARIANCE: PassSource = source!(new, "keep_covariance");
 
-/// Most iterations there are. A bracket between equal distances takes about fourteen to become as narrow as numbers are.
+/// Most iterations. A bracket between equal distances takes about fourteen to shrink to the precision of floats.
 pub(crate) const ITERATIONS: usize = 16;
-/// Part of the points that need not converge: 1 - t_conv [Paper, §5.2].
+/// Fraction of the points that need not converge: 1 - t_conv [Paper, §5.2].
 pub(crate) const UNCONVERGED: f64 = 0.001;
 
-/// What a gathering pass writes for each pixel: two textures.
+/// The two textures that a gathering pass writes.
 const GATHERED: [Target; 2] = [Target::Add, Target::AddAndMax];
 const GATHERED_BYTES: u32 = 32;
 
 /// Arguments of an indirect draw.
 type DrawArguments = [u32; 4];
 
-/// How much there is to draw, as `shared/communication.wgsl` has it.
+/// Arguments of all draws, laid out as in `shared/communication.wgsl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Arguments {
@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     pub(crate) iterations: u32,
 }
 
-/// Byte at which the arguments of a draw lie.
+/// Byte offset of a draw's arguments.
 macro_rules! at {
     ($field:ident) => {
         std::mem::offset_of!(Arguments, $field) as u64
@@ -79,7 +79,7 @@ pub(crate) struct CommunicationPasses {
     rounds: [RoundPasses; 2],
 }
 
-/// Those that differ from round to round.
+/// The passes that differ from round to round.
 #[derive(Debug)]
 struct RoundPasses {
     begin: Pass,
@@ -92,7 +92,7 @@ struct RoundPasses {
 
 impl CommunicationPasses {
     /// # Errors
-    /// [`Error::Device`] if the device cannot do what the paper asks of it.
+    /// [`Error::Device`] if the device lacks a feature that the paper's method needs.
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         check(gpu)?;
         let margin = ("MARGIN_PX", f64::from(MARGIN_PX));
@@ -125,7 +125,7 @@ impl CommunicationPasses {
     }
 }
 
-/// Refuses devices on which a pass could not run, saying why.
+/// Refuses devices on which a pass cannot run, with the reason.
 ///
 /// # Errors
 /// [`Error::Device`].
@@ -147,10 +147,10 @@ pub(crate) fn check(gpu: &Gpu) -> Result<(), Error> {
     Ok(())
 }
 
-/// What belongs to one size of picture.
+/// Textures of one size of picture.
 struct Textures {
     depth: wgpu::TextureView,
-    /// View space, and the first search radius.
+    /// Positions in view space, and in alpha the first search radius.
     positions: wgpu::TextureView,
     /// T_F: bounds, and in alpha the feedback radius.
     feedback: wgpu::TextureView,
@@ -179,7 +179,7 @@ impl Textures {
         })
     }
 
-    /// To draw into textures behind the mask.
+    /// Targets for drawing into textures behind the depth mask.
     fn into(&self, colors: &[&wgpu::TextureView]) -> Targets {
         let colors = colors.iter().map(|&view| (view.clone(), Load::Kept)).collect();
         Targets { colors, depth: self.depth.clone(), clear_depth: None }
@@ -199,7 +199,7 @@ impl EnginePasses for CommunicationPasses {
     }
 }
 
-/// The passes and what they are bound to.
+/// The passes with their resources.
 struct Bound<'a> {
     passes: &'a CommunicationPasses,
     gpu: &'a Gpu,
@@ -213,7 +213,7 @@ impl Bound<'_> {
     fn steps(&self, round: Round) -> Vec<Step> {
         let mut steps = vec![self.begin(round)];
         if round == Round::Active {
-            // The points are the same in both rounds.
+            // Both rounds share the points.
             steps.push(self.mask());
         }
         steps.push(self.ask(round));

@@ -1,4 +1,4 @@
-// Takes each query's second moments from its pixel.
+// Stores each query's second moments from its pixel.
 //
 // Reads: points, queries, counters and both radius textures. Writes: neighborhoods.
 
@@ -15,7 +15,7 @@
 @group(0) @binding(5) var first_products: texture_2d<f32>;
 @group(0) @binding(6) var last_products: texture_2d<f32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 
 @compute @workgroup_size(256)

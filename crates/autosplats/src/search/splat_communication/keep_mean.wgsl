@@ -1,4 +1,4 @@
-// Takes each query's count, mean offset and k-radius from its pixel.
+// Stores each query's count, mean offset and k-radius from its pixel.
 //
 // Reads: points, queries, the feedback texture and both radius textures. Writes: neighborhoods, counters.
 
@@ -17,7 +17,7 @@
 @group(0) @binding(6) var sums: texture_2d<f32>;
 @group(0) @binding(7) var furthest: texture_2d<f32>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 
 @compute @workgroup_size(256)

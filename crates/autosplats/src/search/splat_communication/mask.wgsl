@@ -1,7 +1,8 @@
-// Every screen point draws its pixel: its position, and its depth into the mask that keeps empty pixels and points too far
-// away from ever starting a fragment [Paper, §4].
+// Every screen point draws its pixel: its position, and its depth into the mask. With the mask, empty pixels and
+// points too far away start no fragment [Paper, §4].
 //
-// Reads: points, density, counters. Writes: the position texture (view space, and the first search radius), the depth mask.
+// Reads: points, density, counters. Writes: the position texture (view space, and the first search radius), and the
+// depth mask.
 
 #import frame
 #import counters
@@ -15,7 +16,7 @@
 @group(0) @binding(2) var<storage, read> density: array<vec2u>;
 @group(0) @binding(3) var<storage, read> counters: array<u32>;
 
-// A radius that rounds to nothing would never grow.
+// A radius that rounds to 0 would never grow.
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
 struct Splat {

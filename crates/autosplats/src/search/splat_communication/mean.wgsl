@@ -1,7 +1,7 @@
-// Mean accumulation [Paper, §6]: every point adds its offset, and 1, at each point that has it in its neighbourhood; and the
-// distance to the furthest is kept, which is the k-radius.
+// Mean accumulation [Paper, §6]: every point adds its offset, and 1, at each point whose neighbourhood holds it. The
+// largest distance is kept as the k-radius.
 //
-// Differs from the paper: offsets are taken about the point itself, so that nothing cancels, and it is not counted.
+// Differs from the paper: offsets are about the point itself, so that nothing cancels, and the point is not counted.
 //
 // Reads: points, the position and the feedback texture. Writes: both radius textures.
 

@@ -1,4 +1,4 @@
-// Begins a tree: one large node of all points.
+// Begins a tree with one large node of all points.
 //
 // Reads: the cloud, which is one chunk. Writes: points, radii, large, state, arguments. One invocation per point.
 
@@ -25,7 +25,7 @@ fn begin(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if at < chunk.len {
         let position = vec3f(positions[3u * at], positions[3u * at + 1u], positions[3u * at + 2u]);
         points[at] = vec4u(bitcast<vec3u>(position), at);
-        // Points that are not in the tree keep this: they have no neighbours.
+        // Initial radius, kept by points that are not in the tree: they have no neighbours.
         radii[at] = -1.0;
     }
     if at == 0u {

@@ -1,8 +1,8 @@
-// Ends a level: sums up the chunks, makes the children of the nodes that are split, and lists those that are large for the
-// next level and those that are small for later. All in the order of the nodes, so that it does not depend on timing.
+// Ends a level: sums the chunks, makes the children of the nodes that are split, and lists large children for the next
+// level and small children for later. All in the order of the nodes, so that the result does not depend on timing.
 //
-// Reads: state. Reads and writes: large, chunk_sums. Writes: next_state, next_large, small, nodes, and the arguments of the
-// next level. One workgroup.
+// Reads: state. Reads and writes: large, chunk_sums. Writes: next_state, next_large, small, nodes, and the arguments
+// of the next level. One workgroup.
 
 #import groups
 #import put_work
@@ -20,9 +20,9 @@
 @group(0) @binding(6) var<storage, read_write> nodes: array<KdNode>;
 @group(0) @binding(7) var<storage, read_write> arguments: array<u32>;
 
-// What a run of nodes makes: nodes split, large children, their chunks, small children.
+// Sums over runs of nodes: nodes split, large children, their chunks, small children.
 var<workgroup> made: array<vec4u, 257>;
-// Points that go left in a run of chunks.
+// Points that go left, summed over runs of chunks.
 var<workgroup> sums: array<u32, 257>;
 
 fn points_left(own: KdLarge) -> u32 {
@@ -30,9 +30,9 @@ fn points_left(own: KdLarge) -> u32 {
     return chunk_sums[own.first_chunk + chunks] - chunk_sums[own.first_chunk];
 }
 
-// Whether a node is split. One that loses no points never would be.
+// Whether a node is split. Splits that leave all points on one side are refused, as they might never end.
 fn is_split(own: KdLarge, left: u32) -> bool {
-    // A level for whose children there is no room is the last.
+    // A level without room for its children is the last.
     let has_room = state.nodes + 2u * state.large <= arrayLength(&small);
     return has_room && (own.axis == KD_FINITE_LEFT || (own.axis != KD_UNSPLIT && left > 0u && left < own.len));
 }
@@ -53,11 +53,12 @@ fn children(own: KdLarge, left: u32) -> vec4u {
         return vec4u(0u);
     }
     let of_left = vec4u(1u, 0u, 0u, 0u) + child(left);
-    // What is not finite is in no list.
+    // Points that are not finite enter no list.
     return select(of_left + child(own.len - left), of_left, vec4<bool>(own.axis == KD_FINITE_LEFT));
 }
 
-// Lists a child; `at` is where the lists have come to.
+// Appends a child to its list, at the places `at`. Returns its place in the next level's list of large nodes, or
+// KD_NONE.
 fn put(node: u32, first: u32, len: u32, parent_len: u32, at: vec4u) -> u32 {
     if is_large(len) {
         let empty_low = vec3u(0xffffffffu);
@@ -66,7 +67,7 @@ fn put(node: u32, first: u32, len: u32, parent_len: u32, at: vec4u) -> u32 {
         return at.y;
     }
     if len > 0u {
-        // Points of an even level go to the second list.
+        // Points of an even level are scattered to the second list.
         small[state.small + at.w] = KdSmall(node, first, len, 1u - (state.level % 2u));
     }
     return KD_NONE;
@@ -74,7 +75,7 @@ fn put(node: u32, first: u32, len: u32, parent_len: u32, at: vec4u) -> u32 {
 
 @compute @workgroup_size(256)
 fn place(@builtin(local_invocation_index) local: u32) {
-    // Points that go left before each chunk, and after the last.
+    // Replace the sums of chunks by the number of points that go left before each chunk, and after the last.
     let chunks_each = (state.chunks + 255u) / 256u;
     let first_chunk = min(local * chunks_each, state.chunks);
     let end_chunk = min(first_chunk + chunks_each, state.chunks);
@@ -138,7 +139,7 @@ fn place(@builtin(local_invocation_index) local: u32) {
         nodes[both + 1u] = nodes[both];
         nodes[own.node].first = both;
         nodes[own.node].len = 0u;
-        // The finite points are no part of a lopsided split.
+        // Separating the finite points does not count as a lopsided split.
         let parent_len = select(own.len, KD_NONE, is_root);
         large[at].left = left;
         large[at].next_left = put(both, own.first, left, parent_len, so_far);

@@ -1,5 +1,5 @@
-// Moves the points of a level to the halves of their nodes' runs, in order, and finds the boxes of the children that are to
-// be split. Points of a node that is not split stay where they are, in the other list.
+// Moves the points of a level to the halves of their nodes' runs, in order, and finds the boxes of the large children.
+// Points of a node that is not split keep their place in the other list.
 //
 // Reads: state, large, chunk_sums, points. Writes: next_points, next_large. One workgroup per chunk of a large node.
 
@@ -15,9 +15,10 @@
 @group(0) @binding(4) var<storage, read_write> next_points: array<vec4u>;
 @group(0) @binding(5) var<storage, read_write> next_large: array<atomic<u32>>;
 
-// Which points of the chunk go left.
+// Bits of the chunk's points that go left.
 var<workgroup> bits: array<atomic<u32>, 8>;
-// Boxes of what each invocation moves left and right: twelve values, least and negated greatest coordinates.
+// Boxes of the points that each invocation moves left and right: twelve values, least and negated greatest
+// coordinates.
 var<workgroup> boxes: array<f32, 768>;
 
 const MOST = 3.4028234663852886e38;
@@ -80,7 +81,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     bound(6u, local, right_low);
     bound(9u, local, right_high);
     workgroupBarrier();
-    // Each of twelve invocations sums up one value.
+    // Each of twelve invocations reduces one value.
     let slot = select(own.next_right, own.next_left, local < 6u);
     if local >= 12u || task.first >= task.end || task.axis == KD_UNSPLIT || slot == KD_NONE {
         return;
@@ -92,7 +93,7 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     let axis = local % 3u;
     let words = slot * KD_LARGE_WORDS;
     if least == MOST {
-        // Nothing of this chunk goes there.
+        // No point of this chunk goes to that child.
         return;
     }
     if local % 6u < 3u {

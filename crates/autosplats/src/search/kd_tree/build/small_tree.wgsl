@@ -1,14 +1,14 @@
-// Makes a tree of each small node, splitting by the voxel volume heuristic [ZHWG08, §5]: of all planes through its points
-// the one with the least
+// Makes a tree of each small node by the voxel volume heuristic [ZHWG08, §5]. Of all planes through a node's points,
+// the split takes the one with the least
 //
 //     VVH(x) = C_L·V(L ± R) + C_R·V(R ± R),
 //
-// points of either side times the volume from which a query of radius R reaches them, if that is less than C·V(node ± R).
-// As in [ZHWG08, §3.3] a node's points are bits of a mask, those before each candidate plane too, and are counted by
-// counting bits.
+// that is, the points of either side times the volume from which a query of radius R reaches them. The node is split
+// if that is less than C·V(node ± R). As in [ZHWG08, §3.3] the points of a node, and the points before each candidate
+// plane, are masks whose bits are counted.
 //
-// Reads: state, small, points_b. Reads and writes: points_a. Writes: nodes. One workgroup per small node, an invocation per point
-// and its three candidate planes.
+// Reads: state, small, points_b. Reads and writes: points_a. Writes: nodes. One workgroup per small node; one
+// invocation per point and its three candidate planes.
 
 #import frame
 #import groups
@@ -22,21 +22,21 @@
 @group(0) @binding(4) var<storage, read> points_b: array<vec4u>;
 @group(0) @binding(5) var<storage, read_write> nodes: array<KdNode>;
 
-// Points of a leaf at least, if there are more; so nodes below a small one are no more than a quarter of its points.
+// Fewest points of a leaf, where there are more. So the nodes below a small node are at most a quarter of its points.
 override LEAST: u32;
-// A step down the tree costs as much as so many points.
+// Number of points whose reading costs as much as a step down the tree.
 override STEP_COST: f32;
 
-// Coordinates by axis.
+// Coordinates of the points, axis by axis.
 var<workgroup> coordinates: array<f32, 192>;
-// Nodes still to be looked at: their points, and where they go.
+// Masks of the nodes still to be processed, and their places in `nodes`.
 var<workgroup> masks: array<vec2u, 16>;
 var<workgroup> places: array<u32, 16>;
 var<workgroup> open: u32;
-// Nodes made, points put into leaves.
+// Nodes made, and points put into leaves.
 var<workgroup> made: u32;
 var<workgroup> put: u32;
-// The box of a node: least and negated greatest coordinates.
+// Box of a node: least and negated greatest coordinates.
 var<workgroup> box: array<f32, 6>;
 var<workgroup> best_cost: atomic<u32>;
 var<workgroup> best: atomic<u32>;
@@ -53,7 +53,7 @@ fn is_in(mask: vec2u, at: u32) -> bool {
     return any((mask & bit(at)) != vec2u(0u));
 }
 
-// Points before a plane.
+// Mask of the points before a plane.
 fn before(axis: u32, plane: f32, len: u32) -> vec2u {
     var mask = vec2u(0u);
     for (var at = 0u; at < len; at++) {
@@ -62,7 +62,7 @@ fn before(axis: u32, plane: f32, len: u32) -> vec2u {
     return mask;
 }
 
-// The cost of a split, relative to V(node ± R): volumes differ along the axis alone.
+// The cost of a split, relative to V(node ± R): volumes differ along the axis only.
 fn split_cost(axis: u32, plane: f32, left: u32, count: u32) -> f32 {
     let low = box[axis];
     let high = -box[3u + axis];
@@ -104,7 +104,7 @@ fn small_tree(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     let before_x = before(0u, position.x, len);
     let before_y = before(1u, position.y, len);
     let before_z = before(2u, position.z, len);
-    // Nodes below the small ones follow those above, at a place of their own.
+    // Nodes below small nodes follow the nodes above them, at a place of their own.
     let room = arrayLength(&small) + root.first / 4u;
 
     loop {
@@ -154,7 +154,7 @@ fn small_tree(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         let low = vec3f(box[0], box[1], box[2]);
         let high = -vec3f(box[3], box[4], box[5]);
         if splitter == KD_NONE {
-            // A leaf: its points come to lie together, in the order in which they were.
+            // A leaf: its points are stored together, in their previous order.
             if is_mine {
                 points_a[root.first + already_put + ones(mask & before_bit(local))] = point;
             }
@@ -177,7 +177,7 @@ fn small_tree(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     }
 }
 
-// The bits below one.
+// The bits below a bit.
 fn before_bit(at: u32) -> vec2u {
     let low = (1u << (at % 32u)) - 1u;
     return select(vec2u(0xffffffffu, low), vec2u(low, 0u), at < 32u);

@@ -1,6 +1,6 @@
-// Chooses how each large node of a level is split: at the spatial median of the longest axis of its tight box.
+// Chooses the split of each large node of a level: at the spatial median of the longest axis of its tight box.
 //
-// Empty space is cut off by keeping that box: all of it, where [ZHWG08] makes empty nodes of parts that are large enough.
+// The tight box cuts off all empty space, where [ZHWG08] makes empty nodes of large enough parts.
 //
 // Reads: state, points. Reads and writes: large. Writes: nodes. One invocation per large node.
 
@@ -14,14 +14,14 @@
 @group(0) @binding(2) var<storage, read_write> large: array<KdLarge>;
 @group(0) @binding(3) var<storage, read_write> nodes: array<KdNode>;
 
-// Points whose median is taken for that of a node.
+// Number of points whose median stands for the median of a node.
 const SAMPLES = 15u;
 
 fn corner(keys: vec3u) -> vec3f {
     return bitcast<vec3f>(vec3u(key_bits(keys.x), key_bits(keys.y), key_bits(keys.z)));
 }
 
-// The coordinate of one of the points that are spread over a node's run.
+// Coordinate of one of the points spread evenly over a node's run.
 fn sample(at: u32, large_node: KdLarge, axis: u32) -> f32 {
     let place = large_node.first + at * (large_node.len / SAMPLES);
     return kd_coordinate(kd_position(points[place]), axis);
@@ -58,12 +58,12 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     let low = corner(own.low);
     let high = corner(own.high);
-    // A leaf, until it turns out to have children.
+    // A leaf, unless `place` gives the node children.
     nodes[own.node] = KdNode(low, own.first, high, own.len);
     let extent = high - low;
     let longest = max(max(extent.x, extent.y), extent.z);
     if !(longest > 0.0) {
-        // All its points are in one place.
+        // All points are coincident.
         large[at].axis = KD_UNSPLIT;
         return;
     }
@@ -71,13 +71,13 @@ fn split(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let least = kd_coordinate(low, axis);
     let most = kd_coordinate(high, axis);
     var plane = 0.5 * least + 0.5 * most;
-    // Differs from [ZHWG08]: no two lopsided splits follow each other, so that the levels are bounded. Without, a cluster
-    // seen from far away would take a level for each halving of the space around it.
+    // Differs from [ZHWG08]: no two lopsided splits follow each other, which bounds the levels. Otherwise a distant
+    // cluster would take a level for each halving of the space around.
     if own.len > own.parent_len / 4u * 3u {
         let median = sampled_median(own, axis);
         plane = select(plane, median, median > least);
     }
-    // The middle of two neighbouring numbers is one of them; the points at `most` go right, those at `least` left.
+    // The mean of two adjacent floats is one of them. Points at `most` go right, points at `least` left.
     large[at].plane = select(most, plane, plane > least);
     large[at].axis = axis;
 }

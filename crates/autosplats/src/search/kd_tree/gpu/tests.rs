@@ -1,4 +1,4 @@
-//! The tree's form, and what is found in it, against brute force.
+//! The form of the tree, and the neighbourhoods found in it, against brute force.
 
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
@@ -14,10 +14,10 @@ use crate::test_clouds::{self, EYE, Random};
 
 const SIZE: [u32; 2] = [121, 90];
 
-/// What a search leaves.
+/// The result of a search.
 #[derive(Debug, PartialEq)]
 struct Found {
-    /// Indices in the cloud of the queries, and what was found for them.
+    /// Indices in the cloud of the queries, and their neighbourhoods.
     sources: Vec<u32>,
     neighborhoods: Vec<[f32; 12]>,
     points: Vec<Point>,
@@ -36,7 +36,7 @@ impl Found {
     }
 }
 
-/// Sees all the points, were none hidden behind others.
+/// A view of the whole cloud.
 fn view(scale: f64) -> View {
     let projection = Projection::OrthographicHeight(2.4 * scale);
     let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
@@ -84,7 +84,7 @@ fn squared(a: [f32; 3], b: [f32; 3]) -> f64 {
     (0..3).map(|axis| (f64::from(a[axis]) - f64::from(b[axis])).powi(2)).sum()
 }
 
-/// Distances from a point to all others that have a distance, in order.
+/// Distances from a point to all others at a finite distance, ascending.
 fn distances(positions: &[[f32; 3]], own: u32) -> Vec<f64> {
     let center = positions[own as usize];
     let others = positions.iter().enumerate().filter(|&(index, _)| index != own as usize);
@@ -94,7 +94,7 @@ fn distances(positions: &[[f32; 3]], own: u32) -> Vec<f64> {
     distances
 }
 
-/// A radius within which nearly all points of a cloud have k neighbours, but not many more.
+/// A radius within which nearly all points have k neighbours, but not many more.
 fn ample_radius(positions: &[[f32; 3]], k: u32) -> f32 {
     let mut radii: Vec<f64> = (0..positions.len() as u32)
         .step_by(positions.len().div_ceil(50))
@@ -104,7 +104,7 @@ fn ample_radius(positions: &[[f32; 3]], k: u32) -> f32 {
     2.0 * radii.last().copied().unwrap_or(1.0).max(1e-12) as f32
 }
 
-/// Goes through a tree and checks it; leaves that are larger than a small node may be, and the deepest level.
+/// Walks through a tree and checks it. Returns the number of leaves larger than a small node, and the depth.
 fn check_tree(found: &Found, positions: &[[f32; 3]], case: &str) -> (usize, usize) {
     let is_finite = |p: &[f32; 3]| p.iter().all(|c| c.abs() <= 1e18);
     let finite = positions.iter().filter(|p| is_finite(p)).count();
@@ -165,7 +165,7 @@ fn trees_hold_each_point_once_in_tight_boxes() {
     }
 }
 
-/// Share of the queries whose k-radius is that of brute force to 1e-4, of those that have k neighbours.
+/// The queries whose k-radius equals brute force to 1e-4, and the queries compared, which have k neighbours.
 fn accuracy(found: &Found, positions: &[[f32; 3]], k: u32) -> (usize, usize) {
     let (mut right, mut compared) = (0, 0);
     for (query, &own) in found.sources.iter().enumerate().step_by(7) {
@@ -180,8 +180,8 @@ fn accuracy(found: &Found, positions: &[[f32; 3]], k: u32) -> (usize, usize) {
 fn k_radii_are_those_of_brute_force() {
     let Some(gpu) = test_gpu() else { return };
     let passes = KdTreePasses::new(&gpu).expect("passes");
-    // More neighbours share the bins of the same histogram: two in the k-th's bin, beside it, are one too many. At k = 3 that
-    // is one point of three thousand.
+    // Larger k puts more neighbours into the bins of the same histogram. Two more in the bin of the k-th are one too
+    // many; at k = 3 this is rare.
     for (k, least) in [(1, 1.0), (3, 0.999), (10, 0.995), (17, 0.99), (64, 0.95)] {
         let (mut right, mut compared) = (0, 0);
         for (name, positions) in test_clouds::all(4000) {
@@ -195,7 +195,7 @@ fn k_radii_are_those_of_brute_force() {
     }
 }
 
-/// Sums of moments against those of brute force, in double precision.
+/// Sums of moments against brute force in `f64`.
 #[test]
 fn moments_are_those_of_the_neighbours_up_to_the_k_radius() {
     let Some(gpu) = test_gpu() else { return };
@@ -241,7 +241,7 @@ fn moments_are_those_of_the_neighbours_up_to_the_k_radius() {
     }
 }
 
-/// Nothing recurses for ever, and every point is found.
+/// The build ends, and every point is found.
 #[test]
 fn thousands_of_points_in_one_place_are_one_leaf() {
     let Some(gpu) = test_gpu() else { return };
@@ -260,7 +260,7 @@ fn thousands_of_points_in_one_place_are_one_leaf() {
             assert_eq!([found.count(query), found.k_radius(query)], [k as f32, 0.0], "{name}: k others, no distance");
         }
     }
-    // More than a walk may see.
+    // More points than a walk may visit.
     let positions = vec![[0.1, 0.2, 0.3]; 100_000];
     let found = find(&gpu, &passes, &positions, &view(1.0), 10, 0.3);
     assert_eq!(check_tree(&found, &positions, "a crowd").0, 1, "one leaf");
@@ -295,7 +295,7 @@ fn units_do_not_matter() {
     let Some(gpu) = test_gpu() else { return };
     let passes = KdTreePasses::new(&gpu).expect("passes");
     let positions = test_clouds::edge(4000);
-    // Powers of two, so that nothing is rounded but by the view.
+    // Powers of two, so that only the view rounds.
     let radii = |scale: f32| {
         let scaled: Vec<_> = positions.iter().map(|p| p.map(|c| c * scale)).collect();
         let found = find(&gpu, &passes, &scaled, &view(scale.into()), 10, 0.2 * scale);
@@ -325,7 +325,7 @@ fn levels_are_enough_for_splits_as_uneven_as_they_may_be() {
     }
 }
 
-/// Clusters within clusters: halves of space alone would take a level for each factor of two.
+/// Clusters within clusters, for which spatial medians alone would take a level for each factor of two.
 #[test]
 fn clusters_far_apart_take_few_levels() {
     let Some(gpu) = test_gpu() else { return };
@@ -351,7 +351,7 @@ fn two_frames_are_equal_to_the_byte() {
     assert!(run() == run(), "the order of the points and all sums are the same");
 }
 
-/// A tree that is too large says so.
+/// A tree that is too large is an error.
 #[test]
 fn a_cloud_beyond_the_limit_is_refused() {
     let Some(gpu) = test_gpu() else { return };

@@ -1,4 +1,4 @@
-//! What only the engine itself can be asked: its vectors and its bound.
+//! Tests of the engine's internals: its vectors and its bound.
 
 use super::*;
 use crate::camera::{Camera, Projection};
@@ -30,7 +30,7 @@ fn vectors_of_any_width_give_the_same_bits() {
     }
 }
 
-/// The bound of the search: what it holds at a time, however far apart the points lie.
+/// The engine never holds many more candidates than the bound, however far apart the points lie.
 #[test]
 fn no_more_candidates_are_read_than_allowed() {
     let (screen, view) = screen(test_clouds::outliers(80_000));

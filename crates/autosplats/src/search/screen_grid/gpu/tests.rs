@@ -16,12 +16,12 @@ use crate::test_clouds::{self, EYE, Random};
 
 const KS: [u32; 6] = [1, 3, 10, 16, 17, 64];
 
-/// The frame as the device is told of it.
+/// The frame uniform for a view and rules.
 pub(crate) fn frame_buffer(gpu: &Gpu, view: &View, rules: &SearchRules) -> wgpu::Buffer {
     frame_buffer_with(gpu, &told(view, rules))
 }
 
-/// The same, after a frame that was seen by the same view and left these k-radii, and a buffer with them.
+/// The frame uniform after a frame with the same view and these k-radii, and a buffer of the radii.
 pub(crate) fn frame_buffer_after(
     gpu: &Gpu,
     view: &View,
@@ -41,7 +41,7 @@ fn told(view: &View, rules: &SearchRules) -> FrameUniform {
         outlier_growth: rules.outlier_radius(1.0),
         gap_growth: rules.gap_factor.map_or(f32::INFINITY, f32::sqrt),
         adaptive: rules.adaptive.into(),
-        // Of a screen with a point a pixel there is more room than points, which is no wrong bound.
+        // A screen with one point a pixel has more room than points, which bounds window sizes safely.
         halves: 1,
         ..FrameUniform::new(view, rules.k)
     }
@@ -53,17 +53,17 @@ fn frame_buffer_with(gpu: &Gpu, told: &FrameUniform) -> wgpu::Buffer {
     frame
 }
 
-/// One neighbourhood, in no one's layout.
+/// One neighbourhood, independent of host and device layouts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moments {
     pub(crate) count: f32,
     pub(crate) k_radius: f32,
     pub(crate) offset: [f32; 3],
-    /// xx, xy, xz, yy, yz, zz.
+    /// Second moments xx, xy, xz, yy, yz, zz.
     pub(crate) second: [f32; 6],
 }
 
-/// The first `len` neighbourhoods that the host found.
+/// The first `len` neighbourhoods found by the host.
 pub(crate) fn host_moments(neighborhoods: &Neighborhoods, len: usize) -> Vec<Moments> {
     (0..len).map(|index| Moments::of_host(neighborhoods, index)).collect()
 }
@@ -89,13 +89,13 @@ impl Moments {
         [x, y, z, count, xx, xy, xz, k_radius, yy, yz, zz, 0.0]
     }
 
-    /// Compares with what the host found.
+    /// Compares with a neighbourhood found by the host.
     pub(crate) fn compare(&self, host: &Self) -> Result<(), String> {
         let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(format!("{what}: {self:?}, host: {host:?}")) };
         // Rounding of a sum of squares and a root.
         ensure((self.k_radius - host.k_radius).abs() <= 1e-6 * host.k_radius, "k-radius")?;
         ensure(self.count == host.count, "count")?;
-        // Rounding of up to count additions of terms up to the radius, squared.
+        // Rounding of up to `count` additions of terms up to the radius, squared.
         let near = |a: &[f32], b: &[f32], unit: f32| {
             a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2e-7 * (host.count + 4.0) * unit)
         };
@@ -130,7 +130,7 @@ pub(crate) fn projected(
     (Projector::default().project(&cloud, &view, rules).clone(), view)
 }
 
-/// Both rounds; clamped and bounded points.
+/// Searches both rounds on the device. Returns the neighbourhoods, and the numbers of clamped and bounded points.
 fn on_device(
     gpu: &Gpu,
     passes: &SearchPasses,
@@ -207,7 +207,7 @@ fn the_device_finds_what_the_host_finds() {
             }
         }
     }
-    // A threshold of a rule or a tie is left to rounding on few points only.
+    // Rounding decides a rule's threshold or a tie for few points only.
     assert!(compared > 100_000, "there is something to compare: {compared}");
     assert!(different * 10_000 <= compared, "{different} of {compared} differ");
 }
@@ -232,7 +232,7 @@ fn comparison_sees_each_kind_of_error() {
     }
 }
 
-/// A search that meets its bound keeps fewer neighbours, but all there are up to its k-radius.
+/// A bounded search keeps fewer neighbours, but all points up to its k-radius.
 #[test]
 fn bounded_searches_stay_exact_as_far_as_they_go() {
     let Some(gpu) = test_gpu() else { return };
@@ -249,7 +249,7 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
             let at = |q: usize| screen.points[q].position_view;
             let squared = |q: usize| (0..3).map(|axis| (at(q)[axis] - at(query as usize)[axis]).powi(2)).sum::<f32>();
             let within = |radius: f32| (0..screen.points.len()).filter(|&q| squared(q).sqrt() <= radius).count() - 1;
-            // Rounding decides about the last one.
+            // Rounding decides about the last neighbour.
             let [least, most] = [1.0 - 1e-6, 1.0 + 1e-6].map(|part| within(part * found.k_radius));
             let is_exact = (least..=most).contains(&(found.count as usize)) && most <= least + 1;
             assert!(is_exact, "k = {k}, point {query}: {} of {least} to {most} neighbours", found.count);
@@ -257,14 +257,14 @@ fn bounded_searches_stay_exact_as_far_as_they_go() {
     }
 }
 
-/// Small pictures may have more screen points than the bound on work, and more than pixels: searches in them end, and where
-/// they end on the host.
+/// Small pictures can have more screen points than the bound on search work, and than pixels. Searches there end, and
+/// at the same radius as on the host.
 #[test]
 fn crowded_small_pictures_are_bounded_alike() {
     let Some(gpu) = test_gpu() else { return };
     for (size, count) in [([64, 64], 60_000), ([128, 128], 200_000)] {
         let mut positions = test_clouds::plane(count);
-        // Strays before it, whose neighbours are all far away.
+        // Outliers in front of the plane, whose neighbours are all far away.
         let to_eye = EYE.as_vec3() * 0.3;
         positions.extend((0..20).map(|i| (to_eye + 0.02 * glam::Vec3::splat(i as f32)).to_array()));
         for k in [10, 64] {
@@ -301,14 +301,15 @@ fn huge_coordinates_reach_no_sum() {
     }
 }
 
-/// Windows of tall pictures have many strips: software devices end invocations after so many rounds of their loops.
+/// Windows of tall pictures have many strips, and software devices end invocations after a limited number of loop
+/// rounds.
 #[test]
 fn tall_pictures_are_searched_to_the_end() {
     let Some(gpu) = test_gpu() else { return };
     let up = DVec3::Y;
     let camera =
         Camera { eye: -4.0 * DVec3::Z, look_at: DVec3::ZERO, up, projection: Projection::OrthographicHeight(2.1) };
-    // A column of points at all heights and some depths, dense in the middle.
+    // A column of points at all heights and several depths, dense in the middle.
     let height = |i: usize| (i as f32 / 10_000.0 - 1.0).powi(3);
     let column: Vec<_> = (0..20_000).map(|i| [0.0, height(i), 0.1 * (i % 7) as f32]).collect();
     let sparse = column.iter().step_by(499).copied().collect();
@@ -339,11 +340,11 @@ fn tall_pictures_are_searched_to_the_end() {
     }
 }
 
-/// More points at exactly the same distance than lie between two thresholds at the end: all of them belong.
+/// More points at exactly the same distance than fit between two final thresholds: all of them belong.
 #[test]
 fn all_at_the_same_distance_are_neighbours() {
     let Some(gpu) = test_gpu() else { return };
-    // Whole numbers, the middle of a circle and the 108 points on it: squares are exact.
+    // The centre of a circle and the 108 points with whole coordinates on it: squares are exact.
     let radius = 1105i32;
     let half = |x: i32| f64::from(radius * radius - x * x).sqrt();
     let whole = (-radius..=radius).filter(|&x| half(x).fract() == 0.0);
@@ -371,7 +372,7 @@ fn all_at_the_same_distance_are_neighbours() {
     }
 }
 
-/// Whatever the last frame is said to have found, the same is found, to the bit.
+/// The radii of the last frame do not change the result by a single bit.
 #[test]
 fn the_past_changes_nothing() {
     let Some(gpu) = test_gpu() else { return };

@@ -18,17 +18,17 @@ use crate::test_clouds;
 
 const SIZE: [u32; 2] = [121, 90];
 
-/// What one frame's search left.
+/// The result of one frame's search.
 struct Found {
-    /// The active points, and after them the passive ones.
+    /// Neighbourhoods of the active points, then of the passive.
     neighborhoods: Vec<Moments>,
     clamped: usize,
     bounded: usize,
-    /// Points without their radius before the first iteration and after each.
+    /// Unconverged points before the first iteration and after each.
     curve: Vec<u32>,
 }
 
-/// One point a pixel: a texel has room for one.
+/// A screen with one point a pixel, since a texel has room for one.
 fn screen(positions: &[[f32; 3]], camera: &Camera, size: [u32; 2], k: u32) -> (ScreenPoints, View) {
     projected(positions, camera, size, &ProjectRules { halves: false, ..ProjectRules::usual(k) })
 }
@@ -66,14 +66,15 @@ fn rules(k: u32) -> SearchRules {
     SearchRules { k, outlier_expansions: Some(1), gap_factor: Some(4.0), adaptive: true }
 }
 
-/// How many points have another neighbourhood than on the host, which is exact.
+/// Number of points whose neighbourhood differs from the host's, which is exact.
 fn different(device: &[Moments], host: &[Moments], case: &str) -> usize {
     assert_eq!(device.len(), host.len(), "{case}: every point is a query");
     let errors = device.iter().zip(host).filter_map(|(device, host)| device.compare(host).err());
     errors.inspect(|error| eprintln!("{case}: {error}")).count()
 }
 
-/// A thousandth of each round's points may be left when iterations end; one more for rounding at a rule's threshold.
+/// A thousandth of each round's points may be unfinished when iterations end; one more for rounding at a rule's
+/// threshold.
 fn allowed(screen: &ScreenPoints) -> usize {
     [&screen.active, &screen.passive].map(|queries| queries.len() / 1000).iter().sum::<usize>() + 1
 }
@@ -110,7 +111,7 @@ fn all_but_a_thousandth_is_what_the_host_finds() {
     assert!(wrong * 1000 <= compared, "{wrong} of {compared} differ");
 }
 
-/// What so many iterations cannot reach is said to be unfinished, not to have no neighbours.
+/// Points that the iterations cannot finish count as bounded, not as points without neighbours.
 #[test]
 fn short_steps_and_far_outliers() {
     let Some(gpu) = test_gpu() else { return };
@@ -165,7 +166,7 @@ fn the_search_converges_as_in_the_paper() {
     }
 }
 
-/// Among equal distances no bracket finds its way: all points at the k-th distance belong.
+/// No bracket separates equal distances: all points at the k-th distance belong.
 #[test]
 fn ties_belong() {
     let Some(gpu) = test_gpu() else { return };
@@ -186,14 +187,14 @@ fn ties_belong() {
     }
 }
 
-/// Of points in the same place one is seen; what is nearly there is as near as numbers tell.
+/// Of coincident points one is visible; points nearly there have distances at the limit of precision.
 #[test]
 fn coincident_points() {
     let Some(gpu) = test_gpu() else { return };
     let passes = CommunicationPasses::new(&gpu).expect("passes");
     let mut positions = vec![[0.25, 0.125, 0.0]; 5000];
     positions.extend(test_clouds::plane(500));
-    // A crowd so dense that rounding makes many of its distances equal.
+    // A crowd so dense that rounding makes many distances equal.
     positions.extend((0..900).map(|i| [0.5 + 1e-6 * (i % 30) as f32, 0.5 + 1e-6 * (i / 30) as f32, 0.0]));
     let near = Camera {
         eye: DVec3::new(0.5, 0.5, -1e-4),
@@ -248,7 +249,7 @@ fn comparison_sees_a_wrong_neighbourhood() {
     assert!(different(&other, &right, "another k") > allowed(&screen), "another k is another question");
 }
 
-/// A device with so many bytes per pixel to draw into.
+/// A device with a limit of `bytes` per pixel of colour attachments.
 fn own_device(required_features: wgpu::Features, bytes: u32) -> Gpu {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
