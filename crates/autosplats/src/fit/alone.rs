@@ -1,47 +1,48 @@
-//! Points that are no part of the surface that their neighbours are.
-// Differs from the paper: it takes any neighbour within the radius of e0 expansions, 31 first search radii at k = 10, as a
-// sign of surface, so that a point in the air before a dense scan grows a disc as wide as its distance.
+//! Rules that drop a point that does not belong to the surface of its neighbours. See docs/decisions/0010-outliers.md.
+// Differs from the paper: the paper takes any neighbour within the radius of e0 expansions as a sign of surface, 31
+// first search radii with k = 10. A point in front of a dense scan would grow a disc as wide as its distance.
 
-/// A point whose neighbours' mean is further from it than this part of the k-radius has them all on one side and close
-/// together: they are a surface elsewhere, and the point an outlier. At a straight edge the part is 0.42, at a square corner
-/// 0.6, at the end of a line 0.55.
+/// Distance to the mean of the neighbours, in k-radii, above which a point is an outlier: the neighbours lie together
+/// on one side, on a surface elsewhere. The distance is 0.42 at a straight edge, 0.6 at a square corner, 0.55 at a
+/// line's end.
 pub(super) const LOPSIDED: f32 = 0.75;
-/// The same of a point that is far sparser than what is around it on the screen,
+/// Like `LOPSIDED`, in k-radii, for a point that is far sparser than its surroundings on the screen.
 pub(super) const LOPSIDED_SPARSE: f32 = 0.66;
-/// which it is if its k-radius is so many first search radii.
+/// K-radius, in first search radii, above which a point is far sparser than its surroundings.
 pub(super) const FAR_SPARSER: f32 = 3.0;
-/// Fewer neighbours than this are too often on one side by chance.
+/// Fewest neighbours for `LOPSIDED` and `BESIDE`: fewer are too often on one side by chance.
 pub(super) const LOPSIDED_COUNT: f32 = 6.0;
 
-/// A point that is further from the plane through its neighbours than this part of the k-radius stands beside their surface,
+/// Distance from the plane through the neighbours, in k-radii, above which a point stands beside a flat surface.
 pub(super) const BESIDE: f32 = 0.25;
-/// if that is flat: they scatter about it by less than the distance, squared, over this. At the tip of a cone it is 8, at a
-/// cube's corner 7; of strewn tips one in a hundred goes. So does a single step of coordinates on a grid.
+/// Least ratio of the squared distance from the plane to the neighbours' variance about the plane, for a surface to
+/// count as flat. The ratio is 8 at the tip of a cone and 7 at a cube's corner; few random samples of a tip exceed the
+/// limit. A single step of coordinates on a grid exceeds the limit too.
 pub(super) const FLAT: f32 = 50.0;
 
-/// A point with fewer neighbours than this before a gap is of a surface only where others are not much denser,
+/// Number of neighbours before a gap below which a point is dropped if its surroundings are denser.
 pub(super) const FEW: f32 = 4.0;
-/// as they are if the k-radius is so many first search radii.
+/// K-radius, in first search radii, above which the surroundings of a point with few neighbours are denser.
 pub(super) const SPARSER: f32 = 1.3;
 
-/// In a picture of fewer points than this there is nothing to compare with, and so few in all are no surface.
+/// Number of screen points below which there is nothing to compare with, and a cloud is no surface.
 pub(crate) const HANDFUL: usize = 64;
 
-/// The neighbours of a point, in k-radii.
+/// The neighbours of a point, in units of the k-radius.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Around {
     pub(super) count: f32,
-    /// From the point to their mean.
+    /// Offset from the point to the mean of the neighbours.
     pub(super) mean: [f32; 3],
-    /// Unit normal of the plane through the point and them.
+    /// Unit normal of the plane through the point and its neighbours.
     pub(super) normal: [f32; 3],
-    /// Variance of the point and them along it.
+    /// Variance of the point and its neighbours along the normal.
     pub(super) variance: f32,
 }
 
 impl Around {
-    /// Whether the point is no part of their surface, where `k` were looked for. Its k-radius is `sparser` first search radii,
-    /// which few points are asked; `None` if there is nothing to compare with.
+    /// Whether the point is no part of its neighbours' surface, with `k` neighbours asked for. `sparser` computes the
+    /// k-radius in first search radii, which few points need; `None` if there is nothing to compare with.
     #[inline(always)]
     pub(super) fn is_alone(&self, sparser: Option<impl Fn() -> f32>, k: u32) -> bool {
         let &Self { count, mean, normal, variance } = self;
@@ -55,7 +56,7 @@ impl Around {
             return true;
         }
         let beside = dot(normal) * dot(normal);
-        // Without the point itself.
+        // Variance of the neighbours without the point itself.
         let all = count + 1.0;
         let scatter = (variance - count * beside / (all * all)) * (all / count);
         sparser.is_some() && beside > BESIDE * BESIDE && beside > FLAT * scatter

@@ -14,44 +14,43 @@ use crate::simd::F32s;
 
 /// Blocks per task.
 const TASK_BLOCKS: usize = 64;
-/// A neighbourhood whose middle eigenvalue is below this part of the largest is a line, not a plane.
+/// Ratio of the middle to the largest eigenvalue below which a neighbourhood is a line, not a plane.
 pub(super) const LINE: f32 = 1e-5;
-/// Sine of the angle to the eye below which a line has no side towards it.
+/// Sine of the angle between a line and the direction to the eye below which the line has no side towards the eye.
 pub(super) const LEAST_ACROSS: f32 = 1e-3;
-/// Longest ellipse, semi-major over semi-minor axis.
-// Differs from the paper: it sets no limit, and a nearly straight neighbourhood would draw a needle across the picture.
+/// Default limit of an ellipse's semi-major over semi-minor axis.
+// Differs from the paper: without a limit, a nearly straight neighbourhood would draw a needle across the picture.
 pub(crate) const LONGEST: f32 = 4.0;
-/// Radius in pixels of a point drawn although it has no neighbour.
+/// Radius in pixels of the dot drawn for a kept point without neighbours.
 pub(super) const LONE_RADIUS_PX: f32 = 1.0;
 
-/// Points behind the culling plane of their cell get no splat wider than one whose k-radius were this many first search
-/// radii.
-// Differs from the paper: such a point is seen past the edge of a nearer surface, its neighbours are mostly hidden, and
-// the wide splat that this makes of it sticks out beyond the silhouette, where no depth map can hide it.
+/// Largest k-radius, in first search radii, that widens the splat of a point behind the culling plane of its cell.
+// Differs from the paper: such a point is seen past the edge of a nearer surface, and its neighbours are mostly
+// hidden. Its wide splat would stick out beyond the silhouette, where no depth map can hide it.
 pub(super) const WIDEST_BEHIND: f32 = 3.0;
 
-/// Fewer neighbours than this are a line by chance, and never count as a row of points.
+/// Fewest neighbours that form a line of points; fewer are a line by chance.
 pub(super) const ROW_COUNT: f32 = 8.0;
 
-/// Surface variation of a dot, which is no surface: the most there is. So it has no back either.
+/// Surface variation that marks a dot: the largest possible. A dot is no surface, and has no back.
 pub(super) const DOT_CURVATURE: f32 = 1.0 / 3.0;
 
-/// What the fit may be asked for.
+/// Settings of the fit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FitRules {
     pub(crate) k: u32,
     pub(crate) splat_scale: f32,
-    /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
+    /// Largest semi-major over semi-minor axis of an ellipse; 1 for circles.
     pub(crate) longest: f32,
-    /// Leave ellipses as long as they are, as what adapts them goes by their shape, and compare points with what is around them.
+    /// Whether to keep the full length of ellipses, for adaptation, and to compare points with their surroundings.
     pub(crate) adaptive: bool,
-    /// Keep outliers: points without neighbours as dots, and those that are no part of their neighbours' surface.
+    /// Whether to keep outliers: points without neighbours, as dots, and points off their neighbours' surface.
     pub(crate) keep_outliers: bool,
-    /// Radius in pixels of the dots that all points are, facing the eye; 0 if they are surface.
+    /// Radius in pixels of dots that face the eye and replace all surfels; 0 draws surfaces.
     pub(crate) dot_px: f32,
 }
 
-/// Fits a surfel to the neighbourhood of each of `queries`, indices of screen points, and appends them to `surfels`.
+/// Fits a surfel to the neighbourhood of each of `queries`, indices of screen points, and appends it to `surfels`.
 pub(crate) fn fit(
     screen: &ScreenPoints,
     queries: &[u32],
@@ -111,13 +110,13 @@ fn fit_blocks_with<'a, S: Simd>(
     }
 }
 
-/// The plane through a neighbourhood.
+/// Plane through a neighbourhood.
 pub(crate) struct Plane {
-    /// Unit length.
+    /// Unit normal.
     pub(crate) normal: [f32; 3],
-    /// Unit direction in which the neighbourhood is longest, in the plane.
+    /// Unit direction in the plane in which the neighbourhood is longest.
     pub(crate) major_axis: [f32; 3],
-    /// Eigenvalue along the major axis over the one across it, at least 1; `f32::MAX` of a line.
+    /// Ratio of the eigenvalues along and across the major axis, at least 1; `f32::MAX` for a line.
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
@@ -126,14 +125,14 @@ pub(crate) struct Plane {
 /// Principal axes of sixteen neighbourhoods.
 #[derive(Default)]
 pub(crate) struct Fitted {
-    /// Eigenvalues, ascending, in units of the squared k-radius.
+    /// Eigenvalues, ascending, in squared k-radii.
     values: [Lanes; 3],
     normal: [Lanes; 3],
     major_axis: [Lanes; 3],
 }
 
 impl Fitted {
-    /// Diagonalises the covariances of the `vector`-th part of `block`.
+    /// Diagonalises the covariances of SIMD vector number `vector` of `block`.
     #[inline(always)]
     pub(crate) fn fit<S: Simd>(&mut self, simd: S, block: &NeighborhoodBlock, vector: usize) {
         let eigen = eigen(simd, covariance(simd, block, vector));
@@ -144,9 +143,9 @@ impl Fitted {
         }
     }
 
-    /// The plane through the neighbourhood of `lane` [Paper, Eq. 1 to 3], seen from the side that `toward` points to.
+    /// The plane through the neighbourhood of `lane` [Paper, Eq. 1 to 3], with the normal on the side of `toward`.
     ///
-    /// A neighbourhood that is a line or one place has many; the one most square to `toward` is taken.
+    /// A line or a single place lies in many planes; the plane most perpendicular to `toward` is taken.
     #[inline(always)]
     pub(crate) fn plane(&self, lane: usize, toward: [f32; 3]) -> Plane {
         let [least, middle, largest] = of_lane(&self.values, lane);
@@ -155,7 +154,7 @@ impl Fitted {
         if !plane {
             normal = facing(toward, major_axis, largest > 0.0);
             if !(largest > 0.0) {
-                // Any tangent does for a circle.
+                // A circle may have any tangent.
                 major_axis = Vec3::from(normal).any_orthonormal_vector().to_array();
             }
         }
@@ -173,7 +172,8 @@ impl Fitted {
         }
     }
 
-    /// The surfel of a point whose surroundings have a `usual_radius` to the k-th neighbour, if they are to be compared.
+    /// The surfel of a point. `usual_radius` computes the first search radius; with `None` the point is not compared
+    /// with its surroundings.
     #[inline(always)]
     fn surfel(
         &self,
@@ -224,22 +224,22 @@ fn of_lane(lanes: &[Lanes; 3], lane: usize) -> [f32; 3] {
 }
 
 /// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6].
-// Differs from the paper: a neighbourhood that a gap cut short counts as k neighbours. With κ the fewer neighbours a point
-// has the wider it would spread over the gap: one neighbour at distance d would give a disc of radius 2d.
+// Differs from the paper: a neighbourhood cut short by a gap counts as k neighbours. With κ, a point with fewer
+// neighbours would spread wider over the gap: one neighbour at distance d would give a disc of radius 2d.
 #[inline(always)]
 fn splat_radius(k_radius: f32, count: f32, rules: &FitRules) -> f32 {
     rules.splat_scale * 2.0 * k_radius / count.max(rules.k as f32).sqrt()
 }
 
 /// Covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2].
-// Differs from the paper: it is divided by the count and the squared k-radius, which changes no axis and no ratio, and
-// lets nothing over- or underflow whatever the cloud's unit.
+// Differs from the paper: divided by the count and the squared k-radius. This changes no axis and no ratio, and
+// prevents overflow and underflow in any unit of the cloud.
 #[inline(always)]
 fn covariance<S: Simd>(simd: S, block: &NeighborhoodBlock, vector: usize) -> [F32s<S>; 6] {
     let load = |lanes: &Lanes| F32s::load(simd, &lanes.0, vector);
     let one = F32s::splat(simd, 1.0);
     let least = F32s::splat(simd, f32::MIN_POSITIVE);
-    // The point itself is one of the points fitted; it adds nothing to sums about itself.
+    // The point itself is one of the points fitted, but adds nothing to sums about itself.
     let share = one / (load(&block.count) + one);
     let unit = one / load(&block.k_radius).max(least);
     let mut mean = [share; 3];
@@ -253,13 +253,13 @@ fn covariance<S: Simd>(simd: S, block: &NeighborhoodBlock, vector: usize) -> [F3
     terms
 }
 
-/// The unit normal of a neighbourhood that is no plane: as much towards the eye as its line allows.
+/// The unit normal of a neighbourhood that is no plane: as close to the direction of the eye as the line allows.
 #[cold]
 fn facing(to_eye: [f32; 3], line: [f32; 3], has_line: bool) -> [f32; 3] {
     let to_eye = Vec3::from(to_eye).normalize_or(Vec3::NEG_Z);
     let line = Vec3::from(line);
     let across = to_eye - line * line.dot(to_eye);
-    // Of a line towards the eye nothing but rounding is left across it.
+    // For a line towards the eye, the rest across it is rounding.
     let clear = across.length_squared() > LEAST_ACROSS * LEAST_ACROSS;
     match (has_line, clear) {
         (false, _) => to_eye,

@@ -1,20 +1,21 @@
-//! Eigenvectors of symmetric 3×3 matrices, a SIMD vector of matrices at a time.
+//! Eigenvectors of symmetric 3×3 matrices, one SIMD vector of matrices at a time.
 
 use pulp::Simd;
 
 use crate::simd::F32s;
 
-/// Cyclic Jacobi converges quadratically: after four sweeps the off-diagonal of a 3×3 matrix is below f32's rounding.
+/// Number of Jacobi sweeps. Cyclic Jacobi converges quadratically: after four sweeps the off-diagonal of a 3×3 matrix
+/// is below the rounding of f32.
 pub(crate) const SWEEPS: usize = 4;
 
-/// Eigenvalues, ascending, and the unit eigenvectors that belong to them.
+/// Eigenvalues, ascending, and their unit eigenvectors.
 pub(super) struct Eigen<S: Simd> {
     pub(super) values: [F32s<S>; 3],
     /// `vectors[i][axis]`.
     pub(super) vectors: [[F32s<S>; 3]; 3],
 }
 
-/// Diagonalises symmetric matrices, given as xx, xy, xz, yy, yz, zz.
+/// Diagonalises symmetric matrices given as xx, xy, xz, yy, yz, zz.
 #[inline(always)]
 pub(super) fn eigen<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: [F32s<S>; 6]) -> Eigen<S> {
     let [zero, one] = [0.0, 1.0].map(|value| F32s::splat(simd, value));
@@ -34,8 +35,7 @@ pub(super) fn eigen<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: [F32s<S>; 6]) ->
     Eigen { values: matrix.diagonal, vectors: matrix.vectors }
 }
 
-/// Eigenvalues, ascending, of one symmetric matrix given as xx, xy, xz, yy, yz, zz, and the unit eigenvectors that belong to
-/// them.
+/// Eigenvalues, ascending, and unit eigenvectors of one symmetric matrix given as xx, xy, xz, yy, yz, zz.
 #[inline(always)]
 pub(crate) fn eigenvectors(matrix: [f32; 6]) -> ([f32; 3], [[f32; 3]; 3]) {
     let simd = pulp::Scalar;
@@ -48,10 +48,10 @@ pub(crate) fn eigenvectors(matrix: [f32; 6]) -> ([f32; 3], [[f32; 3]; 3]) {
     (values.map(first), vectors.map(|vector| vector.map(first)))
 }
 
-/// A matrix on its way to the diagonal.
+/// A matrix that rotations make diagonal.
 struct Rotated<S: Simd> {
     diagonal: [F32s<S>; 3],
-    /// Entries off the diagonal, by the axis they leave out.
+    /// Off-diagonal entries, each at the index of the axis missing from it.
     rest: [F32s<S>; 3],
     vectors: [[F32s<S>; 3]; 3],
 }
@@ -64,7 +64,7 @@ impl<S: Simd> Rotated<S> {
         let least = F32s::splat(simd, f32::MIN_POSITIVE);
         let pq = self.rest[R];
         let difference = half * (self.diagonal[Q] - self.diagonal[P]);
-        // tan of the smaller angle: sign(δ)·a/(|δ| + √(δ² + a²)); for a zero entry the least divisor makes it 0.
+        // Tangent of the smaller angle: sign(δ)·a/(|δ| + √(δ² + a²)). The least divisor makes it 0 for a zero entry.
         let length = (difference * difference + pq * pq).sqrt();
         let signed = difference.less(zero).select(zero - pq, pq);
         let tan = signed / (difference.abs() + length).max(least);
@@ -103,7 +103,7 @@ impl<S: Simd> Rotated<S> {
 mod tests {
     use super::*;
 
-    /// Diagonalises one matrix on the narrowest and on the widest vectors; both must give the same bits.
+    /// Diagonalises one matrix with the narrowest and the widest vectors, which must give the same bits.
     fn eigen_of(matrix: [f32; 6]) -> ([f32; 3], [[f32; 3]; 3]) {
         #[pulp::with_simd(widest = pulp::Arch::new())]
         #[inline(always)]
@@ -121,7 +121,7 @@ mod tests {
         result
     }
 
-    /// A·v = λ·v for each pair, unit orthogonal vectors, values ascending: no sign or order to compare around.
+    /// Checks A·v = λ·v, unit orthogonal vectors and ascending values, which avoids comparing signs.
     #[test]
     fn reconstructs_random_matrices() {
         let mut state = 1u64;

@@ -1,4 +1,5 @@
-// Moments to surfels, by the eigenvectors of the covariance [Paper, §6]. See the CPU form for what differs from the paper.
+// Moments to surfels, by the eigenvectors of the covariance [Paper, §6]. The CPU form says what differs from the
+// paper.
 //
 // Reads: counters, density, points, source, queries, neighborhoods. Writes: surfels, counters.
 
@@ -19,7 +20,7 @@
 @group(0) @binding(6) var<storage, read> neighborhoods: array<Neighborhood>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 override LINE: f32;
 override LEAST_ACROSS: f32;
@@ -39,13 +40,13 @@ override HANDFUL: u32;
 
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
-// What all queries of a workgroup need to know.
+// Values that all queries of a workgroup share.
 struct Task {
     first: u32,
     len: u32,
     cell_px: u32,
     cell_columns: u32,
-    // Screen points.
+    // Number of screen points.
     points: u32,
 }
 
@@ -57,7 +58,7 @@ struct Plane {
     major_axis: vec3f,
     major_ratio: f32,
     curvature: f32,
-    // Of the point and its neighbours along the normal, squared k-radii.
+    // Variance of the point and its neighbours along the normal, in squared k-radii.
     variance: f32,
 }
 
@@ -70,10 +71,10 @@ fn normalized_or(v: vec3f, otherwise: vec3f) -> vec3f {
     return select(otherwise, v * scale, is_finite(scale) && scale > 0.0);
 }
 
-// Eigenvectors of the covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2], in units of the squared
-// k-radius, so that nothing over- or underflows.
+// Eigenvectors of the covariance of a point and its neighbours about their mean [Paper, Eq. 1, 2]. The unit is the
+// squared k-radius, which prevents overflow and underflow.
 fn axes(sums: Neighborhood) -> Eigen {
-    // The point itself is one of the points fitted; it adds nothing to sums about itself.
+    // The point itself is one of the points fitted, but adds nothing to sums about itself.
     let share = 1.0 / (sums.count + 1.0);
     let unit = 1.0 / max(sums.k_radius, MIN_POSITIVE);
     let mean = sums.offset * unit * share;
@@ -82,19 +83,19 @@ fn axes(sums: Neighborhood) -> Eigen {
     return eigen(vec3f(of_x.x, of_yz.x, of_yz.z), vec3f(of_yz.y, of_x.z, of_x.y));
 }
 
-// The unit normal of a neighbourhood that is no plane: as much towards the eye as its line allows.
+// The unit normal of a neighbourhood that is no plane: as close to the direction of the eye as the line allows.
 fn facing(eye: vec3f, line: vec3f, has_line: bool) -> vec3f {
     let toward = normalized_or(eye, vec3f(0.0, 0.0, -1.0));
     let across = toward - line * product(line, toward);
     let length_squared = product(across, across);
-    // Of a line towards the eye nothing but rounding is left across it.
+    // For a line towards the eye, the rest across it is rounding.
     let is_clear = length_squared > LEAST_ACROSS * LEAST_ACROSS;
     let of_line = select(any_orthonormal(line), across * (1.0 / sqrt(max(length_squared, MIN_POSITIVE))), is_clear);
     return select(toward, of_line, has_line);
 }
 
-// The plane through a neighbourhood [Paper, Eq. 1 to 3], seen from the eye. A neighbourhood that is a line or one place has
-// many; the one most square to the line of sight is taken.
+// The plane through a neighbourhood [Paper, Eq. 1 to 3], seen from the eye. A line or a single place lies in many
+// planes; the plane most perpendicular to the line of sight is taken.
 fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     let found = axes(sums);
     let middle = found.values.y;
@@ -104,7 +105,7 @@ fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     var major_ratio = largest / middle;
     if !(middle > LINE * largest) {
         normal = facing(eye, major_axis, largest > 0.0);
-        // Any tangent does for a circle.
+        // A circle may have any tangent.
         major_axis = select(any_orthonormal(normal), major_axis, largest > 0.0);
         major_ratio = select(1.0, MOST, largest > 0.0);
     }
@@ -114,13 +115,13 @@ fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     return Plane(select(normal, -normal, product(normal, eye) < 0.0), major_axis, major_ratio, curvature, found.values.x);
 }
 
-// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6]; one cut short counts as k neighbours.
+// Splat radius of a point with `count` neighbours within `k_radius` [Paper, §6]. With a gap, k neighbours count.
 fn splat_radius(k_radius: f32, count: f32) -> f32 {
     return frame.splat_scale * 2.0 * k_radius / sqrt(max(count, f32(frame.k)));
 }
 
-// Whether a point is no part of its neighbours' surface; its k-radius is `sparser` first search radii, 0 where there is nothing to
-// compare with. See `alone.rs`.
+// Whether a point is no part of its neighbours' surface. `sparser` is the k-radius in first search radii, 0 if there
+// is nothing to compare with. See `alone.rs`.
 fn is_alone(sums: Neighborhood, face: Plane, sparser: f32) -> bool {
     let count = sums.count;
     if count < LOPSIDED_COUNT {
@@ -129,7 +130,7 @@ fn is_alone(sums: Neighborhood, face: Plane, sparser: f32) -> bool {
     let mean = sums.offset / (count * max(sums.k_radius, MIN_POSITIVE));
     let height = product(mean, face.normal);
     let beside = height * height;
-    // Without the point itself.
+    // Variance of the neighbours without the point itself.
     let all = count + 1.0;
     let scatter = (face.variance - count * beside / (all * all)) * (all / count);
     let is_beside = beside > BESIDE * BESIDE && beside > FLAT * scatter && sparser > 0.0;
@@ -167,7 +168,7 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     }
     // A line has no width to draw.
     let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MOST);
-    // What adapts it goes by its shape.
+    // Adaptation needs the full length.
     let major_ratio = select(drawn_ratio, face.major_ratio, frame.adaptive == 1u && sums.count >= ROW_COUNT);
     return Surfel(
         center,

@@ -1,4 +1,4 @@
-//! Surfels of points whose planes are known beforehand.
+//! Surfels of points whose planes are given.
 
 use glam::Vec3;
 
@@ -6,18 +6,18 @@ use super::{Surfel, Surfels};
 use crate::camera::View;
 use crate::project::ScreenPoints;
 
-/// Planes of all points of a cloud, in its order.
+/// Planes of all points of a cloud, in the order of the points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GivenPlanes<'a> {
-    /// Unit normals in the cloud's axes, on either side.
+    /// Unit normals in the cloud's axes, on either side of the surface.
     pub(crate) normals: &'a [[f32; 3]],
-    /// Splat radii, before they are scaled.
+    /// Splat radii in world units, before scaling.
     pub(crate) radius: &'a [f32],
     pub(crate) curvature: &'a [f32],
 }
 
-/// Appends the surfels of `queries`, indices of screen points, to `surfels`: circles as given, seen from the eye. Those that
-/// are none, by a normal or a radius that is no number, have radius 0 and are not drawn.
+/// Appends the surfels of `queries`, indices of screen points, to `surfels`: the given circles, turned towards the
+/// eye. A surfel whose normal or radius is not finite gets radius 0 and is not drawn.
 pub(crate) fn place(
     screen: &ScreenPoints,
     queries: &[u32],
@@ -32,7 +32,7 @@ pub(crate) fn place(
         let source = screen.source[query as usize];
         let normal = view.view_from_world * Vec3::from(planes.normals[source as usize]);
         let normal = view.turned_to_eye(normal, point.position_view.into());
-        // Splat set-up would draw a radius of NaN as wide as splats may be.
+        // Splat set-up draws a NaN radius as wide as a splat can be.
         let is_drawn = normal.is_finite() && planes.radius[source as usize].is_finite();
         let radius = if is_drawn { planes.radius[source as usize].max(0.0) } else { 0.0 };
         Surfel {

@@ -1,4 +1,4 @@
-//! The fit on the GPU: an invocation per point.
+//! The fit on the GPU: one invocation per point.
 
 use super::Surfel;
 use super::alone::{BESIDE, FAR_SPARSER, FEW, FLAT, HANDFUL, LOPSIDED, LOPSIDED_COUNT, LOPSIDED_SPARSE, SPARSER};
@@ -12,22 +12,22 @@ use crate::project::gpu::{Round, ScreenBuffers};
 pub(crate) const PASSES: &[PassSource] = &[FIT];
 const FIT: PassSource = PassSource::new("fit/fit", include_str!("fit.wgsl"));
 
-/// Room for the surfels of `capacity` queries.
+/// Allocates the surfels of `capacity` queries.
 ///
 /// # Errors
-/// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+/// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
 pub(crate) fn surfel_buffer(gpu: &Gpu, capacity: u32) -> Result<wgpu::Buffer, Error> {
     gpu.storage::<Surfel>("surfels", capacity as usize)
 }
 
-/// The passes of the fit: one per round.
+/// The passes of the fit, one per round.
 #[derive(Debug)]
 pub(crate) struct FitPasses {
     rounds: [Pass; 2],
 }
 
 impl FitPasses {
-    /// Compiles them.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// [`Error::Device`].

@@ -1,12 +1,12 @@
 //! Fit: moments to surfels, by the eigenvectors of the covariance [Paper, §6].
 //!
 //! # How it works
-//! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, a SIMD vector of matrices at a time:
-//! a fixed number of additions, multiplications and square roots without branches, which converges from any start and
-//! keeps the axes orthogonal. The axis of the least eigenvalue is the normal, turned towards the eye. The splat radius is
-//! 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average. A point that
-//! is no part of its neighbours' surface gets none (`alone`). If it is known from where a point was
-//! scanned, its surfel is then marked if that was on the other side (`orient/`).
+//! The covariance of a point and its neighbours is diagonalised by cyclic Jacobi rotations, one SIMD vector of
+//! matrices at a time. The number of operations is fixed and free of branches; the rotations converge from any start
+//! and keep the axes orthogonal. The axis of the least eigenvalue is the normal, turned towards the eye. The splat
+//! radius is 2·√(r_k²/k), twice the radius of the circle that each neighbour covers on average. A point that is no
+//! part of its neighbours' surface gets radius 0 (`alone`). Where a point's sensor is known, surfels seen from the
+//! other side are marked (`orient/`).
 
 mod alone;
 mod cpu;
@@ -26,16 +26,16 @@ use glam::Vec3;
 
 use crate::camera::View;
 
-/// A splat is drawn out to this many splat radii, its weight falling to nearly nothing: with randomly scattered points
-/// every fiftieth place on a surface lies in no disc of the splat radius, every three-thousandth in none of these.
-// Differs from the paper: it cuts the Gaussian at the splat radius.
+/// Radius to which a splat is drawn, in splat radii; the weight falls to nearly 0 there. With random samples, 1 in 50
+/// places of a surface lies in no disc of the splat radius, 1 in 3000 in no disc of this radius.
+// Differs from the paper: the paper cuts the Gaussian at the splat radius.
 pub(crate) const SUPPORT: f32 = 1.4;
 
 /// An oriented disc in view space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Surfel {
-    /// The point itself, or where the surface is that was fitted to noisy ones, view space.
+    /// The point itself, or the surface fitted to noisy points there, in view space.
     pub(crate) center: [f32; 3],
     /// Semi-minor axis, world units; 0 if the point was discarded.
     pub(crate) radius: f32,
@@ -49,7 +49,7 @@ pub(crate) struct Surfel {
     pub(crate) major_ratio: f32,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 to 1/3.
     pub(crate) curvature: f32,
-    /// Of the centre: pixel column in the low, row in the high 16 bits.
+    /// Pixel of the centre: column in the low, row in the high 16 bits.
     pub(crate) pixel: u32,
     /// Index in the cloud.
     pub(crate) source: u32,
@@ -58,7 +58,7 @@ pub(crate) struct Surfel {
 }
 
 impl Surfel {
-    /// Beyond all indices of screen points, of which there are no more than two a pixel: 2³⁰.
+    /// Bit of `screen` that marks a surface's back. Indices of screen points, at most two a pixel, stay below 2³⁰.
     pub(crate) const BACK: u32 = 1 << 31;
 
     /// Whether the eye sees the side that the point's sensor did not see.
@@ -67,13 +67,13 @@ impl Surfel {
         self.screen & Self::BACK != 0
     }
 
-    /// Pixel column and row of the centre.
+    /// Column and row of the centre's pixel.
     #[inline(always)]
     pub(crate) fn pixel_xy(&self) -> [usize; 2] {
         [(self.pixel & 0xffff) as usize, (self.pixel >> 16) as usize]
     }
 
-    /// Moves the centre, unless that is off the screen: it would have no pixel to be hidden at.
+    /// Moves the centre, unless it would leave the screen: there is no pixel outside to test its visibility at.
     #[inline(always)]
     pub(crate) fn move_to(&mut self, center: Vec3, view: &View) {
         let [x, y] = view.to_pixel(center);
@@ -84,5 +84,5 @@ impl Surfel {
     }
 }
 
-/// The surfels of a list of screen points, in that list's order.
+/// The surfels of a list of screen points, in the order of the list.
 pub(crate) type Surfels = Vec<Surfel>;

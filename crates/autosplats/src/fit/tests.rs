@@ -13,7 +13,7 @@ use crate::test_clouds::Random;
 const RULES: FitRules =
     FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
 
-/// A point with its neighbours, view space.
+/// A point and its neighbours, in view space.
 #[derive(Clone, Debug)]
 struct Neighborhood {
     center: DVec3,
@@ -29,7 +29,7 @@ impl Neighborhood {
         self.offsets.iter().sum::<DVec3>() / (self.offsets.len() + 1) as f64
     }
 
-    /// Covariance of the point and its neighbours about their mean, in two passes.
+    /// Covariance of the point and its neighbours about their mean, computed in two passes.
     fn covariance(&self) -> DMat3 {
         let about_mean = |offset: DVec3| {
             let v = offset - self.mean();
@@ -40,7 +40,7 @@ impl Neighborhood {
     }
 }
 
-/// Eigenvalues, ascending, by the trigonometric solution of the characteristic polynomial.
+/// Eigenvalues, ascending, from the trigonometric solution of the characteristic polynomial.
 pub(crate) fn eigenvalues(a: DMat3) -> [f64; 3] {
     let mean = (a.x_axis.x + a.y_axis.y + a.z_axis.z) / 3.0;
     let b = a - DMat3::from_diagonal(DVec3::splat(mean));
@@ -60,13 +60,13 @@ fn views() -> [View; 2] {
     })
 }
 
-/// First search radius at a depth in the density grid of [`fitted`], one cell of 200 pixels with one point.
+/// First search radius at a depth, in the density grid of [`fitted`]: one cell of 200 pixels with one point.
 fn first_radius(depth: f64, view: &View) -> f64 {
     let pixel = if view.perspective { depth } else { 1.0 } / f64::from(view.focal_px);
     200.0 * (10.0 / std::f64::consts::PI).sqrt() * pixel
 }
 
-/// Runs the stage on neighbourhoods whose moments are summed here.
+/// Runs the stage on neighbourhoods with moments summed in `f64`.
 fn fitted(neighborhoods: &[Neighborhood], view: &View, rules: &FitRules, culling: f32) -> Surfels {
     let pixel = 3 << 16 | 5;
     let at = |n: &Neighborhood| ScreenPoint { position_view: n.center.as_vec3().to_array(), pixel };
@@ -107,7 +107,7 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
     let covariance = n.covariance();
     let [least, middle, largest] = eigenvalues(covariance);
     let variance = |direction: DVec3| direction.dot(covariance * direction);
-    // f32 rounding of moments, whose mean is subtracted, and of some hundred operations.
+    // f32 rounding of moments with the mean subtracted, and of some hundred operations.
     let tolerance = 4e-6 * n.k_radius().powi(2);
     ensure((normal.length() - 1.0).abs() < 1e-5, "the normal is not a unit vector")?;
     ensure((major.length() - 1.0).abs() < 1e-5, "the major axis is not a unit vector")?;
@@ -121,7 +121,7 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
     let count = n.offsets.len() as f64;
     let lopsided = (n.mean() * (count + 1.0) / count).length() > f64::from(LOPSIDED) * n.k_radius();
     let lopsided = lopsided && count >= f64::from(LOPSIDED_COUNT);
-    // A neighbourhood cut short counts as k neighbours.
+    // A neighbourhood cut short by a gap counts as k neighbours.
     let radius = f64::from(rules.splat_scale) * 2.0 * n.k_radius() / count.max(f64::from(rules.k)).sqrt();
     let radius = if lopsided && !rules.keep_outliers { 0.0 } else { radius };
     ensure(near(surfel.radius, radius, 1e-6 * radius), &format!("radius is not {radius}"))?;
@@ -136,7 +136,7 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
     ensure(surfel.center == n.center.as_vec3().to_array() && surfel.pixel == 3 << 16 | 5, "centre or pixel")
 }
 
-/// Neighbourhoods of all thicknesses, elongations, sizes and directions.
+/// Neighbourhoods of various thicknesses, elongations, sizes and directions.
 fn random_neighborhoods(seed: u64, count: usize) -> Vec<Neighborhood> {
     let mut random = Random::new(seed);
     let one = |round: usize| {
@@ -194,7 +194,7 @@ fn comparison_sees_each_kind_of_error() {
     }
 }
 
-/// Few neighbours, neighbours in a line, all on one side, none at all.
+/// Few neighbours, neighbours in a line, all on one side, or none.
 #[test]
 fn degenerate_neighborhoods() {
     let center = DVec3::new(0.25, -0.5, 4.0);
@@ -208,9 +208,9 @@ fn degenerate_neighborhoods() {
                 let rules = FitRules { keep_outliers, ..RULES };
                 let surfel = fitted(&[one(offsets)], &view, &rules, f32::INFINITY)[0];
                 let normal = DVec3::from(surfel.normal.map(f64::from));
-                // As much towards the eye as the line allows.
+                // As close to the direction of the eye as the line allows.
                 let expected = (to_eye - along.normalize() * along.normalize().dot(to_eye)).normalize();
-                // The axis is found to f32 rounding, where one neighbour is a covariance of rank 1.
+                // The axis is exact to f32 rounding, where one neighbour gives a covariance of rank 1.
                 assert!((normal - expected).length() < 2e-3, "{name}: normal {normal}, expected {expected}");
                 assert_eq!(surfel.major_ratio, 1.0, "{name}: drawn as a circle");
                 let radius = 2.0 * one(offsets).k_radius() / 10f64.sqrt();
@@ -235,7 +235,7 @@ fn degenerate_neighborhoods() {
     }
 }
 
-/// Points behind the culling plane get no wider splat than some first search radii would give.
+/// The splats of points behind the culling plane are limited to a number of first search radii.
 #[test]
 fn splats_behind_the_culling_plane_are_limited() {
     for view in views() {
@@ -254,7 +254,7 @@ fn splats_behind_the_culling_plane_are_limited() {
     }
 }
 
-/// The share of `count` points that are drawn, with neighbours made by `offsets` and a k-radius of `sparser` first search radii.
+/// Fraction of `count` points that are drawn: neighbours from `offsets`, k-radius `sparser` first search radii.
 fn kept(k: u32, sparser: f64, count: usize, mut offsets: impl FnMut(&mut Random) -> Vec<DVec3>) -> f64 {
     let view = views()[1];
     let first_radius = first_radius(4.0, &view);
@@ -269,8 +269,7 @@ fn kept(k: u32, sparser: f64, count: usize, mut offsets: impl FnMut(&mut Random)
     surfels.iter().filter(|surfel| surfel.radius > 0.0).count() as f64 / count as f64
 }
 
-/// Ten points strewn over the unit disc, in a direction of their own each time, moved by `place`, which also gets a
-/// random number between -1 and 1.
+/// Ten random samples of the unit disc in a random orientation. `place` moves each, by a random number in -1..1.
 fn strewn(random: &mut Random, place: impl Fn(f64, f64, f64) -> DVec3) -> Vec<DVec3> {
     let normal = DVec3::from(random.direction().map(f64::from));
     let (a, b) = normal.any_orthonormal_pair();
@@ -300,7 +299,7 @@ fn points_beside_a_surface_are_dropped() {
         let share = above(height, rough);
         assert!(expected.contains(&share), "{height} above a surface, {rough} thick: {share} of the points are kept");
     }
-    // Where it is the shape that is not flat, its points stay.
+    // Where the shape itself is not flat, its points stay.
     let cone = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x, y, x.hypot(y)));
     let ridge = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x, y, x.abs()));
     let corner = |random: &mut Random| {
@@ -334,7 +333,7 @@ fn points_much_sparser_than_their_surroundings_are_dropped() {
     for (sparser, expected) in [(0.9 * FAR_SPARSER, 1.0), (1.1 * FAR_SPARSER, 0.0)] {
         assert_eq!(kept(10, sparser.into(), 1000, aside), expected, "{sparser} times as far apart");
     }
-    // Borders of what is sparse stay, and two in three of its corners.
+    // Border points of a sparse surface stay, and two in three corner points.
     let border = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x.abs(), y, 0.0));
     let corner = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x.abs(), y.abs(), 0.0));
     for (name, offsets, least) in [("border", &border as &dyn Fn(&mut Random) -> _, 0.98), ("corner", &corner, 0.6)] {
@@ -356,7 +355,7 @@ fn points_much_sparser_than_their_surroundings_are_dropped() {
     }
 }
 
-/// Whatever the cloud's unit: the same surfels but for their size.
+/// In any unit of the cloud, surfels are equal up to their size.
 #[test]
 fn units_do_not_matter() {
     let view = views()[1];

@@ -51,8 +51,7 @@ impl Projector {
     }
 }
 
-/// The keys of each pixel, in one slot or two, and the number of points per block. Most blocks of many pictures are
-/// empty and are skipped.
+/// The keys of each pixel, in one slot or two, and the points per block. Empty blocks, often the most, are skipped.
 struct Keys<'a> {
     slots: &'a [AtomicU64],
     per_pixel: usize,
@@ -63,8 +62,7 @@ struct Keys<'a> {
 }
 
 impl<'a> Keys<'a> {
-    /// Empties the slots of points far behind the other point of their pixel, and counts the remaining points per
-    /// block.
+    /// Empties the slots of points far behind the other point of their pixel, and counts the rest per block.
     fn settle(slots: &'a mut [AtomicU64], view: &View, halves: bool) -> Self {
         let per_pixel = 1 + usize::from(halves);
         let width = view.width as usize;
@@ -187,8 +185,8 @@ fn project_chunk(
                 slot => {
                     let index = first + (group * LANES + lane) as u32;
                     let key = u64::from(depth[lane].to_bits()) << 32 | u64::from(index);
-                    // Most points lose, and their sixteenth is already marked. Skipping the write spares other
-                    // threads' cache lines.
+                    // Most points lose in a marked sixteenth: without a write they take no cache line from other
+                    // threads.
                     if key < before[lane] {
                         keys[slot as usize].fetch_min(key, Ordering::Relaxed);
                     }

@@ -11,9 +11,8 @@
 //! strip high, and the cells of a strip follow each other. Any sixteen consecutive points of the list lie close
 //! together on the screen, whatever the local density.
 //!
-//! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The same
-//! grid holds the nearest depth of each cell for grid culling (§7): points well behind the nearest of their cell are
-//! *passive*.
+//! A coarser grid, with about k screen points to a cell, counts points for the first search radius (§5.1). The grid
+//! also holds the nearest depth for grid culling (§7): points well behind the nearest of their cell are *passive*.
 //!
 //! All other points leave one bit each: the sixteenth of a pixel that they fall into. The splatting finds the borders
 //! of surfaces from these bits.
@@ -149,8 +148,7 @@ impl DensityGrid {
         point.position_view[2] > self.culling[self.cell(point.pixel_xy())]
     }
 
-    /// Whether a point's splat can matter to the picture: the point lies inside, or at most `MARGIN_REACH` first
-    /// search radii beside.
+    /// Whether a point's splat can matter to the picture: at most `MARGIN_REACH` first search radii beside.
     #[inline(always)]
     pub(crate) fn matters(&self, point: &ScreenPoint, k: u32, view: &View) -> bool {
         let beside_px = view.beside_picture(point.pixel_xy());

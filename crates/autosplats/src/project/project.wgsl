@@ -1,5 +1,4 @@
-// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3]: depth and index in a 64-bit atomic
-// minimum.
+// Every point goes to its pixel, or half pixel, and the nearest wins [Paper, §3], by a 64-bit atomic minimum.
 //
 // Reads: a chunk of the cloud. Writes: keys, counters, sixteenths. `project_32` does the same with 32 bits.
 

@@ -20,8 +20,7 @@ pub(crate) struct SearchBuffers<'a> {
     pub(crate) screen: &'a ScreenBuffers,
     /// `Neighborhood` of `shared/surfel.wgsl` for each query, in query order.
     pub(crate) neighborhoods: &'a wgpu::Buffer,
-    /// Bits of a k-radius for each pixel of the last frame, 0 for none. Valid only if `frame` describes the last
-    /// frame.
+    /// Bits of a k-radius for each pixel of the last frame, 0 for none. Valid only if `frame` describes that frame.
     pub(crate) past: &'a wgpu::Buffer,
 }
 
@@ -39,8 +38,7 @@ pub(crate) trait EnginePasses: Debug {
 pub(crate) struct EngineSteps {
     /// The steps of each [`Round`].
     pub(crate) rounds: [Vec<Step>; 2],
-    /// For an engine that iterates: a run of `u32` per round, the unconverged points before the first iteration and
-    /// after each.
+    /// For an engine that iterates: per round, the unconverged points before the first iteration and after each.
     pub(crate) convergence: Option<wgpu::Buffer>,
 }
 

@@ -56,8 +56,7 @@ pub(crate) const LANES: usize = 16;
 pub(crate) const MARGIN_PX: f32 = 0.02;
 /// Most screen points in the projection of the largest sphere that is searched.
 pub(crate) const MAX_CANDIDATES: usize = 4096;
-/// Number of screen points in a window from which on its points may meet the bound: density does not rise eightfold in
-/// one step.
+/// Screen points in a window from which on its points may meet the bound: density does not rise eightfold in a step.
 pub(crate) const CROWDED: usize = MAX_CANDIDATES / 8;
 /// Ratio of successive radii among which the bound is chosen.
 pub(crate) const BOUND_STEP: f32 = 1.25;
@@ -152,8 +151,7 @@ impl SearchRules {
     /// Outlier radius in world units: a point needs a neighbour within, apart from [`STEEP`].
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
-        // Differs from the paper: an expansion by √k alone would be none at k = 1, and discard surfaces below the
-        // usual k.
+        // Differs from the paper: an expansion by √k is none at k = 1, and would discard surfaces below the usual k.
         let growth = self.k.max(10) as f32;
         self.outlier_expansions.map_or(f32::INFINITY, |e0| initial_radius * growth.powf(0.5 * e0 as f32))
     }

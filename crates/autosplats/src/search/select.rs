@@ -59,7 +59,7 @@ pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &
                 continue;
             }
             any_open = true;
-            // On a surface the count grows with the area, hence with the squared distance. Odd steps bisect, for other
+            // On a surface the count grows with the area, hence the squared distance. Odd steps bisect, for other
             // shapes.
             let next = if above == f32::INFINITY {
                 t * (target / n * 1.1).clamp(1.2, 4.0)

@@ -1,4 +1,4 @@
-//! The fit on the GPU against that on the CPU.
+//! The fit on the GPU against the fit on the CPU.
 
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DMat3, DVec3};
@@ -20,7 +20,7 @@ use crate::test_clouds::{self, EYE, Random};
 const RULES: FitRules =
     FitRules { k: 10, splat_scale: 1.0, longest: LONGEST, adaptive: false, keep_outliers: false, dot_px: 0.0 };
 
-/// Screen points and their neighbourhoods, of the active and of the passive ones.
+/// Screen points, with the neighbourhoods of the active and of the passive points.
 struct Case {
     screen: ScreenPoints,
     view: View,
@@ -58,7 +58,7 @@ impl Case {
         surfels
     }
 
-    /// Surfels of both rounds, and how many are counted as outliers.
+    /// Surfels of both rounds, and the number counted as outliers.
     fn on_device(&self, gpu: &Gpu, passes: &FitPasses, rules: &FitRules) -> (Surfels, usize) {
         let buffers = upload_screen(gpu, &self.screen, &self.view);
         let moments: Vec<_> = self.moments().iter().map(|moments| moments.to_device()).collect();
@@ -86,7 +86,7 @@ impl Case {
     }
 }
 
-/// Covariance in units of the squared k-radius.
+/// Covariance in squared k-radii.
 fn covariance(moments: &Moments) -> DMat3 {
     let share = 1.0 / (f64::from(moments.count) + 1.0);
     let unit = 1.0 / f64::from(moments.k_radius).max(1e-38);
@@ -100,14 +100,14 @@ fn compare(device: &Surfel, host: &Surfel, moments: &Moments) -> Result<(), Stri
     let ensure = |ok: bool, what: &str| if ok { Ok(()) } else { Err(format!("{what}: {device:?}, host: {host:?}")) };
     let of_point = |surfel: &Surfel| (surfel.center, surfel.k_radius, surfel.pixel, surfel.source, surfel.screen);
     ensure(of_point(device) == of_point(host), "what is only copied")?;
-    // A quotient and a root.
+    // Rounding of a quotient and a root.
     ensure((device.radius - host.radius).abs() <= 1e-6 * host.radius, "radius")?;
     let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
     let [normal, major] = [device.normal, device.major_axis].map(vector);
     ensure((normal.length() - 1.0).abs() < 1e-5 && (major.length() - 1.0).abs() < 1e-5, "lengths of axes")?;
     ensure(normal.dot(major).abs() < 1e-5, "the major axis is not in the disc's plane")?;
-    // Eigenvectors of nearly equal eigenvalues are anybody's guess, but the variance along them is not. f32 rounding of
-    // moments, whose mean is subtracted, and of some hundred operations.
+    // Eigenvectors of nearly equal eigenvalues are arbitrary, but the variance along them is not. The tolerance is f32
+    // rounding of moments with the mean subtracted, and of some hundred operations.
     const TOLERANCE: f64 = 4e-6;
     let covariance = covariance(moments);
     let variance = |direction: DVec3| direction.dot(covariance * direction);
@@ -118,7 +118,7 @@ fn compare(device: &Surfel, host: &Surfel, moments: &Moments) -> Result<(), Stri
     ensure(!is_plane || like_host(device.major_axis, host.major_axis), "variance along the major axis")?;
     let is_line = middle < 0.5e-5 * largest;
     let angle = (normal - vector(host.normal)).length();
-    // The rounding above, divided by the distance to the next eigenvalue.
+    // The tolerance above, divided by the distance to the next eigenvalue.
     ensure(!(is_line || middle - least > 2e-3 * largest) || angle < 4e-3, "normal")?;
     let near = |a: f32, b: f32, tolerance: f64| f64::from((a - b).abs()) <= tolerance;
     ensure(near(device.curvature, host.curvature, TOLERANCE / largest.max(TOLERANCE)), "curvature")?;
@@ -155,7 +155,7 @@ fn the_device_fits_what_the_host_fits() {
         }
     }
     assert!(compared > 50_000 && outliers > 50, "there is something to compare: {compared}, {outliers} outliers");
-    // Rounding decides what is lopsided, or a line, in few neighbourhoods.
+    // Rounding decides whether a few neighbourhoods are lopsided, or a line.
     assert!(different * 10_000 <= compared, "{different} of {compared} differ");
 }
 
@@ -181,7 +181,7 @@ fn the_device_makes_the_dots_that_the_host_makes() {
     }
 }
 
-/// Where k adapts more points stand alone, with few neighbours and with many.
+/// Adaptive rules drop more points, with few neighbours and with many.
 #[test]
 fn the_device_drops_what_the_host_drops() {
     let Some(gpu) = test_gpu() else { return };

@@ -1,4 +1,4 @@
-//! The same on the GPU: an invocation per surfel, for clouds that know of sensors.
+//! Orientation by sensors on the GPU: one invocation per surfel, for clouds with known sensors.
 
 use super::{SEEN, SURE, Sensor, Sensors};
 use crate::Error;
@@ -9,27 +9,27 @@ use crate::project::gpu::{Round, ScreenBuffers};
 pub(crate) const PASSES: &[PassSource] = &[ORIENT];
 const ORIENT: PassSource = PassSource::new("fit/orient/orient", include_str!("orient.wgsl"));
 
-/// The sensors of a cloud on the device.
+/// Allocates the sensors of a cloud.
 ///
 /// # Errors
-/// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
+/// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
 pub(crate) fn sensor_buffer(gpu: &Gpu, sensors: usize) -> Result<wgpu::Buffer, Error> {
     gpu.storage::<Sensor>("sensors", sensors)
 }
 
-/// Tells the device where sensors stood; the buffer has room for just these.
+/// Writes the positions of the sensors to a buffer of just their size.
 pub(crate) fn write_sensors(gpu: &Gpu, sensors: &Sensors, to: &wgpu::Buffer) {
     gpu.queue.write_buffer(to, 0, bytemuck::cast_slice(&sensors.runs));
 }
 
-/// The pass, one per round.
+/// The pass, for each round.
 #[derive(Debug)]
 pub(crate) struct OrientPasses {
     rounds: [Pass; 2],
 }
 
 impl OrientPasses {
-    /// Compiles them.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -41,7 +41,7 @@ impl OrientPasses {
         Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })
     }
 
-    /// Marks those of the surfels just fitted that show their back.
+    /// Marks the surfels of a round that show their back.
     pub(crate) fn step(
         &self,
         gpu: &Gpu,

@@ -1,10 +1,9 @@
-//! Which side of a surface is seen: the one that its sensor saw, or its back.
+//! The side of a surface that is seen: the sensor's side, or the back.
 //!
 //! # How it works
-//! A point was seen from where its sensor stood, so the surface there has its outside on that side. Surfels face the eye,
-//! whatever the stages after the fit do with them; this marks those whose sensor was on the other side. Where the sensor
-//! looked along the surface, or the eye does, noise decides on which side of the plane they are, all the more so the
-//! thicker the neighbourhood is: there no back is claimed.
+//! A point was seen from its sensor, so the outside of the surface is on the sensor's side. Surfels face the eye in
+//! all stages; this stage marks surfels whose sensor was on the other side. Where the sensor or the eye looks along
+//! the surface, noise decides the side of the plane, more so in a thick neighbourhood. No back is claimed there.
 
 pub(crate) mod gpu;
 #[cfg(test)]
@@ -17,29 +16,29 @@ use rayon::prelude::*;
 use super::Surfel;
 use crate::camera::View;
 
-/// Cosine of the angle between the normal and the way to the sensor from which on the sensor's side is known.
+/// Cosine of the angle between the normal and the direction to the sensor above which the sensor's side is certain.
 pub(super) const SURE: f32 = 0.15;
-/// The same of the way to the eye.
+/// Cosine of the angle between the normal and the direction to the eye above which the eye's side is certain.
 pub(super) const SEEN: f32 = 0.05;
-/// Sensors further away than this from the cloud's origin are unknown: squares of distances must be finite.
+/// Largest coordinate of a known sensor about the cloud's origin, world units. Larger squares could overflow.
 const FARTHEST: f32 = 1e18;
 /// Surfels per task.
 const TASK: usize = 1 << 12;
 
-/// Where the sensor stood that saw the points from one index on, as `orient.wgsl` has it.
+/// Position of the sensor of a run of points, laid out as in `orient.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Sensor {
-    /// About the cloud's origin; infinite if unknown.
+    /// Position about the cloud's origin, world units; infinite if unknown.
     pub(crate) position: [f32; 3],
-    /// Index of the first point.
+    /// Index of the first point of the run.
     pub(crate) first: u32,
 }
 
-/// Where the sensor of each point stood. Empty if that is known of none.
+/// Positions of the sensors of all points, empty if none is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Sensors {
-    /// In the order of the points, the first from point 0 on.
+    /// Runs of points, in the order of the points. The first begins at point 0.
     pub(super) runs: Vec<Sensor>,
 }
 
@@ -48,14 +47,14 @@ pub(crate) fn has_sensors(cloud: &PointCloud) -> bool {
     cloud.scans().iter().any(|scan| !scan.points.is_empty() && position(cloud, scan).is_some())
 }
 
-/// Where a scan's sensor stood, about the cloud's origin.
+/// Position of a scan's sensor about the cloud's origin; `None` if not finite or too far away.
 fn position(cloud: &PointCloud, scan: &Scan) -> Option<[f32; 3]> {
     let position = (scan.position() - cloud.origin()).as_vec3();
     (position.is_finite() && position.abs().max_element() <= FARTHEST).then_some(position.to_array())
 }
 
-/// Runs of points by the scan that they belong to, as the index of the first point and the scan, from point 0 on. A point
-/// that several scans claim belongs to the first of them.
+/// Runs of points by scan: the index of the first point, and the scan if any. The first run begins at point 0. A point
+/// in several scans belongs to the first of them.
 pub(crate) fn runs(cloud: &PointCloud) -> Vec<(u32, Option<&Scan>)> {
     let mut scans: Vec<&Scan> = cloud.scans().iter().filter(|scan| !scan.points.is_empty()).collect();
     scans.sort_by_key(|scan| (scan.points.start, scan.points.end));
@@ -77,7 +76,7 @@ pub(crate) fn runs(cloud: &PointCloud) -> Vec<(u32, Option<&Scan>)> {
 }
 
 impl Sensors {
-    /// Those of the scans of `cloud`.
+    /// The sensors of the scans of `cloud`.
     pub(crate) fn new(cloud: &PointCloud) -> Self {
         if !has_sensors(cloud) {
             return Self::default();
@@ -97,7 +96,7 @@ impl Sensors {
         self.runs.len()
     }
 
-    /// Where the sensor of a point stood, about the cloud's origin.
+    /// Position of a point's sensor about the cloud's origin.
     fn of(&self, point: u32) -> Option<Vec3> {
         let begun = self.runs.partition_point(|run| run.first <= point);
         let position = Vec3::from(self.runs[begun.checked_sub(1)?].position);
@@ -118,12 +117,12 @@ impl Sensors {
     }
 }
 
-/// Whether the sensor, in view space, was surely on the other side of a surfel than the eye.
+/// Whether the sensor, in view space, was certainly on the other side of a surfel than the eye.
 fn shows_back(surfel: &Surfel, sensor: Vec3, view: &View) -> bool {
     let [center, normal] = [surfel.center, surfel.normal].map(Vec3::from);
     let to_eye = view.to_eye(center);
     let to_sensor = sensor - center;
-    // How thick the neighbourhood is for its width: about the tangent of the angle that its normal may be off by.
+    // Thickness of the neighbourhood over its width: about the tangent of the normal's error angle.
     let rough = (2.0 * surfel.curvature).sqrt();
     normal.dot(to_sensor) < -rough.max(SURE) * to_sensor.length()
         && normal.dot(to_eye) > rough.max(SEEN) * to_eye.length()

@@ -1,4 +1,4 @@
-// Marks the surfels that show the eye the side which their sensor did not see. The CPU form, `mod.rs`, says how.
+// Marks the surfels that show the side that their sensor did not see. The CPU form, `mod.rs`, explains the rule.
 //
 // Reads: counters, sensors. Reads and writes: surfels.
 
@@ -7,20 +7,20 @@
 #import counters
 #import surfel
 
-// Where the sensor stood that saw the points from one index on.
+// Position of the sensor of a run of points.
 struct Sensor {
-    // About the cloud's origin; infinite if unknown.
+    // Position about the cloud's origin; infinite if unknown.
     position: vec3f,
-    // Index of the first point.
+    // Index of the first point of the run.
     first: u32,
 }
 
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
-// In the order of the points, the first from point 0 on.
+// Runs of points, in the order of the points. The first begins at point 0.
 @group(0) @binding(2) var<storage, read> sensors: array<Sensor>;
 @group(0) @binding(3) var<storage, read_write> surfels: array<Surfel>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 override SURE: f32;
 override SEEN: f32;
@@ -43,7 +43,7 @@ fn sensor_of(point: u32) -> vec3f {
 fn shows_back(surfel: Surfel, sensor: vec3f) -> bool {
     let eye = to_eye(surfel.center);
     let to_sensor = to_view(sensor) - surfel.center;
-    // How thick the neighbourhood is for its width: about the tangent of the angle that its normal may be off by.
+    // Thickness of the neighbourhood over its width: about the tangent of the normal's error angle.
     let rough = sqrt(2.0 * surfel.curvature);
     return dot(surfel.normal, to_sensor) < -max(rough, SURE) * length(to_sensor)
         && dot(surfel.normal, eye) > max(rough, SEEN) * length(eye);

@@ -1,4 +1,4 @@
-//! Which sensor a point has, and which side of a surfel that makes the back.
+//! The sensor of each point, and the side of a surfel that is its back.
 
 use autosplats_cloud::glam::{DMat4, DVec3};
 
@@ -20,7 +20,7 @@ fn cloud(count: usize, scans: Vec<Scan>) -> PointCloud {
     PointCloud::new(ORIGIN, vec![[0.0; 3]; count]).with_scans(scans)
 }
 
-/// The x of the sensor of each point.
+/// The x coordinate of each point's sensor.
 fn of_points(cloud: &PointCloud) -> Vec<Option<f32>> {
     let sensors = Sensors::new(cloud);
     (0..cloud.len() as u32).map(|point| sensors.of(point).map(|sensor| sensor.x)).collect()
@@ -31,12 +31,12 @@ fn each_point_has_its_own_sensor() {
     let at = |x: f64| ORIGIN + x;
     let scans = vec![
         scan(at(3.0), 6..8),
-        // Claimed by two: the first has them.
+        // Points in two scans belong to the first.
         scan(at(1.0), 1..4),
         scan(at(2.0), 3..5),
         scan(at(2.5), 3..4),
         scan(at(9.0), 5..5),
-        // The same place goes on.
+        // The next scan at the same position.
         scan(at(3.0), 8..9),
         scan(at(f64::NAN), 9..10),
         scan(at(1e300), 10..11),
@@ -67,7 +67,7 @@ fn view(projection: Projection) -> View {
 
 const PROJECTIONS: [Projection; 2] = [Projection::PerspectiveFovDeg(30.0), Projection::OrthographicHeight(3.0)];
 
-/// Surfels at the cloud's origin, ten units before the eye, one for each normal.
+/// Surfels at the cloud's origin, ten units in front of the eye, one per normal.
 fn at_the_origin(normals: &[Vec3]) -> Vec<Surfel> {
     let surfel = |normal: &Vec3| Surfel {
         center: [0.0, 0.0, 10.0],
@@ -90,7 +90,7 @@ fn only_what_is_sure_is_a_back() {
             assert!(surfels.iter().all(|surfel| surfel.screen & !Surfel::BACK == 7), "the index stays");
             surfels.iter().map(Surfel::shows_back).collect::<Vec<bool>>()
         };
-        // In view space: towards the eye, tilted, nearly and quite sideways.
+        // In view space: towards the eye, tilted, nearly sideways, and almost exactly sideways.
         let normals = [Vec3::NEG_Z, Vec3::new(0.7, 0.0, -0.7), Vec3::new(1.0, 0.0, -0.1), Vec3::new(1.0, 0.0, -0.03)];
         assert_eq!(backs(DVec3::new(0.1, 0.2, -5.0), &normals), [false; 4], "the sensor is at the eye's side");
         assert_eq!(backs(DVec3::new(0.0, 0.0, 3.0), &normals), [true, true, false, false], "right behind");
@@ -119,7 +119,7 @@ fn the_device_marks_what_the_host_marks() {
             let mut turn = Random::new(92);
             let mut vector = || Vec3::from(turn.direction());
             let count = 3000;
-            // Some of no scan, some of a sensor that is unknown.
+            // Some points without a scan, some with an unknown sensor.
             let position = |i: usize, at: Vec3| if i % 7 == 3 { DVec3::INFINITY } else { ORIGIN + 4.0 * at.as_dvec3() };
             let run = count / scans;
             let scans = (0..scans).map(|i| scan(position(i, vector()), i * run + i % 3..(i + 1) * run));
@@ -141,11 +141,11 @@ fn the_device_marks_what_the_host_marks() {
         }
     }
     assert!(backs * 5 > compared && backs * 2 < compared, "some of each: {backs} of {compared}");
-    // Rounding decides a few.
+    // Rounding decides a few surfels.
     assert!(different * 5000 <= compared, "{different} of {compared} differ");
 }
 
-/// Marks a third of the surfels in the first round, the others in the second.
+/// Marks a third of the surfels in the first round, the rest in the second.
 fn on_device(gpu: &Gpu, passes: &OrientPasses, sensors: &Sensors, surfels: &[Surfel], view: &View) -> Vec<Surfel> {
     let screen = ScreenBuffers::new(gpu, [view.width, view.height], false, 0, 0).expect("room");
     let active = surfels.len() / 3;

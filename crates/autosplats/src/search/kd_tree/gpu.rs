@@ -76,8 +76,7 @@ struct TreeBuffers {
     arguments: [wgpu::Buffer; 2],
     small: wgpu::Buffer,
     chunk_sums: wgpu::Buffer,
-    /// For each point of the cloud, in its order, the k-radius or a little more; negative if the point is not in the
-    /// tree.
+    /// For each point of the cloud, in its order, the k-radius or a little more; negative for points off the tree.
     radii: wgpu::Buffer,
 }
 

@@ -48,7 +48,6 @@
 //! - A point whose k nearest are all coincident has no surface, where the other engines see just one of these points.
 //! - Points beyond ±1e18 are left out, as for [normals](crate::estimate_normals).
 //!
-//! The engine takes 52 bytes a point. A binding must hold 16 of these, so bindings of 128 MiB allow 8.4 million
-//! points.
+//! The engine takes 52 bytes a point. A binding must hold 16 of these: 128 MiB allow 8.4 million points.
 
 pub(crate) mod gpu;

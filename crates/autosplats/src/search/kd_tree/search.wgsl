@@ -64,8 +64,7 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
             }
             leaf = kd_next_leaf(&walk);
         }
-        // Differs from [ZHWG08]: a search that visits too much ends. The points visited still bound the radius from
-        // above.
+        // Differs from [ZHWG08]: a search that visits too much ends. The points visited still bound the radius.
         let is_whole = walk.seen < MOST_SEEN;
         var so_far = nearer;
         var bin = 0u;

@@ -1,5 +1,4 @@
-// Stores the k-radii found, as starting radii of the next frame. The maximum picks the same one of a pixel's points in
-// every run.
+// Stores the k-radii found, as starting radii of the next frame. The maximum is the same point's in every run.
 //
 // Reads: counters, points, queries, neighborhoods. Writes: past.
 

@@ -68,8 +68,7 @@ struct Scratch {
     squared: Vec<Lanes>,
     /// Squared distances of one lane, sorted.
     sorted: Vec<f32>,
-    /// Mean k-radius of the block before, in first search radii: a guess that decides what is read first, not the
-    /// result.
+    /// Mean k-radius of the block before, in first search radii: a guess that does not change the result.
     reach: f32,
     /// Trust in the radii of the last frame.
     trust: Trust,
@@ -349,8 +348,7 @@ impl Block {
         (sum / f32::max(count, 1.0)).clamp(least, most)
     }
 
-    /// Largest factor by which the last frame's radii fell short in the first `lanes` lanes; `None` if no lane has
-    /// any.
+    /// Largest factor by which the last frame's radii fell short in the first `lanes` lanes; `None` without any.
     #[inline(always)]
     fn missed(&self, lanes: usize, out: &NeighborhoodBlock, k: u32) -> Option<f32> {
         let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32 && self.likely.0[lane] > 0.0);
@@ -426,8 +424,7 @@ impl Block {
     }
 }
 
-/// Lists the screen points in `window` at the front of `candidates`, followed by a group of points at infinity.
-/// Returns their number.
+/// Lists the screen points in `window` at the front of `candidates`, then a group at infinity; returns their number.
 #[inline(always)]
 fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>) -> usize {
     let most = window.candidates(&screen.cells);

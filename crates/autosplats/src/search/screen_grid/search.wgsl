@@ -46,12 +46,11 @@ var<workgroup> bounded: atomic<u32>;
 struct Seen {
     // Distance to the nearest neighbour.
     nearest: f32,
-    // Number of neighbours within the radius that the window certainly holds, and squared distance to the last of
-    // them.
+    // Number of neighbours within the radius that the window certainly holds, and squared distance to the last.
     sure: u32,
     sure_squared: f32,
-    // The first gap: squared distance to the neighbour before it (MOST without a gap), the length at which it counts,
-    // and its end.
+    // The first gap: squared distance to the neighbour before it (MOST if none), the length at which it counts, its
+    // end.
     gap_squared: f32,
     gap_reach: f32,
     gap_end: f32,

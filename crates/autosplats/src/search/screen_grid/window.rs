@@ -111,8 +111,7 @@ impl Window {
     }
 }
 
-/// Slopes of the two lines through the eye that touch the circle of `radius` about (x, z). The circle must lie in
-/// front of the eye.
+/// Slopes of the lines through the eye that touch the circle of `radius` about (x, z), which lies in front of the eye.
 #[inline(always)]
 fn tangents(x: f32, z: f32, radius: f32) -> [f32; 2] {
     let length = (x * x + z * z - radius * radius).max(0.0).sqrt();

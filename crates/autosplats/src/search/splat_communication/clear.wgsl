@@ -2,8 +2,7 @@
 
 @vertex
 fn clear_vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
-    // One triangle around the picture, as far away as empty pixels of the mask: only pixels of points are nearer and
-    // pass.
+    // One triangle around the picture, as far away as the mask's empty pixels: only pixels of points are nearer.
     return vec4f(f32(4u * (vertex & 1u)) - 1.0, f32(2u * (vertex & 2u)) - 1.0, 1.0, 1.0);
 }
 

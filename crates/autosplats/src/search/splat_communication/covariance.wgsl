@@ -1,5 +1,5 @@
-// Covariance accumulation [Paper, §6]: every point adds the products of its offset's coordinates at each point whose
-// neighbourhood holds it.
+// Covariance accumulation [Paper, §6]: every point adds its offset's products at each point whose neighbourhood holds
+// it.
 //
 // Differs from the paper: taken about the point itself instead of the mean; the fit corrects for the mean.
 //

@@ -1,5 +1,4 @@
-// Decides after an iteration whether another follows: passes with nothing to draw cost next to nothing. One
-// invocation.
+// Decides after an iteration whether another follows: passes without instances cost next to nothing. One invocation.
 //
 // Reads: counters. Writes: arguments, convergence.
 

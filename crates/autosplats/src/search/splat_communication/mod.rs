@@ -31,8 +31,7 @@
 //!
 //! - Converged points are counted by a compute pass over the queries, not by an occlusion query: WebGPU's queries only
 //!   tell whether there are any.
-//! - Projection is the compute passes of `project/`, shared by the engines, not a raster pass. `mask` draws the
-//!   result.
+//! - Projection is not a raster pass but the compute passes of `project/`, as in all engines; `mask` draws the result.
 //! - T_F and T_R are cleared by a triangle that the depth mask limits to the pixels of points. The triangle has no
 //!   instances once iterations end, so that results stay.
 //! - A point is a box of two triangles, or of one pixel where that suffices: WebGPU has no geometry shader.
@@ -41,14 +40,13 @@
 //!   k-th itself misses every second time.
 //! - An expansion goes no further than λ allows; the paper checks λ after an expansion. Larger steps would skip gaps,
 //!   and the result would depend on the steps.
-//! - e0 stands for a radius, reached in as many expansions as λ allows, so that all engines agree; the paper counts 3
-//!   to 4 expansions.
+//! - e0 stands for a radius, reached in as many expansions as λ allows, as in all engines; the paper counts
+//!   expansions.
 //! - d_max is the lower bound while a radius expands, and a is recomputed from b, because four channels hold no more.
 //! - Brackets between equal distances end when narrower than four steps of their floats: all points at the k-th
 //!   distance belong. Only lattices need these iterations.
 //! - Mean and covariance are both taken about the point itself, which is not counted, as in all engines.
-//! - The point itself is told from others by its pixel, not by its position. Points whose distance rounds to 0 are
-//!   still neighbours.
+//! - The point itself is told by its pixel, not by its position: points whose distance rounds to 0 remain neighbours.
 //! - t_conv applies to each round, active and recovered, not to all points: grid culling makes two searches of one.
 //! - Iterations end at t_conv or after 16, because a frame is recorded in advance. With λ near 1 or a large e0,
 //!   sixteen steps of √λ or √k may not reach the end of a gap or the outlier radius. Such points count as bounded.

@@ -57,8 +57,7 @@ fn children(own: KdLarge, left: u32) -> vec4u {
     return select(of_left + child(own.len - left), of_left, vec4<bool>(own.axis == KD_FINITE_LEFT));
 }
 
-// Appends a child to its list, at the places `at`. Returns its place in the next level's list of large nodes, or
-// KD_NONE.
+// Appends a child to its list, at the places `at`. Returns its place in the next level's large nodes, or KD_NONE.
 fn put(node: u32, first: u32, len: u32, parent_len: u32, at: vec4u) -> u32 {
     if is_large(len) {
         let empty_low = vec3u(0xffffffffu);

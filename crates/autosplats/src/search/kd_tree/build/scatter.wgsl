@@ -17,8 +17,7 @@
 
 // Bits of the chunk's points that go left.
 var<workgroup> bits: array<atomic<u32>, 8>;
-// Boxes of the points that each invocation moves left and right: twelve values, least and negated greatest
-// coordinates.
+// Boxes of the points that each invocation moves left and right: least and negated greatest coordinates.
 var<workgroup> boxes: array<f32, 768>;
 
 const MOST = 3.4028234663852886e38;

@@ -301,8 +301,7 @@ fn huge_coordinates_reach_no_sum() {
     }
 }
 
-/// Windows of tall pictures have many strips, and software devices end invocations after a limited number of loop
-/// rounds.
+/// Windows of tall pictures have many strips, and software devices limit the loop rounds of an invocation.
 #[test]
 fn tall_pictures_are_searched_to_the_end() {
     let Some(gpu) = test_gpu() else { return };

@@ -73,8 +73,7 @@ fn different(device: &[Moments], host: &[Moments], case: &str) -> usize {
     errors.inspect(|error| eprintln!("{case}: {error}")).count()
 }
 
-/// A thousandth of each round's points may be unfinished when iterations end; one more for rounding at a rule's
-/// threshold.
+/// A thousandth of each round's points may be unfinished at the end; one more for rounding at a rule's threshold.
 fn allowed(screen: &ScreenPoints) -> usize {
     [&screen.active, &screen.passive].map(|queries| queries.len() / 1000).iter().sum::<usize>() + 1
 }
