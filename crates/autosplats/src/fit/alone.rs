@@ -10,7 +10,7 @@ pub(super) const LOPSIDED: f32 = 0.75;
 pub(super) const LOPSIDED_SPARSE: f32 = 0.66;
 /// K-radius, in first search radii, above which a point is far sparser than its surroundings.
 pub(super) const FAR_SPARSER: f32 = 3.0;
-/// Fewest neighbours for `LOPSIDED` and `BESIDE`: fewer are too often on one side by chance.
+/// Fewest neighbours whose mean and plane are compared with the point: fewer are too often on one side by chance.
 pub(super) const LOPSIDED_COUNT: f32 = 6.0;
 
 /// Distance from the plane through the neighbours, in k-radii, above which a point stands beside a flat surface.

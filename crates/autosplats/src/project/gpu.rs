@@ -73,8 +73,8 @@ impl Round {
     }
 }
 
-/// Queries that a workgroup processes together, one after the other; at most 32. Small groups keep a GPU evenly busy.
-/// A software device pays more for each workgroup than for most queries, so it takes larger groups.
+/// Items, such as queries, that a workgroup processes together, one after the other; at most 32. Small groups keep a
+/// GPU evenly busy. A software device pays more for a workgroup than for most items, so it takes larger groups.
 pub(crate) fn few(gpu: &Gpu) -> u32 {
     if gpu.is_software() { 16 } else { 4 }
 }

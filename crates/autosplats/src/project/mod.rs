@@ -148,7 +148,7 @@ impl DensityGrid {
         point.position_view[2] > self.culling[self.cell(point.pixel_xy())]
     }
 
-    /// Whether a point's splat can matter to the picture: at most `MARGIN_REACH` first search radii beside.
+    /// Whether a point's splat can matter: the point lies at most `MARGIN_REACH` first search radii beside the picture.
     #[inline(always)]
     pub(crate) fn matters(&self, point: &ScreenPoint, k: u32, view: &View) -> bool {
         let beside_px = view.beside_picture(point.pixel_xy());

@@ -25,7 +25,7 @@ const LEFT_RECOVERED64 = 10u;
 const ACTIVE_FEW = 11u;
 const RECOVERED_FEW = 12u;
 
-// Queries that a workgroup processes together.
+// Items that a workgroup processes together.
 override FEW: u32;
 
 @compute @workgroup_size(1)

@@ -7,8 +7,8 @@
 //! For a point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to the other screen points:
 //!
 //! - *Outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions without a neighbour.
-//!   With adaptive rules P is discarded if d₁ is more than [`STEEP`] times that radius, or if d₁ exceeds that radius
-//!   and a gap ends the neighbourhood.
+//!   With adaptive rules P is discarded if d₁ is more than [`STEEP`] times that radius, or if d₁ exceeds
+//!   that radius and a gap ends the neighbourhood.
 //! - *Gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood. The area of the circle has then
 //!   grown by λ, from r̃₀ on, without a new neighbour. P is *clamped* to κ = j neighbours, and its k-radius is dⱼ.
 //!   With adaptive rules a gap after one neighbour needs d₂ > λ·d₁.
@@ -16,7 +16,7 @@
 //! - *Bound*: a search ends at the largest radius r̃₀·1.25ⁱ, for whole i, whose sphere projects to a rectangle with at
 //!   most [`MAX_CANDIDATES`] screen points. If no rule ends the neighbourhood and the k-th neighbour lies beyond, P
 //!   keeps the neighbours within that radius and counts as *bounded*. The bound limits the time per point, even in a
-//!   cloud of outliers only. An engine may skip the bound where it reads fewer than [`CROWDED`] screen points. Splat
+//!   cloud of outliers only. An engine may skip the bound where it reads fewer than [`CROWDED`] points. Splat
 //!   communication has no such bound; its number of iterations is limited instead.
 
 pub(crate) mod gpu;

@@ -58,8 +58,9 @@
 //! Up to 0.1 % of each round's points are unfinished when the iterations end. A point between two counters keeps the
 //! wider bound, with one or two neighbours too many. A point still expanding keeps the neighbours met, if any, and
 //! counts as *bounded*. The bound on search work of [`search`](super) does not apply: a search without the outlier
-//! rule draws splats as wide as the picture. With adaptive rules too, a nearest neighbour beyond the outlier radius
-//! makes an outlier, however many follow ([`STEEP`](super::STEEP)): channels hold the furthest point of a radius, not
-//! the nearest. Distances between different points that round to 0, in clouds some 1e-19 units wide, count as 0.
+//! rule draws splats as wide as the picture. A nearest neighbour beyond the outlier radius makes an outlier with
+//! adaptive rules too, however many follow ([`STEEP`](super::STEEP)): channels hold the
+//! furthest point of a radius, not the nearest. Distances between different points that round to 0, in clouds some
+//! 1e-19 units wide, count as 0.
 
 pub(crate) mod gpu;
