@@ -1,8 +1,8 @@
 //! Search: the k nearest screen points of each screen point, summed up in moments [Paper, §4, §5].
 //!
 //! The rules below have no iterations, so that the result depends on the screen points alone. The screen grid and
-//! splat communication follow these rules. The kd-tree, the paper's baseline, answers another question: its neighbours
-//! are all points of the cloud, visible or not, it has no gap rule, and its bound is its own.
+//! splat communication follow these rules. The kd-tree, the paper's baseline, answers another question. Its neighbours
+//! are all points of the cloud, visible or not; it has no gap rule, and its bound is its own.
 //!
 //! For a point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to the other screen points:
 //!
@@ -121,8 +121,8 @@ impl std::ops::Add for SearchCounts {
 }
 
 /// Factor on the outlier radius up to which adaptive rules keep a point that has k neighbours without a gap. On a
-/// steep surface, or in front of another surface, density is overestimated and first search radii are too short: with
-/// noise, a surface would lose most of its points. Outliers have gaps around them.
+/// steep surface, or in front of another surface, density is overestimated and first search radii are too short. With
+/// noise, such a surface would lose most of its points. Outliers have gaps around them.
 pub(crate) const STEEP: f32 = 1.2;
 
 /// Rules that define the neighbourhoods; an engine implements them.
@@ -133,8 +133,8 @@ pub(crate) struct SearchRules {
     pub(crate) outlier_expansions: Option<u32>,
     /// Gap factor λ; `None` bridges any gap.
     pub(crate) gap_factor: Option<f32>,
-    /// Whether a gap after one neighbour must be wider, so that random samples have it no more often than a gap after
-    /// two neighbours, and whether [`STEEP`] applies.
+    /// Whether a gap after one neighbour must be wider, and whether [`STEEP`] applies. Random samples then have that
+    /// gap no more often than a gap after two neighbours.
     pub(crate) adaptive: bool,
 }
 

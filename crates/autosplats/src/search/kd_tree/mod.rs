@@ -1,6 +1,6 @@
 //! The kd-tree engine, the paper's baseline [Paper, §8]: Zhou, Hou, Wang, Guo, *Real-Time KD-Tree Construction on
-//! Graphics Hardware*, 2008 [ZHWG08]. The engine builds a tree of all points of the cloud in each frame, and finds the
-//! k-radius of each point, visible or not, from a first radius that the user sets.
+//! Graphics Hardware*, 2008 [ZHWG08]. The engine builds a tree of all points of the cloud in each frame. A search from
+//! a first radius, which the user sets, finds the k-radius of each point, visible or not.
 //!
 //! # How it works
 //! *Large nodes* of more than 64 points are split breadth-first, one level at a time. `split` splits each at the
@@ -20,9 +20,9 @@
 //!
 //! # What is from [ZHWG08]
 //! Recalled from [ZHWG08], without the text at hand: the two phases, chunks of 256, large nodes of more than 64
-//! points, spatial medians and empty space, masks and bit counts in small nodes, the histogram search, and
-//! `VVH(x) = C_L·V(L ± R) + C_R·V(R ± R)`. Chosen here: R is the first radius, a step down the tree costs as much as
-//! 16 points (with VVH alone each split pays), and leaves have at least eight points.
+//! points, spatial medians and empty space. Masks and bit counts in small nodes, the histogram search, and `VVH(x) =
+//! C_L·V(L ± R) + C_R·V(R ± R)` are from there too. Chosen here: R is the first radius, and leaves have at least eight
+//! points. A step down the tree costs as much as 16 points, as with VVH alone each split pays.
 //!
 //! # Where the engine differs from [ZHWG08]
 //! - Every node keeps the tight box of its points. This cuts off all empty space, not only large parts, and leaves no

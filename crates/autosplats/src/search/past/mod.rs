@@ -21,8 +21,8 @@ use crate::project::ScreenPoints;
 pub(crate) const SLACK: f32 = 1.05;
 /// Range of starting radii in first search radii. A radius outside belongs to another surface.
 pub(crate) const LIKELY: [f32; 2] = [0.1, 4.0];
-/// Largest shortfall of the last frame's radii within a block with which the CPU still uses them. Beyond, the radii of
-/// the block before are as good.
+/// Largest mean shortfall of the last frame's radii, over recent blocks, with which the CPU still uses them. Beyond,
+/// the radii of the previous block are as good.
 const TRUSTED: f32 = 1.2;
 /// While the last frame's radii are not trusted, one block in this many still reads them, to notice a change.
 const SKIPPED: u32 = 8;

@@ -214,7 +214,7 @@ fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
     }
     radius = max(radius, vec4f(MIN_POSITIVE));
     let outlier_radius = frame.outlier_growth * initial_radius;
-    // Up to this radius no gap begins and no point is an outlier.
+    // A k-th neighbour up to this radius breaks no rule.
     let unruled = min(frame.gap_growth * initial_radius, outlier_radius);
     let is_gap_first = frame.gap_growth * initial_radius <= outlier_radius;
     for (var step = 0u; step < MOST_WINDOWS && any(open); step++) {
