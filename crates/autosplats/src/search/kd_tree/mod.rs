@@ -20,9 +20,9 @@
 //!
 //! # What is from [ZHWG08]
 //! Recalled from [ZHWG08], without the text at hand: the two phases, chunks of 256, large nodes of more than 64
-//! points, spatial medians and empty space. Masks and bit counts in small nodes, the histogram search, and `VVH(x) =
-//! C_L·V(L ± R) + C_R·V(R ± R)` are from there too. Chosen here: R is the first radius, and leaves have at least eight
-//! points. A step down the tree costs as much as 16 points, as with VVH alone each split pays.
+//! points, spatial medians and empty space. Masks and bit counts in small nodes and the histogram search are from
+//! there too, as is `VVH(x) = C_L·V(L ± R) + C_R·V(R ± R)`. Chosen here: R is the first radius, and leaves have at
+//! least eight points. A step down the tree costs as much as 16 points, as with VVH alone each split pays.
 //!
 //! # Where the engine differs from [ZHWG08]
 //! - Every node keeps the tight box of its points. This cuts off all empty space, not only large parts, and leaves no
