@@ -1,5 +1,5 @@
-// Turns and moves each surfel that the noise tilts onto the sheets beside it, and shrinks those that are no surface: an invocation
-// per surfel. Those of rows are left to `turn_rows`. See the CPU form.
+// Moves each noisy surfel onto the sheets beside it, and shrinks surfels that are no surface: an invocation per surfel.
+// Scan lines are left to `turn_rows`. See the CPU form.
 //
 // Reads: density, levels, clusters, measured, sheets, depth_noise. Reads and writes: counters, surfels.
 
@@ -24,7 +24,7 @@
 @group(0) @binding(7) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(8) var<storage, read_write> surfels: array<Surfel>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 override THICKEST_FIRST: f32;
 override WIDEST: f32;
@@ -36,16 +36,17 @@ override LONGEST_SHADOW: f32;
 
 // The surface beside a surfel.
 struct Surface {
-    // From the surfel to the surface.
+    // From the surfel to the surface, world units.
     offset: vec3f,
-    // Sum of weights; 0 if there is none, below 0 if there are some of which none agrees.
+    // Sum of weights; 0 without sheets, below 0 if none of the sheets agrees.
     weight: f32,
-    // Of either sign.
+    // Unit normal, of either sign.
     normal: vec3f,
     curvature: f32,
 }
 
-// The surface beside a surfel, from the sheets of the four cells around it that agree with the `first` normal.
+// The surface beside a surfel, from the sheets of the four cells around. `first` is a normal and its standard error,
+// below 0 if unreliable. Sheets have to agree with a reliable one.
 fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     var sum = Surface();
     let level = levels[sheet_level()];
@@ -60,7 +61,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     for (var row = low.y; row <= high.y; row++) {
         for (var column = low.x; column <= high.x; column++) {
             let cell = row * level.columns + column;
-            // Falls to 0 where the next cells come in.
+            // Falls to 0 where the next cells begin.
             let apart = 1.0 - abs(at - vec2f(vec2u(column, row)));
             for (var index = 0u; index < SHEETS; index++) {
                 let sheet = sheets[cell * SHEETS + index];
@@ -75,13 +76,13 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
                 }
                 let normal = sheet_normal(sheet, over);
                 let across = cross(normal, first.xyz);
-                // The smallest of a sheet's balls was held against nothing.
+                // The smallest of a sheet's balls has not been held against any normal.
                 let agrees = dot(across, across) <= AGREE * AGREE * (sheet.error * sheet.error + first.w * first.w);
                 if first.w >= 0.0 && !(agrees && sheet.scatter <= scatter) {
                     disagrees = true;
                     continue;
                 }
-                // To the eighth: about as likely as noise puts a point there.
+                // The eighth power is about the likelihood of such a distance under noise.
                 let second = rest * rest;
                 let fourth = second * second;
                 let weight = apart.x * apart.y * (over.near * over.near) * (fourth * fourth) * sheet.trust;
@@ -103,8 +104,8 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     return sum;
 }
 
-// A move by `offset` onto the plane with a `normal`, made along the ray instead; along the normal where the ray is nearly in
-// the plane.
+// Replaces a move by `offset` onto the plane with a `normal` by a move along the ray. Where the ray nearly lies in the
+// plane, the move stays along the normal.
 fn offset_along(known: Known, normal: vec3f, offset: vec3f) -> vec3f {
     let distance = dot(offset, normal);
     let slope = dot(known.ray, normal);
@@ -116,8 +117,8 @@ fn offset_along(known: Known, normal: vec3f, offset: vec3f) -> vec3f {
     return (known.ray * along + normal * rest) * part;
 }
 
-// The shadow that a disc with the normal `before` casts along the ray on a plane with the normal `after`, as its major axis
-// and ratio; `otherwise` if it is no longer.
+// The shadow that a disc with the normal `before` casts along the ray onto a plane with the normal `after`: major axis
+// and ratio. Returns `otherwise` if the shadow is no longer than the disc.
 fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> vec4f {
     let slope = dot(known.ray, after);
     let ratio = min(abs(dot(known.ray, before)) / max(abs(slope), GRAZING), LONGEST_SHADOW);
@@ -129,8 +130,8 @@ fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> 
     return otherwise;
 }
 
-// A surfel turned and moved onto a surface, along the ray along which its noise was made if that is known. Where `noise` does not
-// explain how far it is from there, it becomes a dot.
+// Turns and moves a surfel onto a surface, along the sensor's ray where the noise is known. The surfel becomes a dot
+// where `noise` does not explain its distance from the surface.
 fn moved_onto(surfel: Surfel, surface: Surface, noise: f32, known: Known) -> Surfel {
     var offset = surface.offset;
     if known.noise > 0.0 {
@@ -173,7 +174,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     let noise = max(known.noise, noise_at(surfel.k_radius));
     let cell_px = atomicLoad(&counters[CELL_PX]);
     let cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
-    // Before it moves, maybe to where nothing is.
+    // Read before the surfel moves, possibly to an empty place.
     let own_radius = initial_radius(surfel, cell_px, cell_columns);
     // A line has no width to draw.
     surfel.major_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MOST);
@@ -195,7 +196,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     if surface.weight > 0.0 {
         if known.noise > 0.0 {
-            // Between two surfaces the k-radius is the way to one of them.
+            // Between two surfaces the k-radius is the distance to one of them.
             surfel.radius *= min(WIDEST * own_radius / surfel.k_radius, 1.0);
         }
         surfel = moved_onto(surfel, surface, noise, known);

@@ -1,5 +1,5 @@
-// Lays out the levels of cells, whose sizes follow from the density of screen points, and says how many workgroups fill each, and
-// after that how many fit sheets. Nothing is picked yet for the sample.
+// Lays out the levels of cells, whose sizes follow from the density of screen points. Counts the workgroups that fill
+// each level, then those that fit sheets. Resets the number of picked surfels.
 //
 // Reads: counters. Writes: levels, arguments, picked. One invocation.
 
@@ -17,22 +17,22 @@
 override MOST_LEVELS: u32;
 override MOST_FINEST: u32;
 override MOST_SAMPLED: u32;
-// The finest level whose cells may have sheets, and cells of a workgroup that fits them.
+// The finest level whose cells may have sheets, and the number of cells per workgroup that fits them.
 override FINE_SHEETS: u32;
 override FEW: u32;
 
-// Cells in a row and in a column of a picture.
+// Columns and rows of cells in a picture.
 fn cells_across(side_px: u32) -> vec2u {
     return (frame.size + side_px - 1u) / side_px;
 }
 
-// Side of the finest cells: about the distance between screen points, at least two pixels, more in a large picture.
+// Side of the finest cells in pixels: about the distance between screen points, at least 2, more in a large picture.
 fn finest_side_px() -> u32 {
     var least = 2u;
     while cells_across(least).x * cells_across(least).y > MOST_FINEST {
         least++;
     }
-    // A quotient of exactly a half more is rounded up, also where a division is off in the last place.
+    // The factor rounds a quotient of exactly a half up even if the division is off in the last place.
     let side = f32(counters[CELL_PX]) / sqrt(f32(frame.k)) * 1.000001;
     return max(u32(floor(side + 0.5)), least);
 }

@@ -1,7 +1,7 @@
-// Asks for sheets where surfels are that the noise tilts: an invocation per surfel.
+// Asks for sheets where surfels are noisy: an invocation per surfel.
 //
-// Reads: counters, levels, measured, surfels, depth_noise. Writes: asked, of each cell the number of surfels, the sum of their
-// k-radii and the first of their points.
+// Reads: counters, levels, measured, surfels, depth_noise. Writes: asked, for each cell the number of surfels, the sum
+// of their k-radii and the smallest point index.
 
 #import frame
 #import groups
@@ -20,7 +20,7 @@
 @group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(6) var<storage, read_write> asked: array<atomic<u32>>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 override PARTS: f32;
 override MOST_PX: f32;

@@ -7,38 +7,37 @@ use rayon::prelude::*;
 use crate::camera::View;
 use crate::project::ScreenPoints;
 
-/// Most slabs of depth in a cell, each as thick as a cell is wide: a surface seen at 82° or less from its normal fills no
-/// more. A cell with more to hold has thicker ones, which noise seen from the side does: then clusters are cut along lines of
-/// sight that nearly lie in the surface, and fits lean.
+/// Most slabs of depth in a cell, each as thick as the cell is wide. A surface tilted by up to 82° fills no more. A
+/// fuller cell, such as one with noise seen from the side, has thicker slabs. These cut clusters along lines of sight
+/// that nearly lie in the surface, and fits lean. See docs/decisions/0008-eight-slabs.md.
 pub(crate) const SLABS: usize = 8;
-/// Most finest cells: the pictures that have as many at two pixels are larger than 3200×1800.
+/// Most finest cells. Pictures with as many cells of two pixels are larger than 3200×1800.
 pub(crate) const MOST_FINEST: usize = 1_500_000;
-/// Coarser levels are of no use to any ball.
+/// Most levels of cells. No ball needs coarser ones.
 pub(super) const MOST_LEVELS: usize = 9;
-/// Values after the last of a row: as many are copied at a time.
+/// Padding after the last value of a row of cells. Values are copied in runs of this length.
 pub(super) const AFTER: usize = 8;
 
-/// The mean of some screen points near each other, view space, and their number.
+/// The mean (view space) and the number of some neighbouring screen points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cluster {
     pub(crate) mean: [f32; 3],
-    /// Not 0.
+    /// Above 0.
     pub(crate) count: f32,
 }
 
-/// The clusters of a row of cells, those of a cell after those of the cell before: a coordinate of all of them side by side, for
-/// SIMD. Most cells of a picture are empty, and others have one or two of the clusters that they may have: what is written and
-/// read again goes by clusters, not by cells.
+/// The clusters of a row of cells, cell after cell, with one array per coordinate for SIMD. Most cells are empty and
+/// others hold one or two clusters, so clusters are stored without gaps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CellRow {
-    /// Where the clusters of each cell begin, and the number of all.
+    /// First cluster of each cell, then the number of all.
     starts: Vec<u32>,
-    /// X, y and z of the means, and the counts; then [`AFTER`] zeros.
+    /// X, y and z of the means, and the counts; each followed by [`AFTER`] zeros.
     values: [Vec<f32>; 4],
 }
 
 impl CellRow {
-    /// Of cells with these clusters, first to last.
+    /// A row of cells with these clusters, first cell to last.
     #[cfg(test)]
     pub(crate) fn of(cells: impl Iterator<Item = impl Iterator<Item = Cluster>>) -> Self {
         let mut row = Self::default();
@@ -51,7 +50,7 @@ impl CellRow {
         row
     }
 
-    /// Writes the row anew with what `cells` pushes.
+    /// Replaces the content by what `cells` pushes.
     #[inline(always)]
     fn fill(&mut self, cells: impl FnOnce(&mut Self)) {
         self.starts.clear();
@@ -68,24 +67,24 @@ impl CellRow {
         }
     }
 
-    /// The cell has no more clusters.
+    /// Ends the current cell.
     #[inline(always)]
     fn end_cell(&mut self) {
         self.starts.push(self.values[0].len() as u32);
     }
 
-    /// Where the clusters of some cells that follow each other are in [`values`](Self::values).
+    /// Range in [`values`](Self::values) of the clusters of a range of cells.
     #[inline(always)]
     pub(super) fn run(&self, columns: Range<usize>) -> Range<usize> {
         self.starts[columns.start] as usize..self.starts[columns.end] as usize
     }
 
-    /// Copies a run of each coordinate to that coordinate of `into`, from `at` on; over the end by less than [`AFTER`] values.
+    /// Copies a run of each array to `into`, from `at` on. Writes less than [`AFTER`] values beyond the end.
     #[inline(always)]
     pub(super) fn copy(&self, run: Range<usize>, into: &mut [Vec<f32>; 4], at: usize) {
         for (into, from) in into.iter_mut().zip(&self.values) {
             for offset in (0..run.len()).step_by(AFTER) {
-                // Of a fixed length, which is a load and a store.
+                // A fixed length compiles to one load and one store.
                 let from = &from[run.start + offset..][..AFTER];
                 into[at + offset..][..AFTER].copy_from_slice(from);
             }
@@ -109,7 +108,7 @@ pub(crate) struct Level {
 }
 
 impl Level {
-    /// The clusters of a cell, by slabs of depth.
+    /// The clusters of a cell, one per slab of depth.
     #[inline(always)]
     pub(crate) fn clusters(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = Cluster> {
         self.rows[row].clusters(column..column + 1)
@@ -121,21 +120,21 @@ impl Level {
     }
 }
 
-/// All screen points of a frame in cells of several sizes, finest first, each level's twice as wide as those before.
+/// All screen points of a frame in cells of several sizes, finest first, each level twice as wide as the one before.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cells {
     pub(crate) levels: Vec<Level>,
 }
 
-/// A cell being filled. Its slabs are as thin as the number of them allows, whatever the order of its points.
+/// A cell being filled. Its slabs are as thin as their number allows, whatever the order of points.
 #[derive(Clone, Copy, Debug)]
 struct Filling {
     sum: [[f32; 3]; SLABS],
     count: [f32; SLABS],
-    /// Slab of depth of each cluster, in slabs of this cell.
+    /// Slab of each cluster, in slabs of the cell's current thickness.
     slab: [u32; SLABS],
     used: usize,
-    /// How often the thickness of this cell's slabs was doubled.
+    /// How often the slabs' thickness has doubled.
     doubled: u32,
 }
 
@@ -151,7 +150,7 @@ impl Filling {
         }
     }
 
-    /// Adds a sum to its slab, unless there is none and no room for one.
+    /// Adds a sum to its slab. Returns false if a new slab is needed and there is no room.
     #[inline(always)]
     fn put(&mut self, sum: [f32; 3], count: f32, slab: u32) -> bool {
         let at = self.slab[..self.used].iter().position(|&other| other == slab).unwrap_or(self.used);
@@ -170,7 +169,7 @@ impl Filling {
         true
     }
 
-    /// Makes slabs twice as thick.
+    /// Doubles the thickness of slabs.
     #[cold]
     fn double(&mut self) {
         let full = *self;
@@ -180,7 +179,7 @@ impl Filling {
         }
     }
 
-    /// Writes what it holds to the next cell of a row, and is empty.
+    /// Pushes the clusters to a row of cells, ends the cell there and becomes empty.
     #[inline(always)]
     fn finish(&mut self, row: &mut CellRow) {
         for at in 0..self.used {
@@ -188,16 +187,16 @@ impl Filling {
             row.push(Cluster { mean: self.sum[at].map(|sum| sum / count), count });
         }
         row.end_cell();
-        // What is beyond those used is not read.
+        // Values beyond `used` are never read.
         (self.used, self.doubled) = (0, 0);
     }
 }
 
-/// How depth is cut into slabs about as thick as a cell is wide.
+/// Cuts depth into slabs about as thick as a cell is wide.
 #[derive(Clone, Copy, Debug)]
 struct Slabs {
     perspective: bool,
-    /// Perspective: low bits of a depth that do not count, so that slabs get thicker as cells get wider with depth.
+    /// Perspective: low bits of a depth that are dropped. Slabs thus get thicker with depth, as cells get wider.
     shift: u32,
     /// Parallel: slabs per world unit.
     per_unit: f32,
@@ -221,7 +220,7 @@ impl Slabs {
 }
 
 impl Cells {
-    /// Sums up the screen points of a frame whose cells in the density grid hold about `k` points.
+    /// Sums up the screen points of a frame. `k` is the number of points per cell of the density grid.
     pub(crate) fn fill(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
         let side_px = finest_side_px(screen.density.cell_px, k, [view.width, view.height]);
         let [mut columns, mut rows] = [view.width, view.height].map(|side| (side as usize).div_ceil(side_px));
@@ -242,12 +241,12 @@ impl Cells {
     }
 }
 
-/// Side of the finest cells of a picture: about the distance between its screen points.
+/// Side of a picture's finest cells in pixels: about the distance between its screen points.
 pub(crate) fn finest_side_px(density_cell_px: usize, k: u32, size: [u32; 2]) -> usize {
     ((density_cell_px as f32 / (k as f32).sqrt()).round() as usize).max(least_side_px(size, MOST_FINEST))
 }
 
-/// Least side of the finest cells of a picture: two pixels, more if there would be more cells than `most`.
+/// Least side of a picture's finest cells in pixels: 2, or more to have at most `most` cells.
 pub(crate) fn least_side_px(size: [u32; 2], most: usize) -> usize {
     let [width, height] = size.map(|side| side as usize);
     let mut side_px = 2;
@@ -280,7 +279,7 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
     );
 }
 
-/// Fills a level with what the one below it holds.
+/// Fills a level from the clusters of the next finer one, `below`.
 fn merge(below: &Level, view: &View, level: &mut Level) {
     let slabs = Slabs::new(level.side_px, view);
     let columns = level.columns;

@@ -1,4 +1,4 @@
-//! Surfels turned and moved onto sheets, or onto a quadric of their own; the choice of a quadric's scale.
+//! Moves surfels onto sheets or onto a quadric of their own, and chooses the scale of a quadric.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -18,78 +18,80 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 
 /// Surfels per task.
 const TASK: usize = 256;
-/// Standard error of a normal, radians, that is good enough where noise is many pixels.
+/// Standard error of a normal, in radians, that is good enough where the noise is many pixels.
 pub(super) const ENOUGH: f32 = 0.025;
-/// Noise that is smaller than this, in pixels, may as well be detail too small for the pixels: the less there is, the larger
-/// an error is good enough.
+/// Noise level, in pixels, below which noise may be detail finer than pixels. Less noise allows a larger error.
 pub(super) const TINY_PX: f32 = 0.5;
-/// By how much, in radians a pixel, where k-radii are [`TINY_REACH_PX`] pixels.
+/// Allowed error of a normal, in radians per pixel of noise below [`TINY_PX`], for k-radii of [`TINY_REACH_PX`].
 pub(super) const TINY_SLOPE: f32 = 0.5;
-/// And the more, the denser points are on the screen, with the square of that over the k-radius,
+/// K-radius, in pixels, to which [`TINY_SLOPE`] applies. The allowed error grows with its squared ratio to the
+/// k-radius.
 pub(super) const TINY_REACH_PX: f32 = 2.0;
-/// up to so many times: in far views all detail looks like noise.
+/// Largest factor by which dense points raise the allowed error. In far views all detail looks like noise.
 pub(super) const MOST_TINY: f32 = 3.0;
-/// Largest standard error of a normal that others are held against.
+/// Largest standard error of a normal, in radians, with which the normal is held against others.
 pub(super) const RELIABLE: f32 = 0.12;
-/// Most noise, as a part of a ball's radius, with which its points are a surface at all.
+/// Largest noise level, in ball radii, at which the points of a ball are a surface at all.
 pub(super) const THICKEST: f32 = 0.3;
-/// The same of the first neighbourhood, whose plane has no error of its own to tell.
+/// Largest noise level, in k-radii, at which the first neighbours' normal is reliable; their plane states no error.
 pub(super) const THICKEST_FIRST: f32 = 0.085;
-/// Least trace, times weight, of what [`Quadric::error`] is the root of, in radii: that of a round ball, evenly filled. Where
-/// even that is no reliable error the quadric need not be fitted: true of most first balls.
+/// Smallest trace times weight, in radii, under the root of [`Quadric::error`]: that of an evenly filled round ball.
+/// Where even this trace gives no reliable error, the fit is skipped, which saves most first balls.
 pub(super) const LEAST_TRACE: f32 = 8.0;
-/// Larger balls may scatter this many times the noise,
+/// Largest scatter of a larger ball's points about their quadric, in noise levels.
 pub(super) const SCATTER: f32 = 1.9;
-/// or that of depth cameras, which is known for what it does to normals: neighbours err alike.
+/// [`SCATTER`] for known noise of depth cameras; lower, as that level is raised to account for equal errors of
+/// neighbours.
 pub(super) const SCATTER_KNOWN: f32 = 0.8;
-/// Normals agree within this many standard errors: not at all beyond, and in full where they are the same.
+/// Largest difference of agreeing normals, in standard errors. Agreement falls from 1 for equal normals to 0 there.
 pub(super) const AGREE: f32 = 3.0;
 
-/// The k-radius of a point that lies between surfaces counts as at most this many first search radii.
+/// Largest k-radius, in first search radii, that the splat radius of a depth camera's point may follow. The k-radius of
+/// a point between two surfaces is its distance to one of them.
 pub(super) const WIDEST: f32 = 3.0;
-/// A surfel moves at most this many times the noise; a quadric further away is another surface.
+/// Largest move of a surfel, in noise levels. A quadric further away is another surface.
 pub(super) const FARTHEST: f32 = 9.0;
-/// One further from that surface than this many times the noise hardly belongs to it, and is drawn as a dot: moved there, its disc,
-/// as wide as its neighbours are far, would hide those that belong.
+/// Distance from its surface, in noise levels, beyond which a surfel is an outlier and drawn as a dot. Moved there at
+/// full size, the wide disc would hide the surfels that belong to the surface.
 pub(super) const STRAY_OFFSET: f32 = 3.0;
-/// The same of depth cameras. A pixel of theirs that sees two surfaces lies anywhere between, nearly always that far from both.
+/// [`STRAY_OFFSET`] of depth cameras. A pixel on two surfaces lies anywhere between, nearly always this far from both.
 pub(super) const STRAY_OFFSET_KNOWN: f32 = 2.0;
-/// Points whose surface variation, times the square of the k-radius in usual ones, is at least this are drawn as dots. Surface
-/// variation is up to 0.15 at edges and corners, which stay where points are up to four times as far apart as usual; in a
-/// cloud that fills space it is 0.2 by mean, and much less for some.
+/// Least surface variation, times the squared ratio of k-radius to median k-radius, of a point drawn as a dot. Surface
+/// variation is up to 0.15 at edges and corners, which therefore stay where points are up to four times sparser than
+/// usual. In a cloud that fills space the mean is 0.2, and much less for some points.
 pub(super) const STRAY_DOT: f32 = 2.5;
-/// And above this they are outliers.
+/// The measure of [`STRAY_DOT`] above which a point is dropped as an outlier.
 pub(super) const STRAY_DROPPED: f32 = 5.0;
-/// Where k-radii are this many usual ones, a ball is asked as well: few neighbours lie flat by chance, or are cut off by gaps.
+/// K-radius, in median k-radii, beyond which a wider ball is checked: few neighbours lie flat by chance or are cut off.
 pub(super) const SPARSE: f32 = 2.5;
-/// The same where surface variation times the square of the k-radius in first search radii is this: what stands before a surface
-/// is sparser than what surrounds it, and its neighbours are hardly flat.
+/// Surface variation, times the squared k-radius in first search radii, beyond which a wider ball is checked. A point
+/// before a surface is sparser than its surroundings, and its neighbours are hardly flat.
 pub(super) const LONE: f32 = 0.5;
-/// Radius of the ball in k-radii. With less weight of points in it than there are neighbours to be, it is no surface.
+/// Radius of the wider ball, in k-radii. A sparse point is no surface if this ball weighs less than k points.
 pub(super) const AROUND_SPARSE: f32 = 2.0;
-/// Nor is a point this far from the plane through a ball that is a crowd or holds hardly anything, in k-radii: it stands by itself,
-/// and its disc would hide what its neighbours are. On ridges and at corners it may be as far, but there is no crowd.
+/// Distance from the wider ball's plane, in k-radii, beyond which a point is an outlier if the ball is over- or
+/// under-populated. Its disc would hide the neighbours. Ridges and corners reach this distance with normal populations.
 pub(super) const ASIDE: f32 = 0.4;
-/// Nor one this far from the middle of a crowd, as it is beside the border of a surface. On a straight border it is 0.75, at a
-/// square corner 1.05, but there is no crowd either.
+/// Distance from the wider ball's mean, in k-radii, beyond which a point is an outlier if the ball is over-populated.
+/// Such a point lies beside a border. Straight borders have 0.75 and square corners 1.05, with normal populations.
 pub(super) const OFF_MIDDLE: f32 = 1.0;
-/// A ball is a crowd if it holds more than so many times the neighbours, 1.4 times what it does where points are even.
+/// Weight of an over-populated ball per neighbour: 1.4 times that of even points. See docs/decisions/0010-outliers.md.
 pub(super) const CROWD: f32 = 1.4 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
-/// Radius of such a dot in pixels.
+/// Radius of a dot, in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
-/// What the stage may be asked for.
+/// Settings of the stage.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdaptRules {
-    /// Neighbours that the fit had.
+    /// Neighbours that the fit took.
     pub(crate) k: u32,
-    /// Longest ellipse of those that stay as they were, semi-major over semi-minor axis.
+    /// Longest ellipse of surfels that stay as fitted: semi-major over semi-minor axis.
     pub(crate) longest: f32,
-    /// Keep what is no surface at all.
+    /// Whether outliers are kept instead of dropped.
     pub(crate) keep_outliers: bool,
 }
 
-/// What all surfels share.
+/// Input that all surfels share.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     cells: &'a Cells,
@@ -97,34 +99,34 @@ struct Task<'a> {
     view: &'a View,
     rules: &'a AdaptRules,
     usual: Usual,
-    /// In view space.
+    /// Known noise of depth cameras, in view space.
     known: &'a DepthNoise,
 }
 
-/// Fits surfels anew where noise calls for it; keeps its buffers from frame to frame.
+/// Fits surfels again where noise calls for it. Keeps its buffers from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Adapter {
     cells: Cells,
     sheets: Sheets,
-    /// Measured by the first surfels of a frame.
+    /// Measured from the first surfels of a frame.
     usual: Option<Usual>,
 }
 
 impl Adapter {
-    /// Sums up the screen points of a new frame, whose cells in the density grid hold about `k` points.
+    /// Sums up the screen points of a new frame in cells. `k` is the number of points per cell of the density grid.
     pub(crate) fn begin(&mut self, screen: &ScreenPoints, view: &View, k: u32) {
         self.cells.fill(screen, view, k);
         self.sheets.clear(&self.cells);
         self.usual = None;
     }
 
-    /// The noise of this frame's points, known once surfels were adapted.
+    /// The noise of this frame's points, [`Noise::NONE`] until surfels are adapted.
     pub(crate) fn noise(&self) -> Noise {
         self.usual.map_or(Noise::NONE, |usual| usual.noise)
     }
 
-    /// Fits each of `surfels` anew at the scale that the frame's noise calls for, and what are rows. The fit has left their
-    /// ellipses as long as they are.
+    /// Fits `surfels` again at the scale that the noise calls for, and turns those on scan lines. Ellipses must have
+    /// full length.
     pub(crate) fn adapt(
         &mut self,
         surfels: &mut [Surfel],
@@ -162,41 +164,41 @@ impl Adapter {
     }
 }
 
-/// Radius that the balls around a surfel are multiples of.
+/// Base radius of the balls around a surfel, world units.
 #[inline(always)]
 pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
     surfel.k_radius.max(LEAST_REACH * initial_radius(surfel, density, view, k))
 }
 
-/// What calls for more than the first neighbours of a surfel.
+/// Why the first neighbours of a surfel do not suffice.
 #[derive(Clone, Copy)]
 enum Call {
     Nothing,
     Noise(Noisy),
-    /// They are a row of points.
+    /// The neighbours form a scan line.
     Row,
 }
 
 #[derive(Clone, Copy)]
 struct Noisy {
     goal: Goal,
-    /// Where it is the noise of a depth camera.
+    /// Set if the noise is the known noise of a depth camera.
     known: Option<Known>,
 }
 
-/// What a fit has to reach.
+/// The accuracy that a fit has to reach.
 #[derive(Clone, Copy)]
 pub(super) struct Goal {
     /// Standard deviation of points from their surface, world units.
     pub(super) noise: f32,
     /// Standard error of a normal that is good enough, radians.
     pub(super) enough: f32,
-    /// Most that points may scatter about larger balls' quadrics, world units.
+    /// Largest scatter of points about the quadrics of larger balls, world units.
     pub(super) scatter: f32,
 }
 
 impl Goal {
-    /// Of points with a k-radius at a depth, whose noise is `known` as that of a depth camera.
+    /// Goal for points with this k-radius and depth. `known` says that the noise is the known noise of a depth camera.
     #[inline(always)]
     pub(super) fn new(noise: f32, known: bool, k_radius: f32, depth: f32, view: &View) -> Self {
         let scatter = if known { SCATTER_KNOWN } else { SCATTER };
@@ -205,7 +207,7 @@ impl Goal {
 }
 
 impl Task<'_> {
-    /// Noise at a place in view space, of a cloud's point with a k-radius: the larger of what was measured and what is known.
+    /// Noise level at `place` in view space for the cloud's point `point`: the larger of measured and known noise.
     #[inline(always)]
     fn noise(&self, place: Vec3, k_radius: f32, point: u32) -> (f32, Option<Known>) {
         let measured = self.usual.noise.at(k_radius);
@@ -215,13 +217,13 @@ impl Task<'_> {
 
     #[inline(always)]
     fn call(&self, surfel: &Surfel) -> Call {
-        // The first neighbourhood's error is about that of its k points over the k-radius.
+        // The standard error of the first plane is about noise over k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
         let goal = Goal::new(noise, known.is_some(), surfel.k_radius, surfel.center[2], self.view);
         if surfel.radius == 0.0 {
             Call::Nothing
         } else if is_row(surfel) && known.is_none() {
-            // Steps of a depth camera's depths are rows too, but the surface is not in them.
+            // The depth steps of a depth camera form lines too, but the surface does not run along them.
             Call::Row
         } else if noise > goal.enough * surfel.k_radius {
             Call::Noise(Noisy { goal, known })
@@ -270,14 +272,14 @@ fn adapt_all_with<'a, S: Simd>(
                 };
                 let surface = match sheets.blend(simd, surfel.center, first, &goal, (cells, view), around) {
                     Blend::Surface(surface) => Some(surface),
-                    // So would nine of ten quadrics of its own, each at the cost of a sheet.
+                    // A quadric of its own would disagree as well in nine of ten cases, at the cost of a sheet.
                     Blend::Disagrees => None,
                     Blend::Nothing => alone(),
                 };
                 match surface {
                     Some(surface) => {
                         if known.is_some() {
-                            // Between two surfaces the k-radius is the way to one of them.
+                            // Between two surfaces the k-radius is the distance to one of them.
                             surfel.radius *= (WIDEST / sparser).min(1.0);
                         }
                         place(surfel, &surface, goal.noise, known.as_ref(), view);
@@ -293,7 +295,7 @@ fn adapt_all_with<'a, S: Simd>(
     }
 }
 
-/// Standard error of a normal, radians, that no larger ball need better.
+/// Standard error of a normal, in radians, at which no larger ball is needed.
 #[inline(always)]
 pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) -> f32 {
     let pixel = view.pixel_size(depth);
@@ -301,13 +303,13 @@ pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) ->
     ENOUGH + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
 }
 
-/// The upright quadric around `center` from balls that grow until its error is small enough; `None` if none is better than the
-/// first neighbours. Radii are multiples of `radius`. The smallest ball has to agree with the `first` normal, where its standard
-/// error is known.
+/// The upright quadric around `center`, from balls that grow until the error is small enough. Ball radii are powers of
+/// [`STEP`] times `radius`. Where `first` is given, a normal and its standard error, the smallest ball has to agree
+/// with that normal. Returns `None` if no quadric is better than the first neighbours.
 ///
-/// Each ball counts as far as it agrees with what the smaller ones gave, and one that does not, or scatters more, is the last
-/// (stagewise aggregation, Belomestny and Spokoiny 2007): if one or the other were taken, chance would decide, differently in
-/// each picture.
+/// Each ball counts by how far it agrees with the result of the smaller ones. A ball that disagrees, or scatters too
+/// much, ends the search (stagewise aggregation, Belomestny and Spokoiny 2007). An all-or-nothing choice would depend
+/// on chance and flicker from picture to picture. See docs/decisions/0006-scale-by-agreement.md.
 #[inline(always)]
 pub(super) fn choose<S: Simd>(
     simd: S,
@@ -318,16 +320,16 @@ pub(super) fn choose<S: Simd>(
     (cells, view): (&Cells, &View),
     gathered: &mut Gathered,
 ) -> Option<Quadric> {
-    // A normal to agree with, and its error.
+    // A normal to agree with, and its standard error.
     let mut reliable = first;
     let mut best: Option<Quadric> = None;
-    // Where nothing is reliable, the least error.
+    // The quadric of least error, for when none is reliable.
     let mut fallback: Option<Quadric> = None;
-    // Heights of the first ball are along its plane's normal, those of larger ones along the normal found before.
+    // The first ball's heights run along its plane's normal, those of larger balls along the normal found so far.
     let mut axis = None;
     for scale in 0..SCALES {
         radius *= STEP;
-        // Points of a ball that the noise fills are no surface. The largest ball has to do where there is no better.
+        // Points of a ball that the noise fills are no surface; the largest ball is taken if there is no better one.
         let thin = noise < THICKEST * radius;
         if !thin & (scale + 1 < SCALES) {
             continue;
@@ -374,17 +376,17 @@ pub(super) fn choose<S: Simd>(
     quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
 }
 
-/// First search radius of a surfel's point.
+/// First search radius of a surfel's point, world units.
 #[inline(always)]
 fn initial_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
     density.initial_radius(&ScreenPoint { position_view: surfel.center, pixel: surfel.pixel }, k, view)
 }
 
-/// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill the space between, or are cut off from
-/// all others. Its k-radius is `sparser` first search radii.
+/// Shrinks or drops a surfel that is no surface: its neighbours are far away and fill space, or are cut off from all
+/// others. `sparser` is the k-radius in first search radii.
 #[inline(always)]
 fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gathered: &mut Gathered) {
-    // A handful of points has nothing that is usual.
+    // Too few surfels have no median k-radius.
     if surfel.radius == 0.0 || task.usual.k_radius == 0.0 {
         return;
     }
@@ -407,7 +409,7 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gath
             let is_aside = plane.axis.dot(plane.mean).abs() * AROUND_SPARSE > ASIDE;
             let is_outside = plane.mean.length() * AROUND_SPARSE > OFF_MIDDLE;
             if is_crowd & (is_aside | is_outside) {
-                // Beside a surface is an outlier; beside a handful nobody knows.
+                // Beside a surface a point is an outlier; beside a few points that is undecidable.
                 stray = f32::INFINITY;
             } else if (len < LEAST_CLUSTERS) & is_aside {
                 stray = stray.max(STRAY_DOT);
@@ -421,14 +423,14 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gath
     }
 }
 
-/// Leaves of a surfel what its point covers.
+/// Shrinks a surfel to the size of its point.
 #[inline(always)]
 fn make_dot(surfel: &mut Surfel, view: &View) {
     surfel.radius = surfel.radius.min(DOT_PX * view.pixel_size(surfel.center[2]));
 }
 
-/// Turns and moves a surfel onto a surface, along the ray along which its noise was made if that is known. Where `noise` does not
-/// explain how far it is from there, it becomes a dot.
+/// Turns and moves a surfel onto a surface, along the sensor's ray where the noise is known. The surfel becomes a dot
+/// where `noise` does not explain its distance from the surface.
 #[inline(always)]
 fn place(surfel: &mut Surfel, surface: &Surface, noise: f32, known: Option<&Known>, view: &View) {
     let &Surface { offset, normal, curvature } = surface;

@@ -24,11 +24,11 @@ fn fill(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     }
     let slabs = slabs_of(level.side_px);
     let low = place_in(level, index) * level.side_px;
-    // One beyond.
+    // Exclusive.
     let high = min(low + level.side_px, frame.size);
     let strip_px = counters[STRIP_PX];
     let last = divide(high.y - 1u, strip_px).x;
-    // A strip's points go column by column, down each: those of the cell's columns are contiguous.
+    // A strip's points are stored column by column, so those of a cell's columns are contiguous.
     for (var strip = divide(low.y, strip_px).x; strip <= last; strip++) {
         let row = strip * frame.size.x;
         let end = cell_start[row + high.x];

@@ -1,5 +1,5 @@
-// Fits sheets to the clusters of each cell that surfels ask for, largest first, until each has one or is near one, or there are as
-// many as a cell may have: a workgroup for a few cells, which takes up those that are asked for together. See the CPU form.
+// Fits sheets to the clusters of each cell that surfels ask for, largest first, until all clusters are covered or the
+// cell is full. A workgroup for a few cells fits those that are asked for one after the other. See the CPU form.
 //
 // Reads: levels, clusters, measured, asked, depth_noise. Reads and writes: sheets.
 
@@ -26,13 +26,13 @@ override COVERED_REACH: f32;
 override FEW: u32;
 
 struct Asked {
-    // Mean k-radius, pixels; 0 if none asks.
+    // Mean k-radius, pixels; 0 if no surfel asks.
     k_radius_px: f32,
-    // First of the points.
+    // Smallest point index.
     point: u32,
 }
 
-// Of the surfels that ask for a cell or one beside it, which may blend its sheets.
+// Demand of the surfels that ask for a cell or a cell beside it, which may blend its sheets.
 fn asked_around(level: Level, cell: u32) -> Asked {
     let at = divide(cell, level.columns).yx;
     let low = max(at, vec2u(1u)) - 1u;
@@ -49,7 +49,7 @@ fn asked_around(level: Level, cell: u32) -> Asked {
     return Asked(select(0.0, f32(sum.y) / (f32(sum.x) * PARTS), sum.x > 0u), point);
 }
 
-// Which of the workgroup's cells want sheets, as bits.
+// Bit mask of the workgroup's cells that need sheets.
 var<workgroup> found_wanted: atomic<u32>;
 var<workgroup> shared_wanted: u32;
 
@@ -77,7 +77,7 @@ fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     }
 }
 
-// All invocations do so together.
+// Runs with all invocations together.
 fn fit_cell(level: Level, cell: u32) {
     let around = asked_around(level, cell);
     let first = level.first + cell;
@@ -117,7 +117,7 @@ fn fit_cell(level: Level, cell: u32) {
             error,
             quadric.curvature,
             quadric.scatter,
-            // One over the error's power of three quarters.
+            // error^-¾, times the excess of scatter to the power of -3.
             1.0 / (sqrt(error) * sqrt(sqrt(error)) * (beyond * beyond * beyond)),
         );
         for (var index = 0u; index < SLABS; index++) {

@@ -1,4 +1,4 @@
-// Forgets the sheets of the frame before: an invocation per cell.
+// Discards the sheets of the last frame: an invocation per cell.
 //
 // Reads: levels. Writes: asked, sheets.
 
@@ -10,7 +10,7 @@
 @group(0) @binding(1) var<storage, read_write> asked: array<u32>;
 @group(0) @binding(2) var<storage, read_write> sheets: array<Sheet>;
 
-// The finest level whose cells may have sheets: they are the most.
+// The finest level whose cells may have sheets; it has the most cells.
 override FINE_SHEETS: u32;
 
 @compute @workgroup_size(64)

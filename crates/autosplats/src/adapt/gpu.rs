@@ -1,4 +1,4 @@
-//! Neighbourhoods as large as the noise calls for, on the GPU: the CPU form's steps, a pass each.
+//! Adapt on the GPU: the steps of the CPU form, one pass each.
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
@@ -44,14 +44,13 @@ const FIT_SHEETS: PassSource = PassSource::new("adapt/fit_sheets", include_str!(
 const ADAPT: PassSource = PassSource::new("adapt/adapt", include_str!("adapt.wgsl"));
 const TURN_ROWS: PassSource = PassSource::new("adapt/turn_rows", include_str!("turn_rows.wgsl"));
 
-/// Invocations in a workgroup of the passes.
+/// Invocations in a workgroup.
 const GROUP: usize = 64;
-/// Invocations that sum up a ball together, on hardware and on a device that is a program on the processor: that runs eight side by
-/// side, and took 1.6 times as long for the stage with 32.
+/// Invocations that sum up a ball together, on hardware and on a software device, which runs eight side by side.
 const TOGETHER: [u32; 2] = [32, 8];
-/// Quantiles: of scatters at each scale, of the densest third of the sample, of the sparsest, of all, and of all by steady shares.
+/// Quantiles of scatter, per scale: of the sample's densest third, its sparsest third, all, and all by steady shares.
 const QUANTILES_TAKEN: usize = 4 * SCALES;
-/// What is measured of noise: `noise.wgsl`.
+/// Numbers that `noise.wgsl` writes.
 pub(crate) const NOISE_FLOATS: usize = 6;
 /// Bytes of the arguments of a dispatch.
 const WORK_BYTES: u64 = 12;
@@ -63,31 +62,30 @@ type Cluster = [f32; 4];
 /// `Sheet` of `shared/sheet.wgsl`, padded.
 type Sheet = [f32; 16];
 
-/// What the stage keeps on the device from pass to pass.
+/// Buffers that the stage keeps on the device from pass to pass.
 #[derive(Debug)]
 pub(crate) struct AdaptBuffers {
     levels: wgpu::Buffer,
-    /// Workgroups that fill each level, three `u32`, and those that fit sheets.
+    /// Workgroups that fill each level, three `u32`, then those that fit sheets.
     arguments: wgpu::Buffer,
     clusters: wgpu::Buffer,
-    /// Number of surfels that ask for the sheets of a cell, the sum of their k-radii and the first of their points.
+    /// Per cell: number of surfels that ask for sheets, sum of their k-radii, smallest point index.
     asked: wgpu::Buffer,
     sheets: wgpu::Buffer,
-    /// Places of the surfels of the sample, and their number; first in any order, then by their k-radii.
+    /// Indices of the sampled surfels, then their number. `picked` is unordered, `sampled` is sorted by k-radius.
     picked: wgpu::Buffer,
     sampled: wgpu::Buffer,
     scatters: wgpu::Buffer,
-    /// And after them the steady shares of the first scales.
+    /// Quantiles, then the steady shares of the first scales.
     quantiles: wgpu::Buffer,
-    /// Level and power of the noise, the median k-radius, the level of the cells that have sheets, the k-radius up to which noise
-    /// grows, and how sure it is.
+    /// Noise level and power, median k-radius, level of cells with sheets, largest k-radius of growth, certainty.
     measured: wgpu::Buffer,
-    /// Not of the stage's own: [`DepthNoiseBuffer`].
+    /// Owned by [`DepthNoiseBuffer`].
     depth_noise: wgpu::Buffer,
 }
 
 impl AdaptBuffers {
-    /// Room for pictures of `size`, of clouds whose noise is in `known`.
+    /// Allocates for pictures of `size`; `known` holds the noise of the cloud.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -113,13 +111,13 @@ impl AdaptBuffers {
         })
     }
 
-    /// The noise that was measured, as `shared/noise.wgsl` has it.
+    /// The measured noise, in the layout of `shared/noise.wgsl`.
     pub(crate) fn noise(&self) -> &wgpu::Buffer {
         &self.measured
     }
 }
 
-/// What is known of the noise of a cloud's depths, on the device.
+/// Known noise of a cloud's depths, on the device.
 #[derive(Debug)]
 pub(crate) struct DepthNoiseBuffer {
     runs: wgpu::Buffer,
@@ -127,16 +125,16 @@ pub(crate) struct DepthNoiseBuffer {
 }
 
 impl DepthNoiseBuffer {
-    /// Of a cloud of which nothing is known.
+    /// The buffer of a cloud without known noise.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        // A new buffer is all zeros, which is a run of which nothing is known.
+        // A new buffer is all zeros, which is a run without known noise.
         Ok(Self { runs: gpu.storage::<DepthRun>("noise of depths", 1)?, len: 1 })
     }
 
-    /// Holds those of a cloud from now on; returns whether the buffer is another one.
+    /// Writes the runs of a cloud. Returns whether the buffer was replaced.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -151,13 +149,13 @@ impl DepthNoiseBuffer {
     }
 }
 
-/// Most finest cells of a picture on a device that binds so many bytes at once: those of all levels are a third more, and a little
-/// where sides are rounded up. Where it is fewer than on the CPU, large pictures have coarser cells.
+/// Most finest cells on a device that binds `most_bound` bytes at once. All levels together take a third more, plus
+/// rounding. A smaller limit than on the CPU makes cells of large pictures coarser.
 fn most_finest(most_bound: u64) -> usize {
     (most_bound as usize / size_of::<[Cluster; SLABS]>() / 7 * 5).min(MOST_FINEST)
 }
 
-/// Cells of all levels if they are as small as can be.
+/// Largest number of cells of all levels, for a picture of `size`.
 fn most_cells(size: [u32; 2], most_finest: usize) -> usize {
     let side_px = least_side_px(size, most_finest);
     let mut sides = size.map(|side| (side as usize).div_ceil(side_px));
@@ -169,7 +167,7 @@ fn most_cells(size: [u32; 2], most_finest: usize) -> usize {
     cells
 }
 
-/// Cells that have sheets if they are as small as can be.
+/// Largest number of cells with sheets, for a picture of `size`.
 fn most_sheet_cells(size: [u32; 2], most_finest: usize) -> usize {
     let side_px = least_side_px(size, most_finest) << SHEET_LEVELS[0];
     size.map(|side| (side as usize).div_ceil(side_px)).iter().product()
@@ -181,7 +179,7 @@ pub(crate) struct AdaptPasses {
     arrange: Pass,
     fill: Pass,
     merge: Pass,
-    /// What tells the pass before each level but the finest.
+    /// Uniforms with the level to fill, for each level but the finest.
     which: Vec<wgpu::Buffer>,
     pick: Pass,
     sample: Pass,
@@ -190,14 +188,14 @@ pub(crate) struct AdaptPasses {
     noise: Pass,
     forget: Pass,
     fit_sheets: Pass,
-    /// Of both rounds.
+    /// One pass per round, as the next two.
     ask: [Pass; 2],
     adapt: [Pass; 2],
     turn_rows: [Pass; 2],
 }
 
 impl AdaptPasses {
-    /// Compiles them.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -381,7 +379,7 @@ impl AdaptPasses {
         })
     }
 
-    /// Sums up the screen points of a new frame.
+    /// Steps that sum up the screen points of a new frame.
     pub(crate) fn steps_cells(
         &self,
         gpu: &Gpu,
@@ -402,7 +400,7 @@ impl AdaptPasses {
         steps
     }
 
-    /// Measures the noise on the surfels of the active points, and fits those of `round` anew at the scale that it calls for.
+    /// Steps that measure the noise (first round only, on active points) and adapt the surfels of `round`.
     pub(crate) fn steps(
         &self,
         gpu: &Gpu,

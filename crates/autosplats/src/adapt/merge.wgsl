@@ -1,4 +1,4 @@
-// Fills a level of cells with what the one below it holds: an invocation per cell. Run once for each level but the finest.
+// Fills a level of cells from the next finer one: an invocation per cell. Run once for each level but the finest.
 //
 // Reads: levels, which. Reads and writes: clusters.
 

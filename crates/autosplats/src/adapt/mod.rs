@@ -1,33 +1,36 @@
 //! Adapt: neighbourhoods as large as the noise calls for.
 //!
 //! # How it works
-//! Ten neighbours tell nothing of a plane that scatters further than they are apart. So larger balls around each point are
-//! tried, [`SCALES`] of them, each [`STEP`] times as wide as the one before, and a quadric is fitted to what lies in them: a
-//! height field with six coefficients, whose slope at the point is free of the bias that curved or one-sided surroundings give
-//! to a plane. A ball of a thousand points costs what one of thirty does, because it is summed up in *cells* (`cells`):
-//! squares of pixels cut into slabs of depth, each level twice as coarse as the one before, of which only the mean and the
-//! count are kept. A ball reads cells of between an eighth and a quarter of its radius, where there are so fine ones.
+//! Ten neighbours do not determine a plane if their noise is larger than their distance. So the stage tries larger
+//! balls around each point: [`SCALES`] of them, each [`STEP`] times as wide as the one before. To the points of a ball
+//! a quadric is fitted: a height field with six coefficients. Its slope at the point is free of the bias that a curved
+//! or one-sided neighbourhood gives to a plane. A ball of a thousand points costs what a ball of thirty costs, because
+//! points are summed up in *cells* (`cells`). Cells are squares of pixels cut into slabs of depth; each level is twice
+//! as coarse as the one before. A slab keeps the mean and the count of its points. A ball reads cells of an eighth to a
+//! quarter of its radius, where cells are that fine.
 //!
-//! How far points scatter is one number for the whole frame (`noise`): it is what is left of the quadrics at the first scale
-//! where many of a sample of points find a surface thinner than their ball is wide. With that number the error of each fit is
-//! known beforehand. Balls grow until it is small enough; each counts as far as it agrees with what the smaller ones gave
-//! within their errors, and one that does not, or scatters more, is the last: on smooth surfaces they agree, at edges not.
-//! Where the first ten neighbours are good enough, the fit stays as it was; nearly everything does in a scan without noise.
+//! The noise level is one number for the whole frame (`noise`). It is the residual of quadrics at the first scale at
+//! which many sampled points find a surface thinner than their ball. With that number the error of each fit is known in
+//! advance. Balls grow until the error is small enough. Each ball counts by how far it agrees with the smaller ones
+//! within their errors; a ball that disagrees or scatters more ends the growth. Balls agree on smooth surfaces and
+//! disagree at edges. Where the first ten neighbours are good enough, the fit stays, which is nearly everywhere in a
+//! scan without noise.
 //!
-//! Where they are not, balls are not tried around each surfel, which would cost more than all else in a frame, but around
-//! the clusters of cells about two points wide: that makes *sheets* (`sheets`), one for each surface in a cell. A surfel
-//! blends those of the four cells around it at its own place: the nearer the centre of a sheet's ball, the nearer the sheet
-//! itself and the smaller its error, the more it counts, and what is another surface does not. It turns to the blended
-//! normal, and its centre moves onto the surface. A surfel without a sheet tries its own balls; one whose own normal is
-//! reliable and unlike all sheets is not moved.
+//! Balls around each noisy surfel would cost more than the rest of the frame. So quadrics are fitted around the
+//! clusters of cells about two points wide, one *sheet* (`sheets`) for each surface in a cell. A surfel blends the
+//! sheets of the four cells around it, evaluated at its own place. A sheet counts more the nearer its ball's centre,
+//! the nearer its surface and the smaller its error; sheets of other surfaces do not count. The surfel turns to the
+//! blended normal and its centre moves onto the surface. A surfel without sheets tries balls of its own. A surfel whose
+//! own normal is reliable and unlike all sheets stays where it is.
 //!
-//! Points of a spinning lidar are dense along its rings and sparse across: their first neighbours are a *row* (`rows`), no
-//! surface. Balls around such a surfel grow until they hold more than the row.
+//! Points of a spinning lidar are dense along a ring and sparse across. The first neighbours of such a point form a
+//! *scan line* (`rows`), not a surface. Balls around the surfel grow until they hold more than the scan line.
 //!
-//! What is sparse before denser points, and no surface, hides no more than its share of them (`through`).
+//! Sparse points before denser ones that form no surface hide only their share of them (`through`).
 //!
-//! Depth cameras have noise that no ball of these sizes shows, because neighbours err alike. It is known from the scan as a whole
-//! (`depth`) and taken where it is the larger; surfels move along the sensor's ray then.
+//! Neighbours in a depth camera err alike, so balls of these sizes do not show the camera's noise. That noise is
+//! estimated from the scan as a whole (`depth`) and used where it is the larger one. Surfels then move along the
+//! sensor's ray.
 
 mod cells;
 mod cpu;
@@ -51,10 +54,9 @@ pub(crate) use noise::Noise;
 #[cfg(test)]
 pub(crate) use sheets::SHEETS;
 
-/// Balls tried around each point, beside the neighbourhood that the search found.
+/// Number of balls tried around each point, besides the neighbourhood that the search found.
 pub(crate) const SCALES: usize = 6;
-/// Radius of a ball over that of the one before; of the first over the k-radius.
+/// Radius of a ball over that of the ball before; of the first ball over the base radius.
 pub(crate) const STEP: f32 = 1.6;
-/// The k-radius counts as at least this part of the first search radius: it is too small where a gap or the end of a
-/// surface left few neighbours.
+/// Least base radius of a surfel's balls, in first search radii; k-radii are too small at gaps and borders.
 pub(crate) const LEAST_REACH: f32 = 0.8;

@@ -1,4 +1,4 @@
-//! How far points scatter about the surface.
+//! The noise level: how far points scatter about the surface.
 
 use pulp::Simd;
 use rayon::prelude::*;
@@ -12,106 +12,105 @@ use crate::camera::View;
 use crate::fit::Surfel;
 use crate::project::DensityGrid;
 
-/// Surfels looked at, about; nearly all if there are no more.
+/// Expected number of sampled surfels; with no more surfels than this, nearly all are sampled.
 pub(crate) const SAMPLE: usize = 1024;
-/// And at most: they are as many as chance has it, give or take thirty.
+/// Largest number of sampled surfels. The number varies by chance, by about thirty.
 pub(crate) const MOST_SAMPLED: usize = SAMPLE + SAMPLE / 2;
-/// The densest and the sparsest third of a sample tell how noise grows with the k-radius if the median k-radius is larger in the
-/// one than in the other by this factor, and the more, the further apart they are: points evenly strewn are 1.2 apart by chance,
-/// very noisy ones 1.7.
+/// Least ratio of the median k-radius of the sample's sparsest third to that of its densest third at which growth of
+/// noise is estimated. Growth counts more the larger the ratio. Random points reach 1.2 by chance, very noisy ones 1.7.
 pub(super) const APART: f32 = 1.7;
-/// All of the growth counts from so many times [`APART`] on.
+/// Multiple of [`APART`] from which growth counts in full.
 pub(super) const FAR_APART: f32 = 1.3;
-/// Growth with less than this power of the k-radius is that of structure,
+/// Power of the k-radius up to which growth is that of structure.
 pub(super) const GROWTH: f32 = 0.8;
-/// and with more than that by this, of noise alone.
+/// Range of powers above [`GROWTH`] over which growth goes from structure to noise alone.
 pub(super) const GROWTH_SURE: f32 = 0.4;
-/// Noise grows up to twice the k-radius that one of this many of the sample exceeds: strewn points may be as far apart as
-/// they like.
+/// Noise grows up to twice the k-radius that one in this many sampled points exceeds; outliers may be further apart.
 pub(super) const BEYOND: usize = 8;
-/// Surfels per task.
+/// Surfels per task when scatter is measured.
 const TASK: usize = 32;
-/// And where they are only picked.
+/// Surfels per task when the sample is picked.
 const PICK_TASK: usize = 4096;
-/// Fewer that find anything in a ball say nothing.
+/// Fewest balls of a scale, with enough points to fit, that give an estimate.
 pub(super) const LEAST_SAMPLE: usize = 64;
-/// So does less than one of this many.
+/// One in this many of the sample has to find such a ball, or the scale gives no estimate.
 pub(super) const LEAST_SHARE: usize = 5;
-/// A surface is thin in a ball if points scatter less than this part of the radius: of points that fill it, it is 0.4.
+/// Scatter, in ball radii, below which a ball is thin. Points that fill a ball scatter by 0.4.
 pub(super) const THIN: f32 = 0.15;
-/// Less than this part of the radius is none: rounding leaves as much, and which ball has more of it is chance.
+/// Scatter, in ball radii, below which scatter is rounding and counts as 0; which ball has more is chance.
 pub(super) const ROUNDING: f32 = 1e-3;
-/// A scale tells the noise if this share of the sample finds a thin surface: the others may be of structure too small for it.
+/// Least share of thin balls at which a scale gives the noise level. Other balls may hold structure finer than the
+/// ball.
 pub(super) const THIN_SHARE: f32 = 0.3;
-/// But if the next scale's share is larger by more than this, noise fills others, and those thin are so by chance. Where it
-/// could not be larger by more, or there is no next scale, that does not count.
+/// Largest rise of the thin share at the next scale. With a larger rise, noise fills the other balls and the thin ones
+/// are thin by chance. The rule does not apply to the last scale, nor to shares that cannot rise by so much.
 pub(super) const RISE: f32 = 0.27;
-/// The noise is this quantile of what is found: more scatter is structure too small for the ball.
+/// Quantile of thin balls' scatter that is the noise level. Larger scatter is structure finer than the ball.
 pub(super) const QUANTILE: f32 = 0.33;
-/// But scatter of structure grows from ball to ball, and noise's does not: it is *steady* where the next ball scatters less than so
-/// many times as much.
+/// Ratio of scatter between successive scales below which a ball is *steady*: that of structure grows, noise's does
+/// not.
 pub(super) const STEADY: f32 = 1.3;
-/// Fewer thin balls say nothing of that.
+/// Fewest thin balls with a next ball that give a steady share.
 pub(super) const LEAST_PAIRS: usize = 32;
-/// Up to the first of these shares of steady balls there is structure and no noise, from the second on there is. Where the first
-/// scales tell nothing of noise, larger ones are not asked this.
+/// Steady shares between which scatter goes from structure to noise. Applies to the first [`STEADY_SCALES`] scales.
 pub(super) const NOISE_SHARES: [f32; 2] = [0.1, 0.2];
-/// Above the first of these, noise begins to differ from place to place, as where two scans do not fit and the way from one to the
-/// other is across the surface in one place and along it in the next,
+/// Steady shares between which the quantile goes from [`QUANTILE`] to [`QUANTILE_DIFFERS`]. Noise that differs from
+/// place to place is as steady, as with misaligned scans: their offset is across the surface here and along it there.
 pub(super) const DIFFERS_SHARES: [f32; 2] = [0.55, 0.7];
-/// and at the second it is this quantile. Noise alone is as steady; it leans less low by that.
+/// Quantile where noise may differ from place to place. Uniform noise is as steady and is biased less low by this
+/// quantile.
 pub(super) const QUANTILE_DIFFERS: f32 = 0.67;
-/// Up to the first of these shares of steady balls it may be structure after all, from the second on it is noise for sure.
+/// Steady shares between which the estimate goes from possible structure to certain noise.
 pub(super) const SURE_SHARES: [f32; 2] = [0.3, 0.45];
-/// Scales that this is known of. Balls after these and the next are so wide against cells that noise of one thickness has two
-/// scatters, as slabs cut it or not.
+/// Number of scales for which steadiness is checked. Larger balls are wide against cells: slabs cut the noise in some
+/// and not in others, so uniform noise has two scatters.
 pub(super) const STEADY_SCALES: usize = 2;
 
-/// Noise that is more than this part of the k-radius needs balls so large that twice as large cells do for sheets: fits are a
-/// quarter as many then, and as good. With less noise they are 5 to 15 % worse.
+/// Noise level, in k-radii, above which sheets use the coarser level of cells. Balls are large then, and a quarter of
+/// the fits is as good; with less noise the fits would be worse.
 pub(super) const THICK_NOISE: f32 = 0.4;
 
-/// What a frame's surfels have in common.
+/// Statistics of a frame's surfels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Usual {
     pub(crate) noise: Noise,
     /// Median k-radius, world units; 0 if there are too few surfels.
     pub(crate) k_radius: f32,
-    /// Which level of cells has sheets.
+    /// Level of the cells that have sheets.
     pub(crate) sheet_level: usize,
 }
 
-/// Standard deviation of points from their surface, which may grow with the k-radius: what a scanner measures far away is
-/// sparser and has more noise.
+/// Standard deviation of points from their surface. It may grow with the k-radius: distant points are sparser and
+/// noisier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Noise {
-    /// At [`most`](Self::most) and beyond, world units.
+    /// Noise level at k-radii of [`most`](Self::most) and beyond, world units.
     pub(crate) level: f32,
-    /// It goes with this power of the k-radius: 0 if it is the same everywhere; up to 2, as of depth cameras.
+    /// Power of the k-radius that the noise grows with, 0 to 2. 0 is uniform noise; depth cameras have up to 2.
     pub(crate) power: f32,
-    /// K-radius up to which its growth was seen, world units.
+    /// K-radius up to which the noise grows, world units; 0 for uniform noise.
     pub(crate) most: f32,
-    /// How sure it is that this is noise and no structure: 0 to 1.
+    /// Certainty that this is noise and not structure, 0 to 1.
     pub(crate) sure: f32,
 }
 
 impl Noise {
-    /// Of points that have none.
+    /// No noise.
     pub(crate) const NONE: Self = Self { level: 0.0, power: 0.0, most: 0.0, sure: 0.0 };
 
-    /// Of points with a k-radius above 0.
+    /// Noise level of points with a `k_radius` above 0, world units.
     #[inline(always)]
     pub(crate) fn at(&self, k_radius: f32) -> f32 {
         if self.power == 0.0 { self.level } else { self.level * (k_radius / self.most).min(1.0).powf(self.power) }
     }
 
-    /// From a sample, densest first.
+    /// Estimates the noise from a sample sorted by k-radius, densest first.
     fn of(sample: &[Sampled]) -> Self {
         let [dense, sparse] = ends(sample);
         let all = scatter_level(sample, None);
-        // Of all, as the ends need not be told by the same scale.
+        // Of the whole sample, as the thirds may take their levels from different scales.
         let steady: [_; STEADY_SCALES] = std::array::from_fn(|scale| steady_share(sample, scale));
-        // Told by the largest balls that are asked, as more of those are thin.
+        // The share of the largest checked balls, as more of them are thin.
         let told = (0..SCALES).find(|&scale| tells_noise(sample, scale));
         let share =
             told.and_then(|scale| steady[..=scale.min(STEADY_SCALES - 1)].iter().rev().copied().flatten().next());
@@ -125,13 +124,14 @@ impl Noise {
             let [least, most] = [dense, sparse].map(|part| scatter_level(part, None));
             if least > 0.0 && most > least {
                 let growth = (most / least).ln() / (large / small).ln();
-                // Little growth is chance, or other things where points are sparse.
+                // Little growth is chance, or a different kind of object where points are sparse.
                 let much = ((growth - GROWTH) * (1.0 / GROWTH_SURE)).clamp(0.0, 1.0);
                 let apart = ((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0))).min(1.0);
                 let grows = much * apart;
                 if grows > 0.0 {
                     let power = grows * growth.min(2.0);
-                    // Through the middle of the two, coming from what all say together.
+                    // Through the geometric mean of both thirds, blended with the level of all where growth is
+                    // uncertain.
                     let both = least.sqrt() * most.sqrt();
                     let middle = if all > 0.0 { all.powf(1.0 - grows) * both.powf(grows) } else { both };
                     let beyond = 2.0 * sample[sample.len() - 1 - sample.len() / BEYOND].surfel.k_radius;
@@ -144,7 +144,7 @@ impl Noise {
     }
 }
 
-/// Measures what is usual in a frame on a sample of `surfels`.
+/// Measures a frame's statistics on a sample of `surfels`.
 pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> Usual {
     let of = |surfel: Surfel| {
         let radius = first_radius(&surfel, density, view, k);
@@ -161,7 +161,7 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
         sample.par_chunks_mut(TASK).for_each_init(Gathered::default, |gathered, sample| {
             measure_scatter(sample, scale, &Task { cells, view }, gathered);
         });
-        // What balls larger than the next would say is not asked for then; most frames need the first two.
+        // A scale is judged with the next one. The loop ends when all parts have a level, mostly after two scales.
         let [dense, sparse] = ends(&sample);
         if [dense, sparse, &sample].iter().all(|part| (0..scale).any(|scale| tells_noise(part, scale))) {
             break;
@@ -174,21 +174,20 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
     Usual { noise, k_radius, sheet_level }
 }
 
-/// Of so many surfels those are in the sample whose points' numbers, [`scrambled`], are below this. So nearly the same surfels, as
-/// those of the next frame are, give nearly the same sample. Picked by their places in the list, one surfel more changed all of
-/// it, and with it the noise by up to a fifth.
+/// Limit of the [`scrambled`] point index below which a surfel is sampled, for a number of surfels. Choosing by point
+/// keeps the sample nearly the same from frame to frame. Choosing by place, one more surfel would change all of it.
 fn picked_below(surfels: usize) -> u32 {
     (u32::MAX / surfels.max(SAMPLE) as u32).saturating_mul(SAMPLE as u32)
 }
 
-/// Another number for each number, in no order [MurmurHash3's finish].
+/// Hashes a number to another one, one to one [finalizer of MurmurHash3].
 fn scrambled(number: u32) -> u32 {
     let number = (number ^ (number >> 16)).wrapping_mul(0x85eb_ca6b);
     let number = (number ^ (number >> 13)).wrapping_mul(0xc2b2_ae35);
     number ^ (number >> 16)
 }
 
-/// What all surfels of a sample share.
+/// Input that all sampled surfels share.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     cells: &'a Cells,
@@ -205,9 +204,9 @@ fn ends(sample: &[Sampled]) -> [&[Sampled]; 2] {
 #[derive(Clone, Copy, Debug)]
 struct Sampled {
     surfel: Surfel,
-    /// Of the ball before the next.
+    /// Radius of the ball measured last, world units.
     radius: f32,
-    /// In each ball that holds enough to fit.
+    /// Scatter at each scale; `None` for balls that hold too little to fit.
     scatter: [Option<Scatter>; SCALES],
 }
 
@@ -231,7 +230,7 @@ fn measure_scatter_with<'a, S: Simd>(
     }
 }
 
-/// What is left of the quadric of a ball.
+/// Residual of a ball's quadric.
 #[derive(Clone, Copy, Debug)]
 struct Scatter {
     /// Standard deviation, world units.
@@ -239,8 +238,8 @@ struct Scatter {
     thin: bool,
 }
 
-/// The noise of a part of a sample whose points are about as dense; 0 if the part is too small to tell. By the steady shares of
-/// each of the first scales, where they are asked.
+/// Noise level of a part of a sample with about the same density; 0 if the part is too small. With the `steady` shares
+/// of the first scales, the level is reduced for structure and raised for noise that differs from place to place.
 fn scatter_level(sample: &[Sampled], steady: Option<[Option<f32>; STEADY_SCALES]>) -> f32 {
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
@@ -252,12 +251,12 @@ fn scatter_level(sample: &[Sampled], steady: Option<[Option<f32>; STEADY_SCALES]
             // Where there is structure as well, noise is steady in the smaller balls.
             let most = steady.get(..=scale).and_then(|known| known.iter().flatten().copied().reduce(f32::max));
             let is_noise = most.map_or(1.0, |share| between(NOISE_SHARES, share));
-            // At the second scale, noise as thick everywhere has two scatters as well.
+            // At the second scale uniform noise has two scatters as well.
             let differs = steady[0].filter(|_| scale == 0).map_or(0.0, |share| between(DIFFERS_SHARES, share));
             return is_noise * quantile(&mut thin, QUANTILE + differs * (QUANTILE_DIFFERS - QUANTILE));
         }
-        // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
-        // fill the ball or of structure.
+        // No scale is thin. Where scatter grows least to the next scale it is noise; elsewhere points fill the ball or
+        // are structure.
         let mut all: Vec<f32> = found(sample, scale).map(|found| found.distance).collect();
         if !is_enough(all.len(), sample) {
             before = None;
@@ -274,7 +273,7 @@ fn scatter_level(sample: &[Sampled], steady: Option<[Option<f32>; STEADY_SCALES]
     plateau
 }
 
-/// What the balls of a scale found.
+/// Scatters of the balls of one scale.
 fn found(sample: &[Sampled], scale: usize) -> impl Iterator<Item = Scatter> {
     sample.iter().filter_map(move |sampled| sampled.scatter[scale])
 }
@@ -283,7 +282,7 @@ fn is_enough(found: usize, sample: &[Sampled]) -> bool {
     found >= LEAST_SAMPLE.max(sample.len() / LEAST_SHARE)
 }
 
-/// Whether so many balls of a scale found a thin surface that they tell the noise.
+/// Whether enough balls of a scale are thin for the scale to give the noise level.
 fn tells_noise(sample: &[Sampled], scale: usize) -> bool {
     let thin_share = |scale: usize| {
         let count = found(sample, scale).count();
@@ -295,7 +294,7 @@ fn tells_noise(sample: &[Sampled], scale: usize) -> bool {
     own >= THIN_SHARE && (own >= 1.0 - RISE || !rises())
 }
 
-/// Share of a scale's thin balls that are steady, if there are enough.
+/// Share of a scale's thin balls that are steady; `None` if too few balls are thin.
 fn steady_share(sample: &[Sampled], scale: usize) -> Option<f32> {
     let (mut pairs, mut steady) = (0, 0);
     for sampled in sample {
@@ -310,7 +309,7 @@ fn steady_share(sample: &[Sampled], scale: usize) -> Option<f32> {
     (pairs >= LEAST_PAIRS).then(|| steady as f32 / pairs as f32)
 }
 
-/// How far a value is from the first to the second, 0 to 1.
+/// Place of `value` between `from` and `to`, clamped to 0 to 1.
 fn between([from, to]: [f32; 2], value: f32) -> f32 {
     ((value - from) * (1.0 / (to - from))).clamp(0.0, 1.0)
 }

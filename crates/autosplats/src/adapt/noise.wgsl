@@ -1,7 +1,7 @@
-// How far points scatter about the surface: see the CPU form. One invocation.
+// The noise level: how far points scatter about the surface. See the CPU form. One invocation.
 //
-// Reads: surfels, sampled, quantiles. Writes: measured: the noise, its power of the k-radius, the median k-radius, the level of the
-// cells that have sheets, the k-radius up to which noise grows, and how sure it is.
+// Reads: surfels, sampled, quantiles. Writes: measured: noise level, power of the k-radius, median k-radius, level of
+// the cells with sheets, largest k-radius of growth, and certainty.
 
 #import frame
 #import surfel
@@ -27,7 +27,7 @@ override SURE_FROM: f32;
 override SURE_TO: f32;
 override STEADY_SCALES: u32;
 
-// The noise of a part of the sample, whose points are about as dense; 0 if it is too small to tell.
+// Noise level of a part of the sample with about the same density; 0 if the part is too small.
 fn scatter_level(part: u32) -> f32 {
     // Below 0: none.
     var before = -1.0;
@@ -39,8 +39,8 @@ fn scatter_level(part: u32) -> f32 {
         if found.x == THIN_TELL {
             return now;
         }
-        // Thicker than every ball: where the scatter grows least with the ball it is noise, elsewhere that of points that
-        // fill the ball or of structure.
+        // No scale is thin. Where scatter grows least to the next scale it is noise; elsewhere points fill the ball or
+        // are structure.
         if found.x == ALL_TELL && before >= 0.0 && now < least_growth * before {
             least_growth = now / before;
             plateau = before;
@@ -50,7 +50,7 @@ fn scatter_level(part: u32) -> f32 {
     return plateau;
 }
 
-// How sure it is that what all of the sample tells is noise.
+// Certainty that the noise of the whole sample is noise, 0 to 1.
 fn sureness() -> f32 {
     for (var scale = 0u; scale < SCALES; scale++) {
         if quantiles[ALL * SCALES + scale].x == THIN_TELL {
@@ -61,16 +61,16 @@ fn sureness() -> f32 {
     return 0.0;
 }
 
-// Of the surfel at a place of the sample, densest first.
+// K-radius of a sampled surfel, densest first.
 fn k_radius(rank: u32) -> f32 {
     return surfels[sampled[rank]].k_radius;
 }
 
-// Its level, power and largest k-radius.
+// Level, power and largest k-radius of growth.
 fn noise_of_sample() -> vec3f {
     let len = sampled[MOST_SAMPLED];
     let all = scatter_level(ALL);
-    // Of all, as the ends need not be told by the same scale.
+    // Of the whole sample, as the thirds may take their levels from different scales.
     let by_steady = select(1.0, scatter_level(STEADY_ALL) / all, all > 0.0);
     let third = len / 3u;
     if third == 0u {
@@ -83,13 +83,13 @@ fn noise_of_sample() -> vec3f {
         let most = scatter_level(SPARSEST);
         if least > 0.0 && most > least {
             let growth = log(most / least) / log(large / small);
-            // Little growth is chance, or other things where points are sparse.
+            // Little growth is chance, or a different kind of object where points are sparse.
             let much = clamp((growth - GROWTH) * (1.0 / GROWTH_SURE), 0.0, 1.0);
             let apart = min((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0)), 1.0);
             let grows = much * apart;
             if grows > 0.0 {
                 let power = grows * min(growth, 2.0);
-                // Through the middle of the two, coming from what all say together.
+                // Through the geometric mean of both thirds, blended with the level of all where growth is uncertain.
                 let both = sqrt(least) * sqrt(most);
                 let middle = select(both, pow(all, 1.0 - grows) * pow(both, grows), all > 0.0);
                 let beyond = 2.0 * k_radius(len - 1u - len / BEYOND);

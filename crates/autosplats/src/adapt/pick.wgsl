@@ -1,6 +1,6 @@
 // Picks the sample: an invocation per surfel. See the CPU form.
 //
-// Reads: counters, surfels. Writes: picked, the places of the surfels in any order, and after them their number.
+// Reads: counters, surfels. Writes: picked, the unordered indices of the sampled surfels, then their number.
 
 #import groups
 #import counters

@@ -1,4 +1,4 @@
-//! A height field with six coefficients over a ball's points.
+//! Quadrics: height fields with six coefficients, fitted to the points of a ball.
 
 use std::ops::RangeInclusive;
 
@@ -11,23 +11,23 @@ use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
-/// A ball's radius is at least so many cells, unless they are the finest. The more, the less it depends on how cells happen to
-/// lie.
+/// Least radius of a ball in cells, where cells are that fine. With more cells, cell borders matter less.
 pub(super) const CELLS_PER_RADIUS: f32 = 4.0;
-/// Fewer clusters than this tell too little of six coefficients.
+/// Fewest clusters for a fit of six coefficients.
 pub(super) const LEAST_CLUSTERS: usize = 12;
-/// And fewer than this of no plane: through three there always is one.
+/// Fewest clusters for a plane. Through three there always is one.
 pub(super) const LEAST_OF_PLANE: usize = 4;
-/// Clusters count in full up to this part of the squared radius, and less and less beyond: none comes or goes at once.
+/// Squared distance, in squared radii, up to which a cluster counts in full. The weight falls to 0 at the radius, so
+/// that no cluster comes or goes at once.
 pub(super) const FULL: f32 = 0.5;
-/// Weight, as a share of all, that pulls curvatures to 0: a one-sided ball tells little of them.
+/// Ridge weight that pulls curvatures to 0, as a share of all weight. One-sided balls hardly determine curvatures.
 pub(super) const RIDGE: f32 = 0.003;
-/// Least pivot of the elimination, as a share of the weight.
+/// Smallest pivot of the elimination, as a share of all weight.
 pub(super) const LEAST_PIVOT: f32 = 1e-6;
 
 const _: () = assert!(AFTER <= LANES, "what is copied over the end of a run has room");
 
-/// Weight of a ball evenly filled with a point in each square of its radius.
+/// Weight of a ball evenly filled with one point per square of its radius.
 pub(super) const EVEN_WEIGHT: f32 = 0.5 * std::f32::consts::PI * (1.0 + FULL);
 
 /// The cells that may reach into a ball.
@@ -38,8 +38,8 @@ pub(super) struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// Of the ball of `radius` around `center` (view space), in the coarsest cells of which that is at least so many, or the
-    /// finest; `None` if there are no cells.
+    /// The cells for the ball of `radius` around `center` (view space). Takes the coarsest level with at least
+    /// `cells_per_radius` cells to a radius, or the finest. `None` if there are no levels.
     #[inline(always)]
     pub(super) fn around(
         cells: &'a Cells,
@@ -65,7 +65,7 @@ impl<'a> Window<'a> {
         Some(Self { level, columns: range(px, level.columns), rows: range(py, level.rows.len()) })
     }
 
-    /// Copies the clusters, then some without points; returns the number of groups of sixteen.
+    /// Copies the clusters and pads the last group with empty ones. Returns the number of groups of sixteen.
     #[inline(always)]
     fn copy_to(&self, copied: &mut [Vec<f32>; 4]) -> usize {
         let columns = *self.columns.start()..self.columns.end() + 1;
@@ -73,7 +73,7 @@ impl<'a> Window<'a> {
         for row in &self.level.rows[self.rows.clone()] {
             let run = row.run(columns.clone());
             let end = len + run.len();
-            // What is copied at once may reach over the end, and so may the last group.
+            // Copies go in fixed lengths, which may reach beyond the end, as may the last group.
             let needed = (end + LANES).next_multiple_of(LANES);
             if copied[0].len() < needed {
                 copied.iter_mut().for_each(|values| values.resize(2 * needed, 0.0));
@@ -94,29 +94,29 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Clusters within a ball, in sixteen lanes for SIMD: positions from its centre in radii, and weights, which are 0 in lanes
-/// without a cluster.
+/// The clusters within a ball, sixteen to a group for SIMD: positions relative to the centre, in radii, and weights.
+/// Lanes without a cluster have weight 0.
 #[derive(Debug, Default)]
 pub(super) struct Gathered {
-    /// X, y, z and counts of what may be in the ball, view space.
+    /// X, y, z (view space) and counts of the candidates.
     copied: [Vec<f32>; 4],
     lanes: Vec<[Lanes; 4]>,
-    /// How many of `lanes` are filled.
+    /// Groups of `lanes` in use.
     filled: usize,
-    /// Clusters.
+    /// Number of clusters within the ball.
     len: usize,
-    /// Side of the cells that they are of, radii: clusters are slabs about as thick.
+    /// Side of the cells, in ball radii, which is also about the thickness of their slabs.
     side: f32,
 }
 
 /// The plane through a ball's clusters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
-    /// Unit axis of least spread; of either sign.
+    /// Unit axis of least spread, of either sign.
     pub(super) axis: Vec3,
-    /// Along it, between, and where the spread is largest; squared radii.
+    /// Variances along the least, middle and largest axes, squared radii.
     pub(super) variances: [f32; 3],
-    /// Of the clusters, from the ball's centre; radii.
+    /// Weighted mean of the clusters relative to the ball's centre, radii.
     pub(super) mean: Vec3,
     /// Sum of the clusters' weights.
     pub(super) weight: f32,
@@ -135,28 +135,28 @@ impl Plane {
 /// The quadric fitted to a ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Quadric {
-    /// Unit normal of the surface at the point's place; of either sign.
+    /// Unit normal of the surface at the point's place, of either sign.
     pub(super) normal: Vec3,
-    /// How far the surface is from the point along `axis`, world units.
+    /// Distance from the point to the surface along `axis`, world units.
     pub(super) height: f32,
     /// Unit direction of the heights.
     pub(super) axis: Vec3,
     /// Standard deviation of points from the surface, world units.
     pub(super) scatter: f32,
-    /// Standard error of the normal's slope, in radians per world unit of scatter.
+    /// Standard error of the normal's slope, in radians per world unit of noise.
     pub(super) error: f32,
     /// Surface variation λ0/(λ0+λ1+λ2) of the clusters, 0 to 1/3.
     pub(super) curvature: f32,
-    /// Of the ball, or between those of several.
+    /// Radius of the ball, or a value between those of several balls, world units.
     pub(super) radius: f32,
-    /// Slopes at the point along the [`tangents`] of the axis; 0 if it is upright.
+    /// Slopes at the point along the [`tangents`] of the axis; 0 for an upright quadric.
     pub(super) slope: [f32; 2],
-    /// Coefficients of the squares and the product of the two, xx, xy and yy, in radii.
+    /// Second-order coefficients xx, xy and yy, in radii.
     pub(super) bend: [f32; 3],
 }
 
 impl Quadric {
-    /// The same surface with heights along its normal at the point, to second order, if it is near to the point.
+    /// The same surface with heights along its normal at the point, to second order, if the surface is near the point.
     #[inline(always)]
     pub(super) fn upright(&self) -> Self {
         let &Self { normal, axis, bend: [xx, xy, yy], .. } = self;
@@ -172,13 +172,14 @@ impl Quadric {
         Self { height: self.height * cos, axis: normal, slope: [0.0; 2], bend, ..*self }
     }
 
-    /// Between this upright one and a larger ball's `other` with the same axis: this one at a `share` of 0, `other` at 1.
+    /// Interpolates between this upright quadric (`share` 0) and a larger ball's `other` with the same axis (`share`
+    /// 1).
     #[inline(always)]
     pub(super) fn towards(&self, other: &Self, share: f32) -> Self {
         let between = |from: f32, to: f32| from + share * (to - from);
         let radius = between(self.radius, other.radius);
         let slope = other.slope.map(|slope| share * slope);
-        // In radii of their own balls; as curvatures in world units they compare.
+        // Each bend is in radii of its own ball; curvatures in world units are comparable.
         let bend =
             std::array::from_fn(|at| radius * between(self.bend[at] / self.radius, other.bend[at] / other.radius));
         let (u, v) = tangents(self.axis);
@@ -196,7 +197,7 @@ impl Quadric {
     }
 }
 
-/// Two unit vectors at right angles to a third and each other: the axes of slopes.
+/// Two unit vectors perpendicular to `axis` and to each other, along which slopes are measured.
 #[inline(always)]
 pub(super) fn tangents(axis: Vec3) -> (Vec3, Vec3) {
     let u = axis.any_orthonormal_vector();
@@ -222,8 +223,8 @@ impl Gathered {
         if self.lanes.len() < groups {
             self.lanes.resize(groups, [Lanes::default(); 4]);
         }
-        // Of sixteen clusters all stay if one is inside: those outside weigh nothing, which costs less than to close ranks.
-        // Loops and no closures, of which not all are inlined.
+        // A group of sixteen stays if one cluster is inside, and those outside get weight 0. Compacting them costs more
+        // than it saves. Loops are used because the compiler does not inline all closures.
         let [cx, cy, cz] = [F32s::splat(simd, center[0]), F32s::splat(simd, center[1]), F32s::splat(simd, center[2])];
         let (zero, one) = (F32s::splat(simd, 0.0), F32s::splat(simd, 1.0));
         let (per_radius, per_rest) = (F32s::splat(simd, per_radius), F32s::splat(simd, 1.0 / (1.0 - FULL)));
@@ -240,7 +241,7 @@ impl Gathered {
                 let (z, count) = (F32s::load(simd, zs, at), F32s::load(simd, counts, at));
                 let (x, y, z) = ((x - cx) * per_radius, (y - cy) * per_radius, (z - cz) * per_radius);
                 let rest = one - (x * x + y * y + z * z);
-                // What is copied without points weighs nothing.
+                // Padding has count 0, hence weight 0.
                 let weight = (rest * per_rest).min(one) * count;
                 let is_in = zero.less(weight);
                 is_any |= is_in.any();
@@ -253,7 +254,7 @@ impl Gathered {
             filled += usize::from(is_any);
         }
         self.filled = filled;
-        // Whole numbers far below 2²⁴.
+        // Exact: whole numbers far below 2²⁴.
         let [len] = add_lanes(&mut [inside]);
         self.len = len as usize;
         self.len
@@ -271,7 +272,7 @@ impl Gathered {
         sums.0.iter().sum()
     }
 
-    /// Forgets the clusters less than `from` radii from the centre towards `side`; returns the number of those left.
+    /// Removes the clusters less than `from` radii from the centre towards `side`. Returns how many are left.
     pub(super) fn keep_beside(&mut self, side: Vec3, from: f32) -> usize {
         for at in 0..self.filled * LANES {
             let [x, y, z, w] = &mut self.lanes[at / LANES];
@@ -284,7 +285,7 @@ impl Gathered {
         self.len
     }
 
-    /// The plane through the clusters.
+    /// Fits the plane through the clusters.
     #[inline(always)]
     pub(super) fn plane<S: Simd>(&self, simd: S) -> Plane {
         let mut lanes = [Lanes::default(); 10];
@@ -310,7 +311,7 @@ impl Gathered {
         Plane { axis, variances: [values[0].max(0.0), values[1], values[2]], mean: Vec3::new(x, y, z), weight: w }
     }
 
-    /// Fits heights along `axis`.
+    /// Fits a quadric with heights along `axis`; `curvature` is stored with the quadric.
     #[inline(always)]
     pub(super) fn quadric<S: Simd>(&self, simd: S, radius: f32, axis: Vec3, curvature: f32) -> Quadric {
         let (u, v) = tangents(axis);
@@ -343,7 +344,7 @@ impl Gathered {
         #[rustfmt::skip]
         let [w, x, y, xx, xy, yy, xxx, xxy, xyy, yyy, xxxx, xxxy, xxyy, xyyy, yyyy, h, hx, hy, hxx, hxy, hyy, hh] = add_lanes(&mut lanes);
         let ridge = RIDGE * w;
-        // Slopes last, so that what is left of their rows when the others are eliminated is their own.
+        // Slopes come last: after elimination of the others, their rows hold the slopes' own information.
         let mut rows = [
             [xxxx + ridge, xxxy, xxyy, xx, xxx, xxy, hxx],
             [xxxy, xxyy + ridge, xyyy, xy, xxy, xyy, hxy],
@@ -354,7 +355,7 @@ impl Gathered {
         ];
         let mut rest = hh;
         for pivot in 0..6 {
-            // What rounding leaves of a row that others explain must not be divided by.
+            // Never divide by the rounding error that remains of a dependent row.
             let inverse = 1.0 / rows[pivot][pivot].max(LEAST_PIVOT * w);
             rest -= rows[pivot][6] * rows[pivot][6] * inverse;
             for row in pivot + 1..6 {
@@ -372,13 +373,13 @@ impl Gathered {
         let yy = (rows[2][6] - known(2)) / pivot(2);
         let xy = (rows[1][6] - known(1) - rows[1][2] * yy) / pivot(1);
         let xx = (rows[0][6] - known(0) - rows[0][1] * xy - rows[0][2] * yy) / pivot(0);
-        // Trace of the inverse of the 2×2 matrix that is left for the slopes.
+        // Trace of the inverse of the 2×2 matrix that remains for the slopes.
         let tilt = rows[4][5] / pivot(4);
         let trace = 1.0 / pivot(4) + (1.0 + tilt * tilt) / pivot(5);
         let len = self.len.max(LEAST_CLUSTERS) as f32;
-        // A cluster counts as often as it has points, and its mean scatters less than they do by the root of that number, unless
-        // the noise is thicker than slabs: then these cut it, and clusters scatter as points do, but for what is left within a
-        // slab. Either variance is too large where the other holds.
+        // A cluster counts once per point, and its mean scatters less than its points by the root of their number.
+        // Where noise is thicker than slabs, slabs cut it: clusters then scatter as points do, but for the part within
+        // a slab. Either variance is too large where the other applies, so the lesser is right.
         let squares = rest.max(0.0) / (len - 6.0);
         let variance = squares.min(squares * len / w + self.side * self.side * (1.0 / 12.0));
         Quadric {
@@ -395,7 +396,7 @@ impl Gathered {
     }
 }
 
-/// Positions and weights of the `vector`-th part of sixteen clusters.
+/// Positions and weights of the `vector`-th part of a group.
 #[inline(always)]
 fn load<S: Simd>(simd: S, lanes: &[Lanes; 4], vector: usize) -> [F32s<S>; 4] {
     let [x, y, z, w] = lanes;
@@ -407,7 +408,7 @@ fn load<S: Simd>(simd: S, lanes: &[Lanes; 4], vector: usize) -> [F32s<S>; 4] {
     ]
 }
 
-/// Puts the `vector`-th part of some sums at its place among all lanes.
+/// Stores the `vector`-th part of some sums at its place among all lanes.
 #[inline(always)]
 fn store<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, lanes: &mut [Lanes; N]) {
     for index in 0..N {
@@ -415,8 +416,7 @@ fn store<S: Simd, const N: usize>(sums: &[F32s<S>; N], vector: usize, lanes: &mu
     }
 }
 
-/// Adds the lanes of some sums up, half to half: the same bits for any width of vectors, and few additions that wait for each
-/// other.
+/// Sums the lanes half to half: the same bits for any vector width, with short chains of dependent additions.
 #[inline(always)]
 fn add_lanes<const N: usize>(lanes: &mut [Lanes; N]) -> [f32; N] {
     for Lanes(lanes) in &mut *lanes {

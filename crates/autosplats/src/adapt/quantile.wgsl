@@ -1,8 +1,8 @@
-// A quantile of the scatter in balls of one size: a workgroup for each size of the densest third of the sample, then of the
-// sparsest, then of all of it, and once more of all of it by the steady shares.
+// Quantiles of scatter, a workgroup each: for every ball size of the sample's densest third, of its sparsest third, of
+// all, and of all by steady shares.
 //
-// Reads: sampled, scatters. Writes: quantiles, each as what it tells and its bits; then, for each of the first sizes, the bits of the
-// steady share of the largest up to it of which enough balls tell, below 0 if there is none.
+// Reads: sampled, scatters. Writes: quantiles, each as its kind and its bits. After them, for each of the first sizes,
+// the bits of the steady share of the largest size up to it that has one; below 0 if none has.
 
 #import frame
 #import scatters
@@ -28,17 +28,16 @@ override QUANTILE_DIFFERS: f32;
 override STEADY_SCALES: u32;
 override LEAST_PAIRS: u32;
 
-// Balls that hold enough to fit, and those that are thin: of the workgroup's size, then of the next.
+// Balls that hold enough to fit, and thin balls: of the workgroup's size, then of the next.
 var<workgroup> fitted: array<atomic<u32>, 2>;
 var<workgroup> thin: array<atomic<u32>, 2>;
-// Of the whole sample's balls of the first sizes, thin ones the next of which holds enough, and those of which it scatters no
-// more.
+// For each of the first sizes: the whole sample's thin balls with a fitted next ball, and the steady ones of them.
 var<workgroup> pairs: array<atomic<u32>, STEADY_SCALES>;
 var<workgroup> steady: array<atomic<u32>, STEADY_SCALES>;
-// Values below the one tried for each bit.
+// Number of values below the candidate of each bit.
 var<workgroup> below: array<atomic<u32>, 32>;
 
-// Below 0 if too few balls tell it.
+// Steady share of a size; below 0 if too few balls are thin.
 fn steady_share(size: u32) -> f32 {
     let count = atomicLoad(&pairs[size]);
     return select(-1.0, f32(atomicLoad(&steady[size])) / f32(max(count, 1u)), count >= LEAST_PAIRS);
@@ -108,7 +107,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     let differs = saturate((first_steady - DIFFERS_FROM) * (1.0 / (DIFFERS_TO - DIFFERS_FROM)));
     let raised = select(0.0, differs * (QUANTILE_DIFFERS - QUANTILE), is_asked && scale == 0u);
     let at = u32((QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
-    // The largest value that at most `at` are below, bit by bit.
+    // The largest value with at most `at` values below it, found bit by bit.
     var found = 0u;
     for (var bit = 31u; bit > 0u; bit--) {
         let tried = found | (1u << (bit - 1u));

@@ -1,12 +1,14 @@
-//! Rows: neighbourhoods that are a line, because a scanner's points are much denser along its scan lines than across.
+//! Scan lines: neighbourhoods that are a line, because a scanner's points are much denser along its scan lines than
+//! across.
 //!
-//! A lidar that spins leaves rings on the ground, ten to fifty times as far apart as their points. The nearest
-//! neighbours of such a point all lie on its own ring: no plane can be fitted to them, and their discs reach no other
-//! ring. So larger balls are tried, as for noise, until one holds an area. If that is flat and the row lies in it, the
-//! surfel turns to its plane and becomes an ellipse across the row, as wide as the rows are apart by the points' density in
-//! the ball. Where the surface bends beside the row, as it does at the foot of a wall, the points on either side of
-//! the row are tried alone. Wires and bars are rows too: their areas end soon, or other things are seen through them. What
-//! finds no area is drawn as the thin line that it is.
+//! A spinning lidar leaves rings on the ground, ten to fifty times as far apart as the points along them. The nearest
+//! neighbours of such a point all lie on the point's own ring. No plane can be fitted to them, and their discs reach no
+//! other ring. So larger balls are tried, as for noise, until one holds an area. If that area is flat and contains the
+//! scan line, the surfel turns to the area's plane. It becomes an ellipse across the scan line, as wide as the distance
+//! between scan lines, which follows from the density in the ball. Where the surface bends at the scan line, as at the
+//! foot of a wall, the points on either side are tried alone. Wires and bars are lines too: their areas end soon, or
+//! other points are seen through them. A scan line without an area is drawn as a thin line. See
+//! docs/decisions/0012-scan-lines.md.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -18,54 +20,55 @@ use super::{SCALES, STEP};
 use crate::camera::View;
 use crate::fit::{LONGEST, Surfel};
 
-/// A neighbourhood is a row if its variance along is this many times that across. Of ten neighbours strewn evenly, one
-/// in two thousand is, and two or three in a thousand at silhouettes.
+/// Least variance along a neighbourhood, over that across, of a scan line. Ten evenly random neighbours reach this
+/// ratio once in two thousand cases, at silhouettes in two or three of a thousand.
 pub(super) const ROW: f32 = 12.0;
-/// A ball holds an area if the variance across is at least this part of that along: that of three rows is,
+/// Least variance across a ball, over that along, of an area. Three scan lines reach this ratio.
 pub(super) const AREA: f32 = 0.25;
-/// and has to be that part too in a ball whose radius is this many distances between rows: of three wires it is 0.18 there, of
-/// four rows or the border of many 0.33. That ball also holds more points by more than its radius is larger, as areas grow with
-/// its square, but a curve that the first ball held whole by less.
+/// Radius of the ball in which an area has to go on, in distances between scan lines. The ratio of variances has to
+/// reach [`AREA`] there: three wires have 0.18, four scan lines or the border of many 0.33. The ball's weight has to
+/// grow more than its radius: that of areas grows with the square, that of a closed curve less.
 pub(super) const BEYOND: f32 = 4.0;
-/// That radius over the first ball's, at least and at most.
+/// Bounds of that ball's radius, in radii of the first ball.
 pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];
-/// Of what is on one side of the row, it is at least this part in the first ball, or it would be the row alone.
+/// Least variance across one side of a first ball, over that along. With less, the side holds the scan line alone.
 pub(super) const AREA_NEAR: f32 = 0.05;
-/// Of the points on one side, those of the row itself count, to this distance on the other side; radii.
+/// Slack by which one side of a ball reaches beyond the scan line, in ball radii, so that the line's own points count.
 pub(super) const BESIDE: f32 = 0.1;
-/// Weight of a ball over that of what counts to one side.
+/// Estimated weight of a whole ball over that of one side with its slack.
 pub(super) const HALVES: f32 = 1.8;
-/// What is this far from an area's plane is not of the area; radii.
+/// Distance from an area's plane, in ball radii, beyond which points are not part of the area.
 pub(super) const OFF_AREA: f32 = 0.15;
-/// An area is none where this share of its cells shows what is behind it and nothing of it.
+/// Share of an area's cells that may show only points behind the area. With more, there is no area.
 pub(super) const SEEN_THROUGH: f32 = 0.3;
-/// An area is flat if the variance of heights is at most this part of that across.
+/// Largest variance of an area's heights, over the variance across.
 pub(super) const FLAT: f32 = 0.1;
-/// Sine of the most that the row leaves the area's plane.
+/// Largest sine of the angle between a scan line and the area's plane.
 pub(super) const ROW_TILT: f32 = 0.25;
-/// Most that the point is above or below the area, radii: more is a row in front of one.
+/// Largest distance of the point from the area's plane, in ball radii. Beyond, the scan line lies in front of the area.
 pub(super) const OFF_ROW: f32 = 0.1;
-/// Semi-axis of the ellipse across the row, in distances between rows: its support is 1.4 times as wide.
+/// Semi-axis of the ellipse across the scan line, in distances between scan lines. The support is 1.4 times as wide.
 pub(super) const REACH: f32 = 0.8;
-/// And at most, radii of the ball.
+/// Largest semi-axis of the ellipse across the scan line, in ball radii.
 pub(super) const FARTHEST_REACH: f32 = 0.5;
-/// Width of a row that belongs to no area, over its splats' length.
+/// Width over length of splats on a scan line without an area.
 pub(super) const THIN_ROW: f32 = 0.4;
 
-/// Whether the first neighbours of a surfel are a row.
+/// Whether the first neighbours of a surfel form a scan line.
 #[inline(always)]
 pub(super) fn is_row(surfel: &Surfel) -> bool {
     surfel.major_ratio > ROW
 }
 
-/// How far apart rows of points k-radius / (k/2) apart are, k-radii, if a ball of so many k-radii holds points of this `weight`.
+/// Distance between scan lines, in k-radii, if a ball of `in_k_radii` k-radii has this `weight`. Points along a scan
+/// line are assumed k-radius / (k/2) apart.
 #[inline(always)]
 fn apart(in_k_radii: f32, k: f32, weight: f32) -> f32 {
     EVEN_WEIGHT * in_k_radii * in_k_radii * k / (2.0 * weight)
 }
 
-/// Turns a surfel whose `k` neighbours are a row to the area that balls around it find; `radius` is that of the ball before
-/// the first, world units. Without an area it becomes thin; returns whether there is one.
+/// Turns a surfel whose `k` neighbours form a scan line to the area around it. `radius` is the base radius of the
+/// balls, world units. Without an area the surfel becomes thin. Returns whether there is an area.
 pub(super) fn turn(
     surfel: &mut Surfel,
     (radius, k): (f32, u32),
@@ -81,7 +84,7 @@ pub(super) fn turn(
     };
     let normal = view.turned_to_eye(plane.axis, surfel.center.into());
     surfel.normal = normal.to_array();
-    // Not zero: the row is nearly in the plane.
+    // Not zero, as the scan line lies nearly in the plane.
     surfel.major_axis = normal.cross(row).normalize().to_array();
     surfel.curvature = plane.curvature();
     // The splat radius is 2/√k k-radii.
@@ -93,7 +96,7 @@ pub(super) fn turn(
     true
 }
 
-/// Plane of the first ball around a `surfel` of a row that holds an area with the row in it, and the ball's radius.
+/// The plane of the first ball that holds an area containing the scan line of `surfel`, and the ball's radius.
 fn area(
     surfel: &Surfel,
     (mut radius, k): (f32, f32),
@@ -129,7 +132,7 @@ fn area(
             let Some(beside) = beside else { continue };
             let bend = beside.variances[0] / beside.variances[1];
             if (bend < least_bend) && goes_on(&beside, plane(beyond, side)) {
-                // As if the other side were as full.
+                // Assumes that the other side has as many points.
                 found = Some(Plane { weight: HALVES * beside.weight, ..beside });
                 least_bend = bend;
             }
@@ -143,10 +146,10 @@ fn area(
     found.filter(is_opaque).map(|plane| (plane, radius))
 }
 
-/// The plane through what is within a `radius`, on the side if one is given.
+/// The plane through the clusters within `radius`, on one side only if `side` is given; `None` with too few clusters.
 ///
-/// Dispatched here and not by the caller: inlined, each of the calls would be a copy for each width of vectors, and within a closure
-/// it would lose these.
+/// Dispatched here: inlined in callers, each call would be copied per vector width, and closures would lose the
+/// dispatch.
 #[pulp::with_simd(plane_within = pulp::Arch::new())]
 #[inline(always)]
 fn plane_within_with<'a, S: Simd>(

@@ -1,6 +1,6 @@
-// Sorts the sample by k-radius, each surfel by counting those before it.
+// Sorts the sample by k-radius: each surfel counts those before it.
 //
-// Reads: surfels, picked. Writes: sampled, the places of the surfels, and after them their number.
+// Reads: surfels, picked. Writes: sampled, the indices of the surfels, then their number.
 
 #import surfel
 
@@ -10,14 +10,14 @@
 
 override MOST_SAMPLED: u32;
 
-// Bits of k-radii, which are in their order, and places; four at a time, for fewer rounds of a loop.
+// Bits of k-radii, which sort as the k-radii do, and indices; four at a time for fewer rounds of the loop.
 var<workgroup> k_radii: array<vec4u, MOST_SAMPLED / 4u>;
 var<workgroup> places: array<vec4u, MOST_SAMPLED / 4u>;
 
-// Beyond all others.
+// Sorts behind all others.
 const NONE = 0xffffffffu;
 
-// Place and bits of the k-radius of the surfel that was picked as number `index`.
+// Index and bits of the k-radius of the `index`-th picked surfel.
 fn one(index: u32, len: u32) -> vec2u {
     if index >= len {
         return vec2u(NONE);

@@ -1,4 +1,4 @@
-// How far points scatter about the quadrics of the balls around each surfel of the sample: a workgroup per ball.
+// Scatter of points about the quadrics of the balls around each sampled surfel: a workgroup per ball.
 //
 // Reads: counters, density, surfels, levels, clusters, sampled. Writes: scatters, ball size by ball size.
 

@@ -1,4 +1,5 @@
-//! Quadrics that surfels share: some for each cell, a fifth as many as there are surfels, each of which blends several.
+//! Sheets: quadrics that surfels share. There are several in a cell and a fifth as many as surfels, each of which
+//! blends several. See docs/decisions/0007-shared-sheets.md.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
@@ -18,41 +19,40 @@ mod blend;
 #[cfg(test)]
 mod tests;
 
-/// Levels of the cells that may have sheets. Their width is about two distances between points, that of the smallest balls
-/// three; or twice as much.
+/// Levels of the cells that may have sheets, for normal and for thick noise. These cells are two and four point
+/// distances wide; the smallest balls have a radius of three.
 pub(super) const SHEET_LEVELS: [usize; 2] = [1, 2];
-/// A cluster within this many times the noise of a sheet needs none of its own,
+/// Distance from a sheet, in noise levels, up to which a cluster needs no sheet of its own.
 pub(super) const COVERED: f32 = 2.0;
-/// if it is no further from the sheet's centre than this part of its squared radius: at a grazing angle a cell
-/// is a long strip of surface. The wider, the worse normals are along silhouettes.
+/// Squared distance from a sheet's axis, in squared radii, up to which [`COVERED`] applies. At a grazing angle a cell
+/// is a long strip of surface. A larger value makes normals along silhouettes worse.
 pub(super) const COVERED_REACH: f32 = 0.12;
 /// Most sheets of a cell.
 pub(crate) const SHEETS: usize = 4;
-/// K-radii are summed up in these parts of a pixel, as integers, so that their order does not matter.
+/// Parts of a pixel in which k-radii are summed up. Integer sums do not depend on their order.
 pub(super) const PARTS: f32 = 64.0;
-/// Larger k-radii, in pixels, count as this: of the nine cells of 32 pixels that are summed up, with two points in each pixel,
-/// that is below 2³².
+/// Cap of a summed k-radius, in pixels. Sums over nine cells of 32 pixels with two points per pixel stay below 2³².
 pub(super) const MOST_PX: f32 = 2048.0;
 
 /// An upright quadric over the balls that it was fitted to.
 #[derive(Clone, Copy, Debug)]
 struct Sheet {
     center: Vec3,
-    /// Of the quadric.
+    /// Radius of the quadric, world units.
     radius: f32,
     /// Unit normal at the centre, and direction of the heights.
     axis: Vec3,
-    /// At the centre; radii, as `bend`.
+    /// Height at the centre, in radii.
     height: f32,
-    /// Heights by the square of an offset, as a symmetric matrix, xx, xy, xz, yy, yz and zz; of the axis it makes 0. The device has
-    /// its three coefficients along tangents, which is the same but for rounding.
+    /// Second-order heights in radii, as a symmetric matrix: xx, xy, xz, yy, yz and zz. The matrix maps the axis to 0.
+    /// The GPU stores the three coefficients along tangents; both forms differ by rounding only.
     bend: [f32; 6],
-    /// Standard error of its normal, radians.
+    /// Standard error of the normal, radians.
     error: f32,
     curvature: f32,
-    /// Standard deviation of points from it, world units.
+    /// Standard deviation of points from the sheet, world units.
     scatter: f32,
-    /// How much it counts beside others, by its error and its scatter.
+    /// Weight beside other sheets, by error and scatter.
     trust: f32,
 }
 
@@ -60,7 +60,7 @@ impl Sheet {
     fn new(center: Vec3, quadric: &Quadric, noise: f32) -> Self {
         let &Quadric { radius, axis, height, bend: [uu, uv, vv], curvature, scatter, .. } = quadric;
         let (u, v) = tangents(axis);
-        // Each term of the sum counts twice off the diagonal.
+        // Each off-diagonal term of the sum counts twice.
         let across = u * (0.5 * uv) + v * vv;
         let along = u * uu + v * (0.5 * uv);
         let bend = |a: usize, b: usize| along[a] * u[b] + across[a] * v[b];
@@ -76,13 +76,13 @@ impl Sheet {
             error,
             curvature,
             scatter,
-            // One over the error's power of three quarters.
+            // error^-¾, times the excess of scatter to the power of -3.
             trust: 1.0 / (error.sqrt() * error.sqrt().sqrt() * (beyond * beyond * beyond)),
         }
     }
 
-    /// How far the sheet is above a place, along its axis, world units, and how near the place is to the ball's axis: 1 on it, 0 at
-    /// the border, negative beyond.
+    /// Height of the sheet above `place` along the sheet's axis, world units, and nearness of `place` to that axis.
+    /// Nearness is 1 on the axis, 0 at the ball's border and negative beyond.
     #[inline(always)]
     fn over(&self, place: Vec3) -> (f32, f32) {
         let offset = (place - self.center) * (1.0 / self.radius);
@@ -95,16 +95,16 @@ impl Sheet {
     }
 }
 
-/// Noise at a place in view space, of a cloud's point with a k-radius, world units, and whether it is known as that of a depth
-/// camera.
+/// Noise level, world units, for a place in view space, a k-radius and a point's index; and whether it is the known
+/// noise of a depth camera.
 type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> (f32, bool) + Sync + 'a;
 
-/// Who asks for the sheets of a cell.
+/// Demand for the sheets of a cell.
 #[derive(Debug)]
 struct Asked {
-    /// How many surfels, in the upper half, and the sum of their k-radii.
+    /// Number of asking surfels in the upper half, sum of their k-radii in the lower half.
     k_radii: AtomicU64,
-    /// The first of their points: noise may depend on the scan that points belong to.
+    /// Smallest point index of the asking surfels. Noise may depend on the scan that a point belongs to.
     point: AtomicU32,
 }
 
@@ -114,19 +114,19 @@ impl Default for Asked {
     }
 }
 
-/// The sheets of all cells of a level that surfels ask for.
+/// The sheets of one level's cells, fitted on demand.
 #[derive(Debug, Default)]
 pub(super) struct Sheets {
-    /// Of the cells.
+    /// Level of the cells.
     pub(super) level: usize,
     stacks: Vec<Stack>,
-    /// Whether each stack is of this frame: nobody may have asked for it.
+    /// Whether each stack is fitted for this frame.
     fitted: Vec<bool>,
     asked: Vec<Asked>,
 }
 
 impl Sheets {
-    /// Forgets those of the frame before.
+    /// Discards the sheets of the last frame.
     pub(super) fn clear(&mut self, cells: &Cells) {
         let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.columns * level.rows.len());
         self.stacks.resize(len, Stack::default());
@@ -148,13 +148,13 @@ impl Sheets {
         asked.point.fetch_min(surfel.source, Ordering::Relaxed);
     }
 
-    /// Fits those that were asked for and are not there yet.
+    /// Fits the sheets that were asked for and are not fitted yet.
     pub(super) fn fit(&mut self, cells: &Cells, noise: &NoiseAt, view: &View) {
         let Some(level) = cells.levels.get(self.level) else { return };
         let Self { stacks, fitted, asked, .. } = self;
         let task = Task { cells, level, asked, noise, view };
         let rows = (stacks.par_chunks_mut(level.columns), fitted.par_chunks_mut(level.columns));
-        // There is room for finer ones.
+        // The vectors have room for the finer level.
         rows.into_par_iter().take(level.rows.len()).enumerate().for_each_init(
             Gathered::default,
             |gathered, (row, (stacks, fitted))| {
@@ -164,7 +164,7 @@ impl Sheets {
     }
 }
 
-/// What all cells share.
+/// Input that all cells share.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     cells: &'a Cells,
@@ -175,8 +175,7 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Mean k-radius, pixels, of the surfels that ask for a cell or one beside it, which may blend its sheets, and the first
-    /// of their points.
+    /// Mean k-radius (pixels) and smallest point index of the surfels that ask for this cell or a neighbour.
     #[inline(always)]
     fn asked_around(&self, row: usize, column: usize) -> Option<(f32, u32)> {
         let level = self.level;
@@ -216,7 +215,7 @@ fn fit_row_with<'a, S: Simd>(
     }
 }
 
-/// Fits sheets to a cell's clusters, largest first, until each has one or is near one, or there are as many as a cell may have.
+/// Fits sheets to a cell's clusters, largest first, until all are covered or [`SHEETS`] is reached.
 #[inline(always)]
 fn fit_cell<S: Simd>(
     simd: S,

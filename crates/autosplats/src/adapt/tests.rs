@@ -1,4 +1,4 @@
-//! Adapted surfels against surfaces that are known.
+//! Adapted surfels against known surfaces.
 
 mod dots;
 mod rows;
@@ -22,13 +22,13 @@ use crate::search::{Neighborhoods, SearchRules, screen_grid};
 use crate::test_clouds::{self, EYE, Positions, Random, noisy};
 
 pub(crate) const K: u32 = 10;
-/// Shapes stay as the fit leaves them.
+/// Keeps the shapes of fitted surfels.
 const ADAPT_RULES: AdaptRules = AdaptRules { k: K, longest: f32::MAX, keep_outliers: false };
 
-/// Of the depth camera's depths, at depth 1.
+/// Step of the depth camera at depth 1.
 const STEP: f32 = 0.0029;
 
-/// The surfels of a cloud as the fit leaves them: of the active points, and of the passive ones.
+/// The fitted surfels of a cloud: of the active points, and of the passive points.
 #[derive(Clone)]
 pub(crate) struct Case {
     pub(crate) screen: ScreenPoints,
@@ -42,18 +42,18 @@ impl Case {
         Self::scaled(positions, projection, size, 1.0)
     }
 
-    /// Seen from a place `scale` times as far away.
+    /// Seen from `scale` times as far away.
     fn scaled(positions: &[[f32; 3]], projection: Projection, size: [u32; 2], scale: f64) -> Self {
         let camera = Camera { eye: EYE * scale, look_at: DVec3::ZERO, up: DVec3::new(0.1, -1.0, 0.0), projection };
         Self::of(&PointCloud::new(DVec3::ZERO, positions.to_vec()), &camera, size)
     }
 
-    /// What a depth camera with coarse steps sees of a room, seen from beside the camera.
+    /// A room as a depth camera with coarse steps sees it, viewed from beside the camera.
     pub(crate) fn stepped() -> Self {
         Self::of_room(|depth| test_clouds::stepped(depth, STEP))
     }
 
-    /// A sphere with noise, and points before it, further off than noise puts them, and which points those are.
+    /// A noisy sphere with outliers further before it than noise explains, and which points are outliers.
     pub(crate) fn noisy_with_strays(projection: Projection) -> (Self, fn(u32) -> bool) {
         const SPHERE: usize = 40_000;
         let sigma = 0.01;
@@ -64,7 +64,7 @@ impl Case {
         (Self::new(&positions, projection, [400, 300]), |source| source >= SPHERE as u32)
     }
 
-    /// The same of the depth camera's room.
+    /// The room of [`stepped`](Self::stepped) with outliers.
     pub(crate) fn stepped_with_strays() -> (Self, fn(u32) -> bool) {
         let is_stray = |source: u32| source.is_multiple_of(211);
         let mut pixel = 0;
@@ -88,12 +88,12 @@ impl Case {
         Self::of(&PointCloud::new(DVec3::ZERO, positions).with_scans(vec![scan]), &camera, [480, 360])
     }
 
-    /// Rings that a lidar with some noise leaves on the ground and a wall, seen from above and behind.
+    /// Rings of a slightly noisy lidar on the ground and a wall, seen from above and behind.
     pub(crate) fn swept() -> Self {
         Self::swept_with_border(0)
     }
 
-    /// The same in a picture that is larger by so many pixels on each side, so that cells lie elsewhere.
+    /// The same in a picture with a border of so many pixels, which moves the cells.
     fn swept_with_border(border: u32) -> Self {
         let mut random = Random::new(31);
         let positions = test_clouds::swept(|distance| distance + 0.002 * random.gaussian());
@@ -137,7 +137,7 @@ impl Case {
         self.usual().noise
     }
 
-    /// Both rounds' surfels.
+    /// The surfels of both rounds.
     pub(crate) fn adapted(&self) -> Surfels {
         let mut adapter = Adapter::default();
         adapter.begin(&self.screen, &self.view, K);
@@ -168,14 +168,14 @@ fn the_noise_of_a_plane_is_measured() {
             let case = Case::new(&noisy(test_clouds::plane(8000), sigma), projection, [240, 180]);
             let Noise { level, power, sure, .. } = case.noise();
             assert_eq!(sure, 1.0, "{sigma} {projection:?}: there is nothing else");
-            // A quantile below the middle, of balls that hold few clusters, leans low.
+            // A quantile below the median, of balls with few clusters, is biased low.
             let ratio = level / sigma;
             assert!(power == 0.0 && (0.75..1.1).contains(&ratio), "{sigma} {projection:?}: {level}, {power}");
         }
     }
 }
 
-/// Up to nearly three times the distance of points, where noise fills the first balls and is cut by slabs.
+/// Up to nearly three point distances, where noise fills the first balls and slabs cut it.
 #[test]
 fn thick_noise_is_measured() {
     for sigma in [0.02, 0.04, 0.06] {
@@ -198,13 +198,13 @@ fn noise_that_grows_with_distance_is_measured() {
         let mut k_radii: Vec<f32> = near.map(|surfel| surfel.k_radius).collect();
         k_radii.sort_by(f32::total_cmp);
         let ratio = noise.at(k_radii[k_radii.len() / 2]) / (sigma * depth * depth);
-        // Noise makes k-radii larger too, which hides some of its growth; at the far end it is half of them, and slabs cut it. There
-        // eight samples told 0.36 to 0.54 of it; without points that stand alone in the noise it is 0.32.
+        // Noise enlarges k-radii too, which hides some of the growth. At the far end the noise is half a k-radius and
+        // slabs cut it, so the estimate is low.
         assert!((0.3..1.6).contains(&ratio), "{noise:?} is {ratio} times what it is at depth {depth}");
     }
 }
 
-/// As those of the next frame are. Samples of this cloud that had nothing in common told 0.36 to 0.54 of the noise at its far end.
+/// As in the next frame.
 #[test]
 fn nearly_the_same_surfels_have_nearly_the_same_noise() {
     let mut case = Case::new(&test_clouds::receding(60_000, 0.0004), PROJECTIONS[0], [400, 300]);
@@ -217,11 +217,11 @@ fn nearly_the_same_surfels_have_nearly_the_same_noise() {
         way += (noise.level / before.level - 1.0).abs() + (noise.power / before.power - 1.0).abs();
         before = noise;
     }
-    // Of samples picked by their places it was more than two.
+    // Samples picked by place in the list change several times as much.
     assert!(way < 0.3, "{way} in twenty steps");
 }
 
-/// Mean angle in degrees between the normals of surfels and those of the surface at their points.
+/// Mean angle in degrees between the normals of surfels and the true normals at their points.
 fn mean_error<'a>(surfels: impl IntoIterator<Item = &'a Surfel>, normal_of: impl Fn(&Surfel) -> Option<Vec3>) -> f32 {
     let of_one = |surfel: &Surfel| {
         let error = angle(surfel.normal, normal_of(surfel)?.into());
@@ -244,8 +244,8 @@ fn normals_of_a_noisy_sphere_are_the_spheres() {
     assert!(before > 15.0 && after < 5.0, "{before} degrees off, then {after}");
 }
 
-/// Noise that is seen from the side lies along lines of sight: cells hold more slabs of it than of a surface, and points that are
-/// pixels apart hide none of it.
+/// Noise seen from the side lies along lines of sight. Cells hold more slabs of it than of a surface, and points
+/// several pixels apart hide none of it.
 #[test]
 fn normals_of_noise_seen_from_the_side_are_the_surfaces() {
     let case = Case::new(&noisy(test_clouds::sphere(60_000), 0.035), PROJECTIONS[0], [800, 600]);
@@ -260,7 +260,7 @@ fn normals_of_noise_seen_from_the_side_are_the_surfaces() {
     assert!(after < 2.5, "{after} degrees off");
 }
 
-/// What is finer than the first balls scatters in them as noise does, but the more the larger the ball.
+/// Detail finer than the first balls scatters as noise does, but more in larger balls.
 #[test]
 fn structure_is_no_noise() {
     for projection in PROJECTIONS {
@@ -273,7 +273,7 @@ fn structure_is_no_noise() {
     }
 }
 
-/// Scatter differs from place to place, and most of it is more than the third that tells of noise as thick everywhere.
+/// Scatter differs from place to place, and most exceeds the quantile that fits uniform noise.
 #[test]
 fn scans_that_do_not_fit_are_one_surface() {
     let apart = 0.015;
@@ -283,7 +283,7 @@ fn scans_that_do_not_fit_are_one_surface() {
         let middle = Vec3::new(0.5 * apart, 0.0, 0.0);
         Some(case.view.view_from_world * (of_eye + case.view.eye_local - middle).normalize())
     };
-    // By mean over the sphere; that of one ball in three is half as much.
+    // The mean over the sphere; one ball in three has half as much.
     let ratio = case.noise().level / (0.5 * apart / 3f32.sqrt());
     assert!((0.7..1.2).contains(&ratio), "{ratio} times the noise");
     let before = mean_error(case.fitted.iter().flatten(), normal);
@@ -299,7 +299,7 @@ fn surfaces_in_steps_are_smooth() {
     // In the room's axes.
     let world = |surfel: &Surfel| askew * (back * Vec3::from(surfel.center) + case.view.eye_local);
     let view = |normal: Vec3| case.view.view_from_world * (askew.inverse() * normal);
-    // By where points are, and not near where the two meet.
+    // Chosen by the points' places, away from the corner.
     let floor = |surfel: &Surfel| {
         let at = world(surfel);
         (at.x.abs() < 0.8 && at.z < 5.0 && at.y > 0.8).then(|| view(Vec3::Y))
@@ -316,7 +316,7 @@ fn surfaces_in_steps_are_smooth() {
     ] {
         assert!(before > 2.0 && after < 0.2 * before, "{name}: normals {before} degrees off, then {after}");
     }
-    // How far from the wall.
+    // Root mean square distance from the wall.
     let distance = |surfels: &[Surfel]| {
         let on_wall = surfels.iter().filter(|surfel| surfel.radius > 0.0 && wall(surfel).is_some());
         let squares: Vec<f32> = on_wall.map(|surfel| (world(surfel).x - 1.5).powi(2)).collect();
@@ -332,9 +332,9 @@ fn rings_of_a_lidar_are_ground() {
     let back = case.view.view_from_world.transpose();
     let world = |surfel: &Surfel| back * Vec3::from(surfel.center) + case.view.eye_local;
     let down = case.view.view_from_world * Vec3::Y;
-    // How far from the sensor a beam meets the ground.
+    // Distance from the sensor at which a beam meets the ground.
     let ring = |beam: usize| 1.0 / test_clouds::beam_radians(beam).tan();
-    // Between the second and the last but one, and not near the wall.
+    // Between the second ring and the last but one, and not near the wall.
     let is_ground = |surfel: &Surfel| {
         let at = world(surfel);
         let away = at.x.hypot(at.z);
@@ -379,7 +379,7 @@ fn where_cells_lie_decides_little_of_what_rings_become() {
             !is_as_wide || angle(a.normal, b.normal) > 5.0
         };
         let share = pairs.iter().filter(differs).count() as f32 / pairs.len() as f32;
-        // With half as many cells in a radius it is 0.06.
+        // Half as many cells to a radius exceed this limit.
         assert!(share < 0.045, "{share} differ if the picture is {border} pixels larger");
     }
 }
@@ -399,7 +399,7 @@ fn a_noisy_edge_stays_sharp() {
     let errors = [[0.02, 0.08], [0.08, 0.3], [0.3, 0.8]].map(|[from, to]| {
         [mean_error(case.fitted.iter().flatten(), beside(from, to)), mean_error(&case.adapted(), beside(from, to))]
     });
-    // Blended over the edge they would be 45° off.
+    // Blended over the edge, normals would be 45° off.
     assert!(errors[0][1] < 12.0 && errors[1][1] < 6.0 && errors[2][1] < 3.0, "{errors:?}");
 }
 
@@ -414,8 +414,7 @@ fn a_step_of_ten_times_the_noise_is_two_surfaces() {
 
 #[test]
 fn a_clean_cloud_stays_as_it_is() {
-    // But for neighbours that are a row by chance, and of curved ones a few whose first neighbours are as near to each other
-    // as a quadric is to the surface.
+    // Exceptions form a line by chance, or have a k-radius as small as a quadric's residual on a curved surface.
     let is_kept = |at: usize, [x, ..]: [f32; 3]| (10.0 * x).sin() > 0.0 || at.is_multiple_of(8);
     let stripes = test_clouds::plane(40_000).into_iter().enumerate().filter(|&(at, p)| is_kept(at, p));
     let stripes = stripes.map(|(_, p)| p).collect();

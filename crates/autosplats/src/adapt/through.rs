@@ -1,10 +1,11 @@
-//! What is seen through a disc, and discs that hide too much.
+//! Discs that hide too much: points seen through a disc, and the radius that they leave.
 //!
-//! A surface takes all the points that its scanner sends there, so it is about as dense as what is seen beside it. Leaves, wires,
-//! and what was measured halfway between two surfaces, are few points before many. Their neighbours are far away and flat often
-//! enough, and their discs would hide what is seen between them. So where far more points are seen through a disc than on it, and
-//! what surrounds it is no surface, it shrinks to its share. What is close to the eye is sparse on the screen only: each point
-//! behind it counts for as many as would fall there if it lay no further away.
+//! A surface receives all the points that its scanner sends there, so it is about as dense as what is seen beside it.
+//! Leaves, wires and points measured halfway between two surfaces are few points before many. Their neighbours are far
+//! away and often flat, and their discs would hide what is seen between them. So a disc shrinks where far more points
+//! are seen through it than on it, unless its surroundings are a surface. Points close to the eye are sparse only on
+//! the screen. So each point behind the disc counts for as many as would fall there at the distance of the disc. See
+//! docs/decisions/0011-seen-through.md.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -15,47 +16,46 @@ use super::quadric::{Gathered, LEAST_CLUSTERS, Plane, Window};
 use crate::camera::View;
 use crate::fit::{SUPPORT, Surfel};
 
-/// Of the points seen where a disc is at least this share has to be on it; its radius shrinks in the measure that is lacking.
+/// Least share of the points seen at a disc that must lie on it. The radius shrinks in proportion to the missing share.
 pub(super) const LEAST_ON: f32 = 0.1;
-/// What is this far from the disc's plane is on it, radii.
+/// Distance from the disc's plane, in disc radii, up to which points are on the disc.
 pub(super) const ON_DISC: f32 = 0.3;
-/// Or this many times the noise.
+/// The same distance in noise levels; the larger of the two counts.
 pub(super) const ON_DISC_NOISE: f32 = 3.0;
-/// Where the k-radius is less than this many first search radii, what is around is not so much denser.
+/// K-radius, in first search radii, above which a disc is tested. With less, the surroundings are hardly denser.
 pub(super) const DENSER: f32 = 3.0;
-/// A surface is one however sparse it is, if it goes on to so many k-radii from the point: sheets of what was measured between two
-/// others do not.
+/// Radius, in k-radii, to which a sparse surface must go on. Points measured between two surfaces do not.
 pub(super) const GOES_ON: f32 = 4.0;
-/// It is as flat as this there, by surface variation,
+/// Largest surface variation of a surface in the ball of [`GOES_ON`].
 pub(super) const FLAT_AROUND: f32 = 0.005;
-/// as wide as this, or it is a wire: variance across over that along; at a straight border it is 0.33,
+/// Least variance across that ball, over that along. Wires have less; a straight border has 0.33.
 pub(super) const WIDE_AROUND: f32 = 0.25;
-/// and goes on to all sides: the mean is no further from the point, radii. At a straight border it is 0.37.
+/// Largest distance of that ball's mean from the point, in ball radii, of a surface on all sides; borders have 0.37.
 pub(super) const ALL_AROUND: f32 = 0.3;
-/// The disc's radius is at least so many cells, unless they are the finest: enough to count.
+/// Least radius of a disc in cells, where cells are that fine: enough cells to count.
 pub(super) const CELLS_TO_COUNT: f32 = 2.0;
 
-/// A disc, and what is near its plane, view space.
+/// A disc with a thickness, view space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Disc {
     pub(super) center: Vec3,
     /// Unit normal, of either sign.
     pub(super) axis: Vec3,
     pub(super) radius: f32,
-    /// What is no further from the plane, on either side, is on the disc.
+    /// Largest distance from the plane of points on the disc, to either side, world units.
     pub(super) half_thickness: f32,
 }
 
-/// What is seen where a disc is: on it, and behind it.
+/// Counts of what is seen where a disc is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Seen {
-    /// Cells that hold something on the disc, and others that hold something behind it.
+    /// Cells that hold points on the disc, and other cells that hold points behind.
     pub(super) cells: [f32; 2],
-    /// Points on it, and behind it: each of these counts for as many as would fall there if it lay on the disc's plane.
+    /// Points on the disc and behind, the latter as many as would fall there at the distance of the disc's plane.
     pub(super) points: [f32; 2],
 }
 
-/// What is seen on a `disc` and through it, in cells of which its radius is at least so many.
+/// Counts what is seen on a `disc` and through it, in cells with at least `cells_per_radius` to a radius.
 pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &View) -> Seen {
     let &Disc { center, axis, radius, half_thickness } = disc;
     let of_plane = axis.dot(center);
@@ -73,7 +73,7 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
                 if off.abs() <= half_thickness {
                     points[0] += count;
                 } else if way < 0.0 {
-                    // Distance from the eye on the plane over that of the point.
+                    // Distance of the plane from the eye over that of the point, along the line of sight.
                     let nearer = if view.perspective { (1.0 + way).max(0.0) } else { 1.0 };
                     points[1] += count * (nearer * nearer);
                 }
@@ -88,8 +88,8 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
     seen
 }
 
-/// Shrinks a surfel, whose points scatter by `noise`, to its share of what is seen where it is, unless it is one of a surface; to
-/// a dot at least. Of an ellipse the circle within is asked, and the ellipse shrinks.
+/// Shrinks a surfel to its share of what is seen where it is, at least to a dot, unless it belongs to a surface.
+/// `noise` is the noise level, world units. For an ellipse the inner circle is tested and the whole ellipse shrinks.
 #[inline(always)]
 pub(super) fn open<S: Simd>(
     simd: S,
@@ -106,7 +106,7 @@ pub(super) fn open<S: Simd>(
     let half_thickness = (ON_DISC * radius).max(ON_DISC_NOISE * noise);
     let disc = Disc { center: surfel.center.into(), axis: surfel.normal.into(), radius, half_thickness };
     let [on, behind] = seen(&disc, CELLS_TO_COUNT, cells, view).points;
-    // Its own point is on it, and may have moved.
+    // The surfel's own point is on the disc, and may have moved.
     let on = on.max(1.0);
     let share = on / (on + behind);
     if !(share < LEAST_ON) {

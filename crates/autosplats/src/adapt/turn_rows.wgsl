@@ -1,6 +1,6 @@
-// Turns surfels of rows onto areas, or makes them thin, and shrinks those that are no surface: a workgroup for a few surfels, which takes
-// up those of rows together. They are few, but ask for several balls each, and one by one each invocation would wait for those of
-// its neighbours. See the CPU form.
+// Turns surfels on scan lines to their areas or makes them thin, and shrinks those that are no surface. A workgroup for
+// a few surfels fits those on scan lines together, one after the other. Such surfels are rare but need several balls
+// each; with an invocation per surfel, neighbours would wait. See the CPU form.
 //
 // Reads: density, levels, clusters, measured, depth_noise. Reads and writes: counters, surfels.
 
@@ -22,12 +22,12 @@
 @group(0) @binding(6) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(7) var<storage, read_write> surfels: array<Surfel>;
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 // Surfels of a workgroup.
 override FEW: u32;
 
-// Which of the workgroup's surfels are of rows, as bits, and what all need to know of the frame.
+// Bit mask of the workgroup's surfels on scan lines, and what all invocations need to know.
 var<workgroup> found_rows: atomic<u32>;
 struct Task {
     rows: u32,
@@ -36,7 +36,7 @@ struct Task {
     cell_columns: u32,
 }
 var<workgroup> task: Task;
-// The row that is taken up.
+// The surfel being turned.
 var<workgroup> shared_surfel: Surfel;
 
 @compute @workgroup_size(TOGETHER)

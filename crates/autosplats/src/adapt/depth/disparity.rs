@@ -1,43 +1,44 @@
 //! Noise of disparities: the same in inverse depth everywhere.
 //!
 //! # How it works
-//! In a camera's picture a plane is a linear function in inverse depth, too. So the picture is cut into square windows, a
-//! plane is fitted to each, and what it leaves over is sorted by depth. The flattest windows of each range of depths show
-//! noise, the others structure. If that is as much in inverse depth from near to far, it is noise of disparities: the
-//! same error of a depth, as time of flight has it, falls with its square, and structure seen through an angle at least with depth.
+//! In a camera's picture a plane is a linear function in inverse depth, too. So the picture is cut into square windows,
+//! a plane is fitted to each, and the residuals are sorted by depth. In each range of depths the flattest windows show
+//! noise, the others structure. A residual that is the same in inverse depth from near to far is noise of disparities.
+//! In inverse depth, the constant depth error of time of flight falls with the square of depth. Structure seen through
+//! a fixed angle falls at least with depth.
 
 use glam::DVec3;
 
 use super::{Law, WIDEST};
 
-/// Points in a full window, about. Of a Kinect's picture every fourth to sixth point is taken, and windows are 20 pixels wide,
-/// twice as wide as those that it matches.
+/// Expected points in a full window. A Kinect's picture is sampled at every fourth to sixth point. Windows are then 20
+/// pixels wide, twice as wide as those that the Kinect matches.
 const WINDOW_POINTS: f64 = 96.0;
-/// Share of them without which a window says nothing.
+/// Least filling of a window, as a share of [`WINDOW_POINTS`].
 const LEAST_FULL: f64 = 0.5;
-/// Ranges of depth, with as many windows in each.
+/// Ranges of depth, with equally many windows each.
 const RANGES: usize = 6;
-/// Windows in each, at least.
+/// Fewest windows per range.
 const LEAST_WINDOWS: usize = 24;
-/// The noise of a range is this quantile of its windows.
+/// Quantile of a range's windows that is the noise.
 const QUANTILE: f64 = 0.2;
-/// Median depths of the farthest and the nearest range are at least so far apart, far over near.
+/// Least ratio of the median depths of the farthest and the nearest range.
 const APART: f64 = 2.0;
-/// Most power of depth that the noise of inverse depths may grow or fall with, and how far ranges may be off that, as
-/// standard deviation of logarithms.
+/// Largest power of depth, up or down, that noise of inverse depths may follow.
 const STEEPEST: f64 = 0.5;
+/// Largest deviation of ranges from such a power, as a standard deviation of logarithms.
 const TIGHT: f64 = 0.3;
-/// Noise over rounding, at least.
+/// Least ratio of noise to rounding.
 const LEAST_NOISE: f64 = 8.0;
-/// Noise over what windows show of it: they take part of it for the slope of their plane.
+/// Ratio of noise to what windows show of it. The slope of a window's plane absorbs a part.
 const UNSEEN: f64 = 1.25;
-/// Cells along the longer side of the picture that tell how much of it is filled.
+/// Cells along the longer side of the picture, for measuring how much of the picture is filled.
 const CELLS: f64 = 128.0;
 
 /// Sums over a window's points, about its middle: of 1, u, v, d, and of the products.
 type Sums = [f64; 10];
 
-/// The law of a camera's noise, by points in its own axes, depth last.
+/// The law of a camera's noise. `points` are in the camera's axes, depth last; `rounding` is that of coordinates.
 pub(super) fn law(mut points: Vec<DVec3>, rounding: f64) -> Option<Law> {
     points.retain_mut(|point| {
         let inverse = 1.0 / point.z;
@@ -50,7 +51,7 @@ pub(super) fn law(mut points: Vec<DVec3>, rounding: f64) -> Option<Law> {
     if len < LEAST_WINDOWS {
         return None;
     }
-    // Of each range: logarithms of depth, and of the noise of inverse depth.
+    // Per range: logarithms of depth, and of the noise of inverse depth.
     let ranges: Vec<[f64; 2]> = windows
         .chunks_exact(len)
         .take(RANGES)
@@ -77,14 +78,14 @@ pub(super) fn law(mut points: Vec<DVec3>, rounding: f64) -> Option<Law> {
     is_law.then_some(Law { factor, power: 2 })
 }
 
-/// What is left of the plane of a window.
+/// Residual of a window's plane.
 struct Window {
     inverse_depth: f64,
     /// Standard deviation of inverse depths.
     noise: f64,
 }
 
-/// The windows of a picture that are filled, nearest first.
+/// The filled windows of a picture, nearest first.
 fn windows(on_picture: &[DVec3]) -> Vec<Window> {
     let mut least = [f64::INFINITY; 2];
     let mut most = [f64::NEG_INFINITY; 2];
@@ -107,7 +108,7 @@ fn windows(on_picture: &[DVec3]) -> Vec<Window> {
         filled[row * columns + column] = true;
     }
     let area = filled.iter().filter(|filled| **filled).count() as f64 * side * side;
-    // No smaller than such cells, which bounds their number.
+    // At least as large as these cells, which bounds the number of windows.
     let side = (area * WINDOW_POINTS / on_picture.len() as f64).sqrt().max(side);
     let columns = (longer / side) as usize + 1;
     let mut sums: Vec<Sums> = vec![[0.0; 10]; columns * columns];
@@ -139,6 +140,6 @@ fn plane(&[count, u, v, d, uu, uv, vv, ud, vd, dd]: &Sums) -> Option<Window> {
     }
     let [slope_u, slope_v] = [(vv * ud - uv * vd) / determinant, (uu * vd - uv * ud) / determinant];
     let rest = dd - slope_u * ud - slope_v * vd;
-    // What is rounding has no logarithm to speak of.
+    // A residual of 0 has no logarithm.
     Some(Window { inverse_depth: d, noise: rest.max(0.0).sqrt().max(f64::MIN_POSITIVE) })
 }

@@ -1,15 +1,15 @@
 //! The noise of depth cameras.
 //!
 //! # How it works
-//! A camera that finds depth by matching a pattern or a second picture knows disparities, which are inverse depths. It knows
-//! them in steps, and neighbours err alike, because they are matched by windows of pixels. So its points lie on planes a
-//! step apart, 3 mm at 1 m and 27 cm at 9.7 m, many times what neighbouring points are apart, or on a surface that waves as
-//! much. Small neighbourhoods scatter little then, and their normals are wrong: what is measured in a frame (`noise`) says
-//! that all is well. But such noise gives itself away in the scan as a whole, once for a cloud: depths come in steps
-//! (`steps`), or what windows of neighbours leave of planes is as much in inverse depth near and far (`disparity`). It grows
-//! with a power of the depth from its sensor, whatever the eye is. The noise of a surfel is this or what was measured,
-//! whichever is larger; and as it was made along the ray from the sensor, it is undone along it. Each scan has a law of its
-//! own, and each point that of the scan it belongs to.
+//! A camera that finds depth by matching a pattern or a second picture measures disparities, which are inverse depths.
+//! Disparities come in steps, and neighbours err alike because windows of pixels are matched. So the camera's points
+//! lie on planes a step apart: 3 mm at 1 m and 27 cm at 9.7 m, many times the distance of neighbours. Or they lie on a
+//! surface with waves as high. Small neighbourhoods then scatter little and their normals are wrong, and the noise
+//! measured in a frame (`noise`) is far too low. Such noise shows in the scan as a whole, once per cloud. Either depths
+//! come in steps (`steps`), or the residuals of planes in windows are equal in inverse depth near and far
+//! (`disparity`). The noise grows with a power of the depth from the sensor, independent of the eye. A surfel uses the
+//! larger of this known noise and the measured one. As the noise acts along the sensor's ray, surfels move along that
+//! ray. Each scan has its own law, and each point that of its scan. See docs/decisions/0009-depth-cameras.md.
 
 mod disparity;
 mod steps;
@@ -25,55 +25,55 @@ use rayon::prelude::*;
 use crate::camera::View;
 use crate::fit::orient::runs;
 
-/// Fewer points of a scan say nothing.
+/// Fewest points of a scan that give a law.
 const LEAST_POINTS: usize = 1 << 10;
-/// Points whose steps are looked at, of all scans together.
+/// Points checked for steps, of all scans together.
 const STEPS_SAMPLE: usize = 1 << 14;
-/// Points of windows, of all scans together.
+/// Points put into windows, of all scans together.
 const DISPARITY_SAMPLE: usize = 1 << 16;
-/// Share of the points that may be outside of a camera's view.
+/// Largest share of a scan's points outside the field of view.
 const OUTSIDE: f64 = 0.001;
-/// Tangent of half the widest angle of view.
+/// Tangent of half the widest field of view.
 const WIDEST: f64 = 4.0;
-/// Rounding of coordinates, as a part of the largest one.
+/// Rounding of coordinates, relative to the largest one.
 const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
-/// A surfel moves at most this many standard deviations along the ray: a surface further away is not what it was seen on.
+/// Longest move of a surfel along the ray, in standard deviations; surfaces further away are others.
 pub(super) const FARTHEST_ALONG: f32 = 3.0;
-/// A disc becomes at most this many times as long as it was when it is turned.
+/// Largest factor by which a disc grows in length when it is turned.
 pub(super) const LONGEST_SHADOW: f32 = 2.0;
-/// Cosine of the angle between ray and normal at which a surfel is moved along both alike.
+/// Cosine between ray and normal at which half of the way to the plane is along the ray, half along the normal.
 pub(super) const GRAZING: f32 = 0.1;
 
-/// How depths scatter that one sensor measured, those of the points from one index on.
+/// The noise law of one sensor, for the points from one index on.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct DepthRun {
-    /// Where the sensor stood, about the cloud's origin.
+    /// Position of the sensor relative to the cloud's origin.
     pub(crate) position: [f32; 3],
     /// Index of the first point.
     pub(crate) first: u32,
-    /// Where it looked: a unit vector, in the axes of the cloud.
+    /// Viewing direction: a unit vector in the axes of the cloud.
     pub(crate) axis: [f32; 3],
-    /// Standard deviation at depth 1 along the axis; 0 if nothing is known.
+    /// Standard deviation at depth 1 along the axis; 0 if unknown.
     pub(crate) factor: f32,
-    /// Of depth, that it grows with: 0, 1 or 2.
+    /// Power of depth that the noise grows with: 0, 1 or 2.
     pub(crate) power: f32,
     pub(crate) padding: [u32; 3],
 }
 
-/// What is known of the noise of a cloud, in the order of its points, from point 0 on. Empty if nothing is.
+/// Known noise of a cloud: runs in the order of points, from point 0 on. Empty if nothing is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DepthNoise {
     pub(super) runs: Vec<DepthRun>,
 }
 
-/// What is known of the noise at a surfel.
+/// Known noise at a surfel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Known {
     /// Standard deviation, world units.
     pub(super) noise: f32,
-    /// Unit direction along which it was made, view space.
+    /// Unit direction along which the noise acts, view space.
     pub(super) ray: Vec3,
 }
 
@@ -85,7 +85,7 @@ struct Law {
 }
 
 impl DepthNoise {
-    /// Of the scans of `cloud`, each by itself.
+    /// Estimates the noise of each scan of `cloud`.
     pub(crate) fn new(cloud: &PointCloud) -> Self {
         let runs = runs(cloud);
         let known = runs.iter().filter(|(_, scan)| scan.is_some()).count().max(1);
@@ -100,7 +100,7 @@ impl DepthNoise {
         Self { runs: if is_known { found } else { Vec::new() } }
     }
 
-    /// As the device has it: at least one run.
+    /// The runs for the GPU, at least one.
     pub(crate) fn on_device(&self) -> Vec<DepthRun> {
         if self.runs.is_empty() { vec![bytemuck::Zeroable::zeroed()] } else { self.runs.clone() }
     }
@@ -115,7 +115,7 @@ impl DepthNoise {
         Self { runs: self.runs.iter().map(turn).collect() }
     }
 
-    /// At a place in the axes of these sensors; of a cloud's point.
+    /// The noise at `place`, in the axes of these sensors, for a point of the cloud; `None` if unknown.
     #[inline(always)]
     pub(super) fn at(&self, place: Vec3, point: u32) -> Option<Known> {
         let run = match self.runs.as_slice() {
@@ -125,7 +125,7 @@ impl DepthNoise {
         };
         let from_sensor = place - Vec3::from(run.position);
         let depth = from_sensor.dot(run.axis.into());
-        // What is in the sensor itself, or behind it, was not seen by it.
+        // The sensor saw nothing at itself or behind.
         if !(run.factor > 0.0 && depth > 0.0) {
             return None;
         }
@@ -135,8 +135,8 @@ impl DepthNoise {
 }
 
 impl Known {
-    /// A move by `offset` onto the plane with a `normal`, made along the ray instead; along the normal where the ray is
-    /// nearly in the plane.
+    /// Replaces a move by `offset` onto the plane with a `normal` by a move along the ray. Where the ray nearly lies in
+    /// the plane, the move stays along the normal.
     #[inline(always)]
     pub(super) fn onto(&self, normal: Vec3, offset: Vec3) -> Vec3 {
         let distance = offset.dot(normal);
@@ -149,9 +149,9 @@ impl Known {
         (self.ray * along + normal * rest) * part
     }
 
-    /// The shadow that a disc with the normal `before` casts along the ray on a plane with the normal `after`, as its major
-    /// axis and how many times as long it is as wide; `None` if it is no longer. The disc was as wide as the points of a step
-    /// need it, and would leave gaps where the surface is steep.
+    /// The shadow that a disc with the normal `before` casts along the ray onto a plane with the normal `after`: major
+    /// axis and ratio of length to width. `None` if the shadow is no longer than the disc. The unstretched disc fits
+    /// the points of a depth step and would leave gaps on a steep surface.
     #[inline(always)]
     pub(super) fn shadow(&self, before: Vec3, after: Vec3) -> Option<(Vec3, f32)> {
         let slope = self.ray.dot(after);
@@ -161,27 +161,27 @@ impl Known {
     }
 }
 
-/// Of the points of a scan by index, where there are `scans` of them.
+/// The noise of a scan with these points; `scans` is the number of scans that share the samples.
 fn of_scan(cloud: &PointCloud, scan: &Scan, points: Range<usize>, scans: usize) -> Option<DepthRun> {
     if points.len() < LEAST_POINTS {
         return None;
     }
     let position = scan.position() - cloud.origin();
     let points = &cloud.positions()[points];
-    // About so many, evenly.
+    // An even sample of about `most / scans` points.
     let sample = |most: usize, sensor_from_world: DMat3| -> Vec<DVec3> {
         let stride = points.len().div_ceil((most / scans).max(LEAST_POINTS));
         let picked = points.iter().step_by(stride).map(|point| Vec3::from(*point)).filter(|point| point.is_finite());
         picked.map(|point| sensor_from_world * (point.as_dvec3() - position)).collect()
     };
     let few = sample(STEPS_SAMPLE, DMat3::IDENTITY);
-    // Coordinates are rounded where they are about the cloud's origin.
+    // Coordinates are rounded relative to the cloud's origin.
     let largest = few.iter().map(|point| point.abs().max_element()).fold(position.abs().max_element(), f64::max);
     let rounding = ROUNDING * largest;
     let [x, y, z] = [scan.world_from_sensor.x_axis, scan.world_from_sensor.y_axis, scan.world_from_sensor.z_axis]
         .map(|axis| axis.truncate().normalize_or_zero());
-    // A camera looks along its third axis, and sees what is before it. But not all formats say what a sensor's axes are: it
-    // is the one about which all points are.
+    // A camera looks along its third axis, but some formats do not define a sensor's axes. So each axis with all points
+    // before it is tried.
     [[x, y, z], [y, z, x], [z, x, y], [x, y, -z], [y, z, -x], [z, x, -y]].into_iter().find_map(|[x, y, axis]| {
         let sensor_from_world = DMat3::from_cols(x, y, axis).transpose();
         let seen: Vec<DVec3> = few.iter().map(|point| sensor_from_world * *point).collect();

@@ -1,52 +1,53 @@
 //! Depths in coarse steps.
 //!
 //! # How it works
-//! Depths in steps have few different values, while there are many along the other axes of the sensor; and the gaps between
-//! those values follow a power of depth: 2 where disparities are whole numbers, 0 where depths are.
+//! Depths in steps take few values, while coordinates along the sensor's other axes take many. The gaps between those
+//! values follow a power of depth: 2 if disparities are whole numbers, 0 if depths are.
 
 use glam::DVec3;
 
 use super::Law;
 
-/// Fewer steps have no law.
+/// Fewest distinct depths that give a law.
 const LEAST_VALUES: usize = 8;
-/// Points per value, at least.
+/// Fewest points per distinct depth.
 const POINTS_PER_VALUE: usize = 6;
-/// Values along other axes per value along the sensor's: coordinates that are all rounded, and grids, have no such axis.
+/// Fewest values along each other axis per depth value. Rounded coordinates and grids have fewer.
 const OTHER_VALUES: usize = 4;
-/// Steps are at least this many times as wide as coordinates are rounded.
+/// Least width of a step, in roundings of coordinates.
 const LEAST_STEP: f64 = 8.0;
-/// Points of a depth that tell whether they are a line.
+/// Fewest points of equal depth that are tested for lying on a line.
 const LEAST_ALIKE: usize = 8;
-/// Powers of depth that steps may grow with: of disparities, of anything between, of depths.
+/// Candidate powers of depth for the steps: of disparities, of something in between, of depths.
 const POWERS: [i32; 3] = [2, 1, 0];
-/// A gap is as wide as a number of steps up to this part of one.
+/// Largest deviation of a gap from a whole number of steps, in steps.
 const TIGHT: f64 = 0.25;
-/// Share of the gaps that are one step wide, at least, and of those that are some whole number of steps wide.
+/// Least share of the gaps that are one step wide.
 const ONE_STEP: f64 = 0.6;
+/// Least share of the gaps that are a whole number of steps wide.
 const WHOLE_STEPS: f64 = 0.75;
 
-/// Standard deviation of a depth, in steps: 1/√3. Rounding alone makes half as much, but neighbours are rounded alike, so that
-/// fits average less out than of errors that are independent, and depths between two steps toggle. With 1/√12 bodies are
-/// lumpy and walls crazed, with √3/2 folds of cloth are gone. Nguyen, Izadi, Lovell: *Modeling Kinect Sensor Noise for Improved
-/// 3D Reconstruction and Tracking*, 2012, measured as much.
+/// Standard deviation of a depth, in steps: 1/√3. Rounding alone gives half as much. But neighbours are rounded alike,
+/// so fits average out less than with independent errors, and depths between two steps toggle. With 1/√12 bodies are
+/// lumpy and walls crazed; with √3/2 folds of cloth vanish. The value agrees with Nguyen, Izadi, Lovell: *Modeling
+/// Kinect Sensor Noise for Improved 3D Reconstruction and Tracking*, 2012.
 const STEP_ERROR: f64 = 0.577_350_269_189_625_8;
 
-/// The law of a sensor's steps, by points in its own axes, depth last.
+/// The law of a sensor's steps. `points` are in the sensor's axes, depth last; `rounding` is that of coordinates.
 pub(super) fn law(points: &[DVec3], rounding: f64) -> Option<Law> {
     let values = distinct(points.iter().map(|point| point.z).filter(|depth| *depth > rounding), rounding);
     if values.len() < LEAST_VALUES || values.len() * POINTS_PER_VALUE > points.len() {
         return None;
     }
     let (step, power) = steps(&values).filter(|(step, power)| step * values[0].powi(*power) > LEAST_STEP * rounding)?;
-    // Last, because it sorts twice more.
+    // Checked last, as it sorts twice more.
     let others = [0, 1].map(|axis| distinct(points.iter().map(|point| point[axis]), rounding).len());
     let alone = others.iter().all(|other| *other >= OTHER_VALUES * values.len()) && fill_areas(points, rounding);
     alone.then_some(Law { factor: STEP_ERROR * step, power })
 }
 
-/// Whether points of a depth are spread over the picture. All of a row has one depth where a camera is held level over a floor,
-/// and depths of rows have the same law as steps, though there is no noise at all.
+/// Whether points of equal depth are spread over the picture. When a level camera sees a floor, each image row has one
+/// depth. Depths of image rows follow the law of steps without any noise.
 fn fill_areas(points: &[DVec3], rounding: f64) -> bool {
     let mut sorted: Vec<[f64; 3]> =
         points.iter().map(|point| [point.z, point.x / point.z, point.y / point.z]).collect();
@@ -67,13 +68,13 @@ fn fill_areas(points: &[DVec3], rounding: f64) -> bool {
     2 * areas > all
 }
 
-/// The values that are further than `rounding` apart, in order.
+/// The sorted values, without those within `rounding` of the next smaller one.
 fn distinct(values: impl Iterator<Item = f64>, rounding: f64) -> Vec<f64> {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let mut last = f64::NEG_INFINITY;
     sorted.retain(|value| {
-        // To the value before, not to the first that is equal: of a continuum one is left.
+        // Compared with the value just before, so that one value of a continuum is left.
         let is_new = *value - last > rounding;
         last = *value;
         is_new
@@ -81,11 +82,11 @@ fn distinct(values: impl Iterator<Item = f64>, rounding: f64) -> Vec<f64> {
     sorted
 }
 
-/// The width of a step at 1 and the power of depth that it grows with, if gaps between the values have such a law.
+/// The width of a step at depth 1 and the power of depth that steps grow with, if the gaps between values follow a law.
 fn steps(values: &[f64]) -> Option<(f64, i32)> {
     let mut best: Option<(f64, f64, i32)> = None;
     for power in POWERS {
-        // Between equal disparities the gap of two depths is their product times a constant.
+        // For disparities one step apart, the gap of two depths is proportional to their product.
         let widths: Vec<f64> =
             values.windows(2).map(|pair| (pair[1] - pair[0]) / (pair[0] * pair[1]).sqrt().powi(power)).collect();
         let mut sorted = widths.clone();

@@ -1,4 +1,4 @@
-//! Which clouds are known to be noisy, how much, and what surfels make of it.
+//! Which clouds have known noise, how much, and how it moves surfels.
 
 use autosplats_cloud::glam::{DMat4, DQuat};
 
@@ -8,7 +8,7 @@ use crate::test_clouds::{self, Positions, Random, room, stepped};
 
 const STEP: f32 = 0.0029;
 
-/// A cloud seen by a sensor with a pose, in whose axes the positions are.
+/// A cloud seen by a sensor with this pose; positions are in the sensor's axes.
 fn seen_from(pose: DMat4, origin: DVec3, positions: &[[f32; 3]]) -> PointCloud {
     let of_world = |point: &[f32; 3]| {
         let point = DVec3::from(point.map(f64::from));
@@ -22,7 +22,7 @@ fn by_camera(positions: Positions) -> PointCloud {
     seen_from(DMat4::IDENTITY, DVec3::ZERO, &positions)
 }
 
-/// Factor and power of the only run there is.
+/// Factor and power of the only run.
 fn law(cloud: &PointCloud) -> Option<(f32, f32)> {
     let noise = DepthNoise::new(cloud);
     assert!(noise.runs.len() <= 1, "of one scan: {noise:?}");
@@ -38,11 +38,11 @@ fn steps_are_found() {
     let factor = STEP / 3f32.sqrt();
     let found = law(&by_camera(room(200, |depth| stepped(depth, STEP))));
     assert!(near(found, factor, 2.0, 0.01), "{found:?}");
-    // As files in millimetres have them.
+    // As in files with millimetres.
     let millimetres = |depth: f32| (1000.0 * depth).round() / 1000.0;
     let found = law(&by_camera(room(200, |depth| millimetres(stepped(depth, STEP)))));
     assert!(near(found, factor, 2.0, 0.02), "{found:?}");
-    // Where the camera says depths by eight bits.
+    // A camera with depths of eight bits.
     let found = law(&by_camera(room(200, |depth| (depth / 0.04).round() * 0.04)));
     assert!(near(found, 0.04 / 3f32.sqrt(), 0.0, 0.01), "{found:?}");
     // Some pixels are the mean of two others.
@@ -56,7 +56,7 @@ fn steps_are_found() {
 fn the_sensor_may_stand_and_look_anywhere() {
     let positions = room(200, |depth| stepped(depth, STEP));
     let turns = [DQuat::IDENTITY, DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0)];
-    // Axes as a camera's, a robot's, and a graphics library's.
+    // Axes of a camera, of a robot, and of a graphics library.
     let axes = [
         DQuat::IDENTITY,
         DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2),
@@ -81,7 +81,7 @@ fn the_sensor_may_stand_and_look_anywhere() {
     }
 }
 
-/// Noise of inverse depth, the same in squares of four by four pixels if it is `alike`.
+/// A room with noise of inverse depth, equal in squares of four by four pixels if `alike`.
 fn disparities(sigma: f32, alike: bool) -> Positions {
     let width = 320;
     let mut random = Random::new(5);
@@ -99,7 +99,7 @@ fn disparities(sigma: f32, alike: bool) -> Positions {
 fn noise_of_disparities_is_found() {
     for alike in [false, true] {
         let found = law(&by_camera(disparities(0.0014, alike)));
-        // Less is seen of noise that is correlated.
+        // Correlated noise shows less.
         let ratio = found.map_or(0.0, |(factor, power)| if power == 2.0 { factor / 0.0014 } else { 0.0 });
         assert!((0.9..1.4).contains(&ratio), "{alike}: {found:?}");
     }
@@ -109,12 +109,12 @@ fn noise_of_disparities_is_found() {
 fn other_clouds_are_let_be() {
     let mut random = Random::new(6);
     let time_of_flight = room(320, |depth| depth + 0.005 * random.gaussian());
-    // Voxels, whose coordinates are all in steps; and pixels of an image of depths that are equal.
+    // Voxels, whose coordinates all come in steps.
     let voxels = room(320, |depth| depth).iter().map(|point| point.map(|c| (c / 0.04).round() * 0.04)).collect();
     let mut random = Random::new(7);
     let surroundings =
         (0..100_000).map(|_| random.direction().map(|c| (500.0 * c).round() / 100.0)).collect::<Positions>();
-    // Where a camera without noise is held level, all of a row has one depth, and rows follow the law of disparities.
+    // A level camera without noise: each image row has one depth, and the rows follow the law of disparities.
     let level = |walls: bool| -> Positions {
         let at = |pixel: usize| [pixel % 240, pixel / 240].map(|at| (at as f32 + 30.0) / 240.0);
         let depth = |[x, y]: [f32; 2]| if walls { (1.0 / y).min(1.5 / x).min(5.0) } else { 1.0 / y };
@@ -170,7 +170,7 @@ fn hostile_values_do_no_harm() {
             nothing(&cloud, &format!("{pose}"));
         }
     }
-    // What is not finite is left out.
+    // Non-finite points are left out.
     let mut holes = positions;
     holes.iter_mut().step_by(3).for_each(|point| *point = [f32::NAN; 3]);
     holes.iter_mut().skip(1).step_by(997).for_each(|point| *point = [f32::INFINITY, 0.0, 1.0]);

@@ -1,4 +1,4 @@
-//! The stage on the GPU against that on the CPU, fed with the same surfels.
+//! The stage on the GPU against the CPU, with the same surfels.
 
 use super::super::cells::{CellRow, Cells, Cluster, Level};
 use super::super::noise::{Noise, Usual};
@@ -10,14 +10,14 @@ use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::test_clouds::{self, noisy};
 
-/// Clusters of a cell that lie side by side on the device.
+/// Clusters of a cell that are contiguous on the device.
 pub(crate) const BUNCH: usize = 4;
-/// Cells that may differ: rounding puts a few means into the next slab.
+/// Share of cells that may differ: rounding moves a few means into the next slab.
 const UNLIKE_CELLS: f64 = 1e-3;
-/// Surfels that may differ: rounding decides whether a ball is the last.
+/// Share of surfels that may differ: rounding decides whether a ball is the last.
 const UNLIKE_SURFELS: f64 = 1e-2;
 
-/// What the device makes of a case.
+/// Results of the device.
 struct Made {
     /// Clusters of each cell, level by level.
     cells: Cells,
@@ -70,7 +70,7 @@ fn read_cells(gpu: &Gpu, buffers: &AdaptBuffers, size: [u32; 2]) -> Cells {
     Cells { levels: levels.iter().filter(|level| level[0] > 0).map(of_level).collect() }
 }
 
-/// Filled cells that differ, and all of them.
+/// Number of filled cells that differ, and of all filled cells.
 fn unlike_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
     let layout = |cells: &Cells| -> Vec<_> {
         cells.levels.iter().map(|level| [level.side_px, level.columns, level.rows.len()]).collect()
@@ -108,7 +108,7 @@ fn compare_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
 }
 
 fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
-    // Where nothing scatters, what is left is the rounding of positions a few units away.
+    // Without scatter, the rounding of positions a few units away remains.
     let near = |a: f32, b: f32| (a - b).abs() <= 0.01 * b.abs() + 1e-6;
     let same = near(device.noise.level, host.noise.level)
         && near(device.noise.most, host.noise.most)
@@ -131,7 +131,7 @@ fn is_like(device: &Surfel, host: &Surfel) -> bool {
         && (device.major_ratio - host.major_ratio).abs() <= 0.02 * host.major_ratio
 }
 
-/// Surfels that differ.
+/// Number of surfels that differ.
 fn compare_surfels(device: &[Surfel], host: &[Surfel]) -> Result<usize, String> {
     let unlike = device.iter().zip(host).filter(|(device, host)| !is_like(device, host)).count();
     let all = host.len();
@@ -163,7 +163,7 @@ fn the_device_fills_the_cells_that_the_host_fills() {
     assert!(all[1] > 100_000, "there is something to compare: {all:?}");
 }
 
-/// Noisy and clean surfaces, and whether they are noisy.
+/// Name, whether noisy, and points of noisy and clean surfaces.
 fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
     vec![
         ("noisy plane", true, noisy(test_clouds::plane(12_000), 0.02)),
@@ -179,14 +179,14 @@ fn surfaces() -> Vec<(&'static str, bool, test_clouds::Positions)> {
     ]
 }
 
-/// Of what shrinks there is little, so that it is compared by itself.
+/// Few surfels shrink, so they are compared separately.
 #[test]
 fn the_device_shrinks_what_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
     let passes = AdaptPasses::new(&gpu).expect("passes");
     let compare = |name: &str, case: &Case, is_asked: &dyn Fn(u32) -> bool, least: f64| {
         let fitted = case.fitted.concat();
-        // Of those that the fit leaves.
+        // Of the surfels that the fit leaves.
         let is_left = |surfel: &Surfel| is_asked(surfel.source) && surfel.radius > 0.0;
         let of = |surfels: Surfels| -> Surfels {
             surfels.into_iter().zip(&fitted).filter(|(_, fitted)| is_left(fitted)).map(|(surfel, _)| surfel).collect()
@@ -214,7 +214,7 @@ fn the_device_shrinks_what_the_host_does() {
     compare("in a room", &room, &is_stray, 0.2);
 }
 
-/// A device of one kind is there to test on: as many as on those of the other kind sum up a ball there as well.
+/// Only one kind of device is available for tests, so the workgroup size of the other kind is tested on it too.
 #[test]
 fn however_many_sum_up_a_ball_the_device_adapts_as_the_host_does() {
     let Some(gpu) = test_gpu() else { return };
@@ -255,7 +255,7 @@ fn the_device_adapts_as_the_host_does() {
             if is_noisy {
                 assert!(2 * changed > host.len(), "{name} {projection:?}: {changed} of {} adapted", host.len());
             } else {
-                // But for neighbours that are a row by chance.
+                // Except neighbours that form a line by chance.
                 assert!(changed <= host.len() / 400, "{name} {projection:?}: {changed} changed");
             }
         }
@@ -273,7 +273,7 @@ fn the_device_knows_the_noise_of_a_depth_camera_as_the_host_does() {
     let changed = host.iter().zip(&case.fitted.concat()).filter(|(a, b)| a != b).count();
     assert!(2 * changed > host.len(), "{changed} of {} adapted", host.len());
     compare_surfels(&made.surfels, &host).unwrap_or_else(|error| panic!("{error}"));
-    // Of points from one index on something is known, of the others nothing.
+    // Noise is known for points from one index on, and unknown before.
     let half = host.len() as u32 / 2;
     case.known.runs.insert(0, bytemuck::Zeroable::zeroed());
     case.known.runs[1].first = half;
@@ -318,7 +318,7 @@ fn comparison_sees_what_is_wrong() {
     let case = Case::new(&noisy(test_clouds::sphere(20_000), 0.02), PROJECTIONS[0], [240, 180]);
     let right = case.cells();
     assert!(compare_cells(&right, &right).is_ok(), "nothing is wrong yet");
-    // The clusters of one cell, or of all.
+    // Changes the clusters of one cell or of all.
     let changed = |index: usize, only: Option<[usize; 2]>, change: fn(Cluster) -> Cluster| {
         let mut cells = right.clone();
         let level = &mut cells.levels[index];
@@ -391,7 +391,7 @@ fn cells_of_any_picture_fit_into_what_devices_bind() {
         [19_116, 19_116],
         [16_502, 818],
     ] {
-        // What every device binds, and what nearly all do.
+        // The limit of every device, and of nearly all.
         for bound in [128 << 20, 1 << 31] {
             let most_finest = most_finest(bound);
             let clusters = most_cells(size, most_finest) * size_of::<[Cluster; SLABS]>();

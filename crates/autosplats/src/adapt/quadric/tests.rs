@@ -1,4 +1,4 @@
-//! Quadrics against surfaces that are known.
+//! Quadrics against known surfaces.
 
 use autosplats_cloud::glam::DVec3;
 use glam::Vec3;
@@ -11,7 +11,7 @@ use crate::adapt::cpu::{Goal, choose};
 use crate::adapt::tests::angle;
 use crate::camera::{Camera, Projection, View};
 
-/// A cluster in each cell of the surface z = `depth`(x, y).
+/// One cluster in each cell of the surface z = `depth`(x, y).
 fn cells_on(depth: impl Fn(f32, f32) -> f32) -> (Cells, View) {
     let projection = Projection::OrthographicHeight(2.0);
     let camera = Camera { eye: DVec3::ZERO, look_at: DVec3::Z, up: DVec3::NEG_Y, projection };
@@ -49,7 +49,7 @@ fn a_quadric_is_found_again() {
                 let found = quadric_on(depth, at, above, radius);
                 let normal = Vec3::new(-slope[0], -slope[1], 1.0).normalize();
                 let case = format!("{at:?} {above} {bend}: {found:?}");
-                // Curvatures are pulled towards 0 by some hundredths, which moves a bent surface.
+                // The ridge pulls curvatures towards 0 by some hundredths, which moves a bent surface.
                 let bent = bend * radius;
                 assert!(angle(found.normal.into(), normal.into()) < 0.05 + 4.0 * bent, "{case}");
                 assert!((found.height - above).abs() < radius * (1e-4 + 0.05 * bent), "{case}");
@@ -59,7 +59,7 @@ fn a_quadric_is_found_again() {
     }
 }
 
-/// A bent surface, along an axis that its normal is 24° from: the tangents turn much further from one to the other.
+/// A bent surface with a normal 24° off its axis. The tangents turn much further.
 fn leaning() -> Quadric {
     let axis = Vec3::new(0.7, -0.5, 0.05).normalize();
     let (u, v) = tangents(axis);
@@ -77,7 +77,7 @@ fn leaning() -> Quadric {
     }
 }
 
-/// How far a place on the first quadric is above the second, in radii of the second.
+/// Height of a place on the first quadric above the second, in radii of the second.
 fn above(from: &Quadric, at: [f32; 2], to: &Quadric) -> f32 {
     let height = |quadric: &Quadric, [x, y]: [f32; 2]| {
         let ([sx, sy], [xx, xy, yy]) = (quadric.slope, quadric.bend);
@@ -97,7 +97,7 @@ fn upright_quadrics_are_the_same_surface() {
     let places = [[0.3, 0.0], [0.0, 0.3], [-0.3, 0.0], [0.0, -0.3], [0.2, 0.2], [-0.2, 0.2]];
     let most_off = |other: &Quadric| places.map(|at| above(&leaning, at, other).abs()).into_iter().fold(0.0, f32::max);
     assert!(above(&leaning, [0.0, 0.0], &upright).abs() < 1e-3, "{upright:?}");
-    // What is left is of third order.
+    // The rest is of third order.
     let (off, flat_off) = (most_off(&upright), most_off(&Quadric { bend: [0.0; 3], ..upright }));
     assert!(off < 0.12 * flat_off, "{off}, and {flat_off} without curvature");
 }
@@ -129,12 +129,12 @@ fn between_quadrics_of_two_balls() {
     let ends = [&smaller, &larger].map(numbers);
     let half: Vec<f32> = ends[0].iter().zip(&ends[1]).map(|(a, b)| 0.5 * (a + b)).collect();
     assert!(off(0.0, &ends[0]) < 1e-6 && off(1.0, &ends[1]) < 1e-6);
-    // Slopes are in the middle, normals nearly.
+    // Slopes are exactly in the middle, normals nearly.
     assert!(off(0.5, &half) < 0.01, "{}", off(0.5, &half));
     assert!(off(0.5, &ends[0]) > 0.1 && off(0.5, &ends[1]) > 0.1);
 }
 
-/// A surface that bends by more than a quadric can the further away it is: larger balls agree less and less with the smaller ones.
+/// The surface bends more than a quadric with distance: larger balls agree less and less with the smaller ones.
 #[test]
 fn a_ball_that_agrees_by_half_counts_by_half() {
     let radius = 0.2;
@@ -173,7 +173,7 @@ fn read_and_fit_with<'a, S: Simd>(
 fn any_width_of_vectors_fits_to_the_same_bits() {
     let (cells, view) = cells_on(|x, y| 4.0 + 0.1 * x + 0.3 * (x * x - y));
     let [mut gathered, mut alone]: [Gathered; 2] = Default::default();
-    // The second reads less than the first has left behind.
+    // The second ball reads less than the first has left behind.
     for radius in [0.9, 0.21, 0.4] {
         let center = [0.113, -0.237, 4.08];
         let found = read_and_fit(&cells, center, radius, &view, &mut gathered);

@@ -1,4 +1,4 @@
-//! What the sheets around a surfel say together.
+//! Blends the sheets around a surfel.
 
 use glam::Vec3;
 use pulp::Simd;
@@ -13,28 +13,28 @@ use crate::simd::F32s;
 /// The surface beside a surfel.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::adapt) struct Surface {
-    /// From the surfel to the surface.
+    /// From the surfel to the surface, world units.
     pub(in crate::adapt) offset: Vec3,
     /// Unit normal, of either sign.
     pub(in crate::adapt) normal: Vec3,
     pub(in crate::adapt) curvature: f32,
 }
 
-/// What the sheets around a surfel say.
+/// Result of blending the sheets around a surfel.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::adapt) enum Blend {
     Surface(Surface),
-    /// There are some, but each is unlike the surfel's first normal or scatters too much: it is at an edge, or of detail finer than
-    /// sheets.
+    /// All sheets differ from the surfel's first normal or scatter too much. The surfel is at an edge, or shows detail
+    /// finer than sheets.
     Disagrees,
-    /// There are none.
+    /// There are no sheets.
     Nothing,
 }
 
-/// Numbers that tell a sheet.
+/// Numbers that describe a sheet.
 const FIELDS: usize = 19;
 
-/// Sheets of a cell, a number of all of them side by side, for SIMD; all 0 where there is none.
+/// The sheets of a cell, one array per number for SIMD. All numbers are 0 where there is no sheet.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stack(pub(super) [[f32; SHEETS]; FIELDS]);
 
@@ -53,13 +53,13 @@ impl Stack {
     }
 }
 
-/// The sheets of four cells, a lane each. Surfels that follow each other mostly have the same around them.
+/// The sheets of four cells, one per lane. Successive surfels mostly share them, so the last ones are kept.
 #[derive(Debug)]
 pub(in crate::adapt) struct Around {
-    /// First and last column and row.
+    /// First and last column, first and last row.
     cells: [usize; 4],
     fields: [Lanes; FIELDS],
-    /// Of the cell, for each of its sheets.
+    /// Column of each sheet's cell.
     column: Lanes,
     row: Lanes,
 }
@@ -67,7 +67,7 @@ pub(in crate::adapt) struct Around {
 impl Default for Around {
     fn default() -> Self {
         let zero = Lanes::default();
-        // No cells are these.
+        // Matches no cells.
         Self { cells: [usize::MAX; 4], fields: [zero; FIELDS], column: zero, row: zero }
     }
 }
@@ -85,7 +85,7 @@ impl Around {
             self.column.0[lanes.clone()].fill(column as f32);
             self.row.0[lanes.clone()].fill(row as f32);
             let cell = row * columns + column;
-            // Those at the picture's border count twice, all of them.
+            // At the picture's border a cell appears twice, which does not change the ratio of weights.
             let stack = if sheets.fitted[cell] { sheets.stacks[cell] } else { Stack::default() };
             for (field, values) in self.fields.iter_mut().zip(&stack.0) {
                 field.0[lanes.clone()].copy_from_slice(values);
@@ -95,8 +95,8 @@ impl Around {
 }
 
 impl Sheets {
-    /// The surface beside `center`, from the sheets of the four cells around it that agree with the `first` normal, where
-    /// its standard error is known.
+    /// The surface beside `center`, from the sheets of the four cells around. Where `first` is given, a normal and its
+    /// standard error, sheets have to agree with that normal.
     #[inline(always)]
     pub(in crate::adapt) fn blend<S: Simd>(
         &self,
@@ -114,11 +114,11 @@ impl Sheets {
         let [x0, y0] = [x as usize, y as usize];
         let x1 = ((x + 1.0) as usize).min(level.columns - 1);
         let y1 = ((y + 1.0) as usize).min(level.rows.len() - 1);
-        // Surfels of a strip change from row to row of cells, and back.
+        // Successive surfels of a strip alternate between rows of cells.
         let around = &mut around[y0 & 1];
         around.gather(self, [x0, x1, y0, y1], level.columns);
         let per_farthest = 1.0 / (FARTHEST * goal.noise);
-        // No closures within arrays' methods, which are not inlined.
+        // Closures within arrays' methods are not inlined.
         let splat = |value: f32| F32s::splat(simd, value);
         let (zero, one, two) = (splat(0.0), splat(1.0), splat(2.0));
         let (cx, cy, cz) = (splat(center[0]), splat(center[1]), splat(center[2]));
@@ -154,7 +154,7 @@ impl Sheets {
                 continue;
             }
             let (nx, ny, nz) = (ax - two * sx, ay - two * sy, az - two * sz);
-            // Not 0 where there is no sheet.
+            // Avoids a division by 0 in lanes without a sheet.
             let per_length = one / is_there.select((nx * nx + ny * ny + nz * nz).sqrt(), one);
             let (nx, ny, nz) = (nx * per_length, ny * per_length, nz * per_length);
             let mut counts = is_there;
@@ -162,15 +162,15 @@ impl Sheets {
                 let (fx, fy, fz) = (splat(first.x), splat(first.y), splat(first.z));
                 let (across_x, across_y, across_z) = (ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx);
                 let across = across_x * across_x + across_y * across_y + across_z * across_z;
-                // The smallest of a sheet's balls was held against nothing.
+                // The smallest of a sheet's balls has not been held against any normal.
                 let agrees = across.at_most(splat(AGREE * AGREE) * (load(squared_error) + splat(error * error)));
                 counts = is_there.and(agrees).and(load(scatter).at_most(splat(goal.scatter)));
                 disagrees |= zero.less(is_there.keep(one) - counts.keep(one)).any();
             }
-            // Falls to 0 where the next cells come in.
+            // Falls to 0 where the next cells begin.
             let share_x = one - (splat(x) - F32s::load(simd, &around.column.0, vector)).abs();
             let share_y = one - (splat(y) - F32s::load(simd, &around.row.0, vector)).abs();
-            // To the eighth: about as likely as noise puts a point there.
+            // The eighth power is about the likelihood of such a distance under noise.
             let likely = likely * likely;
             let likely = likely * likely;
             let likely = likely * likely;
@@ -184,7 +184,7 @@ impl Sheets {
         let mut sum = Surface { offset: Vec3::ZERO, normal: Vec3::ZERO, curvature: 0.0 };
         let mut total = 0.0;
         let [weights, nx, ny, nz, heights] = &told;
-        // A bit for each that counts: which do is anybody's guess.
+        // One bit per sheet that counts; a branch per lane would be unpredictable.
         let mut left = 0u32;
         for lane in 0..LANES {
             left |= u32::from(weights.0[lane] > 0.0) << lane;

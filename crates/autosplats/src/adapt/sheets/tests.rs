@@ -42,7 +42,7 @@ fn blend_with<'a, S: Simd>(
     sheets.blend(simd, surfel.center, first, &goal(surfel, view), (cells, view), around)
 }
 
-/// Offset and normal of the surface beside a surfel that has no normal of its own, one sheet after the other.
+/// Offset and normal of the surface beside a surfel without a normal of its own, one sheet after the other.
 fn blended_one_by_one(sheets: &Sheets, surfel: &Surfel, cells: &Cells, view: &View) -> Option<[Vec3; 2]> {
     let level = &cells.levels[sheets.level];
     let place = Vec3::from(surfel.center);
@@ -117,7 +117,7 @@ fn any_width_of_vectors_blends_to_the_same_bits() {
     let [mut around, mut around_alone]: [[Around; 2]; 2] = Default::default();
     let mut kinds = [0; 3];
     for (index, surfel) in case.fitted[0].iter().enumerate() {
-        // Some have a reliable normal, of which some are unlike all sheets.
+        // Some have a reliable normal, and some of these differ from all sheets.
         let first = [None, Some(Vec3::from(surfel.normal)), Some(Vec3::from(surfel.major_axis))][index % 3];
         let first = first.map(|normal| (normal, 0.01));
         let found = blend(&sheets, surfel, first, &cells, &case.view, &mut around);

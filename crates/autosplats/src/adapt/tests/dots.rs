@@ -1,8 +1,8 @@
-//! Which surfels are dots and which are not.
+//! Which surfels become dots.
 
 use super::*;
 
-/// How many discs of the fit there are and how many of them are dots now: of points that are not strays, and of those that are.
+/// Fitted discs and how many of them become dots: for points of surfaces, then for outliers.
 fn dots(case: &Case, is_stray: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
     let mut counts = [[0; 2]; 2];
     let is_disc = |surfel: &Surfel| surfel.radius > 1.01 * case.view.pixel_size(surfel.center[2]);
@@ -14,7 +14,7 @@ fn dots(case: &Case, is_stray: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
     counts
 }
 
-/// How many points the fit saw neighbours of and how many of them it dropped: of those that are not strays, and of those that are.
+/// Points with neighbours and how many of them the fit dropped: for points of surfaces, then for outliers.
 fn dropped(case: &Case, is_stray: impl Fn(u32) -> bool) -> [[usize; 2]; 2] {
     let mut counts = [[0; 2]; 2];
     for surfel in case.fitted.concat().iter().filter(|surfel| surfel.k_radius > 0.0) {
@@ -57,7 +57,7 @@ fn points_just_before_a_surface_are_dropped() {
         let mut positions = test_clouds::sphere(40_000);
         let surface = positions.len() as u32;
         let mut random = Random::new(7);
-        // Up to eighteen spacings of the sphere's points away, by mean six from each other.
+        // Up to eighteen spacings of the sphere's points away, six from each other on average.
         let strewn = (0..1000).map(|_| random.direction().map(|c| c * (1.0 + 0.32 * random.unit())));
         positions.extend(strewn);
         let case = Case::new(&positions, projection, [400, 300]);
@@ -69,7 +69,7 @@ fn points_just_before_a_surface_are_dropped() {
     }
 }
 
-/// Noise puts hardly any point four deviations before its surface, or one of a depth camera three steps.
+/// Noise hardly ever puts a point four deviations before its surface, or three steps for a depth camera.
 #[test]
 fn points_too_far_off_for_noise_are_dots() {
     for projection in PROJECTIONS {
@@ -79,13 +79,13 @@ fn points_too_far_off_for_noise_are_dots() {
         assert!(its_dots * 100 < of_sphere, "{its_dots} of the sphere's {of_sphere} are dots");
     }
     let (room, is_stray) = Case::stepped_with_strays();
-    // The others have no sheet near enough to be moved to.
+    // The other outliers have no sheet near enough to move to.
     let [[of_room, its_dots], [strays, dots]] = dots(&room, is_stray);
     assert!(strays > 30 && dots * 2 > strays, "{dots} of {strays} are dots");
     assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
 }
 
-/// Noise of disparities has no end as that of steps has.
+/// Noise of disparities is unbounded, unlike noise of steps.
 #[test]
 fn depth_cameras_with_noise_of_disparities_lose_no_surface() {
     let mut random = Random::new(9);
@@ -95,7 +95,7 @@ fn depth_cameras_with_noise_of_disparities_lose_no_surface() {
     assert!(its_dots * 1000 < of_room, "{its_dots} of the room's {of_room} are dots");
 }
 
-/// In the plane of the surface, so that only how one-sided their neighbours are tells of them.
+/// In the plane of the surface, so that only their one-sided neighbourhoods reveal them.
 #[test]
 fn points_beyond_a_border_are_dots() {
     for projection in PROJECTIONS {
@@ -107,7 +107,7 @@ fn points_beyond_a_border_are_dots() {
     }
 }
 
-/// A cube of few points above a dense floor: none of it stands aside of what surrounds it.
+/// A cube of few points above a dense floor.
 #[test]
 fn sparse_edges_and_corners_are_surface() {
     for projection in PROJECTIONS {

@@ -1,8 +1,8 @@
-//! What is an area of rows, and what is not.
+//! Which scan lines have an area.
 
 use super::*;
 
-/// Points half a hundredth apart along lines at these heights, before what else there is.
+/// Points 0.005 apart along lines at these heights, and the `rest`.
 fn lines(heights: &[f32], rest: Positions) -> Case {
     let line = |&y: &f32| (0..400).map(move |step| [0.005 * step as f32 - 1.0, y, 0.0]);
     let mut positions: Positions = heights.iter().flat_map(line).collect();
@@ -11,7 +11,7 @@ fn lines(heights: &[f32], rest: Positions) -> Case {
     Case::of(&PointCloud::new(DVec3::ZERO, positions), &camera, [600, 600])
 }
 
-/// Of the rows in the middle half of [`lines`], the share that finds an area.
+/// Share of scan lines in the middle half of [`lines`] that find an area.
 fn share_of_areas(case: &Case) -> f32 {
     let (fitted, adapted) = (case.fitted.concat(), case.adapted());
     let in_middle =
@@ -23,7 +23,7 @@ fn share_of_areas(case: &Case) -> f32 {
 
 #[test]
 fn wires_are_no_area_and_nor_is_what_is_seen_through() {
-    // However far apart they are against the radii of balls, which grow in steps.
+    // Several distances, as the radii of balls grow in steps.
     for apart in [0.05, 0.06, 0.07, 0.08, 0.1, 0.12] {
         let many: Vec<f32> = (0..20).map(|line| apart * (line as f32 - 9.5)).collect();
         let surface = share_of_areas(&lines(&many, Vec::new()));

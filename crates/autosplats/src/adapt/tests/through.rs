@@ -1,9 +1,9 @@
-//! How much discs hide that others are seen through.
+//! How much discs hide of what is seen through them.
 
 use super::*;
 use crate::adapt::through::LEAST_ON;
 
-/// How much of their radius discs keep, ascending: of the points that are asked for, and that the fit left discs.
+/// Share of their radius that fitted discs keep, ascending, for the chosen points.
 fn kept(case: &Case, is_asked: impl Fn(&Surfel) -> bool) -> Vec<f32> {
     let (fitted, adapted) = (case.fitted.concat(), case.adapted());
     let asked = fitted.iter().zip(&adapted).filter(|(before, _)| before.radius > 0.0 && is_asked(before));
@@ -17,10 +17,10 @@ fn a_crooked_sheet_before_a_denser_wall_hides_its_share() {
     let (positions, sheet) = test_clouds::before_a_wall(0.07);
     for projection in PROJECTIONS {
         let case = Case::new(&positions, projection, [400, 300]);
-        // Others have lost neighbours to gaps.
+        // The others have lost neighbours to gaps.
         let of_sheet = kept(&case, |surfel| surfel.source < sheet && surfel.k_radius > 0.14);
         assert!(of_sheet.len() > 300, "{} discs", of_sheet.len());
-        // Of 41 points one is of the sheet, and the disc's own point besides: of eight or nine.
+        // One of 41 points is of the sheet. The disc's own point adds to the eight or nine others.
         let right = 1.12 / 41.0 / LEAST_ON;
         let [low, middle, high] = [1, 5, 7].map(|tenth| of_sheet[of_sheet.len() * tenth / 10]);
         let is_right = (0.8..1.25).contains(&(middle / right)) && low > 0.4 * right && high < 2.5 * right;
@@ -42,7 +42,7 @@ fn a_flat_sheet_before_a_denser_wall_stays_closed() {
     }
 }
 
-/// Of what is as flat, and no wider than its points are apart.
+/// Strips that are as flat, but no wider than their points are apart.
 #[test]
 fn strips_before_a_denser_wall_hide_their_share() {
     let mut random = Random::new(25);
