@@ -1,4 +1,4 @@
-//! Boxes along the axes, one by one and sixteen side by side, and the distances between them.
+//! Axis-aligned boxes, single and in groups of sixteen, and the distances between them.
 
 use pulp::Simd;
 
@@ -7,7 +7,7 @@ use crate::search::select::vectors;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
-/// A box with its faces parallel to the axes.
+/// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) low: [f32; 3],
@@ -15,11 +15,12 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Contains nothing.
+    /// Contains no point.
     pub(super) const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
     pub(super) fn of(points: &[Point]) -> Self {
-        // Four boxes grow at once, as one would wait for itself, and with the index as a fourth coordinate: a whole vector.
+        // Four boxes grow at once, to shorten the chain of dependent steps. The index as a fourth coordinate fills a
+        // vector.
         let mut low = [[f32::INFINITY; 4]; 4];
         let mut high = [[f32::NEG_INFINITY; 4]; 4];
         let (fours, rest) = points.as_chunks::<4>();
@@ -84,7 +85,7 @@ impl Bounds {
     }
 }
 
-// Without f32::max's care for NaN, which is two instructions more: no coordinate is NaN.
+// `f32::max` would spend two instructions more on NaN, which no coordinate is.
 #[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -95,7 +96,7 @@ fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Boxes of sixteen nodes side by side, side by side for SIMD; empty where there are fewer.
+/// The boxes of sixteen nodes, in lanes for SIMD; empty boxes fill the rest.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(super) struct Boxes {
@@ -115,7 +116,7 @@ impl Boxes {
         all
     }
 
-    /// The box around all of them.
+    /// The box around all boxes.
     pub(super) fn union(&self) -> Bounds {
         let least = |lanes: &Lanes| lanes.0.iter().copied().fold(f32::INFINITY, f32::min);
         let most = |lanes: &Lanes| lanes.0.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -127,7 +128,7 @@ impl Boxes {
         Bounds { low: self.low.map(|low| low.0[lane]), high: self.high.map(|high| high.0[lane]) }
     }
 
-    /// Squared distance of each to a box.
+    /// Squared distance of each box to another.
     #[inline(always)]
     pub(super) fn squared_distances<S: Simd>(&self, simd: S, to: &Bounds) -> Lanes {
         squared_distances(simd, &self.low, &self.high, to)

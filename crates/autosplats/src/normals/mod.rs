@@ -1,20 +1,20 @@
-//! Normals: normal, curvature and density radius of every point of a cloud, from its k nearest in all the cloud.
+//! Normals: normal, curvature and density radius of every point of a cloud, from its k nearest neighbours in the cloud.
 //!
-//! This is the computation that a picture previews [Paper, §8.3], by the definitions of the `fit` stage but without a
-//! camera: the neighbourhood of a point is the point itself and its k nearest neighbours in space.
+//! A picture previews this computation [Paper, §8.3]. The definitions are those of the `fit` stage, but without a
+//! camera. The neighbourhood of a point is the point itself and its k nearest neighbours in space. See
+//! docs/decisions/0016-normals.md.
 //!
 //! # How it works
-//! The points are sorted into leaves of sixteen by a balanced kd-tree (`tree`). Sixteen points of a leaf lie close
-//! together, so they share one list of candidates (`neighbors`): all points within some radius of the leaf's box. From
-//! there it is the screen-grid search over again: distances, counting selection and moments, sixteen points at a time.
-//! A point whose k-th distance is no greater than the radius has its exact neighbours; the others get a wider list, and
-//! those few whose list would be too long are searched for alone, nearest nodes first (`nearest`). The covariances are
-//! diagonalised where they are, so that nothing but the result is stored.
+//! A balanced kd-tree (`tree`) sorts the points into leaves of sixteen. The points of a leaf lie close together, so
+//! they share one list of candidates (`neighbors`): all points within some radius of the leaf's box. From there the
+//! search is that of the screen grid: distances, counting selection and moments, sixteen points at a time. A point with
+//! a k-th distance within that radius has its exact neighbours; the others get a wider list. The few points whose list
+//! would be too long are searched for one by one, nearest nodes first (`nearest`). The covariances are diagonalised at
+//! once, so that only the result is stored.
 //!
 //! # Ties
-//! All points at the k-th distance belong to the neighbourhood, as in the search stage. So nothing depends on an order among
-//! equals, and the result has the same bits for any number of threads and any width of vectors. The order of the points
-//! in the cloud matters to no more than the rounding of sums.
+//! All points at the k-th distance belong to the neighbourhood, as in the search stage. So the result has the same bits
+//! for any number of threads and any vector width. The order of points in the cloud changes only the rounding of sums.
 
 mod boxes;
 mod nearest;
@@ -43,22 +43,23 @@ use crate::Error;
 use crate::fit::Fitted;
 use crate::search::LANES;
 
-/// Leaves per task: enough to hide its start, few enough to share out evenly.
+/// Leaves per task: enough to hide the task's start, few enough for an even share.
 const TASK_LEAVES: usize = 64;
-/// Tasks from one report of progress to the next, some ten milliseconds of one thread.
+/// Tasks between two reports of progress, some ten milliseconds of one thread.
 const REPORT_TASKS: usize = 32;
-/// Coordinates beyond this count as not finite: their squared distances would overflow.
+/// Largest absolute coordinate that counts as finite. Squared distances of larger ones would overflow.
 const FARTHEST: f32 = 1e18;
-/// What is done, 0 to 1, when the points are listed and when the tree is built.
+/// Progress, 0 to 1, when the points are listed.
 const LISTED: f32 = 0.02;
+/// Progress, 0 to 1, when the tree is built.
 const BUILT: f32 = 0.25;
 
-/// What [`estimate_normals`] may be asked for.
+/// Settings of [`estimate_normals`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalSettings {
-    /// Neighbours that a plane is fitted to, beside the point itself; 3 to 1024. Default 10, the paper's.
+    /// Neighbours that a plane is fitted to, besides the point itself; 3 to 1024. Default 10, as in the paper.
     pub k: u32,
-    /// Which of its two sides a normal is to point to. Default [`Orientation::Outward`].
+    /// The side that normals point to. Default [`Orientation::Outward`].
     pub orientation: Orientation,
 }
 
@@ -68,54 +69,55 @@ impl Default for NormalSettings {
     }
 }
 
-/// Which of its two sides a normal points to. Each point is judged alone; a normal square to the direction asked for may
-/// point either way.
+/// The side that normals point to. Each point is decided alone; a normal perpendicular to that side may point either
+/// way.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Orientation {
-    /// To where the point was seen from. Points in no viewpoint's range are turned [outward](Self::Outward).
+    /// Towards the position that the point was seen from. Points in no viewpoint's range point
+    /// [outward](Self::Outward).
     Viewpoints(Vec<Viewpoint>),
-    /// To the side of this direction, of any length but zero: up, for what an aeroplane has seen.
+    /// Towards this direction, of any length but zero. Up is right for aerial scans.
     Direction(DVec3),
-    /// Away from the middle of the cloud, the median of each coordinate to within sixteen points: for a single body seen
-    /// from all around.
+    /// Away from the middle of the cloud: the median of each coordinate, to within sixteen points. Right for a single
+    /// body seen from all around.
     Outward,
 }
 
-/// Where a run of points was seen from.
+/// The position that a range of points was seen from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Viewpoint {
     /// World coordinates; finite, within 1e18 of the cloud's origin.
     pub position: DVec3,
-    /// Indices of the points seen from there. Ranges of different viewpoints must not overlap.
+    /// Indices of the points. Ranges of different viewpoints must not overlap.
     pub points: Range<usize>,
 }
 
-/// One value per point, in the cloud's order. All are NaN for points whose position is not finite or has a coordinate
-/// beyond ±1e18.
+/// One value per point, in the cloud's order. All are NaN for points with a coordinate that is not finite or beyond
+/// ±1e18.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Normals {
-    /// Unit normals. Where the neighbourhood is a line, as much to the side asked for as the line allows; where it is one
-    /// place, right to that side.
+    /// Unit normals. For neighbours on a line, the perpendicular nearest to the wanted side; at one place, that
+    /// direction.
     pub normals: Vec<[f32; 3]>,
-    /// Surface variation λ0/(λ0+λ1+λ2), 0 (flat, or a line, or one place) to 1/3 (no direction is special).
+    /// Surface variation λ0/(λ0+λ1+λ2), from 0 (flat, a line or one place) to 1/3 (no direction is special).
     pub curvature: Vec<f32>,
-    /// Density radius 2·√(r²/k) in the cloud's unit, where r is the distance to the k-th neighbour: twice the radius of the
-    /// circle that each neighbour covers on average [Paper, §6]. 0 where k neighbours coincide with the point, and for a point
-    /// alone.
+    /// Density radius 2·√(r²/k) in the cloud's unit, where r is the distance to the k-th neighbour. This is twice the
+    /// radius of the circle that each neighbour covers on average [Paper, §6]. 0 if k neighbours coincide with the
+    /// point, or there are none.
     pub radius: Vec<f32>,
 }
 
 /// Estimates the normal, curvature and density radius of every point from its k nearest neighbours.
 ///
-/// Points without a finite position are nobody's neighbours. Where there are not k others, all of them are the
-/// neighbourhood, and k is their number. Points nearer to each other than about 1e-18 may count as one place.
+/// Points without a finite position are no neighbours. With fewer than k other points, all of them are the
+/// neighbourhood and k is their number. Points nearer to each other than about 1e-18 may count as one place.
 ///
-/// Beside the cloud this takes 38 bytes per point, the 20 of the result among them, and some megabytes per thread.
+/// Takes 38 bytes per point besides the cloud, including 20 for the result, and some megabytes per thread.
 ///
 /// # Errors
-/// [`Error::Setting`] for a k or an orientation outside its range, [`Error::TooManyPoints`], and [`Error::Cancelled`] if
-/// `progress` says so.
+/// [`Error::Setting`] for a k or an orientation out of range, [`Error::TooManyPoints`], and [`Error::Cancelled`] if
+/// `progress` cancels.
 pub fn estimate_normals(
     cloud: &PointCloud,
     settings: &NormalSettings,
@@ -127,8 +129,8 @@ pub fn estimate_normals(
     estimate(cloud, settings, progress)
 }
 
-/// The distance from each point to its k-th nearest in the whole cloud, the last there is if it has fewer; NaN for points
-/// that [`Normals`] has none for. Good for any k.
+/// The distance from each point to its k-th nearest in the cloud, or to the furthest point if there are fewer. NaN
+/// where [`Normals`] are NaN. Any k is allowed.
 ///
 /// # Errors
 /// [`Error::TooManyPoints`].
@@ -177,7 +179,7 @@ fn finite_points(cloud: &PointCloud) -> Vec<Point> {
     points
 }
 
-/// What all tasks share.
+/// Input that all tasks share.
 struct Job<'a> {
     tree: &'a Tree,
     sides: &'a Sides,
@@ -200,7 +202,7 @@ fn estimate_leaves_with<'a, S: Simd>(simd: S, job: &'a Job<'a>, leaves: Range<us
         for lane in 0..job.tree.lanes(number) {
             let index = leaf.index[lane];
             let plane = fitted.plane(lane, job.sides.toward(leaf.point(lane), index));
-            // Not by the count, as the fit has it: with ties that would jump where two distances become equal.
+            // By k and not by the count, unlike the fit: with ties the count would jump.
             let radius = 2.0 * block.k_radius.0[lane] / (job.k.max(1) as f32).sqrt();
             job.output.set(index, plane.normal, plane.curvature, radius);
         }

@@ -1,7 +1,7 @@
-//! The k nearest neighbours of one point, nearest nodes first: what is left where a leaf's points cannot share a list.
+//! The k nearest neighbours of one point, nearest nodes first, for points that cannot share their leaf's list.
 //!
-//! That is one point in a thousand of a scan, but all where thousands of points coincide, or where a leaf's points belong to
-//! clusters apart. Then it costs what a kd-tree does.
+//! Such points are about one in a thousand of a scan. But all points are such if thousands coincide or leaves mix
+//! distant clusters. Then the search costs as much as with a plain kd-tree.
 
 use std::collections::BinaryHeap;
 
@@ -9,10 +9,10 @@ use super::boxes::Bounds;
 use super::tree::{Node, Tree};
 use crate::search::{LANES, NeighborhoodBlock};
 
-/// Memory of one thread.
+/// Buffers of one thread.
 #[derive(Default)]
 pub(super) struct Nearest {
-    /// Bits of the k + 1 least squared distances; those of floats above zero are ordered as the floats are.
+    /// Bits of the k + 1 least squared distances. Bits of non-negative floats sort as the floats do.
     heap: BinaryHeap<u32>,
     stack: Vec<(f32, Node)>,
 }
@@ -22,7 +22,7 @@ impl Nearest {
     pub(super) fn search(&mut self, tree: &Tree, point: [f32; 3], k: u32, lane: usize, out: &mut NeighborhoodBlock) {
         let threshold = self.kth_smallest(tree, point, k);
         let [mut count, mut offset, mut second] = [-1.0, 0.0, 0.0].map(|start| [start; 6]);
-        // All that coincides with the point adds nothing, and may be most of the cloud.
+        // Points that coincide with this one add nothing and may be most of the cloud.
         if threshold > 0.0 {
             self.stack.push((0.0, tree.root()));
         } else {

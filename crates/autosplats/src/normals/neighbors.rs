@@ -1,9 +1,9 @@
 //! The k nearest neighbours of the sixteen points of a leaf, from one list of candidates.
 //!
 //! # How it works
-//! The list is of all points within some radius of the box of the points searched for. Distances are rounded the same way
-//! from a box as from a point in it, each step of them never falling as coordinates move apart; so what lies within the radius
-//! of a point by the computed distance is on the list, and no margin is needed.
+//! The list holds all points within some radius of the box around the searched points. Distances from a box and from a
+//! point inside are rounded alike. Each step is monotonic in the coordinates. So every point within the radius of a
+//! searched point, by the computed distance, is on the list without a margin.
 
 use pulp::Simd;
 
@@ -14,44 +14,43 @@ use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::select::{GROUP, kth_smallest};
 use crate::search::{LANES, Lanes, NeighborhoodBlock};
 
-/// The first radius is the k-radius expected times this. 1.3 to 1.7 take the same time within 5 %.
+/// Radius of the first list over the expected k-radius. The time hardly depends on this value.
 const FIRST_REACH: f32 = 1.35;
-/// Mean k-radius that a task expects at first, in those that the size of a leaf suggests: the mean of scanned surfaces.
+/// Mean k-radius expected at the start of a task, over [`suggested_radius`]: the mean of scanned surfaces.
 const START_REACH: f32 = 0.9;
-/// Least and most that is expected.
+/// Least and largest expected k-radius, over [`suggested_radius`].
 const REACH: [f32; 2] = [0.3, 3.0];
-/// A radius with too few candidates grows as if they lay on a line, within these factors.
+/// Least and largest growth of a radius with too few candidates. Between them, growth assumes points on a line.
 const GROWTH: [f32; 2] = [2.0, 8.0];
-/// A radius with enough candidates for some grows by this factor at most.
+/// Largest growth of a radius with enough candidates for some points.
 const LAST_GROWTH: f32 = 1.6;
-/// Lists read for one leaf before what is left is searched for alone.
+/// Most lists for one leaf. The points left are searched for one by one.
 const MOST_LISTS: usize = 8;
 
-/// Candidates that a list may hold: well above what a surface or a volume of even density needs.
+/// Most candidates of a list, well above what an even surface or volume needs.
 const fn most_candidates(k: u32) -> usize {
     8 * (k as usize + LANES) + 256
 }
 
-/// Memory of one thread.
+/// Buffers of one thread.
 #[derive(Default)]
 pub(super) struct Scratch {
     candidates: Vec<[f32; 3]>,
     /// Squared distance of each candidate to each of the sixteen points.
     squared: Vec<Lanes>,
     nearest: Nearest,
-    /// Mean k-radius of the leaf before, in those that the size of a leaf suggests. A guess: it decides what is read first,
-    /// not what is found.
+    /// Mean k-radius of the last leaf, over [`suggested_radius`]. Affects what is read first, not the result.
     reach: f32,
 }
 
 impl Scratch {
-    /// Tasks are cut the same for any number of threads, and so must be what they start from.
+    /// Resets the expectation, so that results do not depend on which thread ran which task.
     pub(super) fn start_task(&mut self) {
         self.reach = START_REACH;
     }
 }
 
-/// Finds the neighbourhoods of the points of `leaf`. There are more than `k` points.
+/// Finds the neighbourhoods of the points of `leaf`. The tree must have more than `k` points.
 #[inline(always)]
 pub(super) fn search_leaf<S: Simd>(
     simd: S,
@@ -72,7 +71,7 @@ pub(super) fn search_leaf<S: Simd>(
     let mut radius = FIRST_REACH * expected;
     let mut threshold = Lanes([expected * expected; LANES]);
     let mut pending: [bool; LANES] = std::array::from_fn(|lane| lane < points);
-    // Where the points coincide nothing is expected.
+    // Coinciding points give no expectation.
     let lists = if threshold.0[0] < f32::MIN_POSITIVE { 0 } else { MOST_LISTS };
     for _ in 0..lists {
         let squared_radius = radius * radius;
@@ -100,7 +99,7 @@ pub(super) fn search_leaf<S: Simd>(
         if !pending.contains(&true) {
             break;
         }
-        // What was read bounds the k-radius, but for a point apart from the others only loosely.
+        // The candidates read bound the k-radius, though only loosely for a distant point.
         radius = (furthest.sqrt() * 1.0001).min(LAST_GROWTH * radius);
         bounds = Bounds::EMPTY;
         for lane in (0..points).filter(|&lane| pending[lane]) {
@@ -118,7 +117,7 @@ pub(super) fn search_leaf<S: Simd>(
     out
 }
 
-/// The positions of a leaf of so many points; the last one is repeated.
+/// The positions of a leaf with `points` points; the last one is repeated.
 #[inline(always)]
 fn positions(leaf: &Leaf, points: usize) -> [Lanes; 3] {
     let mut position = leaf.position;
@@ -129,7 +128,7 @@ fn positions(leaf: &Leaf, points: usize) -> [Lanes; 3] {
     position
 }
 
-/// The k-radius to expect of a point of a leaf whose points are a surface or a line.
+/// The expected k-radius of a leaf's points, if they form a surface or a line.
 #[inline(always)]
 fn suggested_radius(bounds: &Bounds, points: usize, k: u32) -> f32 {
     let [x, y, z] = bounds.extent();
@@ -138,8 +137,8 @@ fn suggested_radius(bounds: &Bounds, points: usize, k: u32) -> f32 {
     surface.max(0.05 * (x + y + z))
 }
 
-/// Lists the points within a distance, given `squared`, of `bounds` at the front of `candidates`, in the tree's order, and returns their
-/// number; a group of points infinitely far follows. `None` if there are more than `most`.
+/// Lists the points within a `squared` distance of `bounds` in `candidates`, in the tree's order, and returns their
+/// number. A group of infinitely distant points follows. `None` if there are more than `most`.
 #[inline(always)]
 fn list<S: Simd>(
     simd: S,
@@ -153,7 +152,7 @@ fn list<S: Simd>(
         candidates.resize(most + LANES + GROUP, [0.0; 3]);
     }
     let mut len = 0;
-    // Seven levels hold every cloud; each leaves fifteen children waiting at most.
+    // Seven levels hold every cloud, and each leaves at most fifteen children waiting.
     let mut stack = [(0u32, 0u32); 128];
     stack[0] = (tree.levels.len() as u32 - 1, 0);
     let mut depth = 1;
@@ -163,7 +162,7 @@ fn list<S: Simd>(
         let near = tree.levels[level as usize][node as usize].squared_distances(simd, bounds);
         if level > 0 {
             for lane in (0..LANES).rev() {
-                // Written first and counted after: whether a node is near enough is anybody's guess.
+                // Written first and counted after: a branch would be unpredictable.
                 stack[depth] = (level - 1, node * LANES as u32 + lane as u32);
                 depth += usize::from(near.0[lane] <= squared);
             }

@@ -1,4 +1,4 @@
-//! Which of its two sides each normal points to.
+//! The side that each normal points to.
 
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
@@ -6,14 +6,14 @@ use autosplats_cloud::glam::{DVec3, Vec3};
 use super::{FARTHEST, Orientation, Viewpoint};
 use crate::Error;
 
-/// Where normals point to.
+/// Resolved orientation of normals.
 pub(super) enum Sides {
     Direction(Vec3),
     /// Away from the middle, except where a viewpoint is known.
     Outward {
-        /// By the first index of their points.
+        /// Sorted by the first index of their points; positions are relative to the cloud's origin.
         viewpoints: Vec<Viewpoint>,
-        /// About the cloud's origin, as the viewpoints are.
+        /// Relative to the cloud's origin.
         middle: Vec3,
     },
 }
@@ -48,7 +48,7 @@ impl Sides {
         }
     }
 
-    /// The same, for a cloud with this middle.
+    /// Sets the middle of the cloud.
     pub(super) fn about(self, middle: [f32; 3]) -> Self {
         match self {
             Self::Direction(_) => self,
@@ -56,14 +56,14 @@ impl Sides {
         }
     }
 
-    /// The direction in which the normal of a point is to point, of any length.
+    /// The direction that the normal of a point should face, of any length.
     #[inline(always)]
     pub(super) fn toward(&self, position: [f32; 3], index: u32) -> [f32; 3] {
         match self {
             Self::Direction(direction) => direction.to_array(),
             Self::Outward { viewpoints, middle } => {
                 let index = index as usize;
-                // The last of those that begin no later is the only one that can contain it.
+                // Only the last range that begins at or before the index can contain it.
                 let begun = viewpoints.partition_point(|viewpoint| viewpoint.points.start <= index);
                 match begun.checked_sub(1).map(|last| &viewpoints[last]) {
                     Some(seen) if index < seen.points.end => {

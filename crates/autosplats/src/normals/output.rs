@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::Normals;
 
-/// The bits of the numbers to be. Atomic, as threads write between each other's; each number is written once.
+/// The bits of the result's numbers. Atomic because threads write to interleaved places; each number is written once.
 pub(super) struct Output {
     normals: Vec<[AtomicU32; 3]>,
     curvature: Vec<AtomicU32>,
@@ -14,7 +14,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    /// Nothing but NaN.
+    /// All values NaN.
     pub(super) fn new(len: usize) -> Self {
         let nan = || AtomicU32::new(f32::NAN.to_bits());
         let all = || (0..len).into_par_iter();
@@ -36,7 +36,7 @@ impl Output {
     }
 
     pub(super) fn finish(self) -> Normals {
-        // Collected in place: no byte is moved.
+        // Collected in place, without copying.
         let value = |bits: AtomicU32| f32::from_bits(bits.into_inner());
         Normals {
             normals: self.normals.into_iter().map(|normal| normal.map(value)).collect(),

@@ -1,4 +1,4 @@
-//! Normals against brute force in `f64`, and what must not matter: order, threads, vectors, degenerate clouds.
+//! Normals against brute force in `f64`; independence of order, threads and vector width; degenerate clouds.
 
 use std::sync::Mutex;
 
@@ -18,7 +18,7 @@ fn is_finite(position: &[f32; 3]) -> bool {
     position.iter().all(|c| c.abs() <= FARTHEST)
 }
 
-/// Clouds of many kinds, of about a thousand points at most.
+/// Clouds of many kinds with up to about a thousand points.
 fn clouds() -> Vec<(&'static str, Positions)> {
     let mut random = Random::new(11);
     let mut volume = |count: usize, size: f32, at: [f32; 3]| -> Positions {
@@ -53,7 +53,7 @@ fn clouds() -> Vec<(&'static str, Positions)> {
     clouds
 }
 
-/// What is wrong with `result` by brute force in `f64`; nothing if it is right.
+/// The first mistake in `result` by brute force in `f64`, if any.
 fn mistake(positions: &[[f32; 3]], k: u32, result: &Normals) -> Option<String> {
     let finite: Vec<DVec3> = positions.iter().filter(|p| is_finite(p)).map(|p| DVec3::from(p.map(f64::from))).collect();
     for (index, position) in positions.iter().enumerate() {
@@ -71,7 +71,7 @@ fn mistake(positions: &[[f32; 3]], k: u32, result: &Normals) -> Option<String> {
         let k = (k as usize).min(finite.len() - 1);
         let kth = neighbors[k].0;
         let expected = 2.0 * kth / (k.max(1) as f64).sqrt();
-        // f32 rounding of three products, their sum and a root. This and what follows is written so that NaN fails.
+        // f32 rounding of three products, their sum and a root. All comparisons are written so that NaN fails.
         if !((radius - expected).abs() <= 1e-6 * expected) {
             return Some(format!("point {index}: radius {radius}, should be {expected}"));
         }
@@ -79,7 +79,7 @@ fn mistake(positions: &[[f32; 3]], k: u32, result: &Normals) -> Option<String> {
         if !((normal.length() - 1.0).abs() <= 1e-5 && (0.0..=0.3334).contains(&curvature)) {
             return Some(format!("point {index}: normal {normal}, curvature {curvature}"));
         }
-        // Whether a point that near to the k-th distance is a neighbour may be decided by f32 rounding.
+        // f32 rounding decides whether a point so near to the k-th distance is a neighbour.
         let unsure = neighbors.iter().any(|n| n.0 != kth && (n.0 - kth).abs() < 1e-6 * kth);
         if unsure || kth == 0.0 {
             continue;
@@ -90,8 +90,8 @@ fn mistake(positions: &[[f32; 3]], k: u32, result: &Normals) -> Option<String> {
         let outer = |v: DVec3| DMat3::from_cols(v * v.x, v * v.y, v * v.z);
         let covariance = near.iter().map(|&n| outer(n - mean)).fold(DMat3::ZERO, |sum, term| sum + term) * share;
         let [least, middle, largest] = eigenvalues(covariance).map(|value| value.max(0.0));
-        // By the variance along the normal: no sign, and no harm where two axes are as good. In units of the k-radius the
-        // entries are at most 1, so what f32 sums and rotations may lose is absolute.
+        // The variance along the normal has no sign and tolerates two equal axes. In units of the k-radius entries are
+        // at most 1, so the loss of f32 sums and rotations is absolute.
         if normal.dot(covariance * normal) > least + 1e-5 * largest + 2e-6 {
             return Some(format!("point {index}: variance {} along the normal", normal.dot(covariance * normal)));
         }
@@ -182,7 +182,7 @@ fn shuffling_changes_nothing_but_rounding() {
         let shuffled: Positions = order.iter().map(|&index| positions[index]).collect();
         let [plain, moved] = [&positions, &shuffled].map(|p| estimate(p, 10, Orientation::Direction(DVec3::Z)));
         for (to, &from) in order.iter().enumerate() {
-            // The radius is exact, curvature and normals are sums in another order.
+            // The radius is exact; curvature and normals are sums in another order.
             let [a, b] = [plain.radius[from], moved.radius[to]];
             assert_eq!(a.to_bits(), b.to_bits(), "{name}: point {from}: radius {a} became {b}");
             let [a, b] = [plain.curvature[from], moved.curvature[to]];
@@ -197,7 +197,7 @@ fn normals_turn_to_their_viewpoint() {
     let positions = test_clouds::sphere(4000);
     let origin = DVec3::new(5e5, -4e6, 100.0);
     let viewpoint = |at: DVec3, points| Viewpoint { position: origin + at, points };
-    // The first thousand seen from one side, the third from its middle, the others from nowhere.
+    // The first thousand are seen from one side, the third thousand from the middle, the others from nowhere.
     let viewpoints = vec![
         viewpoint(DVec3::ZERO, 2000..3000),
         viewpoint(DVec3::new(0.0, 0.0, 50.0), 0..1000),
@@ -231,7 +231,7 @@ fn lines_and_places_look_where_they_are_asked_to() {
     }
 }
 
-/// No time is measured, but with squares of these numbers it would be minutes.
+/// Quadratic time in these numbers would take minutes, so no time is measured.
 #[test]
 fn degenerate_clouds_end() {
     let mut random = Random::new(3);

@@ -1,4 +1,4 @@
-//! Progress told from several threads: never falling.
+//! Reports progress from several threads without ever falling.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -17,7 +17,7 @@ impl<'a> Ticker<'a> {
         Self { progress, reported: Mutex::new(f32::NEG_INFINITY) }
     }
 
-    /// Reports `fraction` unless more was reported already, and stops if the caller wants that.
+    /// Reports `fraction` unless more was reported already. Fails if the caller cancels.
     pub(super) fn tick(&self, fraction: f32) -> Result<(), Error> {
         if self.progress.cancelled() {
             return Err(Error::Cancelled);

@@ -1,12 +1,10 @@
 //! A balanced kd-tree with sixteen points to a leaf and sixteen children to a node.
 //!
 //! # How it works
-//! Points are halved by the median along the widest side of their box until sixteen are left, so that a leaf is small
-//! where points are dense, and clusters of any size and distance get leaves of their own; a grid would be sized by the
-//! outermost points. Coinciding points are halved as any others. What is kept is the order of the leaves and, per sixteen
-//! of them, per sixteen of those and so on, their boxes.
-//!
-//! A binary tree with a box per node took 253 ms of processor time where this takes 220 (all of it, a million points, k = 10).
+//! Points are split at the median along the widest side of their box until sixteen are left. So leaves are small where
+//! points are dense, and clusters of any size and distance get leaves of their own. The outermost points would
+//! determine the cell size of a grid. Coinciding points are split like any others. The tree stores the order of leaves,
+//! and boxes for each sixteen leaves, each sixteen of those, and so on.
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -17,10 +15,10 @@ use super::boxes::{Bounds, Boxes, squared_distances};
 use crate::Error;
 use crate::search::{LANES, Lanes};
 
-/// Nodes of no more leaves are built by one thread.
+/// Nodes with no more leaves than this are built by one thread.
 const TASK_LEAVES: usize = 256;
 
-/// A finite point of the cloud: its position, and its place in the cloud as the bits of a number.
+/// A finite point of the cloud: its position, and the bits of its index as a fourth number.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub(super) struct Point(pub(super) [f32; 4]);
@@ -35,11 +33,11 @@ impl Point {
     }
 }
 
-/// Sixteen points that lie close together, side by side for SIMD.
+/// Sixteen points that lie close together, in lanes for SIMD.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(super) struct Leaf {
-    /// Infinite where the cloud's last leaf has no points left.
+    /// Infinite in unused lanes of the cloud's last leaf.
     pub(super) position: [Lanes; 3],
     pub(super) index: [u32; LANES],
 }
@@ -78,26 +76,26 @@ impl Leaf {
     }
 }
 
-/// The points of the cloud in leaves, and the boxes of the leaves and of the nodes above them, sixteen to a node.
+/// The points of the cloud in leaves, and the boxes of leaves and nodes, sixteen to a node.
 #[derive(Debug)]
 pub(super) struct Tree {
     /// Number of points.
     pub(super) len: usize,
     pub(super) leaves: Vec<Leaf>,
-    /// Boxes by level: of the leaves first, of the root's children last. Node i's children are 16·i to 16·i + 15.
+    /// Boxes by level, from the leaves to the root's children. Node i has children 16·i to 16·i + 15.
     pub(super) levels: Vec<Vec<Boxes>>,
 }
 
-/// Told what part is done, 0 to 1; an error stops the work.
+/// Receives progress, 0 to 1; an error stops the work.
 type Tick<'a> = dyn Fn(f32) -> Result<(), Error> + Sync + 'a;
-/// Told of so many more leaves that are done; an error stops the work.
+/// Receives the number of newly built leaves; an error stops the work.
 type Built<'a> = dyn Fn(usize) -> Result<(), Error> + Sync + 'a;
 
-/// Level, 0 for leaves, and number in it.
+/// Level, 0 for leaves, and number in that level.
 pub(super) type Node = (usize, usize);
 
 impl Tree {
-    /// `tick` is told what part is done, 0 to 1, and may stop the work.
+    /// Builds the tree; `tick` receives progress.
     pub(super) fn build(mut points: Vec<Point>, tick: &Tick) -> Result<Self, Error> {
         let mut leaves = vec![Leaf::EMPTY; points.len().div_ceil(LANES)];
         if !points.is_empty() {
@@ -116,7 +114,7 @@ impl Tree {
         Ok(Self { len: points.len(), leaves, levels })
     }
 
-    /// The median of each coordinate of one point per leaf; the origin if there is none.
+    /// The median of each coordinate of one point per leaf; the origin without points.
     pub(super) fn middle(&self) -> [f32; 3] {
         [0, 1, 2].map(|axis: usize| {
             let mut coordinates: Vec<f32> = self.leaves.iter().map(|leaf| leaf.position[axis].0[0]).collect();
@@ -129,13 +127,13 @@ impl Tree {
         (self.levels.len(), 0)
     }
 
-    /// The boxes of a node's children, their level and the number of the first; of a leaf none.
+    /// The boxes of a node's children, their level and the number of the first; `None` for a leaf.
     pub(super) fn children(&self, (level, number): Node) -> Option<(&Boxes, usize, usize)> {
         let level = level.checked_sub(1)?;
         Some((&self.levels[level][number], level, number * LANES))
     }
 
-    /// Points in a leaf: sixteen, but for the last.
+    /// Points in a leaf: sixteen, except for the last leaf.
     #[inline(always)]
     pub(super) fn lanes(&self, leaf: usize) -> usize {
         LANES.min(self.len - leaf * LANES)
@@ -146,14 +144,14 @@ impl Tree {
     }
 }
 
-/// Sorts points into leaves. `built` is told of leaves done, and asked whether to go on.
+/// Sorts points into leaves; `built` receives the leaves done.
 fn split(points: &mut [Point], leaves: &mut [Leaf], built: &Built) -> Result<(), Error> {
     let count = leaves.len();
     if count == 1 {
         leaves[0] = Leaf::of(points);
         return Ok(());
     }
-    // A node has sixteen children: halves begin where a node of the highest level below this one does.
+    // Nodes have sixteen children, so a half begins where a node of the highest level below this one does.
     let mut span = 1;
     while span * LANES < count {
         span *= LANES;
@@ -170,7 +168,7 @@ fn split(points: &mut [Point], leaves: &mut [Leaf], built: &Built) -> Result<(),
         built(0)?;
         let half = |points: &mut [Point], leaves: &mut [Leaf]| {
             split(points, leaves, built)?;
-            // What is larger is told of by its parts.
+            // The parts of a larger half have reported already.
             if leaves.len() > TASK_LEAVES { Ok(()) } else { built(leaves.len()) }
         };
         let (left, right) = rayon::join(|| half(left, left_leaves), || half(right, right_leaves));
