@@ -1,13 +1,13 @@
-//! Buffers: made within the device's limits, and read back.
+//! Buffers: creation within the device's limits, and readback.
 
 use wgpu::BufferUsages;
 
 use super::Gpu;
 use crate::Error;
 
-/// Parts of a readback begin at multiples of so many bytes.
+/// Alignment of the parts of a readback, bytes.
 const PART: u64 = 16;
-/// A readback's buffer is given back when it is so many times too large.
+/// Largest ratio of a readback's buffer to the needed size. A larger buffer is replaced.
 const MOST_WASTE: u64 = 4;
 
 impl Gpu {
@@ -27,7 +27,7 @@ impl Gpu {
     /// # Errors
     /// [`Error::DeviceLimit`] if the device binds no buffer so large, [`Error::DeviceMemory`] if it has no room.
     pub(crate) fn storage<T>(&self, label: &'static str, len: usize) -> Result<wgpu::Buffer, Error> {
-        // None may be empty; shaders take the length of an array from the size.
+        // No binding may be empty. Shaders take an array's length from the size.
         let size = (len.max(1) * size_of::<T>()) as u64;
         let most = self.most_bound();
         if size > most {
@@ -46,7 +46,7 @@ impl Gpu {
         self.buffer(label, size, BufferUsages::UNIFORM | BufferUsages::COPY_DST)
     }
 
-    /// A texture of the size of the picture that passes draw into and, but for depth, load from.
+    /// A texture of this size that passes draw into and load from.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
@@ -71,7 +71,7 @@ impl Gpu {
         Ok(texture.create_view(&wgpu::TextureViewDescriptor { label: Some(label), ..Default::default() }))
     }
 
-    /// A buffer of any kind.
+    /// A buffer with any usage.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`] if the device has no room.
@@ -86,7 +86,7 @@ impl Gpu {
 
 #[cfg(test)]
 impl Gpu {
-    /// A storage buffer with these values: for tests.
+    /// A storage buffer with these values, for tests.
     ///
     /// # Errors
     /// Those of [`storage`](Self::storage).
@@ -101,7 +101,7 @@ impl Gpu {
     }
 }
 
-/// What the host reads of a frame, through a buffer that is kept from frame to frame.
+/// Reads the results of a frame, through a buffer kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Readback {
     buffer: Option<wgpu::Buffer>,
@@ -110,10 +110,10 @@ pub(crate) struct Readback {
 }
 
 impl Readback {
-    /// Has the whole of some buffers copied.
+    /// Records copies of whole buffers.
     ///
     /// # Errors
-    /// [`Error::DeviceMemory`] if the device has no room.
+    /// [`Error::DeviceLimit`] if the device has no buffer so large, [`Error::DeviceMemory`] if it has no room.
     pub(crate) fn copy(
         &mut self,
         gpu: &Gpu,
@@ -141,7 +141,7 @@ impl Readback {
         Ok(())
     }
 
-    /// Hands what was copied to `take`, a part for each buffer, once the device has done all that was submitted.
+    /// Waits for all submitted work, then passes the copied bytes to `take`, one part per buffer.
     ///
     /// # Errors
     /// [`Error::DeviceLost`].
@@ -161,7 +161,7 @@ impl Readback {
     }
 }
 
-/// Hands the first `size` bytes of a mappable buffer to `take`.
+/// Passes the first `size` bytes of a mappable buffer to `take`.
 pub(super) fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, size: u64, take: impl FnOnce(&[u8]) -> T) -> Result<T, Error> {
     let lost = || gpu.check_lost().err().unwrap_or_else(|| Error::DeviceLost("it does not answer".into()));
     buffer.map_async(wgpu::MapMode::Read, 0..size, |_| {});
@@ -171,7 +171,7 @@ pub(super) fn map<T>(gpu: &Gpu, buffer: &wgpu::Buffer, size: u64, take: impl FnO
     Ok(taken)
 }
 
-/// Waits for all that was submitted and returns the first `len` values of a storage buffer: for tests.
+/// Waits for all submitted work and returns the first `len` values of a storage buffer, for tests.
 ///
 /// # Errors
 /// [`Error::DeviceMemory`], [`Error::DeviceLost`].

@@ -1,13 +1,13 @@
-//! Devices: which there are, and one made ready.
+//! Devices: a list of those available, and one made ready.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::Error;
 
-/// A device that could be rendered on.
+/// A device that can render.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct AdapterSummary {
-    /// What the driver calls it.
+    /// Name given by the driver.
     pub name: String,
     /// Vulkan, Metal, Dx12 …
     pub backend: String,
@@ -15,9 +15,9 @@ pub struct AdapterSummary {
     pub kind: String,
     /// Driver name and version.
     pub driver: String,
-    /// Whether it is a program on the CPU, slower than the CPU backend.
+    /// Whether the device is a program on the CPU, which is slower than the CPU backend.
     pub software: bool,
-    /// Whether depth and index of a point fit one atomic operation; without it points are projected in two passes.
+    /// Whether depth and index of a point fit one atomic operation. Otherwise points are projected in two passes.
     pub int64_atomics: bool,
     /// Whether the device can time its passes.
     pub timestamps: bool,
@@ -30,11 +30,11 @@ pub struct AdapterSummary {
 pub(crate) struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    /// Why the device was lost, once it is.
+    /// Why the device was lost; `None` while it works.
     lost: Arc<Mutex<Option<String>>>,
 }
 
-/// All devices that can be rendered on, hardware first.
+/// All devices that can render, hardware first.
 pub fn adapters() -> Vec<AdapterSummary> {
     let summary = |adapter: &wgpu::Adapter| summary(adapter.get_info(), adapter.features(), &adapter.limits());
     usable_adapters().iter().map(summary).collect()
@@ -58,7 +58,7 @@ fn is_software(info: &wgpu::AdapterInfo) -> bool {
     info.device_type == wgpu::DeviceType::Cpu
 }
 
-/// What one 64-bit atomic minimum needs.
+/// Features for one 64-bit atomic minimum.
 pub(crate) const INT64_ATOMICS: wgpu::Features =
     wgpu::Features::SHADER_INT64.union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
@@ -70,7 +70,7 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
     let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
     adapters
         .retain(|adapter| adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS));
-    // The sort is stable: among devices of a kind the driver's order stays.
+    // A stable sort keeps the driver's order among devices of a kind.
     adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
@@ -82,7 +82,7 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
 }
 
 impl Gpu {
-    /// The best device there is.
+    /// Opens the best device.
     ///
     /// # Errors
     /// [`Error::Device`] if there is none, or it does not start.
@@ -123,13 +123,13 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// The caller's own device, which has one place for a callback, the caller's: its loss is noticed when it does not
+    /// Takes the caller's device and leaves its callback for loss alone; a loss is noticed when the device does not
     /// answer.
     pub(crate) fn from_parts(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self { device, queue, lost: Arc::default() }
     }
 
-    /// What the device is and can do.
+    /// Description of the device.
     pub(crate) fn summary(&self) -> AdapterSummary {
         summary(self.device.adapter_info(), self.device.features(), &self.device.limits())
     }
@@ -144,11 +144,10 @@ impl Gpu {
         self.device.features().contains(INT64_ATOMICS)
     }
 
-    /// What was made by `make`, if the device accepted it.
+    /// Returns what `make` creates, if the device accepts it.
     ///
     /// # Errors
-    /// [`Error::DeviceMemory`] if there was no room for it, [`Error::Device`] if the device refused it,
-    /// [`Error::DeviceLost`].
+    /// [`Error::DeviceMemory`] if the device has no room, [`Error::Device`] if it refuses, [`Error::DeviceLost`].
     pub(crate) fn checked<T>(&self, make: impl FnOnce() -> T) -> Result<T, Error> {
         let invalid = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let full = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);

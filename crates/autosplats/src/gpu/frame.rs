@@ -1,10 +1,10 @@
-//! What all passes of a frame are told.
+//! The uniform that all passes of a frame share.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::camera::{Reprojection, View};
 
-/// The camera and the settings, as `shared/frame.wgsl` has them.
+/// The camera and the settings, in the layout of `shared/frame.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct FrameUniform {
@@ -18,39 +18,39 @@ pub(crate) struct FrameUniform {
     pub(crate) k: u32,
     pub(crate) halves: u32,
     pub(crate) grid_culling: u32,
-    /// 1 if what the fit leaves is adapted.
+    /// 1 if the adapt stage runs.
     pub(crate) adaptive: u32,
     pub(crate) keep_outliers: u32,
     pub(crate) splat_scale: f32,
     /// Radius within which a point must have a neighbour, in first search radii.
     pub(crate) outlier_growth: f32,
-    /// √λ; infinite if any gap is bridged.
+    /// √λ; infinite if all gaps are bridged.
     pub(crate) gap_growth: f32,
-    /// Of the kd-tree search, world units.
+    /// First radius of the kd-tree search, world units.
     pub(crate) first_radius: f32,
     /// Longest ellipse, semi-major over semi-minor axis; 1 for circles.
     pub(crate) longest: f32,
-    /// Over how many frames surfels are averaged.
+    /// Number of frames over which surfels are averaged.
     pub(crate) frames_averaged: f32,
-    /// 1 if the last frame was one of the same points.
+    /// 1 if the last frame showed the same points.
     pub(crate) same_points: u32,
     pub(crate) picture: [u32; 2],
     pub(crate) margin: u32,
-    /// 1 if the last picture was one of the same points, made in the same way, and is to be averaged with.
+    /// 1 if the last picture showed the same points with the same settings and is averaged with this one.
     pub(crate) same_picture: u32,
     /// Columns, each padded to four numbers.
     pub(crate) past_rotation: [[f32; 4]; 3],
     pub(crate) past_shift: [f32; 3],
-    /// 0 if nothing is known of the last frame.
+    /// Focal length of the last frame in pixels; 0 without a last frame.
     pub(crate) past_focal_px: f32,
-    /// Radius in pixels of the dots that all points are; 0 if they are surface.
+    /// Radius in pixels if all points are drawn as dots; 0 if they form a surface.
     pub(crate) dot_px: f32,
-    /// WGSL fills it up to sixteen bytes by itself.
+    /// Padding to sixteen bytes, which WGSL adds implicitly.
     pub(crate) padding: [u32; 3],
 }
 
 impl FrameUniform {
-    /// The camera; settings are the simplest there are.
+    /// The camera with the simplest settings.
     pub(crate) fn new(view: &View, k: u32) -> Self {
         Self {
             view_from_world: columns(view.view_from_world),
@@ -82,14 +82,14 @@ impl FrameUniform {
         }
     }
 
-    /// The same, with the last frame to look back into.
+    /// Adds the last frame for reprojection.
     pub(crate) fn after(self, past: &Reprojection) -> Self {
         let Reprojection { rotation, shift, view } = past;
         Self { past_rotation: columns(*rotation), past_shift: shift.to_array(), past_focal_px: view.focal_px, ..self }
     }
 }
 
-/// A matrix as uniforms have it.
+/// A matrix in the layout of uniforms.
 fn columns(matrix: glam::Mat3) -> [[f32; 4]; 3] {
     [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| [axis.x, axis.y, axis.z, 0.0])
 }

@@ -1,6 +1,6 @@
-//! Links WGSL: `#import name` pulls in `shared/name.wgsl`, once.
+//! Links WGSL: `#import name` includes `shared/name.wgsl` once. See docs/decisions/0018-wgsl-linker.md.
 
-/// What several passes share, by name; a file may import only files that stand before it.
+/// Shared files by name. A file may import only files listed before it.
 const SHARED: &[(&str, &str)] = &[
     ("frame", include_str!("../shared/frame.wgsl")),
     ("picture", include_str!("../shared/picture.wgsl")),
@@ -73,10 +73,10 @@ const SHARED: &[(&str, &str)] = &[
     ("patch", include_str!("../shared/patch.wgsl")),
 ];
 
-/// The source of a pass with all it imports.
+/// The source of a pass with all its imports.
 ///
 /// # Panics
-/// If a name is unknown; every pass is linked in the tests.
+/// If a name is unknown. The tests link every pass.
 pub(crate) fn link(source: &str) -> String {
     let mut wanted = vec![false; SHARED.len()];
     want(source, &mut wanted);
@@ -100,7 +100,7 @@ fn want(source: &str, wanted: &mut [bool]) {
     }
 }
 
-/// Lines stay where they are, so that messages tell the right one of a file that imports nothing.
+/// Keeps line numbers, so that messages about a file without imports name the right line.
 fn without_imports(source: &str) -> String {
     source.lines().map(|line| if line.starts_with("#import ") { "\n".into() } else { format!("{line}\n") }).collect()
 }

@@ -1,8 +1,8 @@
-//! The plumbing of wgpu: devices, shader linking, passes, buffers and readback. Nothing here knows of points.
+//! The plumbing of wgpu: devices, shader linking, passes, buffers and readback. This module knows nothing of points.
 //!
 //! # How it works
-//! A stage compiles its [`Pass`]es once, and makes them [`Step`]s, passes bound to the buffers of a frame, when these
-//! change. A frame is the list of all stages' steps, replayed by a [`Recorder`]: nothing is allocated then.
+//! A stage compiles its [`Pass`]es once. Whenever a frame's buffers change, the stage binds passes to them, which gives
+//! [`Step`]s. A frame is the list of all stages' steps, which a [`Recorder`] replays without allocations.
 
 mod buffers;
 mod device;

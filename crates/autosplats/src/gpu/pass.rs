@@ -1,4 +1,4 @@
-//! A pass: one WGSL file made into a compute pipeline. `raster.rs` has those that draw.
+//! A pass: one WGSL file made into a compute pipeline. Passes that draw are in `raster.rs`.
 
 use std::borrow::Cow;
 
@@ -8,14 +8,14 @@ use super::raster::Raster;
 use super::{Gpu, link::link};
 use crate::Error;
 
-/// Where the code of a pass is.
+/// The source of a pass.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassSource {
-    /// Folder and file name without its ending: `project/compact`. The entry point has the file's name, those of a
-    /// raster pass that name and the stage's: `gather_vertex`, `gather_fragment`.
+    /// Folder and file name without ending: `project/compact`. The entry point has the file's name. A raster pass has
+    /// two, with the stage appended: `gather_vertex`, `gather_fragment`.
     pub(crate) path: &'static str,
     pub(crate) source: &'static str,
-    /// What the shader uses beyond WebGPU's core.
+    /// Features of the shader beyond WebGPU's core.
     pub(crate) needs: wgpu::Features,
 }
 
@@ -37,7 +37,7 @@ impl PassSource {
     /// The linked source, parsed.
     ///
     /// # Panics
-    /// If it is not WGSL: sources are our own.
+    /// If the source is not valid WGSL. All sources are our own.
     pub(crate) fn module(&self) -> naga::Module {
         let source = link(self.source);
         naga::front::wgsl::parse_str(&source)
@@ -45,7 +45,7 @@ impl PassSource {
     }
 }
 
-/// A compute pipeline with the layout of what it is bound to.
+/// A compute pipeline with the layout of its bindings.
 #[derive(Debug)]
 pub(crate) struct Pass {
     path: &'static str,
@@ -55,7 +55,7 @@ pub(crate) struct Pass {
 }
 
 impl Pass {
-    /// Compiles a pass; `constants` are its overrides.
+    /// Compiles a pass; `constants` are values of its overrides.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks a feature or refuses the shader.
@@ -75,13 +75,13 @@ impl Pass {
         })
     }
 
-    /// The pass bound to buffers, in the order of their binding numbers, to run in `groups` workgroups.
+    /// Binds the pass to buffers, in the order of their binding numbers, to run in `groups` workgroups.
     pub(crate) fn step(&self, gpu: &Gpu, buffers: &[&wgpu::Buffer], groups: impl Into<Groups>) -> Step {
         let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
         self.step_with(gpu, &resources, groups)
     }
 
-    /// The pass bound to buffers and textures alike.
+    /// Binds the pass to buffers and textures, as [`step`](Self::step) does.
     pub(crate) fn step_with(
         &self,
         gpu: &Gpu,
@@ -97,7 +97,7 @@ impl Pass {
     }
 }
 
-/// A pass's source made ready for the device.
+/// The source of a pass, ready for the device.
 pub(super) struct Linked {
     pub(super) label: String,
     pub(super) module: naga::Module,
@@ -119,7 +119,7 @@ impl Linked {
     }
 }
 
-/// What pipelines of either kind are made from.
+/// The common parts of compute and render pipelines.
 pub(super) struct Made {
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) shader: wgpu::ShaderModule,
@@ -144,7 +144,7 @@ impl Made {
     }
 }
 
-/// Buffers are ours and sized by us; workgroup memory is written before it is read.
+/// Zeroing is off, as passes write workgroup memory before they read it.
 pub(super) fn compilation_options<'a>(constants: &'a [(&'a str, f64)]) -> wgpu::PipelineCompilationOptions<'a> {
     wgpu::PipelineCompilationOptions { constants, zero_initialize_workgroup_memory: false }
 }
@@ -163,12 +163,12 @@ pub(super) fn bind(
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 
-/// How many workgroups a step has.
+/// Number of workgroups of a step.
 #[derive(Clone, Debug)]
 pub(crate) enum Groups {
-    /// So many.
+    /// A fixed number.
     Number(u32),
-    /// As many as the device wrote into a buffer, in rows as a dispatch has them, at this byte.
+    /// The arguments of an indirect dispatch, in a buffer at this byte.
     Counted(wgpu::Buffer, u64),
 }
 
@@ -186,14 +186,14 @@ pub(crate) struct Step {
     pub(super) work: Work,
 }
 
-/// What a step does.
+/// The work of a step.
 #[derive(Clone, Debug)]
 pub(super) enum Work {
     Compute { pipeline: wgpu::ComputePipeline, bindings: wgpu::BindGroup, groups: Groups },
     Raster(Raster),
 }
 
-/// The layout that a module declares, whether or not it uses all of it.
+/// The layout of all bindings that a module declares, used or not.
 fn layout_entries(module: &naga::Module, visibility: wgpu::ShaderStages) -> Vec<wgpu::BindGroupLayoutEntry> {
     let mut entries: Vec<_> = module
         .global_variables
@@ -206,7 +206,7 @@ fn layout_entries(module: &naga::Module, visibility: wgpu::ShaderStages) -> Vec<
                     let read_only = !access.contains(naga::StorageAccess::STORE);
                     buffer(wgpu::BufferBindingType::Storage { read_only })
                 }
-                // Textures hold numbers that are loaded one by one.
+                // Textures hold numbers, which passes load without filtering.
                 naga::AddressSpace::Handle => wgpu::BindingType::Texture {
                     sample_type: wgpu::TextureSampleType::Float { filterable: false },
                     view_dimension: wgpu::TextureViewDimension::D2,

@@ -4,17 +4,17 @@ use super::Gpu;
 use super::pass::{Linked, Made, PassSource, Step, Work, bind, compilation_options};
 use crate::Error;
 
-/// Four numbers per pixel: all that passes draw into.
+/// Format of all colour targets: four numbers per pixel.
 const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// How what is drawn meets what is there, colour and alpha apart.
+/// How drawn values combine with stored ones, in colour and alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Target {
     Replace,
     /// Sums in all channels.
     Add,
-    /// Sums in colour, the greatest in alpha.
+    /// Sums in colour, maximum in alpha.
     AddAndMax,
 }
 
@@ -34,25 +34,25 @@ impl Target {
     }
 }
 
-/// What a pass does with the depth buffer.
+/// How a pass uses the depth buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DepthMask {
-    /// Writes what it draws.
+    /// Writes the drawn depth.
     Write,
-    /// Draws where it is further than what is there, and leaves that.
+    /// Draws where the fragment is further away than the stored depth, and keeps that depth.
     Greater,
 }
 
-/// What a texture holds when drawing begins.
+/// Content of a texture when drawing begins.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Load {
-    /// What it held.
+    /// The former content.
     Kept,
-    /// The same everywhere.
+    /// One value everywhere.
     Cleared([f64; 4]),
 }
 
-/// A render pipeline with the layout of what it is bound to.
+/// A render pipeline with the layout of its bindings.
 #[derive(Debug)]
 pub(crate) struct RasterPass {
     path: &'static str,
@@ -61,7 +61,7 @@ pub(crate) struct RasterPass {
     layout: wgpu::BindGroupLayout,
 }
 
-/// A pass bound to what it reads; how many vertices it has is read from a buffer.
+/// A pass bound to its resources. A buffer holds the number of vertices.
 #[derive(Clone, Debug)]
 pub(crate) struct Draw {
     path: &'static str,
@@ -72,7 +72,7 @@ pub(crate) struct Draw {
     at: u64,
 }
 
-/// What a step draws into.
+/// The targets of a step.
 #[derive(Clone, Debug)]
 pub(crate) struct Targets {
     pub(crate) colors: Vec<(wgpu::TextureView, Load)>,
@@ -89,7 +89,7 @@ pub(super) struct Raster {
 }
 
 impl RasterPass {
-    /// Compiles a pass that draws triangles into `targets`; `constants` are its overrides.
+    /// Compiles a pass that draws triangles into `targets`; `constants` are values of its overrides.
     ///
     /// # Errors
     /// [`Error::Device`] if the device lacks a feature or refuses the shader.
@@ -145,8 +145,7 @@ impl RasterPass {
         })
     }
 
-    /// The pass bound to what it reads, in the order of binding numbers; the arguments of its draw lie in a buffer, at this
-    /// byte.
+    /// Binds the pass to resources, in the order of binding numbers. `arguments` has the draw's arguments at byte `at`.
     pub(crate) fn draw(
         &self,
         gpu: &Gpu,
@@ -166,7 +165,7 @@ impl RasterPass {
 }
 
 impl Targets {
-    /// Draws one after the other, as one step with the last one's name.
+    /// Draws in this order, as one step with the name of the last draw.
     ///
     /// # Panics
     /// If there is nothing to draw.

@@ -7,7 +7,7 @@ use super::buffers::map;
 use super::pass::{Groups, Step, Work};
 use crate::Error;
 
-/// Workgroups in a row of a dispatch: more than 65535 need a second dimension. `shared/groups.wgsl` undoes this.
+/// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
 pub(crate) const GROUPS_PER_ROW: u32 = 32768;
 
 /// Most passes of a frame that can be timed.
@@ -25,11 +25,11 @@ pub struct PassTime {
 /// How passes are timed.
 #[derive(Debug)]
 pub(crate) enum Clock {
-    /// Not at all.
+    /// No timing.
     Off,
-    /// By the device, as it runs.
+    /// By timestamps of the device.
     Timestamps { queries: wgpu::QuerySet, resolved: wgpu::Buffer, mapped: wgpu::Buffer },
-    /// Each pass is submitted and waited for: software devices' timestamps are not to be trusted.
+    /// Each pass is submitted and waited for. Timestamps of software devices are unreliable.
     Wall,
 }
 
@@ -73,15 +73,15 @@ impl Clock {
 }
 
 impl Clock {
-    /// Fills in the times of a frame that was submitted, waiting for it, and returns when each pass timed began and ended, in
-    /// milliseconds from the first one's start.
+    /// Waits for a submitted frame and fills in its times. Returns begin and end of each timed pass, in milliseconds
+    /// from the start of the first.
     ///
     /// # Errors
     /// [`Error::DeviceLost`].
     pub(crate) fn read(&self, gpu: &Gpu, times: &mut [PassTime]) -> Result<Vec<[f64; 2]>, Error> {
         let timed = times.len().min(MOST_PASSES as usize);
         let Self::Timestamps { mapped, .. } = self else {
-            // One after the other.
+            // Passes ran one after the other.
             let one = |end: &mut f64, time: &PassTime| {
                 let begin = *end;
                 *end += time.ms;
@@ -104,13 +104,13 @@ impl Clock {
     }
 }
 
-/// Milliseconds that a stage took: from the begin to the end of each run of its passes, what lies between them included.
-/// Without that a stage of many short passes would look faster than it is.
+/// Milliseconds that a stage took: for each run of its passes, from begin to end. Gaps count, or a stage of many short
+/// passes would seem faster than it is.
 pub(crate) fn stage_ms(stage: &str, times: &[PassTime], spans: &[[f64; 2]]) -> f64 {
     let stage_of = |time: &PassTime| time.pass.split('/').next();
     let passes: Vec<_> = times.iter().map(stage_of).zip(spans).collect();
     let runs = passes.chunk_by(|(before, _), (after, _)| before == after).filter(|run| run[0].0 == Some(stage));
-    // A sum of nothing would be -0.
+    // `sum` of nothing would be -0.
     runs.fold(0.0, |ms, run| ms + run[run.len() - 1].1[1] - run[0].1[0])
 }
 
@@ -164,12 +164,12 @@ impl<'a> Recorder<'a> {
         self.times.push(PassTime { pass: step.path, ms });
     }
 
-    /// Submits what was recorded and waits for it; the milliseconds that took.
+    /// Submits the recorded commands and waits. Returns the milliseconds that they took.
     fn submit(&mut self) -> f64 {
         let commands = std::mem::replace(&mut self.encoder, encoder(self.gpu)).finish();
         let start = Instant::now();
         self.gpu.queue.submit([commands]);
-        // A lost device is noticed when the frame ends.
+        // A lost device is noticed at the end of the frame.
         let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
         start.elapsed().as_secs_f64() * 1e3
     }
