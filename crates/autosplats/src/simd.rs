@@ -1,7 +1,7 @@
 //! Vectors of `f32` as wide as the processor has them, with operators.
 //!
-//! The width is chosen when a function runs ([`pulp`] dispatches it), never what is computed: no operation mixes lanes and
-//! none is fused, so every width gives the same bits.
+//! [`pulp`] chooses the width at run time. All widths give the same bits, as no operation mixes lanes and none is
+//! fused.
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
@@ -49,13 +49,13 @@ impl<S: Simd> F32s<S> {
         Self { value: self.simd.abs_f32s(self.value), ..self }
     }
 
-    /// Neither may be NaN: processors differ in what they make of it.
+    /// Minimum by lane. Neither may be NaN, for which processors differ.
     #[inline(always)]
     pub(crate) fn min(self, other: Self) -> Self {
         Self { value: self.simd.min_f32s(self.value, other.value), ..self }
     }
 
-    /// Neither may be NaN: processors differ in what they make of it.
+    /// Maximum by lane. Neither may be NaN, for which processors differ.
     #[inline(always)]
     pub(crate) fn max(self, other: Self) -> Self {
         Self { value: self.simd.max_f32s(self.value, other.value), ..self }

@@ -1,4 +1,4 @@
-//! Point clouds for tests: synthetic, seeded and named, all about the world's origin and some two units wide.
+//! Point clouds for tests: synthetic, seeded and named, around the world's origin and about two units wide.
 
 #![allow(dead_code, reason = "unit tests and tests of the public API use different ones")]
 
@@ -29,7 +29,7 @@ impl Random {
         2.0 * self.unit() - 1.0
     }
 
-    /// Of the normal distribution with standard deviation 1.
+    /// Normally distributed with standard deviation 1.
     pub(crate) fn gaussian(&mut self) -> f32 {
         let [u, v] = [1.0 - self.unit(), self.unit()];
         (-2.0 * u.ln()).sqrt() * (std::f32::consts::TAU * v).cos()
@@ -39,7 +39,7 @@ impl Random {
         (self.bits() % end as u64) as usize
     }
 
-    /// A direction, all equally likely.
+    /// A unit vector; all directions are equally likely.
     pub(crate) fn direction(&mut self) -> [f32; 3] {
         loop {
             let v = [self.signed(), self.signed(), self.signed()];
@@ -57,29 +57,29 @@ impl Random {
     }
 }
 
-/// Where the test cameras stand.
+/// Position of the test cameras.
 pub(crate) const EYE: DVec3 = DVec3::new(0.5, -0.8, -4.0);
 
-/// The middle of the ball in a [`room`], in its axes.
+/// Centre of the ball in a [`room`], in the room's axes.
 const BALL: DVec3 = DVec3::new(-0.3, 0.2, 2.0);
 
 pub(crate) type Positions = Vec<[f32; 3]>;
 
-/// `count` points of a square patch, `at` places its coordinates, -1 to 1, in space.
+/// `count` points of a square patch. `at` maps its coordinates, -1 to 1, to space.
 fn patch(seed: u64, count: usize, at: impl Fn(f32, f32) -> [f32; 3]) -> Positions {
     let mut random = Random::new(seed);
     (0..count).map(|_| at(random.signed(), random.signed())).collect()
 }
 
-/// Across [`plane`], towards the eye, of any length.
+/// Normal of [`plane`] towards the eye, not normalised.
 pub(crate) const PLANE_NORMAL: DVec3 = DVec3::new(0.3, -0.2, -1.0);
 
 pub(crate) fn plane(count: usize) -> Positions {
     patch(1, count, |x, y| [x, y, 0.3 * x - 0.2 * y])
 }
 
-/// A dense square, and a few points in its plane beyond one of its borders, further away from it than its points are from each
-/// other; with the number of the first of those.
+/// A dense square, and a few points in its plane beyond a border, further away than points are apart. Returns the index
+/// of the first of these.
 pub(crate) fn beyond_a_border() -> (Positions, u32) {
     let mut random = Random::new(5);
     let mut positions: Positions = (0..40_000).map(|_| [0.5 * random.signed(), 0.5 * random.signed(), 0.0]).collect();
@@ -88,7 +88,7 @@ pub(crate) fn beyond_a_border() -> (Positions, u32) {
     (positions, surface)
 }
 
-/// A sheet of points, in waves so high, before a wall that is forty times as dense; with the number of the first of the wall.
+/// A sheet with waves of this height before a wall forty times as dense. Returns the index of the wall's first point.
 pub(crate) fn before_a_wall(waves: f32) -> (Positions, u32) {
     let mut random = Random::new(23);
     let mut square = |half: f32, per_unit: f32| -> Vec<[f32; 2]> {
@@ -119,12 +119,12 @@ pub(crate) fn edge(count: usize) -> Positions {
     patch(5, count, |x, y| [x, y, x.abs()])
 }
 
-/// Two halves of a plane, one a tenth before the other.
+/// Two halves of a plane, one 0.1 before the other.
 pub(crate) fn step(count: usize) -> Positions {
     patch(1, count, |x, y| [x, y, if x > 0.0 { -0.1 } else { 0.0 }])
 }
 
-/// A plane with more and more points towards one side.
+/// A plane with a density that rises towards one side.
 pub(crate) fn density_ramp(count: usize) -> Positions {
     patch(6, count, |x, y| [x * x * x, y, 0.1 * y])
 }
@@ -156,7 +156,7 @@ pub(crate) fn line(count: usize) -> Positions {
     patch(8, count, |t, _| [t, 0.6 * t, -0.4 * t])
 }
 
-/// Points with nothing near them, along the line of sight through a room far deeper than wide.
+/// Isolated points along the line of sight, in a space far deeper than wide.
 pub(crate) fn outliers(count: usize) -> Positions {
     let mut random = Random::new(9);
     let forward = (EYE / EYE.z).as_vec3();
@@ -167,14 +167,14 @@ pub(crate) fn outliers(count: usize) -> Positions {
     (0..count).map(|_| point()).collect()
 }
 
-/// Moves points by chance, `sigma` in the mean square along each axis.
+/// Adds noise with standard deviation `sigma` along each axis.
 pub(crate) fn noisy(mut points: Positions, sigma: f32) -> Positions {
     let mut random = Random::new(10);
     points.iter_mut().flatten().for_each(|c| *c += sigma * random.gaussian());
     points
 }
 
-/// Every other point of a sphere `apart` further to one side, as scans of it that do not fit.
+/// A sphere with every other point moved by `apart` along x, like two misaligned scans.
 pub(crate) fn misfit(count: usize, apart: f32) -> Positions {
     let mut points = sphere(count);
     points.iter_mut().step_by(2).for_each(|point| point[0] += apart);
@@ -186,14 +186,14 @@ pub(crate) fn bumpy(count: usize) -> Positions {
     patch(11, count, |x, y| [x, y, 0.15 * (5.0 * x).sin() * (4.0 * y).cos()])
 }
 
-/// A floor that leads away from the eye to three times the depth of its near end, with noise that grows with the square of
-/// depth as that of depth cameras does: `sigma` at depth 1.
+/// A floor that leads away from the eye to three times the depth of its near end. Noise grows with the square of depth,
+/// as with depth cameras: `sigma` at depth 1.
 pub(crate) fn receding(count: usize, sigma: f32) -> Positions {
     let eye = EYE.as_vec3();
     let forward = eye / eye.z;
     let mut random = Random::new(12);
     let mut point = || {
-        // As far apart as scanned.
+        // Spacing grows with depth, as in a scan.
         let depth = 4.0 * 3f32.powf(random.unit());
         let [x, y] = [0.25 * depth * random.signed(), 0.8 - 0.4 * (depth - 4.0)];
         let point = [eye.x + forward.x * depth + x, eye.y + forward.y * depth + y, eye.z + depth];
@@ -202,7 +202,7 @@ pub(crate) fn receding(count: usize, sigma: f32) -> Positions {
     (0..count).map(|_| point()).collect()
 }
 
-/// All of them by name, those with many points of about `count`.
+/// All clouds by name, most with about `count` points.
 pub(crate) fn all(count: usize) -> Vec<(&'static str, Positions)> {
     vec![
         ("plane", plane(count)),
@@ -220,13 +220,13 @@ pub(crate) fn all(count: usize) -> Vec<(&'static str, Positions)> {
     ]
 }
 
-/// From the axes of the camera of [`room`], which is held askew, to those of the room.
+/// Rotation from the axes of [`room`]'s tilted camera to those of the room.
 pub(crate) fn askew() -> DQuat {
     DQuat::from_rotation_z(0.2) * DQuat::from_rotation_x(0.15) * DQuat::from_rotation_y(-0.1)
 }
 
-/// What a depth camera at the origin sees of a room with a ball in it, in the camera's axes: `width` columns, and the depth
-/// that it measures in place of the right one. In the room's axes the floor is at y = 1, a wall at x = 1.5, another at z = 8.
+/// A room with a ball, seen by a depth camera at the origin, in the camera's axes, with `width` columns. `measured`
+/// maps true to measured depths. In the room's axes the floor is at y = 1, one wall at x = 1.5, another at z = 8.
 pub(crate) fn room(width: usize, mut measured: impl FnMut(f32) -> f32) -> Positions {
     let height = width / 4 * 3;
     let mut points = Vec::with_capacity(width * height);
@@ -235,7 +235,7 @@ pub(crate) fn room(width: usize, mut measured: impl FnMut(f32) -> f32) -> Positi
         let [x, y] = [(column - width as f32 / 2.0) / width as f32, (row - height as f32 / 2.0) / width as f32];
         let way = askew() * DVec3::new(x.into(), y.into(), 1.0);
         let until = |at: f64, way: f64| if way > 0.0 { at / way } else { f64::INFINITY };
-        // Half a unit in radius.
+        // The ball's radius is 0.5.
         let [a, b, c] = [way.length_squared(), way.dot(BALL), BALL.length_squared() - 0.25];
         let root = b * b - a * c;
         let ball = if root > 0.0 { (b - root.sqrt()) / a } else { f64::INFINITY };
@@ -246,16 +246,16 @@ pub(crate) fn room(width: usize, mut measured: impl FnMut(f32) -> f32) -> Positi
     points
 }
 
-/// A depth in the nearest of a Kinect's steps, each `step` wide at depth 1.
+/// A depth rounded to a Kinect's steps, which are `step` wide at depth 1.
 pub(crate) fn stepped(depth: f32, step: f32) -> f32 {
     1.0 / (step * (1.0 / (step * depth)).round())
 }
 
-/// Beams of the lidar of [`swept`], below the horizon.
+/// Number of beams of the lidar of [`swept`], all below the horizon.
 pub(crate) const BEAMS: usize = 24;
 
-/// What a spinning lidar one unit above the ground y = 1 leaves: rings ten to thirty times as far apart as their points, up to a
-/// wall z = 4. `measured` turns distances into those that it tells.
+/// Rings of a spinning lidar one unit above the ground y = 1, up to a wall z = 4. Rings are ten to thirty times as far
+/// apart as their points. `measured` maps true to measured distances.
 pub(crate) fn swept(mut measured: impl FnMut(f32) -> f32) -> Positions {
     const TURN: usize = 3000;
     let one = |ray: usize| {
@@ -270,7 +270,7 @@ pub(crate) fn swept(mut measured: impl FnMut(f32) -> f32) -> Positions {
     (0..BEAMS * TURN).map(one).collect()
 }
 
-/// How far below the horizon a beam of [`swept`] looks.
+/// Angle of a beam of [`swept`] below the horizon.
 pub(crate) fn beam_radians(beam: usize) -> f32 {
     0.1 + 0.025 * beam as f32
 }
