@@ -99,7 +99,7 @@ struct Task<'a> {
     view: &'a View,
     rules: &'a AdaptRules,
     usual: Usual,
-    /// Known noise of depth cameras, in view space.
+    /// The known noise of depth cameras, in view space.
     known: &'a DepthNoise,
 }
 

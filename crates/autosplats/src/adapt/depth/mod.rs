@@ -62,13 +62,13 @@ pub(crate) struct DepthRun {
     pub(crate) padding: [u32; 3],
 }
 
-/// Known noise of a cloud: runs in the order of points, from point 0 on. Empty if nothing is known.
+/// The known noise of a cloud: runs in the order of points, from point 0 on. Empty if nothing is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct DepthNoise {
     pub(super) runs: Vec<DepthRun>,
 }
 
-/// Known noise at a surfel.
+/// The known noise at a surfel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Known {
     /// Standard deviation, world units.
