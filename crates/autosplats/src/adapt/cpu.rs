@@ -60,7 +60,7 @@ pub(super) const STRAY_OFFSET_KNOWN: f32 = 2.0;
 /// variation is up to 0.15 at edges and corners, which therefore stay where points are up to four times sparser than
 /// usual. In a cloud that fills space the mean is 0.2, and much less for some points.
 pub(super) const STRAY_DOT: f32 = 2.5;
-/// The measure of [`STRAY_DOT`] above which a point is dropped as an outlier.
+/// Outlier score, as defined for [`STRAY_DOT`], above which a point is dropped.
 pub(super) const STRAY_DROPPED: f32 = 5.0;
 /// K-radius, in median k-radii, beyond which a wider ball is checked: few neighbours lie flat by chance or are cut off.
 pub(super) const SPARSE: f32 = 2.5;

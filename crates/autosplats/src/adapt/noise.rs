@@ -33,7 +33,7 @@ const TASK: usize = 32;
 const PICK_TASK: usize = 4096;
 /// Fewest balls of a scale, with enough points to fit, that give an estimate.
 pub(super) const LEAST_SAMPLE: usize = 64;
-/// One in this many of the sample has to find such a ball, or the scale gives no estimate.
+/// One in this many sampled points has to find a ball with enough points, or the scale gives no estimate.
 pub(super) const LEAST_SHARE: usize = 5;
 /// Scatter, in ball radii, below which a ball is thin. Points that fill a ball scatter by 0.4.
 pub(super) const THIN: f32 = 0.15;

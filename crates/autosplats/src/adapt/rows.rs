@@ -29,7 +29,7 @@ pub(super) const AREA: f32 = 0.25;
 /// reach [`AREA`] there: three wires have 0.18, four scan lines or the border of many 0.33. The ball's weight has to
 /// grow more than its radius: that of areas grows with the square, that of a closed curve less.
 pub(super) const BEYOND: f32 = 4.0;
-/// Bounds of that ball's radius, in radii of the first ball.
+/// Least and largest radius of the ball of [`BEYOND`], in radii of the first ball.
 pub(super) const BEYOND_RADII: [f32; 2] = [STEP, STEP * STEP * STEP];
 /// Least variance across one side of a first ball, over that along. With less, the side holds the scan line alone.
 pub(super) const AREA_NEAR: f32 = 0.05;

@@ -20,7 +20,7 @@ use crate::fit::{SUPPORT, Surfel};
 pub(super) const LEAST_ON: f32 = 0.1;
 /// Distance from the disc's plane, in disc radii, up to which points are on the disc.
 pub(super) const ON_DISC: f32 = 0.3;
-/// The same distance in noise levels; the larger of the two counts.
+/// Distance from the disc's plane, in noise levels, up to which points are on the disc, if larger than [`ON_DISC`].
 pub(super) const ON_DISC_NOISE: f32 = 3.0;
 /// K-radius, in first search radii, above which a disc is tested. With less, the surroundings are hardly denser.
 pub(super) const DENSER: f32 = 3.0;
@@ -28,9 +28,10 @@ pub(super) const DENSER: f32 = 3.0;
 pub(super) const GOES_ON: f32 = 4.0;
 /// Largest surface variation of a surface in the ball of [`GOES_ON`].
 pub(super) const FLAT_AROUND: f32 = 0.005;
-/// Least variance across that ball, over that along. Wires have less; a straight border has 0.33.
+/// Least variance across the ball of [`GOES_ON`], over that along, of a surface. Wires have less, a straight border
+/// 0.33.
 pub(super) const WIDE_AROUND: f32 = 0.25;
-/// Largest distance of that ball's mean from the point, in ball radii, of a surface on all sides; borders have 0.37.
+/// Largest distance of the mean of the ball of [`GOES_ON`] from the point, in ball radii; borders have 0.37.
 pub(super) const ALL_AROUND: f32 = 0.3;
 /// Least radius of a disc in cells, where cells are that fine: enough cells to count.
 pub(super) const CELLS_TO_COUNT: f32 = 2.0;
