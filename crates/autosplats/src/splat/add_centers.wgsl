@@ -1,4 +1,4 @@
-// Adds the centre of each splat, dead or alive, to its pixel, for the trim. The CPU form, `centers.rs`, says how.
+// Adds the centre of each splat, living or dead, to its pixel, for the trim. The CPU form is `centers.rs`.
 //
 // Reads: counters, splats, tree. Reads and writes: centers.
 
@@ -13,7 +13,7 @@
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read_write> centers: array<atomic<u32>>;
 
-// Steps of a centre's place in its pixel.
+// Steps along the side of a pixel.
 override STEPS: f32;
 
 @compute @workgroup_size(256)

@@ -1,4 +1,4 @@
-//! What splats carry to the pixels: channels, their sums over a tile, and the layers they become.
+//! Attributes of splats: the channels that they carry, their sums over a tile, and the layers that result.
 
 use autosplats_cloud::FieldValues;
 
@@ -10,18 +10,18 @@ use crate::fit::Surfel;
 /// Most channels a splat can carry: normal, colour, scalar with its weight, radius, k-radius, curvature, back.
 pub(super) const CHANNELS: usize = 12;
 
-/// What is averaged over the splats of a pixel, beside depth and normal.
+/// Attributes that are averaged over the splats of a pixel, beside depth and normal.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Attributes<'a> {
     pub(crate) color: Option<PointColors<'a>>,
     pub(crate) scalar: Option<&'a FieldValues>,
     /// Splat radius, k-radius and curvature.
     pub(crate) measures: bool,
-    /// Whether the surface shows its back.
+    /// Share of the surface's back.
     pub(crate) backs: bool,
 }
 
-/// Colours by point, and the linear value of each of their steps.
+/// Colours by point, and the linear value of each 8-bit step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PointColors<'a> {
     pub(crate) srgb: &'a [[u8; 3]],
@@ -29,7 +29,7 @@ pub(crate) struct PointColors<'a> {
 }
 
 impl Attributes<'_> {
-    /// How many channels a splat carries.
+    /// Number of channels that a splat carries.
     pub(super) fn channels(&self) -> usize {
         3 + if self.color.is_some() { 3 } else { 0 }
             + if self.scalar.is_some() { 2 } else { 0 }
@@ -37,7 +37,7 @@ impl Attributes<'_> {
             + usize::from(self.backs)
     }
 
-    /// Lists what `surfel` carries.
+    /// Writes the channels of `surfel`: the normal, then those requested, in the order of [`CHANNELS`].
     #[inline(always)]
     pub(super) fn values(&self, surfel: &Surfel, values: &mut [f32; CHANNELS]) {
         values[..3].copy_from_slice(&surfel.normal);
@@ -70,9 +70,9 @@ impl Attributes<'_> {
 pub(super) struct TileSums {
     pub(super) weight: Vec<f32>,
     pub(super) depth: Vec<f32>,
-    /// One tile after the other, in the order of [`Attributes::values`].
+    /// One plane per channel, in the order of [`Attributes::values`].
     pub(super) channels: Vec<f32>,
-    /// Weight of the heaviest splat, the bits of the index of the point it comes from, and its reach in pixels.
+    /// Weight of the heaviest splat, the index of its point as bits, and its reach in pixels.
     pub(super) heaviest: Vec<f32>,
     pub(super) point: Vec<f32>,
     pub(super) reach: Vec<f32>,
@@ -103,7 +103,7 @@ impl TileSums {
             let covered = self.weight[i] > 0.0;
             layers.depth[i] = if covered { self.depth[i] / self.weight[i] } else { f32::INFINITY };
             let length = (nx[i] * nx[i] + ny[i] * ny[i] + nz[i] * nz[i]).sqrt();
-            // Opposite normals may cancel; then the surface is taken to face the eye.
+            // Opposite normals may cancel. Then the surface counts as facing the eye.
             let cancelled = covered & !(length > 1e-6 * self.weight[i]);
             let scale = if length > 0.0 { 1.0 / length } else { 0.0 };
             let normal = [nx[i] * scale, ny[i] * scale, nz[i] * scale];
@@ -141,12 +141,12 @@ impl TileLayers<'_> {
         self.weight[at] > 0.0
     }
 
-    /// What pixel `at` of the tile shows.
+    /// The surface at pixel `at` of the tile.
     pub(super) fn shown(&self, at: usize) -> Shown {
         Shown { depth: self.depth[at], normal: self.normal[at] }
     }
 
-    /// Leaves nothing in the tile.
+    /// Empties the tile.
     pub(super) fn clear_all(&mut self) {
         self.weight.fill(0.0);
         self.depth.fill(f32::INFINITY);
@@ -159,7 +159,7 @@ impl TileLayers<'_> {
         }
     }
 
-    /// Leaves nothing at pixel `at` of the tile.
+    /// Empties pixel `at` of the tile.
     pub(super) fn clear(&mut self, at: usize) {
         self.weight[at] = 0.0;
         self.depth[at] = f32::INFINITY;
@@ -179,7 +179,7 @@ impl TileLayers<'_> {
     }
 }
 
-/// The part of each layer that belongs to one tile; empty where the layer is.
+/// The part of each layer that belongs to one tile; empty for a layer that is empty.
 #[derive(Debug)]
 pub(super) struct TileLayers<'a> {
     weight: &'a mut [f32],
@@ -195,7 +195,8 @@ pub(super) struct TileLayers<'a> {
 }
 
 impl GBuffer {
-    /// Makes room for a frame of this size with these layers; whether all are as long as before, and so hold what they did.
+    /// Sizes the layers for a frame. Returns whether all lengths are unchanged, so that the layers still hold the last
+    /// frame.
     pub(super) fn resize(&mut self, view: &View, area: usize, attributes: &Attributes<'_>) -> bool {
         fn fit<T: Copy + Default>(layer: &mut Vec<T>, len: usize) -> bool {
             let fits = layer.len() == len;

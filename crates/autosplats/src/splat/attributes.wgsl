@@ -1,5 +1,5 @@
-// Attribute pass: the weighted mean of all living splats within ε of the depth map, divided by the weights, and the rims
-// for the trim [Paper, §7].
+// Attribute pass: the weighted mean of all living splats within ε of the depth map, and the rims for the trim [Paper,
+// §7].
 //
 // Reads: linear, splats, tree, surfels, values, depth_map. Writes: surface, cover, extras.
 
@@ -11,7 +11,7 @@
 #import layers
 #import depth_map
 
-// Linear value of each step of a colour.
+// Linear value of each 8-bit step of a colour.
 @group(0) @binding(1) var<uniform> linear: array<vec4f, 64>;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
@@ -22,17 +22,17 @@
 @group(0) @binding(8) var<storage, read_write> cover: array<Cover>;
 @group(0) @binding(9) var<storage, read_write> extras: array<vec4f>;
 
-// What splats carry beside their normal.
+// Optional attributes of splats.
 override COLOR: bool;
 override SCALAR: bool;
 override MEASURES: bool;
 override BACKS: bool;
-// Slots for that, 64 or, where it is not carried, 1.
+// Workgroup slots for each attribute: 64, or 1 for an absent one.
 override COLOR_SLOTS: u32;
 override SCALAR_SLOTS: u32;
 override MEASURE_SLOTS: u32;
 override BACK_SLOTS: u32;
-// How steeply the kernel falls.
+// Slope of the kernel.
 override KERNEL_SLOPE: f32;
 override CORE_WEIGHT: f32;
 override INNER_WEIGHT: f32;
@@ -41,38 +41,38 @@ var<workgroup> normals: array<vec3f, GROUP>;
 var<workgroup> sources: array<u32, GROUP>;
 var<workgroup> reaches: array<f32, GROUP>;
 var<workgroup> colors: array<vec3f, COLOR_SLOTS>;
-// x the value, y its weight: 0 if it is unknown.
+// Value (x) and weight (y), which is 0 for an unknown value.
 var<workgroup> scalars: array<vec2f, SCALAR_SLOTS>;
 // Splat radius, k-radius and curvature.
 var<workgroup> measures: array<vec3f, MEASURE_SLOTS>;
 // 1 if the surface shows its back, else 0.
 var<workgroup> backs: array<f32, BACK_SLOTS>;
 
-// What four pixels below each other, the components of vectors, show.
+// Sums of four pixels in a column, one per vector component.
 struct Sums {
-    // The depth map.
+    // Limit from the depth map.
     limit: vec4f,
     weight: vec4f,
     depth: vec4f,
     normal: mat3x4f,
     color: mat3x4f,
-    // Sum of the values, and of the weights of those known.
+    // Sum of the values, and of the weights of known values.
     scalar: mat2x4f,
     measures: mat3x4f,
     back: vec4f,
-    // Weight of the heaviest splat, its point and its reach.
+    // Weight, point and reach of the heaviest splat.
     heaviest: vec4f,
     point: vec4u,
     reach: vec4f,
 }
 
-// Of the invocation's eight pixels: their centres, and what the upper and the lower four show.
+// The invocation's eight pixels: their centres, and the sums of the upper and lower four.
 var<private> own_x: f32;
 var<private> own_y: vec4f;
 var<private> upper: Sums;
 var<private> lower: Sums;
 
-// What splats carry.
+// Attributes of one splat.
 struct Carried {
     normal: vec3f,
     color: vec3f,
@@ -89,7 +89,7 @@ fn load(slot: u32, index: u32) {
     let span = vec2f(lasts(bounds) - firsts(bounds));
     normals[slot] = surfel.normal;
     sources[slot] = surfel.source;
-    // About how far it reaches from its centre, in pixels.
+    // Approximate reach from the centre, in pixels.
     reaches[slot] = 0.5 * max(span.x, span.y) + 0.5;
     let words = u32(COLOR) + u32(SCALAR);
     let screen = surfel.screen & ~BACK;
@@ -186,7 +186,7 @@ fn attributes(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
     end(&lower, pixel + vec2u(0u, 4u));
 }
 
-// Index of a pixel below another; that of the last one if it is beyond the picture.
+// Index of the pixel `below` rows under another; that of the last row if it lies beyond the picture.
 fn pixel_index(pixel: vec2u, below: u32) -> u32 {
     let inside = min(pixel + vec2u(0u, below), frame.size - 1u);
     return inside.y * frame.size.x + inside.x;
@@ -208,7 +208,7 @@ fn end(sums: ptr<private, Sums>, first: vec2u) {
     normalize_sums(sums, first, 3u);
 }
 
-// Divides the sums of one of four pixels by the weights into the layers.
+// Divides the sums of one of four pixels by the weights, into the layers.
 fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
     if any(first + vec2u(0u, i) >= frame.size) {
         return;
@@ -229,7 +229,7 @@ fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
     if length > 0.0 {
         normal = n * (1.0 / length);
     }
-    // Opposite normals may cancel; then the surface is taken to face the eye.
+    // Opposite normals may cancel. Then the surface counts as facing the eye.
     if covered && !(length > 1e-6 * weight) {
         normal = vec3f(0.0, 0.0, -1.0);
     }
@@ -240,7 +240,7 @@ fn normalize_sums(sums: ptr<private, Sums>, first: vec2u, i: u32) {
         scalar = (*sums).scalar[0][i] / (*sums).scalar[1][i];
     }
     cover[at] = Cover(weight, rim, (*sums).point[i], scalar);
-    // Sums are zero where nothing is.
+    // Sums are zero where no surface is.
     if COLOR {
         let c = (*sums).color;
         extras[at] = vec4f(c[0][i], c[1][i], c[2][i], (*sums).back[i]) / divisor;

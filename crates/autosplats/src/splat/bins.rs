@@ -1,4 +1,4 @@
-//! Which splats touch which tile.
+//! Bins: the splats that touch each tile.
 
 use pulp::Simd;
 
@@ -9,18 +9,18 @@ use crate::fit::Surfel;
 
 /// A run of surfels, set up and sorted into the tiles they may touch.
 ///
-/// Each run keeps its own bins. Since screen points are listed in screen order a tile meets few runs, and no two threads
-/// ever write to one list.
+/// Each run has its own bins. Screen points are listed in screen order, so a tile meets few runs. No two threads ever
+/// write to one list.
 #[derive(Debug, Default)]
 pub(super) struct Run {
-    /// Index of its first surfel among the frame's.
+    /// Index of the run's first surfel among the frame's.
     pub(super) first: usize,
     pub(super) splats: Vec<Splat>,
-    /// Whether each is drawn at all: it has an extent and its point is not hidden.
+    /// Whether each splat is drawn: it has an extent, and its point is not hidden.
     pub(super) alive: Vec<bool>,
-    /// First of the tiles that any splat touches, and the bins of the tiles from there on.
+    /// First tile that any splat touches; bins begin there.
     first_tile: usize,
-    /// Where in `entries` each tile begins, and the end.
+    /// Start of each tile in `entries`, then the end.
     start: Vec<u32>,
     /// Indices into `splats`, tile by tile, ascending.
     entries: Vec<u32>,
@@ -43,7 +43,7 @@ impl Run {
             (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| y * columns + x))
         };
         let living = || (0..).zip(&self.splats).zip(&self.alive).filter(|&(_, &alive)| alive).map(|(splat, _)| splat);
-        // The least and greatest tile are those of the extreme corners, whichever splats have them.
+        // The first and last tile are those of the extreme corners, whichever splats have them.
         let corner =
             |end: usize| move |(_, s): (u32, &Splat)| s.y[end] as usize / TILE * columns + s.x[end] as usize / TILE;
         self.first_tile = living().map(corner(0)).min().unwrap_or(0);
@@ -76,7 +76,7 @@ impl Run {
         &self.entries[self.start[bin] as usize..self.start[bin + 1] as usize]
     }
 
-    /// The splats to be drawn into `tile`, ascending.
+    /// The splats to draw into `tile`, ascending.
     pub(super) fn living(&self, tile: usize) -> impl Iterator<Item = usize> {
         self.tile(tile).iter().map(|&index| index as usize).filter(|&index| self.alive[index])
     }
@@ -85,7 +85,7 @@ impl Run {
 #[pulp::with_simd(set_up_all = pulp::Arch::new())]
 #[inline(always)]
 fn set_up_all_with<'a, S: Simd>(_: S, surfels: &'a [Surfel], view: &'a View, splats: &'a mut Vec<Splat>) {
-    // Every splat is written below; what iterators call is not compiled for the processor's vectors.
+    // Every splat is overwritten below. A collecting iterator would not be compiled for the processor's vectors.
     splats.resize(surfels.len(), Splat::default());
     for (splat, surfel) in splats.iter_mut().zip(surfels) {
         *splat = Splat::new(surfel, view);

@@ -1,4 +1,4 @@
-// The upper levels of the tree: a workgroup for each 4096 splats, an invocation for each 16.
+// Builds the upper levels of the tree: a workgroup per 4096 splats, an invocation per 16.
 //
 // Reads: counters. Reads and writes: tree.
 
@@ -10,7 +10,7 @@
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> tree: array<vec2u>;
 
-// Of the sixteen runs and, last, the top: least column and row, greatest column and row.
+// Bounds of the sixteen runs and, last, of the top: least column and row, greatest column and row.
 var<workgroup> sides: array<atomic<u32>, 68>;
 
 @compute @workgroup_size(256)

@@ -1,38 +1,39 @@
-//! Centres of splats in each pixel: how many there are, and where they lie by mean. Those of splats that refinement took out
-//! count as well: hidden points tell as much of a silhouette as those seen.
+//! Centres of splats in each pixel: their number and mean place. Splats that refinement removed count as well, because
+//! hidden points say as much about a silhouette as visible ones.
 //!
-//! A pixel is one integer, so that centres may be added in any order, by any number of threads, and on the device by one
-//! atomic addition each: eight bits of the count, twelve of the sum of columns and twelve of the sum of rows, in
-//! [`STEPS`] steps a pixel. More than 255 centres in a pixel make it wrong, for no more than the border beside it; projection
-//! leaves two, which only the fit to noisy points may move.
+//! A pixel is one integer, so centres may be added in any order by any number of threads. On the device a centre is one
+//! atomic addition. The highest eight bits are the count. Twelve bits each are the sums of rows and columns, in
+//! [`STEPS`] steps a pixel. More than 255 centres in a pixel overflow, which spoils only the border beside it.
+//! Projection leaves at most two, and only adaptation to noise moves centres to other pixels.
 
 use super::bins::Run;
 use super::raster::Tile;
 use super::{TILE, TILE_AREA};
 use crate::fit::Surfel;
 
-/// Steps of a centre's place in its pixel.
+/// Steps along the side of a pixel.
 pub(super) const STEPS: f32 = 16.0;
-/// Bits of a sum of places.
+/// Bits of a sum of steps.
 const SUM_BITS: u32 = 12;
 const SUM_MASK: u32 = (1 << SUM_BITS) - 1;
 
-/// One centre in pixel (x, y).
+/// The word of one centre in pixel (x, y).
 pub(super) fn one([x, y]: [usize; 2], center_px: [f32; 2]) -> u32 {
-    // It lies there but for rounding.
+    // The centre lies in the pixel up to rounding.
     let step = |center: f32, pixel: usize| (STEPS * (center - pixel as f32)).clamp(0.0, STEPS - 1.0) as u32;
     1 << (2 * SUM_BITS) | step(center_px[1], y) << SUM_BITS | step(center_px[0], x)
 }
 
-/// Centres in a pixel, and their mean's offset from its middle, in pixels. No offset if there are none.
+/// Number of centres in a pixel, and the offset in pixels of their mean from the pixel's middle. The offset is
+/// meaningless if there are none.
 pub(super) fn mean(centers: u32) -> (f32, [f32; 2]) {
     let count = (centers >> (2 * SUM_BITS)) as f32;
     let sums = [centers & SUM_MASK, centers >> SUM_BITS & SUM_MASK];
-    // The middle of a step, from the middle of the pixel.
+    // From the pixel's middle to the middle of the mean step.
     (count, sums.map(|sum| (sum as f32 / count.max(1.0) + 0.5) / STEPS - 0.5))
 }
 
-/// Fills `centers` with those of the splats of `runs` whose pixels lie in `tile`.
+/// Fills `centers` with the centres of the splats of `runs` whose pixels lie in `tile`.
 pub(super) fn add_centers(runs: &[Run], surfels: &[Surfel], tile: Tile, centers: &mut [u32]) {
     centers[..TILE_AREA].fill(0);
     let [x0, y0] = tile.origin;

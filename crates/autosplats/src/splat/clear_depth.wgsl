@@ -1,4 +1,4 @@
-// Clears the depth map: nothing is drawn yet.
+// Clears the depth map to infinity.
 //
 // Writes: depth_map.
 

@@ -1,5 +1,5 @@
-// Sets all words of a buffer to 0: refinement begins with no cell marked, the trim with no centre in any pixel, a frame to
-// be looked back at with no point in any half of a pixel.
+// Sets all words of a buffer to 0. Cleared are the marked cells before refinement, the centres before the trim, and the
+// halves of pixels before a frame is kept.
 //
 // Writes: words.
 

@@ -18,7 +18,7 @@ use crate::project::Sixteenths;
 /// Surfels in a run.
 const RUN: usize = 16 * 1024;
 
-/// Draws surfels; keeps its buffers from frame to frame.
+/// Draws surfels, and keeps its buffers from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Splatter {
     runs: Vec<Run>,
@@ -28,11 +28,11 @@ pub(crate) struct Splatter {
     depth: Vec<f32>,
     /// The depth map before the last refinement.
     previous: Vec<f32>,
-    /// What trimming needs to know, tile by tile.
+    /// State of pixels for trimming, tile by tile.
     rims: Vec<Rim>,
     centers: Vec<u32>,
     layers: GBuffer,
-    /// Tiles of which all this is known to hold nothing.
+    /// Tiles in which layers, rims and centres are known to be empty.
     empty: Vec<bool>,
 }
 
@@ -43,7 +43,7 @@ impl Splatter {
         clear(&mut self.depth, view);
     }
 
-    /// The layers: of the last frame, until those of this one are drawn.
+    /// The layers: those of the last frame until the attributes of this frame are drawn.
     pub(crate) fn last(&self) -> &GBuffer {
         &self.layers
     }
@@ -63,8 +63,8 @@ impl Splatter {
         draw_depth_map(runs, view, &mut self.depth);
     }
 
-    /// Whether a point at this pixel and depth lies behind the depth map, and will however silhouettes change:
-    /// `initial_radius_px` is its first search radius.
+    /// Whether the depth map hides a point at this pixel and depth, and will do so however silhouettes change.
+    /// `initial_radius_px` is the point's first search radius.
     pub(crate) fn hides(&self, [x, y]: [usize; 2], depth: f32, initial_radius_px: f32, view: &View) -> bool {
         let [width, height] = [view.width as usize, view.height as usize];
         let hidden = |x: usize, y: usize| depth > self.depth[tiled_index(width, x, y)];
@@ -76,7 +76,8 @@ impl Splatter {
             && hidden(x, (y + reach).min(height - 1))
     }
 
-    /// Redraws the depth map with only those surfels whose point it does not hide [Paper, §7, Depth Refinement].
+    /// Refinement: redraws the depth map with only those surfels whose point it does not hide [Paper, §7, Depth
+    /// Refinement].
     pub(crate) fn refine(&mut self, surfels: &[Surfel], view: &View) {
         std::mem::swap(&mut self.depth, &mut self.previous);
         clear(&mut self.depth, view);
@@ -107,7 +108,7 @@ impl Splatter {
         tiles.enumerate().for_each_init(TileSums::default, |sums, (index, ((mut layers, depth), known))| {
             let ((rims, centers), empty) = known;
             if runs[..*used].iter().all(|run| run.tile(index).is_empty()) {
-                // Much of many pictures, and often what was empty before.
+                // A large part of many pictures is empty, often the same as in the last frame.
                 if !std::mem::replace(empty, true) {
                     layers.clear_all();
                     rims.fill(EMPTY);
@@ -130,8 +131,8 @@ impl Splatter {
         layers
     }
 
-    /// Trims the attributes just drawn: silhouettes end where the surface does, of whose points `sixteenths` tell, and where they
-    /// have `noise`, their density; k-radii are `per_radius` splat radii. Returns the number of the picture's covered pixels too.
+    /// Trims the attributes just drawn, by the points in `sixteenths` and, where they have `noise`, by their density.
+    /// K-radii are `per_radius` splat radii. Returns the layers and the number of covered pixels of the picture.
     pub(crate) fn trim(
         &mut self,
         view: &View,
@@ -164,7 +165,7 @@ impl Splatter {
         (layers, covered)
     }
 
-    /// The attributes just drawn, as they are, and the number of the picture's covered pixels.
+    /// The attributes just drawn, untrimmed, and the number of covered pixels of the picture.
     pub(crate) fn whole(&self) -> (&GBuffer, usize) {
         let layers = &self.layers;
         let covers = |x: usize, y: usize| layers.weight[layers.index(x, y)] > 0.0;

@@ -1,5 +1,5 @@
 // Visibility pass: the nearest depth, pushed back by ε, of the splats that cover each pixel [Paper, §7]. An invocation
-// draws a splat; a minimum does not depend on the order. `depth_large` draws those that are too large for that.
+// draws a splat; a minimum does not depend on the order. `depth_large` draws larger splats.
 //
 // Reads: counters, splats, tree. Reads and writes: depth_map.
 
@@ -15,7 +15,7 @@
 @group(0) @binding(3) var<storage, read> tree: array<vec2u>;
 @group(0) @binding(4) var<storage, read_write> depth_map: array<atomic<u32>>;
 
-// Whether only the recovered ones are drawn.
+// Whether to draw only the recovered splats.
 override RECOVERED_ONLY: bool;
 override MOST_PX: u32;
 

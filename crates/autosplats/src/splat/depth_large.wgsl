@@ -1,4 +1,4 @@
-// Visibility pass for splats that are too large for one invocation: a workgroup draws one [Paper, §7].
+// Visibility pass for splats too large for one invocation: a workgroup draws a splat [Paper, §7].
 //
 // Reads: counters, splats, tree, large, changes, cells. Reads and writes: depth_map.
 
@@ -19,7 +19,7 @@
 @group(0) @binding(6) var<storage, read> cells: array<u32>;
 @group(0) @binding(7) var<storage, read_write> depth_map: array<atomic<u32>>;
 
-// Whether only the recovered ones are drawn, or only those that a refinement draws again.
+// Whether to draw only the recovered splats, or only those that a refinement redraws.
 override RECOVERED_ONLY: bool;
 override REDRAWN_ONLY: bool;
 
@@ -31,7 +31,7 @@ fn depth_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     }
     let index = large[place];
     let bounds = tree[level_start(SPLATS) + index];
-    // It may be dead.
+    // Dead splats count as empty.
     if is_empty(bounds) || (RECOVERED_ONLY && index < counters[ACTIVE]) {
         return;
     }
@@ -39,7 +39,7 @@ fn depth_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
         return;
     }
     let splat = splats[index];
-    // Eight invocations to a row.
+    // Eight invocations per row.
     for (var row = firsts(bounds).y + local / 8u; row <= lasts(bounds).y; row += 8u) {
         let line = line_of(splat, row);
         let span = span_of(splat, line, bounds);

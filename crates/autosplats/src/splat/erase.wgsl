@@ -1,6 +1,5 @@
-// Depth refinement: erases what splats that just died left in the depth map, wherever nothing was in front of them, and
-// marks the cells in which it did [Paper, §7, Depth Refinement]. `erase_large` does it for those that are too large for one
-// invocation.
+// Depth refinement: erases the depths of splats that just died, wherever nothing was in front of them [Paper, §7, Depth
+// Refinement]. The pass marks the cells with erased depths. `erase_large` handles splats too large for one invocation.
 //
 // Reads: counters, splats, tree, changes. Reads and writes: depth_map, cells.
 

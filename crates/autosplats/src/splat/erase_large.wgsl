@@ -1,4 +1,4 @@
-// Depth refinement: as `erase`, for splats that are too large for one invocation: a workgroup each.
+// Depth refinement: `erase` for splats too large for one invocation, a workgroup per splat.
 //
 // Reads: counters, splats, tree, changes, large. Reads and writes: depth_map, cells.
 
@@ -31,7 +31,7 @@ fn erase_large(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     }
     let bounds = living_bounds(tree[level_start(SPLATS) + index]);
     let splat = splats[index];
-    // Eight invocations to a row.
+    // Eight invocations per row.
     for (var row = firsts(bounds).y + local / 8u; row <= lasts(bounds).y; row += 8u) {
         let line = line_of(splat, row);
         let span = span_of(splat, line, bounds);

@@ -1,13 +1,15 @@
 //! Splatting on the GPU.
 //!
 //! # How it works
-//! The depth map takes minima, which no order changes: an invocation draws a splat, a workgroup one that is large, by atomic
-//! minima of integers that order as depths do. Few splats die in a refinement, and most of them were hidden: what they left
-//! in the map is erased, and only those are drawn again that meet a cell of 8×8 pixels where that was so
-//! (`shared/redraw.wgsl`). Attributes are sums, which are to come out as on the CPU and the same each
-//! time: there a pixel draws its splats in the order of the list. A workgroup for each patch of 16×32 pixels finds them, by a
-//! tree over the list instead of bins (`shared/splat.wgsl`, `shared/patch.wgsl`). The centres that the trim asks for are
-//! counted by integers, which again no order changes.
+//! The depth map takes minima, which do not depend on the order. An invocation draws a splat, a workgroup draws a large
+//! one, by atomic minima of integers that order as depths do. Few splats die in a refinement, and most of them were
+//! hidden. So refinement erases their depths from the map, and redraws only splats that meet a cell of 8×8 pixels with
+//! erased depths (`shared/redraw.wgsl`).
+//!
+//! Attributes are sums, which have to equal those of the CPU and be the same each time. So a pixel draws its splats in
+//! list order. A workgroup per patch of 16×32 pixels finds them by a tree over the list instead of bins
+//! (`shared/splat.wgsl`, `shared/patch.wgsl`). The centres for trimming are counted in integers, again independent of
+//! the order.
 
 use super::centers::STEPS;
 use super::layers::{Channels, LayerBuffers};
@@ -65,55 +67,55 @@ const ADD_CENTERS: PassSource = PassSource::new("splat/add_centers", include_str
 const SUM_BLOCKS: PassSource = PassSource::new("splat/sum_blocks", include_str!("sum_blocks.wgsl"));
 const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl"));
 
-/// Pixels of the bounds of a splat that one invocation draws into the depth map, on hardware, where all others of its kind wait for it,
-/// and on a device that is a program on the processor, where a workgroup costs more.
+/// Most pixels of a splat's bounds that one invocation draws. On hardware the other invocations of its group wait for
+/// it; on a software device, the second value, a workgroup costs more.
 const MOST_PX: [u32; 2] = [128, 1024];
-/// Columns and rows of a patch, and splats drawn into it at a time.
+/// Columns and rows of a patch, and splats that are drawn into it at a time.
 const PATCH: [u32; 2] = [16, 32];
 const BATCH: u32 = 64;
-/// Side of a square of pixels that a workgroup trims.
+/// Side in pixels of the square that a workgroup trims.
 const SQUARE: u32 = 32;
-/// Side of a cell of pixels that refinement marks.
+/// Side in pixels of a cell that refinement marks.
 const CELL: u32 = 8;
-/// Splats below each top node of the tree, and nodes: `shared/splat.wgsl`.
+/// Splats below each top node of the tree, and nodes there (`shared/splat.wgsl`).
 const TOP_SPLATS: u32 = 4096;
 const TOP_NODES: u32 = 1 + 16 + 256 + 4096;
 /// Bytes of a splat.
 const SPLAT_BYTES: usize = 48;
 
-/// How layers are drawn.
+/// Options of drawing the layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerRules<'a> {
-    /// Refine the depth map twice before [Paper, §7].
+    /// Refine the depth map twice first [Paper, §7].
     pub(crate) depth_refinement: bool,
-    /// Take tails off after.
+    /// Trim the layers in the end.
     pub(crate) trim: bool,
-    /// The noise of the frame as `shared/noise.wgsl` has it, if it was measured.
+    /// Noise of the frame in the layout of `shared/noise.wgsl`; `None` if it is not measured.
     pub(crate) noise: Option<&'a wgpu::Buffer>,
 }
 
-/// Splats on the device, and the depth maps.
+/// Splats on the device, and the depth map.
 #[derive(Debug)]
 pub(crate) struct SplatBuffers {
     splats: wgpu::Buffer,
     tree: wgpu::Buffer,
-    /// Indices of splats that one invocation cannot draw.
+    /// Indices of splats too large for one invocation.
     large: wgpu::Buffer,
     /// Depth per pixel, pushed back by ε, row by row, as `shared/depth_map.wgsl` has it; infinite where nothing is.
     pub(crate) depth: wgpu::Buffer,
-    /// What the last refinement did to each splat, and in which cells of pixels it erased depths: `shared/redraw.wgsl`.
+    /// Change of each splat in the last refinement, and the marks of cells with erased depths (`shared/redraw.wgsl`).
     changes: wgpu::Buffer,
     cells: wgpu::Buffer,
-    /// Centres of splats in each pixel, row by row.
+    /// Centres of splats in each pixel, row by row (`centers.rs`).
     centers: wgpu::Buffer,
-    /// `shared/blocks.wgsl`, row by row.
+    /// Blocks of pixels, row by row (`shared/blocks.wgsl`).
     blocks: wgpu::Buffer,
-    /// The noise of frames that it is not measured in.
+    /// Zeros for frames whose noise is not measured.
     no_noise: wgpu::Buffer,
 }
 
 impl SplatBuffers {
-    /// Room for `screen_capacity` splats in a picture of `size`.
+    /// Buffers for `screen_capacity` splats and a picture of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -157,14 +159,15 @@ pub(crate) struct SplatPasses {
     attributes: Pass,
     add_centers: Pass,
     sum_blocks: Pass,
-    /// Which takes nothing off, and only counts, and which does.
+    /// The pass that only counts covered pixels, and the pass that trims too.
     trim: [Pass; 2],
-    /// Linear value of each step of a colour.
+    /// Linear value of each 8-bit step of a colour.
     linear: wgpu::Buffer,
 }
 
 impl SplatPasses {
-    /// Compiles them for splats that carry `channels`; `linear` has the linear value of each step of a colour.
+    /// Compiles the passes for splats that carry `channels`; `linear` has the linear value of each 8-bit step of a
+    /// colour.
     ///
     /// # Errors
     /// [`Error::Device`], [`Error::DeviceMemory`].
@@ -301,7 +304,7 @@ impl SplatPasses {
         steps
     }
 
-    /// Takes those splats out of the depth map whose point it hides [Paper, §7, Depth Refinement].
+    /// Refinement: removes splats from the depth map whose point it hides [Paper, §7, Depth Refinement].
     fn steps_refine(
         &self,
         gpu: &Gpu,
@@ -323,7 +326,7 @@ impl SplatPasses {
         ]
     }
 
-    /// Appends the passive points that the depth map does not hide for sure to the queries [Paper, §7, Grid Culling].
+    /// Appends to the queries the passive points that the depth map does not surely hide [Paper, §7, Grid Culling].
     pub(crate) fn steps_recover(
         &self,
         gpu: &Gpu,
@@ -343,7 +346,7 @@ impl SplatPasses {
         ]
     }
 
-    /// Draws the attributes of all rounds' surfels, and trims them, by the `rules`.
+    /// Draws the attributes of all rounds' surfels and trims them, by `rules`.
     #[allow(clippy::too_many_arguments, reason = "each is a buffer or a set of them")]
     pub(crate) fn steps_layers(
         &self,
@@ -380,12 +383,12 @@ impl SplatPasses {
     }
 }
 
-/// Workgroups for the upper levels of the tree; one at least, which notes how many splats there are.
+/// Workgroups for the upper levels of the tree; at least one, which stores the number of splats.
 fn tops(screen: &ScreenBuffers) -> u32 {
     screen.capacity.div_ceil(TOP_SPLATS).max(1)
 }
 
-/// Cells of pixels in a picture of this size, and room for one more column and row.
+/// Cells in a picture of this size, with one more column and row.
 fn cells([columns, rows]: [u32; 2]) -> u32 {
     (columns / CELL + 1) * (rows / CELL + 1)
 }
@@ -400,7 +403,7 @@ fn pixel_groups(screen: &ScreenBuffers) -> u32 {
     (screen.size[0] * screen.size[1]).div_ceil(256)
 }
 
-/// Workgroups for rectangles of so many columns and rows.
+/// Workgroups for rectangles of this many columns and rows.
 fn patches(screen: &ScreenBuffers, [columns, rows]: [u32; 2]) -> u32 {
     screen.size[0].div_ceil(columns) * screen.size[1].div_ceil(rows)
 }

@@ -1,22 +1,22 @@
-//! Layers on the device, and how they become the host's.
+//! Layers on the device, and their conversion to the host's form.
 
 use super::{GBuffer, TILE_AREA, tile_columns, tiled_index};
 use crate::Error;
 use crate::gpu::Gpu;
 
-/// What splats carry beside depth and normal.
+/// Optional attributes that splats carry beside depth and normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Channels {
     pub(crate) color: bool,
     pub(crate) scalar: bool,
     /// Splat radius, k-radius and curvature.
     pub(crate) measures: bool,
-    /// Whether the surface shows its back.
+    /// Share of the surface's back.
     pub(crate) backs: bool,
 }
 
 impl Channels {
-    /// Of [`LayerBuffers::extras`].
+    /// Number of planes of [`LayerBuffers::extras`].
     fn planes(self) -> usize {
         (usize::from(self.color) + usize::from(self.measures)).max(self.backs.into())
     }
@@ -25,16 +25,16 @@ impl Channels {
 /// [`GBuffer`] on the device, row by row.
 #[derive(Debug)]
 pub(crate) struct LayerBuffers {
-    /// Of the screen.
+    /// Size of the screen in pixels.
     pub(crate) size: [u32; 2],
     pub(crate) channels: Channels,
     /// Normal and depth, four `f32` per pixel.
     pub(crate) surface: wgpu::Buffer,
     /// Per pixel sum of weights, rim, point (`u32`) and scalar: `Cover` in `shared/layers.wgsl`.
     pub(crate) cover: wgpu::Buffer,
-    /// A plane per channel, one after the other, four `f32` per pixel: if there are colours, linear RGB; if there are
-    /// measures, splat radius, k-radius and curvature; an empty one if there are but backs. The last number of the first
-    /// plane is the share of the back. One element if there is nothing of that.
+    /// Planes of four `f32` per pixel, one after the other. A plane of linear RGB if there are colours, then one of
+    /// splat radius, k-radius and curvature if there are measures. With backs alone there is one plane, otherwise
+    /// empty. The last number of the first plane is the share of the back. One element if there is no plane.
     pub(crate) extras: wgpu::Buffer,
 }
 
@@ -48,18 +48,18 @@ pub(crate) struct Cover {
     pub(crate) scalar: f32,
 }
 
-/// Bytes of a [`Cover`], of which the shader must think the same.
+/// Bytes of a [`Cover`], which the shader's struct must have too.
 #[cfg(test)]
 pub(super) const COVER_BYTES: usize = size_of::<Cover>();
 
 impl LayerBuffers {
-    /// Whether the device binds what [`new`](Self::new) makes.
+    /// Whether the device can bind the buffers of [`new`](Self::new).
     pub(crate) fn has_room(gpu: &Gpu, size: [u32; 2], channels: Channels) -> bool {
         let pixels = size[0] as usize * size[1] as usize;
         gpu.binds::<[f32; 4]>(channels.planes().max(1) * pixels)
     }
 
-    /// Room for a screen of `size`.
+    /// Buffers for a screen of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -74,7 +74,7 @@ impl LayerBuffers {
         })
     }
 
-    /// The host's form of the layers of a picture with a margin: what was read back of `surface`, `cover` and `extras`.
+    /// The host's form of the layers of a picture with this margin, from the bytes of `surface`, `cover` and `extras`.
     pub(crate) fn to_host(&self, margin: u32, surface: &[u8], cover: &[u8], extras: &[u8]) -> GBuffer {
         let [width, height] = self.size.map(|side| side as usize);
         let Channels { color, scalar, measures, backs } = self.channels;
@@ -124,7 +124,7 @@ impl LayerBuffers {
     }
 }
 
-/// The host's layers on the device.
+/// Uploads the host's layers.
 #[cfg(test)]
 pub(crate) fn upload_layers(gpu: &Gpu, layers: &GBuffer) -> LayerBuffers {
     let channels = Channels {

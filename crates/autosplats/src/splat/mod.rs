@@ -1,16 +1,15 @@
 //! Splat: surfels in, the visible surface per pixel out [Paper, §7].
 //!
 //! # How it works
-//! A splat is weighted by a Gaussian over its disc and drawn at least as a dot a pixel wide. First every splat writes its
-//! depth, pushed back by ε, and the nearest stays (*visibility*). Splats whose own point that map hides are artefacts of
-//! neighbourhoods cut short by occlusion; twice the map is drawn again without them (*refinement*). Then the splats left
-//! add their weighted attributes wherever they lie in front of the map, that is within ε of the surface (*attributes*),
-//! and the sums are divided by the weights (*normalize*). Last, tails that stick out of a silhouette are cut off (*trim*),
-//! by the cores of splats around them and, where points are dense, by the places of those in each pixel (`centers`), or by
-//! where these become fewer, if noise has blurred the silhouette.
+//! The kernel of a splat is nearly a Gaussian over its disc, and each splat is drawn at least as a dot a pixel wide.
+//! First every splat writes its depth, pushed back by ε, and the nearest stays (*visibility*). A splat whose own point
+//! this map hides comes from a neighbourhood that occlusion cut short. The map is drawn twice more without such splats
+//! (*refinement*). The splats left add their weighted attributes wherever they lie in front of the map, that is within
+//! ε of the surface (*attributes*). The sums are divided by the weights (*normalize*). Last, tails that stick out of a
+//! silhouette are removed (*trim*).
 //!
-//! Splats are sorted into tiles of [`TILE`]² pixels. A tile is drawn by one thread, in its cache, splat after splat in the
-//! order of the list, so that sums come out the same for any number of threads.
+//! Splats are sorted into tiles of [`TILE`]² pixels. One thread draws a tile in its cache, splat after splat in list
+//! order. So sums are the same for any number of threads.
 
 mod attributes;
 mod bins;
@@ -41,9 +40,9 @@ pub(crate) const TILE_AREA: usize = TILE * TILE;
 
 /// The visible surface, a value per pixel and layer.
 ///
-/// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work;
-/// [`index`](Self::index) finds a pixel of the picture. There may be others around these, covered ones too. A layer that was not
-/// asked for is empty.
+/// Layers are stored tile by tile, [`TILE`]×[`TILE`] pixels each, so that a tile is one piece of cache and of work.
+/// [`index`](Self::index) finds a pixel of the picture. Layers may have a margin around the picture, whose pixels may
+/// be covered too. A layer that was not requested is empty.
 #[derive(Clone, Debug, Default)]
 pub struct GBuffer {
     /// Image width in pixels.
@@ -54,30 +53,30 @@ pub struct GBuffer {
     pub weight: Vec<f32>,
     /// Depth along the viewing axis in world units; infinite where no surface is.
     pub depth: Vec<f32>,
-    /// Unit normal towards the eye, whichever side the sensor saw, view space (x right, y down, z forward); zero where no
-    /// surface is.
+    /// Unit normal towards the eye, whichever side the sensor saw; view space (x right, y down, z forward). Zero where
+    /// no surface is.
     pub normal: Vec<[f32; 3]>,
     /// Index of the source point of the heaviest splat; `u32::MAX` where no surface is.
     pub point: Vec<u32>,
     /// Colour of the points, linear RGB, 0 to 1.
     pub color: Vec<[f32; 3]>,
-    /// The scalar field that was asked for, averaged.
+    /// Mean of the requested scalar field.
     pub scalar: Vec<f32>,
-    /// Splat radius in world units.
+    /// Mean splat radius in world units.
     pub radius: Vec<f32>,
-    /// k-radius in world units.
+    /// Mean k-radius in world units.
     pub k_radius: Vec<f32>,
-    /// Surface variation, 0 to 1/3.
+    /// Mean surface variation, 0 to 1/3.
     pub curvature: Vec<f32>,
-    /// How much of what is seen is the back of a surface, the side that the sensor did not see, 0 to 1. Empty if the cloud
-    /// does not say where its sensors stood.
+    /// Share of the visible surface that shows its back, the side that the sensor did not see; 0 to 1. Empty if the
+    /// cloud does not say where its sensors stood.
     pub back: Vec<f32>,
-    /// Pixels on every side that layers have beside those of the picture.
+    /// Width in pixels of the margin that layers have on every side of the picture.
     pub(crate) margin: u32,
 }
 
 impl GBuffer {
-    /// Layers of a picture that shows no surface yet; those that not every picture has are empty.
+    /// Layers of a picture without any surface. Optional layers are empty.
     pub fn new(width: u32, height: u32) -> Self {
         let mut layers = Self { width, height, ..Self::default() };
         let area = layers.area();
@@ -88,31 +87,32 @@ impl GBuffer {
         layers
     }
 
-    /// Values in a layer that is not empty.
+    /// Number of values in a layer that is not empty.
     pub(crate) fn area(&self) -> usize {
         let [columns, rows] = [self.width, self.height].map(|side| tile_columns((side + 2 * self.margin) as usize));
         columns * rows * TILE_AREA
     }
 
-    /// Where pixel (x, y) lies in each layer.
+    /// Index of pixel (x, y) in each layer.
     #[inline(always)]
     pub fn index(&self, x: usize, y: usize) -> usize {
         let margin = self.margin as usize;
         tiled_index(self.width as usize + 2 * margin, x + margin, y + margin)
     }
 
-    /// How many pixels of a row, from column `x` on, lie side by side, if the row is so long.
+    /// Number of pixels from column `x` to the end of its tile, which lie side by side in memory. The row may end
+    /// earlier.
     pub(crate) fn run(&self, x: usize) -> usize {
         TILE - (x + self.margin as usize) % TILE
     }
 }
 
-/// Tiles in a row of a screen `width` pixels wide.
+/// Number of tiles in a row of a screen `width` pixels wide.
 pub(crate) const fn tile_columns(width: usize) -> usize {
     width.div_ceil(TILE)
 }
 
-/// Where pixel (x, y) of a screen `width` pixels wide lies in a layer stored tile by tile.
+/// Index of pixel (x, y) of a screen `width` pixels wide in a layer stored tile by tile.
 #[inline(always)]
 pub(crate) const fn tiled_index(width: usize, x: usize, y: usize) -> usize {
     (y / TILE * tile_columns(width) + x / TILE) * TILE_AREA + (y % TILE) * TILE + x % TILE

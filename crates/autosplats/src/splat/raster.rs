@@ -18,16 +18,16 @@ pub(super) struct Tile {
     pub(super) origin: [usize; 2],
 }
 
-/// How steeply the kernel falls: see [`kernel`].
+/// Slope of the [`kernel`].
 pub(super) const KERNEL_SLOPE: f32 = 0.52;
 
-/// Splats whose attributes are looked up at a time.
+/// Splats whose attributes are read at a time.
 const BATCH: usize = 32;
 
-/// Offsets of the pixels of a vector from its first one.
+/// Offsets of the pixels of a vector from its first pixel.
 const STEPS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
-/// Draws the depth, pushed back by ε, of the living splats of `run` that touch `tile`.
+/// Draws the depth, pushed back by ε, of the living splats of `run` that touch `tile` [Paper, §7].
 pub(super) fn draw_depth(run: &Run, tile: Tile, view: &View, depth: &mut [f32]) {
     if !run.tile(tile.index).is_empty() {
         draw_depth_entries(run, tile, view, depth);
@@ -49,7 +49,8 @@ fn draw_depth_entries_with<'a, S: Simd>(simd: S, run: &'a Run, tile: Tile, view:
                 let fragment = brush.fragment(dx);
                 let pushed = fragment.depth + epsilon;
                 let before = F32s::load(simd, row, vector);
-                // A minimum: what is selected of before and written back becomes a masked store, slow on many processors.
+                // A minimum with infinity. A select between old and new values would compile to a masked store, which
+                // is slow on many processors.
                 fragment.squared.at_most(one).select(pushed, beyond).min(before).store(row, vector);
                 dx += F32s::splat(simd, S::F32_LANES as f32);
             }
@@ -91,7 +92,7 @@ fn draw_attribute_entries_with<'a, S: Simd>(
     for batch in run.tile(tile.index).chunks(BATCH) {
         let is_living = |index: u32| run.alive[index as usize];
         let surfel = |index: u32| &surfels[run.first + index as usize];
-        // What splats carry lies anywhere in memory: that of several is waited for together.
+        // Surfels lie scattered in memory: the reads of several are awaited together.
         for (values, &index) in values.iter_mut().zip(batch).filter(|(_, index)| is_living(**index)) {
             attributes.values(surfel(index), values);
         }
@@ -116,13 +117,13 @@ fn draw_attribute_entries_with<'a, S: Simd>(
                     for (channel, &value) in sums.channels.chunks_exact_mut(TILE_AREA).zip(&values[..channels]) {
                         add(simd, &mut channel[row.clone()], vector, weight * F32s::splat(simd, value));
                     }
-                    // All are read before any is written, or what is selected would become a masked store here too.
+                    // All are read before any is written, or the select would become a masked store here too.
                     let before = F32s::load(simd, &sums.heaviest[row.clone()], vector);
                     let point = F32s::load(simd, &sums.point[row.clone()], vector);
                     let reach = F32s::load(simd, &sums.reach[row.clone()], vector);
                     let heavier = before.less(weight);
                     before.max(weight).store(&mut sums.heaviest[row.clone()], vector);
-                    // Indices ride along as the bits of floats.
+                    // Point indices are carried as the bits of floats.
                     let source = F32s::splat(simd, f32::from_bits(surfel.source));
                     heavier.select(source, point).store(&mut sums.point[row.clone()], vector);
                     let own = F32s::splat(simd, splat.reach_px());
@@ -138,8 +139,8 @@ fn add<S: Simd>(simd: S, sums: &mut [f32], vector: usize, value: F32s<S>) {
     (F32s::load(simd, sums, vector) + value).store(sums, vector);
 }
 
-/// The weight of a fragment at a squared distance 0..=1 from the centre, in supports: much like exp(-2·d²) with d in splat
-/// radii, without the exponential, and 0.003 at the end.
+/// Weight of a fragment by its squared distance from the centre in supports, 0 to 1. The weight is much like exp(-2·d²)
+/// with d in splat radii, but without an exponential, and 0.003 at the end.
 #[inline(always)]
 fn kernel<S: Simd>(simd: S, squared: F32s<S>) -> F32s<S> {
     let w = F32s::splat(simd, 1.0) - F32s::splat(simd, KERNEL_SLOPE) * squared;
@@ -152,10 +153,10 @@ fn kernel<S: Simd>(simd: S, squared: F32s<S>) -> F32s<S> {
 struct Row {
     /// Row in the tile.
     y: usize,
-    /// First vector of pixels in the row, and the one after the last.
+    /// First vector of pixels in the row, and the end.
     x: usize,
     end: usize,
-    /// Offset of the centre of the first vector's first pixel from the splat's.
+    /// Offset in pixels from the splat's centre to the centre of the first vector's first pixel.
     dx: f32,
     dy: f32,
 }
@@ -174,19 +175,19 @@ fn rows(splat: &Splat, tile: Tile, width: usize) -> impl Iterator<Item = Row> + 
     (y0..=y1).map(move |y| Row { y, x, end, dx, dy: (y_tile + y) as f32 + 0.5 - cy })
 }
 
-/// A splat's gradients in vectors.
+/// Gradients of a splat as vectors.
 #[derive(Clone, Copy)]
 struct Brush<S: Simd> {
     simd: S,
     perspective: bool,
-    /// Depth at the centre, furthest from it to either side.
+    /// Range of the disc's depth.
     low: F32s<S>,
     high: F32s<S>,
     /// Inverse depth (perspective) or depth in the current row: at the centre's column, and per column.
     plane: Linear<S>,
     u: Linear<S>,
     v: Linear<S>,
-    /// Squared distance in rows from the centre.
+    /// Squared distance of the row from the centre, in square pixels.
     dy_squared: F32s<S>,
     splat: Splat,
 }
@@ -206,7 +207,7 @@ impl<S: Simd> Linear<S> {
 
 /// A vector of pixels of a splat.
 struct Fragment<S: Simd> {
-    /// Squared distance from the centre, in radii; the splat covers up to 1.
+    /// Squared distance from the centre, in supports or dot radii, whichever is less; the splat covers up to 1.
     squared: F32s<S>,
     /// Depth along the viewing axis.
     depth: F32s<S>,
@@ -256,7 +257,8 @@ impl<S: Simd> Brush<S> {
         }
         let per_dot = F32s::splat(simd, 1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
         let dot = (dx * dx + self.dy_squared) * per_dot;
-        // The dot reaches beyond the disc, where its plane is of no use.
+        // The dot reaches beyond the disc, where the disc's plane is meaningless, so depth is clamped to the disc's
+        // range.
         Fragment { squared: (u * u + v * v).min(dot), depth: hit.max(self.low).min(self.high) }
     }
 }

@@ -1,4 +1,4 @@
-// Appends the passive points that were marked to the active ones, ascending [Paper, §7, Grid Culling].
+// Appends the marked passive points to the active ones, ascending [Paper, §7, Grid Culling].
 //
 // Reads: passive, counters, block_sums. Writes: queries.
 

@@ -1,5 +1,5 @@
-// Marks and counts, of each block of 2048 passive points, those that matter and that the depth map does not hide for sure [Paper,
-// §7, Grid Culling].
+// Marks and counts, per block of 2048, the passive points that matter to the picture and may be visible despite the
+// depth map [Paper, §7, Grid Culling].
 //
 // Reads: points, counters, density, depth_map. Reads and writes: passive. Writes: block_sums.
 
@@ -21,7 +21,7 @@
 @group(0) @binding(5) var<storage, read> depth_map: array<u32>;
 @group(0) @binding(6) var<storage, read_write> block_sums: array<u32>;
 
-// In first search radii: splat/setup.rs says what for.
+// In first search radii; see `splat/setup.rs`.
 override RECOVER_REACH: f32;
 
 var<workgroup> recovered_points: atomic<u32>;

@@ -1,5 +1,5 @@
-// Depth refinement: draws the living splats again that may be seen where depths were erased, and those that just revived.
-// Minima do not change when they are taken twice [Paper, §7, Depth Refinement].
+// Depth refinement: redraws the living splats that meet cells with erased depths, and splats that just revived. Taking
+// a minimum twice changes nothing [Paper, §7, Depth Refinement].
 //
 // Reads: counters, splats, tree, changes, cells. Reads and writes: depth_map.
 

@@ -1,4 +1,4 @@
-// Depth refinement: splats whose own point the depth map hides are dead, the others alive [Paper, §7, Depth Refinement].
+// Depth refinement: a splat is dead if the depth map hides its own point, else alive [Paper, §7, Depth Refinement].
 //
 // Reads: counters, splats, depth_map. Reads and writes: tree. Writes: changes.
 
@@ -24,7 +24,7 @@ fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         return;
     }
     let place = level_start(SPLATS) + index;
-    // Those killed before may live again.
+    // Splats that died in the first refinement may revive in the second.
     let before = tree[place].x;
     let bounds = living_bounds(vec2u(before, tree[place].y));
     if is_empty(bounds) {

@@ -1,4 +1,4 @@
-// Splat set-up: surfels made ready to be drawn over their pixels. The CPU form, `setup.rs`, says how.
+// Splat set-up: makes surfels ready to be drawn over their pixels. The CPU form is `setup.rs`.
 //
 // Reads: surfels. Reads and writes: counters. Writes: splats, tree, large.
 
@@ -15,9 +15,9 @@
 // Splats too large for one invocation, in any order.
 @group(0) @binding(5) var<storage, read_write> large: array<u32>;
 
-// Whether only the recovered ones are new.
+// Whether only the recovered surfels are new.
 override RECOVERED_ONLY: bool;
-// Pixels of the bounds of a splat that one invocation draws.
+// Most pixels of a splat's bounds that one invocation draws.
 override MOST_PX: u32;
 override DOT_RADIUS_PX: f32;
 override SUPPORT: f32;
@@ -25,7 +25,7 @@ override GRAZING: f32;
 override EPSILON_RADII: f32;
 override NEAREST: f32;
 
-// No pixel: the first is beyond all, the last before all but the first.
+// Empty bounds: the first pixel lies beyond all, the last is 0.
 const NOWHERE = 0x7fffu;
 
 @compute @workgroup_size(256)
@@ -54,7 +54,7 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let focal = frame.focal_px;
     let a_scale = 1.0 / (focal * major);
     let b_scale = 1.0 / (focal * minor);
-    // How much the disc faces the line of sight, and what each axis loses along it.
+    // How much the disc faces the line of sight, and the shear of each axis along that line.
     var facing = n.z;
     var least_facing = GRAZING;
     var along = vec2f(a.z, b.z);
@@ -70,7 +70,7 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     var u = vec2f((a.x - n.x * shear.x) * a_scale, (a.y - n.y * shear.x) * a_scale);
     var v = vec2f((b.x - n.x * shear.y) * b_scale, (b.y - n.y * shear.y) * b_scale);
     if !(abs(facing) > least_facing) {
-        // Drawn as the dot alone.
+        // A disc seen from its edge is drawn as the dot alone.
         let per_dot = 1.0 / (DOT_RADIUS_PX * select(1.0, c.z, perspective));
         plane = vec2f(0.0);
         u = vec2f(per_dot, 0.0);
@@ -93,8 +93,8 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     splats[index] = Splat(center_px, plane, u, v, c.z, epsilon, depth_reach, surfel.pixel);
 }
 
-// First and last pixel along an axis whose centre the disc or its dot may cover. `axes` are the coordinates of the disc's
-// axes along that axis, `across` their depths.
+// First and last pixel along an axis whose centre the disc or its dot may cover. `axes` are the coordinates of the
+// disc's axes along that axis, `across` their depths.
 fn extent(c: f32, cz: f32, axes: vec2f, across: vec2f, center_px: f32, size: u32) -> u32 {
     let squared = axes.x * axes.x + axes.y * axes.y;
     var low: f32;

@@ -1,54 +1,55 @@
 //! Splat set-up: a surfel made ready to be drawn over its pixels.
 //!
 //! # How it works
-//! With (dx, dy) the offset of a pixel's centre from the projected surfel centre, a plane seen in perspective has an inverse
-//! depth that is linear in (dx, dy), and so have the coordinates within the disc once divided by depth. Seen in parallel,
-//! depth and disc coordinates themselves are linear. So a splat is a few gradients, and a pixel costs a few
-//! multiplications and at most one division.
+//! Let (dx, dy) be the offset of a pixel's centre from the projected surfel centre. In perspective, the inverse depth
+//! of a plane is linear in (dx, dy), and so are the disc coordinates divided by depth. In parallel projection, depth
+//! and disc coordinates themselves are linear. So a splat is a few gradients, and a pixel costs a few multiplications
+//! and at most one division.
 
 use crate::camera::View;
 use crate::fit::{SUPPORT, Surfel};
 
-/// Radius in pixels of the dot that is always drawn around a surfel's centre, so that a splat smaller than a pixel or
-/// seen from its edge still covers the pixel of its point: the low-pass filter of [BHZK05]. The furthest that a pixel's
-/// centre can be from a point in the pixel is √½.
+/// Radius in pixels of the dot that is always drawn around a surfel's centre: the low-pass filter of [BHZK05]. So a
+/// splat smaller than a pixel or seen from its edge still covers the pixel of its point. A pixel's centre is at most √½
+/// away from any point in the pixel.
 pub(super) const DOT_RADIUS_PX: f32 = 0.71;
-/// How far around a passive point, in first search radii, nearer surface must lie on all sides for it to stay hidden. Splats
-/// reach about as far over a silhouette as this, and refinement and trim take that off again: what is seen there instead
-/// has to have been reconstructed.
-// Differs from the paper: it asks at the point's own pixel only; in the cathedral 0.3 % of the pixels then changed with grid
-// culling, holes among them, against 0.05 %, for 6 % more points reconstructed.
+/// Distance around a passive point, in first search radii, at which nearer surface must lie on all four sides for the
+/// point to stay hidden. Splats reach about this far over a silhouette, and refinement and trim remove that part again.
+/// The surface seen there in the end has to be reconstructed.
+// Differs from the paper: the paper asks at the point's own pixel only. Grid culling then changes more of a picture, and
+// leaves holes.
 pub(super) const RECOVER_REACH: f32 = 1.3;
-/// Discs that face the eye less than this (cosine) are drawn as dots: their gradients are no longer numbers to trust.
+/// Cosine of the angle to the line of sight below which a disc is drawn as a dot, because its gradients are no longer
+/// reliable.
 pub(super) const GRAZING: f32 = 0.01;
 /// Depth tolerance ε in splat radii: layers of one surface blend, layers further apart occlude.
 pub(super) const EPSILON_RADII: f32 = 1.0;
-/// A splat reaches at most this part of the way to the eye.
+/// Largest semi-axis of a splat in perspective, as a share of its depth.
 pub(super) const NEAREST: f32 = 0.5;
 
-/// A surfel ready to be drawn.
+/// A surfel ready to be drawn. Depths and ε are in world units.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Splat {
     /// Projected centre in pixels.
     pub(super) center_px: [f32; 2],
     /// Depth of the centre.
     pub(super) depth: f32,
-    /// Furthest that the disc's depth is from the centre's.
+    /// Largest difference of the disc's depth from the centre's.
     pub(super) depth_reach: f32,
-    /// ε in world units.
+    /// Depth tolerance ε.
     pub(super) epsilon: f32,
     /// Gradient of inverse depth (perspective) or depth (orthographic) per pixel.
     pub(super) plane: [f32; 2],
     /// Gradients of the two disc coordinates, divided by depth in perspective; the disc is where u² + v² ≤ 1.
     pub(super) u: [f32; 2],
     pub(super) v: [f32; 2],
-    /// Pixels that may be covered, both ends included; x0 > x1 if none.
+    /// Columns and rows of pixels that may be covered, both ends included; first > last if there are none.
     pub(super) x: [u16; 2],
     pub(super) y: [u16; 2],
 }
 
 impl Splat {
-    /// Covers nothing.
+    /// A splat that covers nothing.
     const NONE: Self = Self {
         center_px: [0.0; 2],
         depth: 0.0,
@@ -94,7 +95,7 @@ impl Splat {
             v = [(b[0] - nx * b_shear) * b_scale, (b[1] - ny * b_shear) * b_scale];
         }
         let grazing = !(facing.abs() > least_facing);
-        // Drawn as the dot alone.
+        // A disc seen from its edge is drawn as the dot alone.
         let per_dot = 1.0 / (DOT_RADIUS_PX * if view.perspective { cz } else { 1.0 });
         let [plane, u, v] = if grazing { [[0.0; 2], [per_dot, 0.0], [0.0, per_dot]] } else { [plane, u, v] };
 
@@ -115,7 +116,7 @@ impl Splat {
         }
     }
 
-    /// About how far it reaches from its centre, in pixels.
+    /// Approximate reach from the centre, in pixels.
     #[inline(always)]
     pub(super) fn reach_px(&self) -> f32 {
         let [width, height] = [self.x, self.y].map(|[first, last]| f32::from(last.saturating_sub(first)));
@@ -149,7 +150,7 @@ fn extent(axis: usize, center: [f32; 3], a: [f32; 3], b: [f32; 3], center_px: f3
     // Pixel i is covered if its centre i + ½ lies within.
     let low = (low * view.focal_px + middle).min(center_px - DOT_RADIUS_PX) - 0.5;
     let high = (high * view.focal_px + middle).max(center_px + DOT_RADIUS_PX) - 0.5;
-    // Casts from float saturate; an extent beside the picture must become an empty one.
+    // Casts from float saturate, so an extent beside the picture must become an empty one explicitly.
     let first = low.ceil().max(0.0);
     let last = high.floor().min(size as f32 - 1.0);
     if first <= last { [first as u16, last as u16] } else { [1, 0] }

@@ -1,5 +1,5 @@
-// Sums up what points a block of pixels holds, and notes which blocks are empty, beside the picture of points too, where there is
-// noise: an invocation per block.
+// Counts the sixteenths with points in each block of pixels, and marks empty blocks; only in frames with noise. An
+// invocation per block.
 //
 // Reads: cover, sixteenths, measured. Writes: blocks.
 
@@ -32,7 +32,7 @@ fn sum_blocks(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             is_empty &= cover[pixel].rim == EMPTY_RIM;
         }
     }
-    // Most of the margin has no splats, and may hold a surface.
+    // Most of the margin has no splats, although it may hold a surface.
     let goes_on = held > 0u && beside_picture(first) > 0u && beside_picture(first + BLOCK_PX - 1u) > 0u;
     blocks[at] = held | select(0u, EMPTY_BLOCK, is_empty && !goes_on);
 }

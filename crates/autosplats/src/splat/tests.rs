@@ -1,4 +1,4 @@
-//! Splatting against the intersection of each pixel's line of sight with each disc, in `f64`.
+//! Splatting against an oracle: the intersection of each pixel's line of sight with each disc, in `f64`.
 
 use autosplats_cloud::FieldValues;
 use autosplats_cloud::glam::DVec3;
@@ -10,7 +10,7 @@ use crate::fit::{SUPPORT, Surfel};
 use crate::project::Sixteenths;
 use crate::test_clouds::Random;
 
-/// Pictures of less than a tile, of several, and with tiles cut off.
+/// Pictures smaller than a tile, of several tiles, and with tiles that are cut off.
 const SIZES: [[u32; 2]; 4] = [[1, 1], [70, 50], [64, 65], [130, 70]];
 
 pub(super) fn views(size: [u32; 2]) -> [View; 2] {
@@ -24,9 +24,9 @@ fn vector(v: [f32; 3]) -> DVec3 {
     DVec3::from(v.map(f64::from))
 }
 
-/// Where a line of sight meets a disc.
+/// Intersection of a line of sight with a disc.
 struct Hit {
-    /// Squared distance from the centre, in supports or dots, whichever is nearer; covered up to 1.
+    /// Squared distance from the centre, in supports or dot radii, whichever is less; covered up to 1.
     squared: f64,
     depth: f64,
 }
@@ -54,7 +54,7 @@ fn hit(surfel: &Surfel, x: usize, y: usize, view: &View) -> Hit {
         squared = (offset.dot(a) / major).powi(2) + (offset.dot(b) / minor).powi(2);
         depth = along.clamp(center.z - reach, center.z + reach);
     }
-    // Everything is drawn at least as a dot.
+    // Every splat is drawn at least as a dot.
     let scale = if view.perspective { focal / center.z } else { focal };
     let from_dot = (dx - center.x * scale).hypot(dy - center.y * scale) / f64::from(DOT_RADIUS_PX);
     Hit { squared: squared.min(from_dot * from_dot), depth }
@@ -69,12 +69,12 @@ fn epsilon(surfel: &Surfel, view: &View) -> f64 {
     f64::from(EPSILON_RADII * surfel.radius.min(most))
 }
 
-/// A pixel's means; `None` where f32 may decide otherwise what covers it, or what is in front.
+/// Weighted sums of a pixel.
 #[derive(Clone, Debug, Default)]
 struct Means {
     weight: f64,
     depth: f64,
-    /// Not yet of unit length.
+    /// Not normalised.
     normal: DVec3,
     color: DVec3,
     scalar: f64,
@@ -85,8 +85,8 @@ struct Means {
     heaviest: Option<u32>,
 }
 
-/// The picture of all surfels, with the depth map drawn `refinements` times again. `None` for pixels that are decided by
-/// less than rounding: f32 gradients are good to about 1e-5 of the disc, or of the depth.
+/// The picture of all surfels, with the depth map redrawn `refinements` times. `None` for pixels that rounding decides:
+/// f32 gradients are accurate to about 1e-5 of the disc, or of the depth.
 fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> Vec<Option<Means>> {
     let [width, height] = [view.width as usize, view.height as usize];
     let hits: Vec<Vec<(usize, Hit)>> = (0..width * height)
@@ -148,7 +148,7 @@ fn oracle(surfels: &[Surfel], view: &View, refinements: usize, data: &Data) -> V
                 heaviest[1] = heaviest[1].max(w);
             }
         }
-        // Equal weights go to the first; nearly equal ones to either.
+        // Among equal weights the first wins; among nearly equal ones either may.
         means.heaviest = means.heaviest.filter(|_| heaviest[1] < 0.999 * heaviest[0]);
         Some(means)
     };
@@ -176,7 +176,7 @@ impl Data {
     }
 }
 
-/// The sixteenths of pixels that hold points if there are those of `surfels` and no others.
+/// The marked sixteenths if the surfels' centres are the only points.
 pub(super) fn sixteenths(surfels: &[Surfel], view: &View) -> Sixteenths {
     let places = surfels.iter().map(|surfel| view.to_pixel(surfel.center.into()));
     let size = [view.width as usize, view.height as usize];
@@ -199,7 +199,7 @@ fn draw_with(
     attributes: &Attributes<'_>,
 ) -> GBuffer {
     splatter.begin(view);
-    // In two parts, as the renderer adds recovered points.
+    // Two parts, as the renderer adds recovered points.
     let first = surfels.len() * 2 / 3;
     splatter.add(&surfels[..first], 0, view);
     splatter.add(surfels, first, view);
@@ -207,7 +207,7 @@ fn draw_with(
     splatter.attributes(surfels, view, attributes).clone()
 }
 
-/// All layers, to the bit.
+/// Bits of all layers.
 fn bits(layers: &GBuffer) -> (Vec<u32>, Vec<u32>) {
     let floats = [&layers.weight, &layers.depth, &layers.scalar, &layers.radius, &layers.k_radius, &layers.back];
     let vectors = layers.normal.iter().chain(&layers.color).flatten();
@@ -216,7 +216,7 @@ fn bits(layers: &GBuffer) -> (Vec<u32>, Vec<u32>) {
     (bits, layers.point.clone())
 }
 
-/// Compares all layers; returns the number of pixels compared.
+/// Compares all layers. Returns the number of pixels compared.
 fn compare(layers: &GBuffer, oracle: &[Option<Means>]) -> Result<usize, String> {
     let width = layers.width as usize;
     for (pixel, means) in oracle.iter().enumerate() {
@@ -224,7 +224,8 @@ fn compare(layers: &GBuffer, oracle: &[Option<Means>]) -> Result<usize, String> 
         let [x, y] = [pixel % width, pixel / width];
         let i = layers.index(x, y);
         let near = |name: &str, value: f32, expected: f64, scale: f64| {
-            // f32 rounding of gradients, the kernel's eighth power and the sums; absolute for sums that cancel.
+            // The tolerance covers f32 rounding of gradients, of the kernel's eighth power and of sums; absolute for
+            // sums that cancel.
             let ok = (f64::from(value) - expected).abs() <= 1e-3 * expected.abs() + 1e-3 * scale;
             if ok { Ok(()) } else { Err(format!("{name} at {x}, {y} is {value}, not {expected}: {means:?}")) }
         };
@@ -266,14 +267,14 @@ fn compare(layers: &GBuffer, oracle: &[Option<Means>]) -> Result<usize, String> 
     Ok(oracle.iter().flatten().count())
 }
 
-/// How discs look.
+/// Kind of discs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Discs {
     Circles,
     Ellipses,
     /// Seen nearly from their edges.
     Grazing,
-    /// About a pixel.
+    /// About a pixel wide.
     Small,
     /// Large and near the eye.
     Near,
@@ -281,7 +282,7 @@ pub(super) enum Discs {
     Surface,
 }
 
-/// Surfels with their centres all over the picture.
+/// Surfels with their centres scattered over the picture.
 pub(super) fn surfels(seed: u64, count: usize, discs: Discs, view: &View) -> Vec<Surfel> {
     let mut random = Random::new(seed);
     let mut one = |source: usize| {
@@ -409,7 +410,8 @@ fn nothing_is_left_of_frames_before() {
     let scalars = FieldValues::F32(data.scalars.clone());
     let all = Attributes { scalar: Some(&scalars), measures: true, backs: true, ..bare };
     let mut splatter = Splatter::default();
-    // Tiles are empty that were not, stay so while layers are added, are filled again, and become those of another picture.
+    // Tiles become empty, stay so while layers are added, are filled again, and are replaced by those of another
+    // picture.
     let frames = [(150, 0..75, bare), (150, 75..150, bare), (150, 75..150, all), (150, 0..0, all), (150, 0..75, all)];
     for (frame, (side, columns, attributes)) in frames.into_iter().chain([(200, 0..75, all)]).enumerate() {
         let view = views([side, side])[0];

@@ -1,21 +1,25 @@
-//! Trim: takes off the rim of tails that splats leave around a silhouette.
+//! Trim: removes the rim of tails that splats leave around a silhouette.
 //!
 //! # How it works
-//! The outer half of a splat closes the gaps between scattered points, but where there are no more points it sticks out.
-//! The inner half, the *core*, ends about where the surface does. A pixel that lies in no core stays if it is closed in:
-//! if on one of eight lines through it there is a core in both directions, at most five times as far as the splat there
-//! reaches, and nothing empty in between; or if there is no core around it at all.
+//! The outer half of a splat closes the gaps between scattered points, but sticks out where points end. The inner half,
+//! the *core*, ends about where the surface does. A pixel that lies in no core stays if it is closed in. That is so if
+//! one of eight lines through the pixel meets a core in both directions. Lines end at empty pixels, and at about five
+//! times the reach of the splat there. The pixel also stays if no line meets any core.
 //!
-//! Where points are dense, discs are too coarse a measure, and what ends the surface are the points themselves, all of them,
-//! hidden or not (`Sixteenths`): close to an empty pixel, one stays if points lie on both sides of its middle, whichever line
-//! through it parts them, or if it is not there that the pixel is empty. Close to an empty square of three pixels, which is no gap
-//! between points, that need not be, and where points are few the mean of the splats around has to be close to its middle as well:
-//! noise strews points past the border, and splats are back on the surface. Lines between cores kept a row of tails wherever two
-//! cores stood out of a border. A surface that curves away has its points close together at its border, however wide its splats are
-//! where it faces the eye: so wide splats are asked as well, but more points have to say it.
+//! Where points are dense, discs are too coarse a measure. There the points themselves end the surface, all of them,
+//! hidden or not (`Sixteenths`). A pixel close to an empty square of three pixels is beside the surface if too few
+//! points lie on one side of its middle. Every line through the middle is tried. Close to a single empty pixel, which
+//! may be a gap between points, the open side must face that pixel too. Otherwise cores decide. Lines between cores
+//! alone would keep a row of tails between two cores that stand out of a border.
 //!
-//! Where there is noise, the density of points tells in place of all this (`blurred`).
-// Differs from the paper: it draws what its splats cover, and silhouettes are as much too wide as splats are.
+//! Where points are few, close to an empty square, the mean of the splats around has to be near the pixel's middle.
+//! Noise scatters points past the border, while their splats are back on the surface. A surface that curves away has
+//! dense points at its border, however wide its splats are where it faces the eye. So points decide about wide splats
+//! too, but more points are needed.
+//!
+//! Where noise blurs the border, the density of points decides before all these rules (`blurred`). See
+//! docs/decisions/0002-borders-by-sixteenths.md.
+// Differs from the paper: the paper draws all that its splats cover, so its silhouettes are too wide by their rims.
 
 pub(super) mod blurred;
 #[cfg(test)]
@@ -29,62 +33,66 @@ use crate::project::Sixteenths;
 
 /// Weight of a splat from which a pixel belongs to its core: the kernel at 0.42 splat radii.
 pub(super) const CORE_WEIGHT: f32 = 0.68;
-/// Sum of weights from which a pixel belongs to the surface whatever its heaviest splat: inside a surface the sum is
+/// Sum of weights from which a pixel belongs to the surface whatever its heaviest splat. Inside a surface the sum is
 /// about 2, at its border 1. Where many points fall into each pixel, the nearest one may lie at the same edge of every
-/// pixel, and no pixel's centre in a core.
+/// pixel. Then no pixel's centre lies in a core.
 pub(super) const INNER_WEIGHT: f32 = 1.3;
-/// How far lines go, in reaches of the splat.
+/// Length of a line to each side, in reaches of the pixel's heaviest splat.
 pub(super) const FURTHEST: f32 = 5.0;
-/// Strides that a line takes in the reach of a splat wider than so many pixels.
+/// Strides that a line takes per reach of a splat. A stride is one pixel at least.
 pub(super) const STRIDES_PER_REACH: f32 = 6.0;
-/// Longest stride, in pixels, that stops where those of neighbours do.
+/// Longest stride, in pixels, at which lines of neighbouring pixels stop at the same places.
 pub(super) const LONGEST_ALIGNED: isize = 3;
-/// Added to how far lines go: what is a pixel wide has cores here and there along it.
+/// Strides added to each line: a structure one pixel wide has cores only here and there along its length.
 pub(super) const LEAST_REACH_PX: usize = 2;
-/// Of the sixteenths of pixels around a pixel that hold points, one in so many lies on either side at least, or the pixel is
-/// beside the surface.
+/// Least share on each side of a border line, as a divisor: at least 1/8 of the marked sixteenths around a pixel. With
+/// fewer on any side the pixel is beside the surface. A sixteenth is marked if it holds a point.
 pub(super) const LEAST_SHARE: u32 = 8;
-/// From how many of them on, out of some 50, they tell: around narrow splats, and around wide ones; and from how many on they do so
-/// alone.
+/// Fewest marked sixteenths, of some 50 within a pixel, that can show an open side: around narrow splats, and around
+/// wide ones.
 pub(super) const FEWEST_POINTS: [u32; 2] = [5, 8];
+/// Marked sixteenths from which points alone decide: without an open side the pixel stays.
 pub(super) const MANY_POINTS: u32 = 18;
-/// From how many of them on they tell which way a border runs more finely than the eight lines.
+/// Marked sixteenths from which 16 directions are tested instead of the eight of the lines.
 pub(super) const FINE_POINTS: u32 = 24;
-/// Splats closer than so many pixels are those around a pixel.
+/// Radius in pixels of the window whose splats are averaged.
 pub(super) const AROUND_PX: f32 = 3.0;
-/// How far from the middle of a pixel their mean may be. At the straight end of points strewn evenly it is 0.8 pixels off, at that
-/// of a surface which curves away, where they lie ever closer, less.
+/// Largest offset in pixels of the mean of the splats in the window from the pixel's middle. At the straight end of
+/// evenly scattered points the mean is off by 0.8 pixels. Where a surface curves away, points get ever closer and the
+/// mean is off by less.
 pub(super) const OFF_PX: f32 = 0.7;
-/// From how many of them on their mean tells: around narrow splats, and around wide ones, of which only a surface that curves away
-/// has as many at its border, and no gap among sparse points.
+/// Fewest splats in the window whose mean decides: around narrow splats, and around wide ones. Around wide splats only
+/// a surface that curves away has so many at its border; a gap among sparse points has fewer.
 pub(super) const FEWEST_SPLATS: [f32; 2] = [3.0, 14.0];
 /// Reach in pixels of the widest narrow splat: points are about two pixels apart then.
 pub(super) const NARROW_PX: f32 = 3.0;
-/// Pixels from the middle of an empty square of three that are the border, along an axis; in a square, but for its corners. An
-/// empty pixel alone may be a gap between points, which the splats around would widen.
+/// Distance in pixels, along either axis, from the middle of an empty 3×3 square up to which pixels are its border. The
+/// pixels form a square without its corners. A single empty pixel may be a gap between points, which this rule would
+/// widen.
 const BORDER_PX: usize = 3;
-/// The same from an empty pixel that may be a gap: points alone tell there, if their open side has it no farther away.
+/// Distance in pixels from a single empty pixel up to which pixels are beside a possible gap; a square without its
+/// corners. Only points decide there, and only if an empty pixel lies within this distance on their open side.
 const GAP_PX: usize = 2;
-/// Pixels beside a tile that tell of its border.
+/// Pixels around a tile that its border tests read.
 const MARGIN: usize = BORDER_PX + 1;
 const _: () = assert!(TILE == 64, "a row of a tile is a word");
-/// Directions of the eight lines.
+/// Directions of the eight lines, in pixels.
 const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
-/// Directions across which borders are looked for: along the lines, and between them.
+/// Directions across which borders are tested: those of the lines, then those between them.
 #[rustfmt::skip]
 const ACROSS: [[isize; 2]; 2 * LINES.len()] = [
     [1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2],
     [4, 1], [1, 4], [4, -1], [1, -4], [4, 3], [3, 4], [4, -3], [3, -4],
 ];
-/// Of the sixteenths around a pixel, as [`Sixteenths::around`] has them, those within a pixel of its middle that lie ahead in
-/// each direction, or neither ahead nor behind; then those behind.
+/// Masks of the two sides of each direction, in the layout of [`Sixteenths::around`]: the sixteenths ahead, then those
+/// behind. Only sixteenths within a pixel of the middle count; those level with the middle belong to both sides.
 const SIDES: [[u64; 2]; ACROSS.len()] = {
     let mut sides = [[0; 2]; ACROSS.len()];
     let mut at = 0;
     while at < 64 * ACROSS.len() {
         let (direction, bit) = (at / 64, at % 64);
         let [dx, dy] = ACROSS[direction];
-        // From the middle, in eighths of a pixel.
+        // Offset from the pixel's middle, in eighths of a pixel.
         let [x, y] = [2 * (bit as isize % 8) - 7, 2 * (bit as isize / 8) - 7];
         let ahead = x * dx + y * dy;
         if x * x + y * y < 64 {
@@ -95,18 +103,19 @@ const SIDES: [[u64; 2]; ACROSS.len()] = {
     }
     sides
 };
-/// Each side holds one of these whole.
+/// Quarters of the disc. Each mask of [`SIDES`] contains one of these whole, so no side is open if all quarters hold
+/// enough points.
 const QUARTERS: [u64; 4] =
     [SIDES[0][0] & SIDES[1][0], SIDES[0][0] & SIDES[1][1], SIDES[0][1] & SIDES[1][0], SIDES[0][1] & SIDES[1][1]];
-/// Those within a pixel of the middle, and those of the pixel itself.
+/// Masks of the sixteenths within a pixel of the middle, and of those of the pixel itself.
 const DISC: u64 = SIDES[0][0] | SIDES[0][1];
 const OWN: u64 = 0x3c3c_3c3c << 16;
 
-/// What trimming knows of a pixel: [`EMPTY`], or how far its heaviest splat reaches in pixels, below 0 in a core.
+/// State of a pixel for trimming: [`EMPTY`], or the reach of its heaviest splat in pixels, negated in a core.
 pub(super) type Rim = f32;
 pub(super) const EMPTY: Rim = 0.0;
 
-/// The rim of a pixel by its sum of weights, and the weight and the reach of its heaviest splat.
+/// The rim of a pixel from its sum of weights, and the weight and reach of its heaviest splat.
 pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
     if heaviest >= CORE_WEIGHT || weight >= INNER_WEIGHT {
         -reach_px
@@ -117,25 +126,25 @@ pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
     }
 }
 
-/// What a pixel shows, before anything is taken off.
+/// Visible surface at a pixel before trimming.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shown {
     pub(super) depth: f32,
-    /// View space.
+    /// Unit normal, view space.
     pub(super) normal: [f32; 3],
 }
 
-/// What is empty close to a pixel.
+/// Kind of emptiness close to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Near {
     Nothing,
-    /// A pixel, which may be a gap between points.
+    /// A single empty pixel, which may be a gap between points.
     Gap,
-    /// A square of three pixels.
+    /// An empty 3×3 square.
     Border,
 }
 
-/// What is empty close to the pixels of a tile: of each row a bit for each of them, the lowest the first.
+/// Masks of the pixels of a tile that are close to emptiness: a word per row, the lowest bit for the first column.
 #[derive(Debug)]
 pub(super) struct Edges {
     gaps: [u64; TILE],
@@ -143,7 +152,7 @@ pub(super) struct Edges {
 }
 
 impl Edges {
-    /// Close to pixel (x, y) of the tile.
+    /// Kind of emptiness close to pixel (x, y) of the tile.
     pub(super) fn near(&self, [x, y]: [usize; 2]) -> Near {
         match [self.borders, self.gaps].map(|rows| rows[y] >> x & 1 == 1) {
             [true, _] => Near::Border,
@@ -153,15 +162,15 @@ impl Edges {
     }
 }
 
-/// What trimming knows of a picture, tile by tile.
+/// Input of trimming for a picture, tile by tile.
 #[derive(Clone, Copy)]
 pub(super) struct Outline<'a> {
     pub(super) rims: &'a [Rim],
-    /// Of splats, in each pixel.
+    /// Centres of splats per pixel (`centers`).
     pub(super) centers: &'a [u32],
     pub(super) sixteenths: &'a Sixteenths,
     pub(super) view: &'a View,
-    /// If there is noise.
+    /// Blurred borders; `None` without noise.
     pub(super) blurred: Option<&'a Blurred>,
 }
 
@@ -174,11 +183,11 @@ impl Outline<'_> {
         tiled_index(self.view.width as usize, x, y)
     }
 
-    /// What is empty close to the pixels of the tile with this upper left one.
+    /// Masks of emptiness for the tile whose upper left pixel is (x0, y0).
     pub(super) fn edges(&self, [x0, y0]: [usize; 2]) -> Edges {
         let [width, height] = self.size();
         let own = &self.rims[self.index([x0, y0])..][..TILE_AREA];
-        // Bits of empty pixels, of the margin on each side as well.
+        // Bits of the empty pixels in a row of the tile with its margin.
         let empty = |row: usize| {
             let Some(y) = (y0 + row).checked_sub(MARGIN).filter(|&y| y < height) else { return 0 };
             let bit = |x: usize| u128::from(self.rims[self.index([x, y])] == EMPTY) << (x + MARGIN - x0);
@@ -193,7 +202,7 @@ impl Outline<'_> {
             bits | u128::from(word) << MARGIN
         };
         let rows: [u128; TILE + 2 * MARGIN] = std::array::from_fn(empty);
-        // Middles of empty squares.
+        // Bits of the middles of empty 3×3 squares.
         let middles: [u128; TILE + 2 * BORDER_PX] = std::array::from_fn(|row| {
             let all = rows[row] & rows[row + 1] & rows[row + 2];
             all & all << 1 & all >> 1
@@ -212,7 +221,7 @@ impl Outline<'_> {
         Edges { gaps: std::array::from_fn(gaps), borders: std::array::from_fn(borders) }
     }
 
-    /// Whether a splat covers pixel (x, y), of which this is shown, but no surface does.
+    /// Whether pixel (x, y), which shows `shown`, is covered by a splat but by no surface.
     pub(super) fn sticks_out(&self, x: usize, y: usize, shown: Shown, near: Near) -> bool {
         let own = self.rims[self.index([x, y])];
         if own == EMPTY {
@@ -224,11 +233,12 @@ impl Outline<'_> {
             .unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }
 
-    /// Whether pixel (x, y) is beside the surface, by the points around, if they tell; `wide` says whether its splat is.
+    /// Whether pixel (x, y) is beside the surface by the points around; `None` if they do not decide. `wide` states
+    /// whether its splat is wide.
     fn is_beside(&self, [x, y]: [usize; 2], wide: bool, near: Near) -> Option<bool> {
         let [width, height] = self.size();
         let window = AROUND_PX as usize;
-        // Of points beyond the screen nothing is known.
+        // Points beyond the screen are unknown.
         let known = x >= window && y >= window && x + window < width && y + window < height;
         if near == Near::Nothing || !known {
             return None;
@@ -244,7 +254,8 @@ impl Outline<'_> {
             if near == Near::Gap && !(1..=GAP_PX as isize).any(|steps| is_empty(ahead(steps))) {
                 return None;
             }
-            // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
+            // A thin structure or an isolated point has points in this pixel, and no closed pixel behind it. It stays,
+            // or it would vanish.
             let behind = ahead(-1);
             let stays = !is_empty(behind) && open_side(self.sixteenths.around(behind)).is_none();
             return Some(points & OWN == 0 || stays);
@@ -259,7 +270,7 @@ impl Outline<'_> {
         Some(square(offset) > OFF_PX * OFF_PX)
     }
 
-    /// The mean offset, in pixels, of the splats around pixel (x, y), if there are so many.
+    /// Mean offset in pixels of the splats in the window around pixel (x, y); `None` if they are fewer than `fewest`.
     fn splats_offset(&self, [x, y]: [usize; 2], fewest: f32) -> Option<[f32; 2]> {
         let window = AROUND_PX as usize;
         let mut splats = 0.0;
@@ -282,15 +293,16 @@ impl Outline<'_> {
         (splats >= fewest).then(|| [ox / weight, oy / weight])
     }
 
-    /// Whether the pixel is a tail that nothing closes in, of a splat that reaches so far.
+    /// Whether no line closes in the pixel, a tail of a splat with this reach.
     fn is_open(&self, [x, y]: [usize; 2], reach_px: f32) -> bool {
         let [width, height] = self.size();
-        // Wide splats have wide cores, which strides do not miss; so the work per pixel is bounded whatever the density.
+        // Wide splats have wide cores, which strides do not miss. So the work per pixel is bounded whatever the
+        // density.
         let stride = (reach_px / STRIDES_PER_REACH).max(1.0) as isize;
         let strides = (FURTHEST * reach_px) as usize / stride as usize + LEAST_REACH_PX;
         let meets_core = |[dx, dy]: [isize; 2]| {
-            // Lines of neighbours stop at the same places: if one saw what the next strides over, borders would be dotted. Not
-            // with long strides, which would make rays of what all of them miss.
+            // Lines of neighbouring pixels stop at the same places, or borders would be dotted where some lines stride
+            // over a core. Long strides are not aligned: places that all lines stride over would show as rays.
             let (along, place) = if dx.abs() == 1 { (dx, x as isize) } else { (dy, y as isize) };
             let beyond = place % stride;
             let first = match (stride > LONGEST_ALIGNED, along > 0 || beyond == 0) {
@@ -302,7 +314,7 @@ impl Outline<'_> {
                 let distance = first + at * stride;
                 let (x, y) = match (x.checked_add_signed(dx * distance), y.checked_add_signed(dy * distance)) {
                     (Some(x), Some(y)) if x < width && y < height => (x, y),
-                    // Beyond the picture the surface goes on.
+                    // Beyond the screen the surface goes on.
                     _ => return true,
                 };
                 let rim = self.rims[self.index([x, y])];
@@ -312,11 +324,11 @@ impl Outline<'_> {
             }
             false
         };
-        // What has no core anywhere around, as a point alone, sticks out of nothing.
+        // A pixel without any core on its lines, such as that of an isolated point, sticks out of nothing.
         let mut sticks_out = false;
         for [dx, dy] in LINES {
             let ahead = meets_core([dx, dy]);
-            // Half a line closes nothing in: the other half is of use only while no core was met at all.
+            // One direction alone closes nothing in. The opposite direction matters only while no core was met at all.
             if !ahead && sticks_out {
                 continue;
             }
@@ -330,12 +342,12 @@ impl Outline<'_> {
     }
 }
 
-/// Towards the side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface.
+/// The direction of the side with the fewest marked sixteenths around a pixel; `None` if every side has enough.
 fn open_side(points: u64) -> Option<[isize; 2]> {
     let count = |side: u64| (points & side).count_ones();
     let all = count(DISC);
     let is_few = |count: u32| LEAST_SHARE * count < all.max(1);
-    // Most pixels have points on all sides.
+    // Quick test: most pixels have points on all sides.
     if !QUARTERS.iter().any(|&quarter| is_few(count(quarter))) {
         return None;
     }

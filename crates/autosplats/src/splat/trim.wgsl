@@ -1,7 +1,7 @@
-// Trim: takes off the tails that splats leave around a silhouette. The CPU form, `trim.rs`, says how.
+// Trim: removes the tails that splats leave around a silhouette. The CPU form is `trim.rs`.
 //
-// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Of other pixels it reads the rims, which
-// are not written. Writes: counters.
+// Reads: centers, sixteenths, measured, blocks. Reads and writes: surface, cover, extras. Writes: counters. Of other
+// pixels it reads only the rims, which no invocation writes.
 
 #import frame
 #import picture
@@ -19,61 +19,62 @@
 @group(0) @binding(7) var<storage, read> measured: array<f32>;
 @group(0) @binding(8) var<storage, read> blocks: array<u32>;
 
-// 1 to take off what sticks out, 0 only to count what is covered.
+// 1 to trim, 0 only to count covered pixels.
 override TRIMS: u32;
-// How far lines go, in reaches of the splat; strides in a reach; pixels added to how far they go.
+// Length of lines in reaches of the splat, strides per reach, and strides added to a line.
 override FURTHEST: f32;
 override STRIDES_PER_REACH: f32;
 override LEAST_REACH_PX: i32;
-// Longest stride that stops where those of neighbours do.
+// Longest stride at which lines of neighbouring pixels stop at the same places.
 override LONGEST_ALIGNED: i32;
-// What part of the points around a pixel lies on each side, how many tell around narrow splats and around wide ones, and how many
-// alone.
+// Marked sixteenths around a pixel: least share on each side, as a divisor; fewest that decide around narrow and wide
+// splats; and how many decide alone.
 override LEAST_SHARE: u32;
 override FEWEST_POINTS_NARROW: u32;
 override FEWEST_POINTS_WIDE: u32;
 override MANY_POINTS: u32;
-// How many tell which way a border runs more finely than the eight lines.
+// Marked sixteenths from which 16 directions are tested instead of eight.
 override FINE_POINTS: u32;
-// What splats around a pixel are, where their mean may be, how many tell around narrow ones and around wide ones, and which are
-// narrow.
+// Splats around a pixel: window radius, largest offset of their mean, fewest that decide around narrow and wide splats,
+// and widest narrow reach.
 override AROUND_PX: f32;
 override OFF_PX: f32;
 override FEWEST_SPLATS_NARROW: f32;
 override FEWEST_SPLATS_WIDE: f32;
 override NARROW_PX: f32;
-// Steps of a centre's place in its pixel.
+// Steps along the side of a pixel.
 override STEPS: f32;
 
-// Side of the square of pixels of a workgroup.
+// Side in pixels of the square of a workgroup.
 const SQUARE = 32u;
 const GROUP = 64u;
-// Pixels on each side of the workgroup's square that tell of its border: `MARGIN` of the CPU form; and that square.
+// Pixels around that square that its border tests read (`MARGIN` of the CPU form), and the side of the square with
+// them.
 const MARGIN = 4u;
 const WIDE = 40u;
-// Blocks on each side of the square's that tell whether something is empty within a fringe, one more than that is wide, and those
-// of that square in a row.
+// Blocks around the square's that show whether a fringe meets emptiness, one more than its width; and the side of the
+// square with them.
 const BLOCK_MARGIN = FRINGE_BLOCKS + 1u;
 const WIDE_BLOCKS = SQUARE / BLOCK_PX + 2u * BLOCK_MARGIN;
 
-// Pixels of the workgroup that stay.
+// Number of the workgroup's pixels that stay.
 var<workgroup> covered: atomic<u32>;
-// Those that may stick out, as places in the square: few of many, so that invocations look for them together first and
-// each has one to follow lines from then.
+// Pixels that may stick out, as places in the square. They are few, so the workgroup finds them together first, and
+// then each invocation follows the lines of one.
 var<workgroup> tails: array<u32, 1024>;
 var<workgroup> tail_count: atomic<u32>;
-// For each row of the wide square, a bit for each pixel that is empty: the first 32 columns, then the others.
+// Bits of empty pixels, per row of the wide square: the first 32 columns, then the others.
 var<workgroup> empties: array<atomic<u32>, 80>;
-// The same of pixels in the middle of an empty square.
+// Bits of the middles of empty 3×3 squares, likewise.
 var<workgroup> middles: array<vec2u, 40>;
-// For each row of blocks, a bit for each that is empty, likewise.
+// Bits of empty blocks, per row of blocks, likewise.
 var<workgroup> empty_blocks: array<atomic<u32>, 2u * WIDE_BLOCKS>;
 var<workgroup> is_any_empty: atomic<u32>;
-// For each direction, the sixteenths around a pixel that lie ahead, then for each those behind: two words of four rows each.
+// Masks of the sixteenths ahead in each direction, then those behind: two words of four rows each.
 var<workgroup> sides: array<vec2u, 2u * DIRECTIONS>;
 
-// The directions across which borders are looked for, the first eight of which are the lines; and the places of a pixel's own
-// sixteenths among those around it.
+// Directions across which borders are tested, of which the first eight are the lines; and the mask of a pixel's own
+// sixteenths.
 const DIRECTIONS = 16u;
 const LINES = 8u;
 const ACROSS = array(
@@ -104,7 +105,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     let corner = SQUARE * vec2u(group % columns, group / columns);
     for (var place = local; place < WIDE * WIDE; place += GROUP) {
         let at = vec2u(place % WIDE, place / WIDE);
-        // Pixels before the first are far beyond the last.
+        // Unsigned wrap-around moves pixels before the first far beyond the last.
         let pixel = corner + at - MARGIN;
         if all(pixel < frame.size) && cover[pixel.y * frame.size.x + pixel.x].rim == EMPTY_RIM {
             atomicOr(&empties[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
@@ -113,7 +114,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     if measured[0] > 0.0 {
         for (var place = local; place < WIDE_BLOCKS * WIDE_BLOCKS; place += GROUP) {
             let at = vec2u(place % WIDE_BLOCKS, place / WIDE_BLOCKS);
-            // Blocks before the first are far beyond the last.
+            // Unsigned wrap-around moves blocks before the first far beyond the last.
             let block = corner / BLOCK_PX + at - BLOCK_MARGIN;
             if all(block < block_counts()) && (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u {
                 atomicOr(&empty_blocks[2u * at.y + at.x / 32u], 1u << (at.x % 32u));
@@ -141,7 +142,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             }
         }
     }
-    // What one invocation has read of a pixel another may take off.
+    // One invocation may clear a pixel that another has read.
     storageBarrier();
     workgroupBarrier();
     for (var tail = local; tail < atomicLoad(&tail_count); tail += GROUP) {
@@ -153,7 +154,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
             stay -= select(0u, 1u, beside_picture(pixel) == 0u);
         }
     }
-    // It may have found more to take off than to stay: the sum over the workgroup is right all the same.
+    // `stay` may wrap below 0; the sum over the workgroup is right all the same.
     atomicAdd(&covered, stay);
     workgroupBarrier();
     if local == 0u && atomicLoad(&covered) > 0u {
@@ -161,7 +162,7 @@ fn trim(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index
     }
 }
 
-// Leaves nothing at a pixel.
+// Empties a pixel.
 fn clear(at: u32) {
     surface[at] = vec4f(0.0, 0.0, 0.0, infinity());
     cover[at].weight = 0.0;
@@ -178,16 +179,16 @@ fn empty_row(row: u32) -> vec2u {
 
 // Whether a pixel of the square is close to an empty pixel.
 fn is_gap(place: vec2u) -> bool {
-    // Of the five rows around it, three of the outer ones' pixels and five of the others'.
+    // Five rows around the pixel: three pixels of the outer rows, five of the others.
     let row = place.y + MARGIN;
     let inner = empty_row(row - 1u) | empty_row(row) | empty_row(row + 1u);
     let outer = empty_row(row - 2u) | empty_row(row + 2u);
     return ((seven_bits(place.x, inner) & 62u) | (seven_bits(place.x, outer) & 28u)) != 0u;
 }
 
-// Whether a pixel of the square is close to the middle of an empty square of three, which makes it close to an empty pixel.
+// Whether a pixel of the square is close to the middle of an empty 3×3 square, and so to an empty pixel too.
 fn is_border(place: vec2u) -> bool {
-    // Around it in the wide square, five of the outer rows' pixels and seven of the others'.
+    // Seven rows around the pixel: five pixels of the outer rows, seven of the others.
     var inner = vec2u(0u);
     for (var row = 2u; row < 7u; row++) {
         inner |= middles[place.y + row];
@@ -196,25 +197,25 @@ fn is_border(place: vec2u) -> bool {
     return (seven_bits(place.x, inner) | (seven_bits(place.x, outer) & 62u)) != 0u;
 }
 
-// Of a row's bits, those of the seven pixels around a column of the square.
+// Bits of the seven pixels around a column of the square.
 fn seven_bits(column: u32, bits: vec2u) -> u32 {
-    // The first of them is one beyond that column; shifted twice, as a word cannot be shifted by its width.
+    // Bit 0 is one beyond that column. Shifted twice, as a word cannot be shifted by its width.
     return (((bits.x >> column) >> 1u) | (bits.y << (31u - column))) & 127u;
 }
 
-// A direction across a border, or the opposite one.
+// A direction across a border; from `DIRECTIONS` on the opposite one.
 fn across(which: u32) -> vec2i {
     var directions = ACROSS;
     let direction = directions[which % DIRECTIONS];
     return select(direction, -direction, which >= DIRECTIONS);
 }
 
-// The sixteenths around a pixel, within a pixel of its middle, that lie ahead in a direction, or neither ahead nor behind.
+// Mask of the sixteenths within a pixel of the middle that lie ahead in a direction, or level with the middle.
 fn side(which: u32) -> vec2u {
     let along = across(which);
     var bits = vec2u(0u);
     for (var bit = 0u; bit < 64u; bit++) {
-        // From the middle, in eighths of a pixel.
+        // Offset from the pixel's middle, in eighths of a pixel.
         let at = 2 * vec2i(vec2u(bit % 8u, bit / 8u)) - 7;
         let is_in = at.x * at.x + at.y * at.y < 64 && at.x * along.x + at.y * along.y >= 0;
         bits[bit / 32u] |= u32(is_in) << (bit % 32u);
@@ -222,8 +223,8 @@ fn side(which: u32) -> vec2u {
     return bits;
 }
 
-// Noise in pixels where it may have blurred the border beside a pixel, which a splat of this reach covers; 0 if not, or if nothing
-// is empty within a fringe.
+// Noise in pixels that may blur the border beside a pixel, covered by a splat of this reach. 0 if there is too little,
+// or nothing empty within a fringe.
 fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
     if atomicLoad(&is_any_empty) == 0u {
         return 0.0;
@@ -243,7 +244,7 @@ fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
     return select(noise, 0.0, all(found == vec2u(0u)));
 }
 
-// The bits of two words below one, which is less than 64.
+// Bits of two words below `bit`, which is less than 64.
 fn bits_below(bit: u32) -> vec2u {
     let part = (1u << (bit % 32u)) - 1u;
     return select(vec2u(part, 0u), vec2u(0xffffffffu, part), bit >= 32u);
@@ -264,16 +265,16 @@ fn sticks_out(place: vec2u, pixel: vec2u, own: f32) -> bool {
     return answer == YES;
 }
 
-// What points say, if anything.
+// Answer of the points around a pixel; `SILENT` if they do not decide.
 const SILENT = 0u;
 const YES = 1u;
 const NO = 2u;
 
-// Whether a pixel is beside the surface, by the points around; `wide` says whether its splat is, `border` whether it is close to an
-// empty square.
+// Whether a pixel is beside the surface by the points around. `wide` states whether its splat is wide, `border` whether
+// an empty 3×3 square is close.
 fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     let window = u32(AROUND_PX);
-    // Of points beyond the picture nothing is known.
+    // Points beyond the screen are unknown.
     if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
         return SILENT;
     }
@@ -287,7 +288,8 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
         if !border && !is_empty(vec2u(vec2i(pixel) + step)) && !is_empty(vec2u(vec2i(pixel) + 2 * step)) {
             return SILENT;
         }
-        // What is thin, or alone, has points in this pixel and no other behind it to be seen in: it would be gone.
+        // A thin structure or an isolated point has points in this pixel, and no closed pixel behind it. It stays, or
+        // it would vanish.
         if all((points & OWN) == vec2u(0u)) {
             return YES;
         }
@@ -311,13 +313,12 @@ fn count(bits: vec2u) -> u32 {
     return countOneBits(bits.x) + countOneBits(bits.y);
 }
 
-// Those within a pixel of the middle.
+// Number of sixteenths within a pixel of the middle.
 fn count_disc(points: vec2u) -> u32 {
     return count(points & (sides[0] | sides[DIRECTIONS]));
 }
 
-// The side on which the fewest of the sixteenths around a pixel that hold points lie, if they are too few for a surface;
-// else twice `DIRECTIONS`.
+// The side with the fewest marked sixteenths around a pixel; twice `DIRECTIONS` if every side has enough.
 fn open_side(points: vec2u) -> u32 {
     let all = count_disc(points);
     let told = select(DIRECTIONS, LINES, all < FINE_POINTS);
@@ -334,7 +335,7 @@ fn open_side(points: vec2u) -> u32 {
     return select(2u * DIRECTIONS, open, LEAST_SHARE * least < max(all, 1u));
 }
 
-// The sixteenths no farther than a pixel from the middle of one that hold points: eight rows of eight.
+// Marked sixteenths of the 8×8 around a pixel's middle, a bit each, row by row.
 fn around(pixel: vec2u) -> vec2u {
     var rows = vec2u(0u);
     for (var row = 0u; row < 8u; row++) {
@@ -348,12 +349,12 @@ fn around(pixel: vec2u) -> vec2u {
     return rows;
 }
 
-// The sixteenths of a pixel.
+// Marked sixteenths of a pixel.
 fn of_pixel_at(index: u32) -> u32 {
     return (sixteenths[index / 2u] >> (16u * (index % 2u))) & 0xffffu;
 }
 
-// Whether the mean of the splats around a pixel is far from its middle, if there are enough of them.
+// Whether the mean of the splats around a pixel is far from its middle; `SILENT` if they are too few.
 fn mean_of_splats(pixel: vec2u, fewest: f32) -> u32 {
     let window = u32(AROUND_PX);
     var splats = 0.0;
@@ -377,7 +378,7 @@ fn mean_of_splats(pixel: vec2u, fewest: f32) -> u32 {
     return select(NO, YES, dot(offset, offset) > OFF_PX * OFF_PX);
 }
 
-// The mean of a pixel's centres from its middle, in pixels, and how many there are.
+// Offset in pixels of the mean of a pixel's centres from its middle, and their number.
 fn centers_of(pixel: vec2u) -> vec3f {
     let bits = centers[pixel.y * frame.size.x + pixel.x];
     let count = f32(bits >> 24u);
@@ -386,14 +387,14 @@ fn centers_of(pixel: vec2u) -> vec3f {
 }
 
 fn is_open(pixel: vec2i, own: f32) -> bool {
-    // Wide splats have wide cores, which strides do not miss; so the work per pixel is bounded whatever the density.
+    // Wide splats have wide cores, which strides do not miss. So the work per pixel is bounded whatever the density.
     let stride = i32(max(own / STRIDES_PER_REACH, 1.0));
     let strides = i32(FURTHEST * own) / stride + LEAST_REACH_PX;
-    // What has no core anywhere around, as a point alone, sticks out of nothing.
+    // A pixel without any core on its lines, such as that of an isolated point, sticks out of nothing.
     var is_tail = false;
     for (var line = 0u; line < LINES; line++) {
         let ahead = meets_core(pixel, across(line), stride, strides);
-        // Where nothing is ahead, what is behind tells only of a core anywhere around.
+        // One direction alone closes nothing in. The opposite direction matters only while no core was met at all.
         let behind = (ahead || !is_tail) && meets_core(pixel, -across(line), stride, strides);
         if ahead && behind {
             return false;
@@ -404,7 +405,7 @@ fn is_open(pixel: vec2i, own: f32) -> bool {
 }
 
 fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> bool {
-    // Lines of neighbours stop at the same places if strides are short.
+    // Short strides stop at the same places as those of neighbouring pixels.
     let by_x = abs(direction.x) == 1;
     let beyond = select(origin.y, origin.x, by_x) % stride;
     let is_up = select(direction.y, direction.x, by_x) > 0;
@@ -413,7 +414,7 @@ fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> boo
     for (var at = 0; at < strides; at++) {
         let pixel = origin + direction * (first + at * stride);
         if any(pixel < vec2i(0)) || any(pixel >= vec2i(frame.size)) {
-            // Beyond the picture the surface goes on.
+            // Beyond the screen the surface goes on.
             return true;
         }
         let rim = cover[u32(pixel.y) * frame.size.x + u32(pixel.x)].rim;

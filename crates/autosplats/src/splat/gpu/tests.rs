@@ -1,4 +1,4 @@
-//! Splatting on the GPU against that on the CPU, fed with the same surfels.
+//! Splatting on the GPU against the CPU, from the same surfels.
 
 use autosplats_cloud::FieldValues;
 use glam::Vec3;
@@ -16,16 +16,16 @@ use crate::project::gpu::tests::find_work;
 use crate::project::{DensityGrid, ScreenPoint};
 use crate::test_clouds::Random;
 
-/// One pixel, patches and tiles that are cut off, several tiles.
+/// One pixel, patches and tiles that are cut off, and several tiles.
 const SIZES: [[u32; 2]; 4] = [[1, 1], [71, 50], [64, 65], [133, 9]];
-/// It is of account for the noise of points, which may differ with their k-radii.
+/// Splat scale, which matters to noise that grows with the k-radius.
 const SPLAT_SCALE: f32 = 1.5;
 const ALL: Channels = Channels { color: true, scalar: true, measures: true, backs: true };
 
-/// What is drawn, and in how many rounds.
+/// Surfels and settings of a frame.
 struct Scene<'a> {
     surfels: &'a [Surfel],
-    /// Those of the first round.
+    /// Number of surfels in the first round.
     active: usize,
     view: &'a View,
     refinement: bool,
@@ -56,7 +56,7 @@ impl Scene<'_> {
     fn upload(&self, gpu: &Gpu, channels: Channels) -> Buffers {
         let size = self.size();
         let mut screen = ScreenBuffers::new(gpu, size, false, 0, 0).expect("room");
-        // There may be more surfels than pixels here.
+        // There may be more surfels than pixels.
         screen.capacity = self.surfels.len() as u32;
         let values = self.surfels.iter().flat_map(|surfel| {
             let [r, g, b] = self.data.colors[surfel.source as usize];
@@ -125,7 +125,7 @@ impl Scene<'_> {
     }
 }
 
-/// The depth map, as depths.
+/// The depth map as depths.
 fn read_depth(gpu: &Gpu, splats: &SplatBuffers, pixels: usize) -> Vec<f32> {
     let keys: Vec<u32> = read_back(gpu, &splats.depth, pixels).expect("a depth map");
     let mask = |key: u32| if key >= 0x8000_0000 { 0x8000_0000 } else { u32::MAX };
@@ -142,8 +142,8 @@ pub(crate) fn read_layers(gpu: &Gpu, layers: &LayerBuffers) -> GBuffer {
     layers.to_host(0, &read(&layers.surface), &read(&layers.cover), &read(&layers.extras))
 }
 
-/// Pixels at which the splatter does not hide what is in front of `depth`, or does not what is behind. Rounding of
-/// gradients moves depths by a millionth.
+/// Number of pixels where the splatter hides a point just before `depth`, or does not hide one just behind. The
+/// tolerance covers rounding of gradients, about a millionth.
 fn other_depths(splatter: &Splatter, depth: &[f32], view: &View) -> usize {
     let wrong = |&pixel: &usize| {
         let at = [pixel % view.width as usize, pixel / view.width as usize];
@@ -154,13 +154,13 @@ fn other_depths(splatter: &Splatter, depth: &[f32], view: &View) -> usize {
     (0..depth.len()).filter(wrong).count()
 }
 
-/// Pixels at which any layer differs.
+/// Number of pixels at which any layer differs.
 fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
     let [width, height] = [host.width as usize, host.height as usize];
     let sizes =
         |l: &GBuffer| [l.weight.len(), l.color.len(), l.scalar.len(), l.radius.len(), l.curvature.len(), l.back.len()];
     assert_eq!(sizes(device), sizes(host), "sizes of layers");
-    // f32 rounding of gradients, which the kernel's eighth power and sums that cancel make greater: some 1e-5.
+    // The tolerance covers f32 rounding of gradients, about 1e-5 after the kernel's eighth power and sums that cancel.
     let near = |a: f32, b: f32, scale: f32| {
         a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-4 * b.abs() + 1e-4 * scale
     };
@@ -183,8 +183,8 @@ fn other_layers(device: &GBuffer, host: &GBuffer) -> usize {
     (0..width * height).filter(|pixel| !same(pixel % width, pixel / width)).count()
 }
 
-/// Rounding decides what covers a pixel, what is in front or which of two splats is heavier at some pixels of ten thousand, and at
-/// more on hardware, which fuses products and sums as it likes: 8 of 1197, of 3550 9 were seen.
+/// At a few pixels rounding decides what covers a pixel, what is in front, or which of two splats is heavier. Hardware
+/// may fuse products and sums, so more pixels differ there.
 fn assert_few(gpu: &Gpu, other: usize, pixels: usize, what: &str) {
     let allowed = if gpu.is_software() { pixels / 1000 } else { 5 + pixels / 200 };
     assert!(other <= allowed, "{what}: {other} of {pixels} pixels differ");
@@ -226,7 +226,7 @@ fn the_device_draws_what_the_host_draws() {
     }
 }
 
-/// A disc of points, tilted from the eye by an angle with such a sine, whose border is blurred by noise of so many pixels.
+/// A disc of points with this sine of tilt from the eye, its border blurred by noise.
 fn blurred_disc(count: u32, away_px: f32, noise_px: f32, tilt: f32, view: &View) -> Vec<Surfel> {
     let depth = 4.0;
     let pixel = view.pixel_size(depth);
@@ -264,7 +264,7 @@ fn the_device_ends_blurred_borders_where_the_host_does() {
         (small, 6.0, 0.0, 0.0),
         (large, 20.0, 0.0, 0.9),
     ] {
-        // In perspective, what faces the eye in the middle is tilted beside it.
+        // In perspective, a disc that faces the eye in its middle is tilted towards its sides.
         for view in views(size).into_iter().filter(|view| tilt > 0.0 || !view.perspective) {
             let surfels = blurred_disc(count, away_px, noise_px, tilt, &view);
             let pixel = view.pixel_size(4.0);
@@ -279,14 +279,14 @@ fn the_device_ends_blurred_borders_where_the_host_does() {
             };
             let [with, without] = [noise, Noise::NONE].map(covered);
             let fewer = 1.0 - with as f64 / without as f64;
-            // Thin noise, and points close together: more differs than the device may.
+            // Certain thin noise among dense points: the result differs by more than the device may.
             let differs = covered(Noise { sure: 0.0, ..noise }) - covered(noise) > (size[0] * size[1] / 1000) as usize;
             assert_eq!(differs, noise_px == 0.6, "{case}: what sure noise takes off");
-            // Where a surface faces the eye its border is as sharp as it is seen.
+            // Where a surface faces the eye its border counts as sharp.
             assert!((fewer > 0.01) == (noise_px > 0.5 && tilt > 0.5), "{case}: takes off {fewer}");
         }
     }
-    // Next to nothing fits into these.
+    // Pictures in which the disc hardly fits.
     for size in SIZES {
         let view = views(size)[0];
         let surfels = blurred_disc(5 + size[0] * size[1] / 4, 20.0, 3.0, 0.3, &view);
@@ -303,7 +303,7 @@ fn many_splats_and_none() {
     let data = Data::new(300_000);
     let passes = SplatPasses::new(&gpu, ALL, &data.linear).expect("passes");
     let view = views([150, 90])[0];
-    // More than the root's first 64 children have, so that lists are filled more than once.
+    // More than the root's first 64 children hold, so that lists are filled more than once.
     for (count, discs) in [(0, Discs::Small), (64, Discs::Surface), (270_000, Discs::Small)] {
         let surfels = surfels(42, count, discs, &view);
         for active in [0, count / 3, count] {
@@ -312,7 +312,7 @@ fn many_splats_and_none() {
             assert_same(&gpu, &passes, &scene, &format!("{active} of {count}"));
         }
     }
-    // Each over the whole picture.
+    // Each splat covers the whole picture.
     for (size, count) in [([150, 90], 3000), ([20, 9], 100_000)] {
         let view = views(size)[0];
         let mut surfels = surfels(43, count, Discs::Circles, &view);
@@ -391,7 +391,7 @@ fn hidden_points_are_not_recovered() {
     screen.points = gpu.storage_with("points", &points).expect("room");
     screen.passive = gpu.storage_with("passive", &passive).expect("room");
     screen.queries = gpu.storage::<u32>("queries", 5000).expect("room");
-    // One density cell holds all.
+    // One density cell holds all points.
     let density = DensityGrid { cell_px: 200, columns: 1, count: vec![1500], ..DensityGrid::default() };
     screen.density = gpu.storage_with("density", &[density.count[0], 0]).expect("room");
     set_counter(&gpu, screen, Counter::CellPx, density.cell_px);
@@ -416,7 +416,7 @@ fn hidden_points_are_not_recovered() {
     let counters: Vec<u32> = read_back(&gpu, &screen.counters, COUNTERS).expect("counters");
     let recovered = counters[Counter::Recovered as usize] as usize;
     let queries: Vec<u32> = read_back(&gpu, &screen.queries, 500 + recovered).expect("queries");
-    // Depths are drawn by chance: none is decided by rounding.
+    // Depths are random, so rounding decides none.
     assert_eq!(queries[500..], expected, "recovered points, in order");
 }
 

@@ -1,4 +1,5 @@
-//! The same on the GPU: an invocation per surfel, which looks back, and one that keeps it.
+//! Temporal smoothing on the GPU: a pass that looks back, and one that keeps the frame, each with an invocation per
+//! surfel.
 
 use super::points::{ALIKE, Fitted};
 use super::surfaces::NEAR;
@@ -13,19 +14,19 @@ pub(crate) const PASSES: &[PassSource] = &[OVER_TIME, KEEP_FITTED];
 const OVER_TIME: PassSource = PassSource::new("splat/over_time/over_time", include_str!("over_time.wgsl"));
 const KEEP_FITTED: PassSource = PassSource::new("splat/over_time/keep_fitted", include_str!("keep_fitted.wgsl"));
 
-/// What the last frame leaves for the next one.
+/// State that the last frame leaves for the next one.
 #[derive(Debug)]
 pub(crate) struct OverTimeBuffers {
-    /// Of each half of a pixel, the place of what was fitted to its point, from 1 on; 0 if it has none.
+    /// Index plus 1 in `fitted` for the point of each half of a pixel; 0 if there is none.
     halves: wgpu::Buffer,
     /// [`Fitted`] per surfel of the last frame.
     fitted: wgpu::Buffer,
-    /// Over how many frames each surfel of this one is averaged.
+    /// Number of frames averaged in each surfel of this frame.
     frames: wgpu::Buffer,
 }
 
 impl OverTimeBuffers {
-    /// Room for `screen_capacity` surfels in a picture of `size`.
+    /// Buffers for `screen_capacity` surfels and a picture of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -49,7 +50,7 @@ pub(crate) struct OverTimePasses {
 }
 
 impl OverTimePasses {
-    /// Compiles them.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -65,7 +66,7 @@ impl OverTimePasses {
         })
     }
 
-    /// Averages the surfels of a round with what the last frame found, whose surface `layers` still hold.
+    /// Averages the surfels of a round with those of the last frame, whose surface `layers` still hold.
     pub(crate) fn step(
         &self,
         gpu: &Gpu,
@@ -81,7 +82,7 @@ impl OverTimePasses {
         self.smooth[round as usize].step(gpu, &bound, screen.groups(round.work_64()))
     }
 
-    /// Keeps the surfels of both rounds; to be run after the last one was averaged.
+    /// Keeps the surfels of both rounds. Runs after both are averaged.
     pub(crate) fn steps_keep(
         &self,
         gpu: &Gpu,

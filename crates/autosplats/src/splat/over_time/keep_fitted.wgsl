@@ -1,6 +1,6 @@
-// Keeps what was fitted to each point for the next frame, which finds it by the half of a pixel that the point lies in.
+// Keeps the fit to each point for the next frame, which finds it by the half of a pixel that the point lies in.
 //
-// Reads: counters, points, surfels, frames. Writes: fitted, halves (set to 0 before).
+// Reads: counters, points, surfels, frames. Writes: fitted, halves (cleared to 0 first).
 
 #import frame
 #import groups
@@ -28,7 +28,7 @@ fn keep_fitted(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     fitted[index] = Fitted(surfel.center - point, surfel.source, surfel.normal, frames[index]);
     let at = to_pixel(point);
     if surfel.radius > 0.0 && all(at >= vec2f(0.0)) && all(at < vec2f(frame.size)) {
-        // Rounding may put two into one half: always the same one stays.
+        // Rounding may put two points into one half. The maximum always keeps the same one.
         atomicMax(&halves[half_at(vec2u(4.0 * at))], index + 1u);
     }
 }

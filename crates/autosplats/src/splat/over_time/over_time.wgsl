@@ -1,6 +1,7 @@
-// Averages surfels with what the last frame found. The CPU form, `points.rs` and `surfaces.rs`, says how.
+// Averages surfels with the last frame. The CPU form is `points.rs` and `surfaces.rs`.
 //
-// Reads: counters, surface, halves, fitted (all three of the last frame), points. Reads and writes: surfels. Writes: frames.
+// Reads: counters, surface, halves, fitted (the last three of the last frame), points. Reads and writes: surfels.
+// Writes: frames.
 
 #import frame
 #import groups
@@ -25,7 +26,7 @@ override ROUND: u32;
 override NEAR: f32;
 override ALIKE: f32;
 
-// Moves a surfel to `center` and turns it towards `before`, a normal to the same side, by `share` of the way.
+// Moves a surfel to `center` and turns it by `share` of the way towards `before`, a normal on the same side.
 fn draw_to(place: u32, center: vec3f, before: vec3f, share: f32) {
     var surfel = surfels[place];
     let normal = turned_to_eye(normalize(surfel.normal + share * (before - surfel.normal)), center);
@@ -34,7 +35,7 @@ fn draw_to(place: u32, center: vec3f, before: vec3f, share: f32) {
     surfels[place] = moved(surfel, center);
 }
 
-// The place from 1 on, in `fitted`, of what was found for a point of the cloud that is at `point` now; 0 if nothing was.
+// Index plus 1 in `fitted` of the last frame's fit to the point of the cloud now at `point`; 0 if there is none.
 fn place_then(source: u32, point: vec3f) -> u32 {
     let position = past_position(point);
     let at = past_place(position);
@@ -48,7 +49,7 @@ fn place_then(source: u32, point: vec3f) -> u32 {
     return place;
 }
 
-// Averages a surfel; returns over how many frames it is the mean then.
+// Averages a surfel. Returns the number of frames in its mean.
 fn smoothed(place: u32) -> f32 {
     let surfel = surfels[place];
     if !has_past() || frame.frames_averaged == 1.0 || surfel.radius == 0.0 {

@@ -1,4 +1,4 @@
-//! What was fitted to each point, kept for the next frame.
+//! The fit to each point, kept for the next frame.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -11,48 +11,47 @@ use crate::fit::{Surfel, Surfels};
 use crate::project::{ScreenPoints, half_at};
 use crate::splat::GBuffer;
 
-/// Frames of the same points that are averaged. Over four normals were nearly as steady: with 0.3 % of noise the bunny's changed
-/// by 1.11° a picture, over eight by 1.07°, and by 2.21° alone.
+/// Frames of the same points that are averaged. See docs/decisions/0014-frame-to-frame.md.
 pub(crate) const STEADY_FRAMES: u32 = 8;
-/// Cosine of the angle by which a surface may have faced another way in the last frame.
+/// Least cosine of the angle between the surfel's normal and that of the same surface in the last frame.
 pub(super) const ALIKE: f32 = 0.7;
 /// Surfels, or halves of pixels, per task.
 const TASK: usize = 4096;
 
-/// What was fitted to a point, in the view space of its frame.
+/// The fit to a point, in the view space of its frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(crate) struct Fitted {
     /// From the point to the surfel's centre.
     pub(crate) offset: [f32; 3],
-    /// Index in the cloud.
+    /// Index of the point in the cloud.
     pub(crate) source: u32,
     /// Unit normal.
     pub(crate) normal: [f32; 3],
-    /// Over how many frames it is the mean.
+    /// Number of frames averaged.
     pub(crate) frames: f32,
 }
 
-/// What the last frame, made by settings `M`, leaves for the next one; keeps its buffers.
+/// State that the last frame, made with settings `M`, leaves for the next one. Keeps its buffers.
 #[derive(Debug)]
 pub(crate) struct OverTime<M> {
-    /// How the last frame was seen and made, and the identity of its points; `None` if it left nothing.
+    /// View and origin of the last frame, identity of its points, and its settings; `None` if there is no last frame.
     seen: Option<(Seen, u64, M)>,
-    /// Of each half of a pixel, the place of its point's surfel in `fitted`, from 1 on; 0 if it has none.
+    /// Index plus 1 in `fitted` for the point of each half of a pixel; 0 if there is none.
     halves: Vec<AtomicU32>,
     fitted: Vec<Fitted>,
-    /// Into the last frame.
+    /// View into the last frame; `None` if this frame does not continue it.
     past: Option<Past>,
-    /// Over how many frames each surfel of this frame is averaged.
+    /// Number of frames averaged in each surfel of this frame.
     frames: Vec<f32>,
 }
 
-/// How a frame looks back into the last one.
+/// Look back from a frame into the last one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Past {
     reprojection: Reprojection,
     same_points: bool,
-    /// Over how many frames to average.
+    /// Number of frames to average.
     frames: f32,
 }
 
@@ -63,8 +62,9 @@ impl<M> Default for OverTime<M> {
 }
 
 impl<M: PartialEq> OverTime<M> {
-    /// A frame of the cloud with this identity begins, to be averaged with so many of the same points, or of others, if they were
-    /// `made` by the same settings. What one that was given up left is forgotten.
+    /// Begins a frame of the cloud with this identity. The frame continues the last one if both were `made` with the
+    /// same settings. Then `of_same` frames are averaged for the same points, `of_others` for others. The state of a
+    /// frame that was given up is dropped.
     pub(crate) fn begin(&mut self, now: Seen, identity: u64, made: &M, [of_same, of_others]: [u32; 2]) {
         self.frames.clear();
         let last = self.seen.take().filter(|(.., before)| before == made);
@@ -76,13 +76,13 @@ impl<M: PartialEq> OverTime<M> {
         });
     }
 
-    /// Nothing is known of frames before the next.
+    /// Forgets all earlier frames.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Averages `surfels`, which follow those of the calls before in this frame, with what the last one found; `last` is the
-    /// surface that it showed.
+    /// Averages `surfels`, which follow those of earlier calls in this frame, with the last frame. `last` is the
+    /// surface that the last frame showed.
     pub(crate) fn smooth(&mut self, surfels: &mut [Surfel], screen: &ScreenPoints, last: &GBuffer, view: &View) {
         let first = self.frames.len();
         self.frames.resize(first + surfels.len(), 1.0);
@@ -97,7 +97,7 @@ impl<M: PartialEq> OverTime<M> {
         });
     }
 
-    /// Keeps what was fitted in this frame, all of whose surfels these are.
+    /// Keeps the fits of this frame; `surfels` are all of its surfels.
     pub(crate) fn end(&mut self, now: Seen, identity: u64, made: M, surfels: &Surfels, screen: &ScreenPoints) {
         let Self { halves, fitted, frames, .. } = self;
         let view = &now.view;
@@ -114,7 +114,7 @@ impl<M: PartialEq> OverTime<M> {
                 if surfel.radius > 0.0
                     && let Some(half) = half_at(view.to_pixel(point), view)
                 {
-                    // Rounding may put two into one half: always the same one stays.
+                    // Rounding may put two points into one half. The maximum always keeps the same one.
                     halves[half].fetch_max((task * TASK + index + 1) as u32, Ordering::Relaxed);
                 }
             }
@@ -123,18 +123,18 @@ impl<M: PartialEq> OverTime<M> {
     }
 }
 
-/// What is known of the last frame.
+/// The last frame, and the screen points of this one.
 struct Known<'a> {
     past: &'a Past,
     halves: &'a [AtomicU32],
     fitted: &'a [Fitted],
     last: &'a GBuffer,
-    /// Of this frame.
+    /// Screen points of this frame.
     screen: &'a ScreenPoints,
 }
 
 impl Known<'_> {
-    /// Averages a surfel; returns over how many frames it is the mean then.
+    /// Averages a surfel. Returns the number of frames in its mean.
     fn smooth(&self, surfel: &mut Surfel, view: &View) -> f32 {
         let Past { reprojection, same_points, frames: most } = self.past;
         if surfel.radius == 0.0 {
@@ -165,7 +165,7 @@ impl Known<'_> {
         1.0
     }
 
-    /// What was fitted to a surfel's point then.
+    /// The fit to a surfel's point in the last frame.
     fn then(&self, surfel: &Surfel, point: Vec3) -> Option<&Fitted> {
         let reprojection = &self.past.reprojection;
         let half = half_at(reprojection.place(point)?, &reprojection.view)?;
@@ -175,7 +175,7 @@ impl Known<'_> {
     }
 }
 
-/// The point that a surfel stands for, where it was measured, view space.
+/// The measured point of a surfel, view space.
 fn point_of(surfel: &Surfel, screen: &ScreenPoints) -> Vec3 {
     screen.points[(surfel.screen & !Surfel::BACK) as usize].position_view.into()
 }

@@ -1,9 +1,9 @@
 //! The surface that the last frame showed.
 //!
-//! A surfel looks back to where it lay in the last frame. If the surface seen there is near and faces the same way, it is taken
-//! for the same one, and the surfel moves towards it, along its normal, and turns towards it, by a share of the way: so noise
-//! is averaged over frames, with weights that fade, and nothing is kept but the last frame's picture. What moves is drawn
-//! behind by as many frames; what moves by more than [`NEAR`] k-radii a frame is left alone. Detail as fine as pixels is blurred.
+//! A surfel looks back to its place in the last frame. If the surface seen there is near and faces the same way, it
+//! counts as the same one. The surfel then moves and turns towards it by a share of the way. So noise is averaged over
+//! frames with fading weights, and only the last frame's picture is kept. Moving surfaces lag by as many frames.
+//! Surfaces that move by more than [`NEAR`] k-radii a frame are left alone. Detail as fine as pixels is blurred.
 
 use glam::Vec3;
 
@@ -12,18 +12,18 @@ use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
 use crate::splat::{GBuffer, tiled_index};
 
-/// How far away the same surface may have been in the last frame, in k-radii of the surfel.
+/// Largest distance of the same surface in the last frame, in k-radii of the surfel.
 pub(super) const NEAR: f32 = 0.5;
 
 /// A surface of the last frame, in view space.
 pub(super) struct Surface {
-    /// Unit normal, to the same side as the surfel's.
+    /// Unit normal, on the same side as the surfel's.
     normal: Vec3,
-    /// How far the surfel lies in front of it.
+    /// Distance in world units by which the surfel lies in front.
     distance: f32,
 }
 
-/// The same surface in the last frame.
+/// The surface that the last frame showed at the surfel's place, if it is the same.
 pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<Surface> {
     let pixel = past.pixel(surfel.center)?;
     let width = past.view.width as usize;
@@ -41,13 +41,13 @@ pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) 
     is_same.then(|| Surface { normal: normal * facing.signum(), distance: distance * facing.signum() })
 }
 
-/// Draws a surfel towards a surface by `share` of the way, 0 to below 1.
+/// Moves and turns a surfel towards a surface by `share` of the way, 0 to below 1.
 pub(super) fn draw_towards(surfel: &mut Surfel, surface: &Surface, share: f32, view: &View) {
     let center = Vec3::from(surfel.center) - share * surface.distance * surface.normal;
     draw_to(surfel, center, surface.normal, share, view);
 }
 
-/// Moves a surfel to `center` and turns it towards `then`, a normal to the same side, by `share` of the way.
+/// Moves a surfel to `center` and turns it by `share` of the way towards `then`, a normal on the same side.
 pub(super) fn draw_to(surfel: &mut Surfel, center: Vec3, then: Vec3, share: f32, view: &View) {
     let now = Vec3::from(surfel.normal);
     let normal = view.turned_to_eye((now + share * (then - now)).normalize(), center);

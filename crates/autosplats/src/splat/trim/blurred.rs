@@ -1,23 +1,26 @@
-//! Borders that noise has blurred: surfaces end by the density of points there.
+//! Borders that noise has blurred: the density of points decides where the surface ends.
 //!
 //! # How it works
-//! Noise strews points past the end of a surface, and what splats draw there, though most are moved back, is a fringe as wide as
-//! the noise. Around a place in it points are the fewer the further out they are, and their mean in a window lies on the side of
-//! the surface. How far does not depend on how dense points are: with a window of deviation w and noise of deviation σ, it is
-//! 0.80 w²/√(w² + σ²) at the straight end of points strewn evenly, and 0.48 w²/√(w² + σ²) where a surface curves away, so that
-//! points lie ever closer up to its end. Their spread tells more: where density grows from the end inwards with power a - 1, the
-//! mean square of what their places would be without noise is a (w² + σ²), which makes 1 and 0.5. So what counts is the mean less a
-//! quarter of the mean square, 0.55 and 0.35 at the two ends: outlines come out smoother by it than by the mean alone. Silhouettes
-//! are nearly always of the second kind; straight ends are cut off by half of the noise too much.
+//! Noise scatters points past the end of a surface. Most of their splats are moved back; the others draw a fringe as
+//! wide as the noise. In the fringe points get fewer outwards, so their mean in a window lies towards the surface. Its
+//! offset does not depend on the density. Let w be the deviation of the window and σ that of the noise. The offset is
+//! 0.80 w²/√(w² + σ²) at the straight end of evenly scattered points. It is 0.48 w²/√(w² + σ²) where a surface curves
+//! away, so that points get ever closer up to its end.
 //!
-//! What is off by more, away from where it is empty, and has something empty ahead there, is beside the surface. Only how far it is
-//! off that way counts: another surface behind the border draws the mean along it. And half way to what is empty the mean has to be
-//! off as well: if not, a surface goes on there, and here it is where another stands behind it that points are dense on one side.
-//! All points tell, hidden ones too: those kept are the nearest of each half of a pixel, fewer than there are where they are dense,
-//! and all there are in the fringe.
+//! The spread of the points tells the two kinds apart. Let density grow from the end inwards with power a - 1; a is 1
+//! and 0.5 for the two kinds. Then the mean square of the places without noise is a (w² + σ²). The measure is the mean
+//! less a quarter of the mean square, in these units: 0.55 and 0.35. Outlines come out smoother than by the mean alone.
+//! Nearly all silhouettes curve away; straight ends are cut by about half of the noise too much.
 //!
-//! Scanners err along their rays, and what is left over of fits is across surfaces. So the border of a surface that faces the eye,
-//! where scans end, is taken for as sharp as it is seen, and all of the noise counts only where a surface is seen from the side.
+//! A pixel is beside the surface if this measure exceeds its limit away from the empty side, and an empty pixel lies
+//! ahead. Only the offset in that direction counts, because another surface behind the border draws the mean along it.
+//! Half way to the empty pixel the mean must be off as well. Otherwise a surface goes on there, and the points here are
+//! denser on one side because another surface stands behind. All points count, hidden ones too. The points kept are the
+//! nearest of each half of a pixel: too few where points are dense, but all of them in the fringe.
+//!
+//! Scanners err along their rays, while the noise left after fitting is across surfaces. So a border of a surface that
+//! faces the eye, where scans end, counts as sharp. The whole noise counts only where a surface is seen from the side.
+//! See docs/decisions/0003-borders-of-noise.md.
 
 use std::f32::consts::PI;
 
@@ -32,82 +35,85 @@ use crate::fit::SUPPORT;
 use crate::project::Sixteenths;
 use crate::splat::{TILE, tiled_index};
 
-/// Least noise, in pixels, that blurs a border: with less, detail of far views that was taken for noise would be cut.
+/// Least noise in pixels that blurs a border. With less noise, detail of far views that passes for noise would be cut.
 pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
-/// Squared radius of a window over the variance of its kernel, along one axis.
+/// Squared window radius per variance of its kernel, along one axis.
 pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
-/// All of the noise counts where the sine of a surface's tilt from the eye is at least this: in a fringe normals lean towards the
-/// eye.
+/// Sine of a surface's tilt from the eye from which the whole noise counts. Below 1, because normals in a fringe lean
+/// towards the eye.
 pub(in crate::splat) const TILTED: f32 = 0.8;
-/// Of the noise, what blurs a border. With all of it borders come out too narrow by a few tenths of a pixel, and slits open.
+/// Share of the noise that blurs a border. With the whole noise borders are too narrow by a few tenths of a pixel, and
+/// slits open.
 pub(in crate::splat) const BLURS: f32 = 0.87;
-/// Squared radius of a window over the variance of the noise, but for what it is without noise.
+/// Growth of the squared window radius per variance of the noise, both in square pixels.
 pub(in crate::splat) const PER_NOISE: f32 = 12.0;
-/// Radius of the window without noise, in pixels: smaller ones hold so few points that borders come out ragged.
+/// Radius in pixels of the window without noise. Smaller windows hold so few points that borders come out ragged.
 pub(in crate::splat) const LEAST_RADIUS_PX: f32 = 4.0;
-/// And of the widest one.
+/// Largest radius of a window, in pixels.
 pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
-/// Windows with a larger radius than this, in pixels, are summed up in pairs of pixels along both axes, and those larger than twice
-/// this in blocks.
+/// Largest radius in pixels of windows that are summed pixel by pixel. Windows up to twice this are summed in pairs of
+/// pixels along both axes, wider ones in blocks.
 pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
-/// How much of the mean square counts against the mean. More would make less of how a surface ends, and more of single points where
-/// these are few.
+/// Weight of the mean square against the mean. A larger weight depends less on how a surface ends, and more on single
+/// points where these are few.
 pub(in crate::splat) const SPREAD: f32 = 0.25;
-/// Of what that makes, how much there may be: with hardly any noise, which may as well be small structure, as much as at sharp
-/// borders, where the mean may be off by [`OFF_PX`](super::OFF_PX), and with noise of [`SURE_NOISE_PX`] and more, or
-/// [`SURE_DISTANCES`].
+/// Largest measure on a surface, in w²/√(w² + σ²): for little noise, and for certain noise. Little noise may be small
+/// structure, so its limit is about that of sharp borders, [`OFF_PX`](super::OFF_PX). The second limit holds from
+/// [`SURE_NOISE_PX`] or [`SURE_DISTANCES`] on; limits between are interpolated.
 pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.5, 0.335];
-/// In pixels.
+/// Noise in pixels from which the limit is that of certain noise.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
-/// If it is sure to be noise, less is enough: as much as this many mean distances of the sixteenths with points in the window, what
-/// is empty of it included. At a border those are √2 times as far apart as on the surface.
+/// Noise from which the limit is that of certain noise, if the frame's noise is certain and this is less than
+/// [`SURE_NOISE_PX`]. The unit is the mean distance of marked sixteenths in the window, its empty part included. At a
+/// border that distance is √2 times as large as on the surface.
 pub(in crate::splat) const SURE_DISTANCES: f32 = 1.25;
-/// From how many sixteenths with points on they tell.
+/// Fewest marked sixteenths in a window whose moments decide.
 pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
-/// A fringe is no wider than the reach of its splats and this many times the noise,
+/// Width of a fringe in multiples of the noise, beside the reach of its splats.
 pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
-/// nor than so many blocks.
+/// Largest width of a fringe, in blocks.
 pub(crate) const FRINGE_BLOCKS: usize = 16;
-/// How far it is off at least half way to what is empty, as a part of that.
+/// Share of the limit that the mean has to exceed half way to the empty pixel.
 pub(in crate::splat) const OFF_HALF_WAY: f32 = 0.7;
-/// Blocks that are empty, up to so many beyond the fringe, tell where it is empty.
+/// Distance beyond the fringe, in blocks, up to which empty blocks define the direction to the empty side.
 pub(in crate::splat) const BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
 pub(crate) const BLOCK_PX: usize = 4;
 
 const _: () = assert!(BLOCK_PX == 4, "pairs of pairs of pixels are blocks");
-/// Along an axis.
+/// Blocks along the side of a tile.
 const BLOCKS_PER_TILE: usize = TILE / BLOCK_PX;
 
-/// Squares that are summed up at a time; their sums are added up in this many parts on any machine.
+/// Squares that are summed at a time. Sums are added in this many lanes on any machine, so results do not depend on the
+/// machine.
 const LANES: usize = 8;
 
-/// How many sixteenths hold points in each square of a picture, row by row.
+/// Number of sixteenths that hold points (marked ones) in each square of a picture, row by row.
 #[derive(Debug)]
 struct Held {
     /// Side of a square in pixels.
     side: usize,
     columns: usize,
     rows: usize,
-    /// And nothing after the last, so that the last lanes may be read.
+    /// Followed by [`LANES`] zeros, so that the last lanes may be read.
     count: Vec<u16>,
 }
 
-/// The noise of a frame's points, and what is known of its picture.
+/// Noise of a frame, and density and emptiness of its picture.
 #[derive(Debug)]
 pub(in crate::splat) struct Blurred {
     noise: Noise,
-    /// K-radii in splat radii.
+    /// K-radius per splat radius.
     per_radius: f32,
-    /// Of pixels, of pairs of them along both axes, and of blocks.
+    /// Counts in single pixels, in pairs along both axes, and in blocks.
     held: [Held; 3],
-    /// Of each block, how many blocks away the nearest is that is empty, along either axis: without splats and, beside the
-    /// picture, without points.
+    /// Distance of each block to the nearest empty one, in blocks, the larger along either axis. An empty block has no
+    /// splats and, in the margin of the picture, no points either.
     to_empty: Vec<u8>,
 }
 
 impl Blurred {
-    /// Of a picture of points whose k-radii are `per_radius` splat radii; `None` if there is no noise.
+    /// State for a picture whose k-radii are `per_radius` splat radii; `None` without noise.
     pub(in crate::splat) fn new(
         noise: Noise,
         per_radius: f32,
@@ -123,13 +129,13 @@ impl Blurred {
         let pairs = pixels.in_pairs();
         let blocks = pairs.in_pairs();
         let [columns, rows] = [blocks.columns, blocks.rows];
-        // Most of the margin has no splats, and may hold a surface.
+        // Most of the margin has no splats, although it may hold a surface.
         let goes_on = |[x, y]: [usize; 2]| {
             let [first, last] = [0, BLOCK_PX - 1].map(|more| [x, y].map(|at| at * BLOCK_PX + more));
             let is_beside = view.beside_picture(first) > 0 && view.beside_picture(last) > 0;
             is_beside && blocks.count[y * columns + x] > 0
         };
-        // Along a row of blocks, tile by tile.
+        // Distances along a row of blocks, tile by tile.
         let along_row = |y: usize, to_empty: &mut [u8]| {
             let pixel_rows = y * BLOCK_PX..((y + 1) * BLOCK_PX).min(height);
             for (tile, to_empty) in to_empty.chunks_mut(BLOCKS_PER_TILE).enumerate() {
@@ -149,7 +155,7 @@ impl Blurred {
         };
         let mut to_empty = vec![0; columns * rows];
         to_empty.par_chunks_mut(columns).enumerate().for_each(|(y, row)| along_row(y, row));
-        // Then from row to row, across corners as well: down, and back.
+        // Distances from row to row, across corners too: down, then up.
         let step = |from: &[u8], row: &mut [u8]| {
             let nearer = |(to_empty, from): (&mut u8, &u8)| *to_empty = (*to_empty).min(from + 1);
             row.iter_mut().zip(from).for_each(nearer);
@@ -171,19 +177,19 @@ impl Blurred {
         &self.held[2]
     }
 
-    /// The squares that a window of such a radius is summed up in.
+    /// The squares that a window of this radius is summed in.
     fn squares(&self, window: f32) -> &Held {
         let wider = [1.0, 2.0].map(|times| usize::from(window > times * FINE_RADIUS_PX));
         &self.held[wider[0] + wider[1]]
     }
 
-    /// How many blocks the nearest empty one is from a block, at most two more than a fringe has.
+    /// Distance of a block to the nearest empty one, in blocks; at most two more than a fringe has.
     pub(super) fn blocks_to_empty(&self, column: usize, row: usize) -> u8 {
         self.to_empty[row * self.blocks().columns + column]
     }
 
-    /// The direction, as a unit vector, from the middle of pixel (x, y) to the blocks that are empty within so many pixels, the
-    /// nearest of which count most; `None` if there are none, or as many on all sides.
+    /// Unit vector from the middle of pixel (x, y) to the empty blocks within `radius` pixels, weighted by nearness.
+    /// `None` if there are none, or if they balance.
     pub(super) fn towards_empty(&self, [x, y]: [usize; 2], radius: f32) -> Option<[f32; 2]> {
         let reach = radius as usize;
         let along =
@@ -209,18 +215,18 @@ impl Blurred {
 }
 
 impl Outline<'_> {
-    /// Whether pixel (x, y), which a splat with this `reach_px` covers, is beside a surface whose border noise has blurred.
-    /// `None` if there is too little noise or too few points, or nothing empty within a fringe.
+    /// Whether pixel (x, y), covered by a splat of this reach, is beside a surface whose border noise has blurred.
+    /// `None` if there is too little noise, too few points, or nothing empty within a fringe.
     pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], shown: Shown, reach_px: f32) -> Option<bool> {
         let blurred = self.blurred?;
         let Blurred { noise, per_radius, .. } = blurred;
         let Shown { depth, normal } = shown;
         let pixel = self.view.pixel_size(depth);
-        // One more, as blocks that a border crosses are not empty.
+        // One more block, because blocks that a border crosses are not empty.
         let blocks = |fringe: f32| (fringe / BLOCK_PX as f32).ceil() as u8 + 1;
         let fringe_of = |noise_px: f32| (reach_px + FRINGE_NOISES * noise_px).min((BLOCK_PX * FRINGE_BLOCKS) as f32);
         let to_empty = blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX);
-        // Most pixels are further inside than any noise is wide.
+        // Early exit: most pixels lie further inside than any noise is wide.
         let most_noise_px = noise.level / pixel;
         if !(most_noise_px >= LEAST_NOISE_PX) || to_empty > blocks(fringe_of(most_noise_px)) {
             return None;
@@ -238,11 +244,11 @@ impl Outline<'_> {
             return None;
         }
         let [width, height] = self.size();
-        // Of points beyond the screen nothing is known.
+        // Points beyond the screen are unknown.
         let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
         let widest = WIDEST_RADIUS_PX.min(to_edge);
         let window = (LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_NOISE * noise_px * noise_px).sqrt().min(widest);
-        // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
+        // A window narrower than splats would show the distances between points, or scan lines.
         if window < AROUND_PX.max(radius_px) {
             return None;
         }
@@ -253,7 +259,7 @@ impl Outline<'_> {
         let sure_px = SURE_NOISE_PX + noise.sure * ((SURE_DISTANCES * apart).min(SURE_NOISE_PX) - SURE_NOISE_PX);
         let [unsure, sure] = OFF_BLURRED;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px).max(0.0);
-        // What is off by less altogether is so that way as well.
+        // An offset that is small in total is small in any direction.
         if blur.most_off(here) <= may_be {
             return Some(false);
         }
@@ -292,7 +298,7 @@ impl Held {
         Self { side, columns, rows, count: counts }
     }
 
-    /// In squares twice as wide.
+    /// The same counts in squares twice as wide.
     fn in_pairs(&self) -> Self {
         let size = [2 * self.side, self.columns.div_ceil(2), self.rows.div_ceil(2)];
         Self::new(size, |x, y| {
@@ -302,7 +308,7 @@ impl Held {
     }
 }
 
-/// What blurs a border, as variances in square pixels: the window, and the noise.
+/// Variances, in square pixels, of the window and of the noise.
 #[derive(Clone, Copy, Debug)]
 struct Blur {
     window: f32,
@@ -310,44 +316,45 @@ struct Blur {
 }
 
 impl Blur {
-    /// How far a mean is off in w²/√(w² + σ²), in pixels.
+    /// Unit of the measure, w²/√(w² + σ²), in pixels.
     fn unit(self) -> f32 {
         self.window / (self.window + self.noise).sqrt()
     }
 
-    /// How far the mean of points is off, if all of it is away from what is empty, and what is spread does not count.
+    /// Upper bound of [`off`](Self::off): the whole mean offset counts as away from the empty side, and the spread does
+    /// not count.
     fn most_off(self, Moments { offset: [x, y], .. }: Moments) -> f32 {
         (x * x + y * y).sqrt() / self.unit()
     }
 
-    /// How far it is off away from `towards`, a unit vector, less a part of the mean square along it, of which no more counts than
-    /// a straight end has: further out it grows faster than the mean.
+    /// Measure of a window: the mean offset away from `towards`, a unit vector, less a share of the mean square along
+    /// it. The mean square is capped at that of a straight end, because further out it grows faster than the mean.
     fn off(self, Moments { offset, squares: [xx, xy, yy], .. }: Moments, [x, y]: [f32; 2]) -> f32 {
         let mean = -(offset[0] * x + offset[1] * y) / self.unit();
         let square = xx * x * x + 2.0 * xy * x * y + yy * y * y;
-        // Noise strews points by so much about where the window sees them.
+        // Variance that noise adds to the places of points in the window.
         let of_noise = self.window * self.noise / (self.window + self.noise);
         mean - SPREAD * ((square - of_noise) / (self.unit() * self.unit())).clamp(0.0, 1.0)
     }
 }
 
-/// Of the sixteenths with points around a pixel.
+/// Moments of the marked sixteenths around a pixel.
 #[derive(Clone, Copy, Debug)]
 struct Moments {
     /// Mean offset from the pixel's middle, in pixels.
     offset: [f32; 2],
-    /// Means of squares, in square pixels: of x, of x and y, of y.
+    /// Mean squares in square pixels: xx, xy, yy.
     squares: [f32; 3],
     count: f32,
 }
 
-/// The moments of the sixteenths with points in a window of such a radius around the middle of pixel (x, y), which lies within the
-/// screen; `None` if there are too few.
+/// The moments in a window of this radius around the middle of pixel (x, y), which lies within the screen. `None` if
+/// there are too few marked sixteenths.
 #[pulp::with_simd(moments = pulp::Arch::new())]
 #[inline(always)]
 fn moments_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<Moments> {
     let reach = window as usize;
-    // The first square's middle from the pixel's, in pixels, and the squares.
+    // Offset in pixels of the first square's middle from the pixel's, then the range of squares.
     let along = |at: usize, most: usize| {
         let first = (at - reach) / squares.side;
         let middle = (squares.side * first) as f32 - at as f32 + 0.5 * (squares.side as f32 - 1.0);
@@ -365,7 +372,8 @@ fn moments_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) 
             let counts: &[u16; LANES] =
                 squares.count[row * squares.columns + column..].first_chunk().expect("some after the last");
             for lane in 0..LANES {
-                // Beyond the window, and beyond the row, nothing counts: what is left of 1 there is none, else 2⁻²⁴ at least.
+                // Nothing counts beyond the window or the row. There 1 - r² is clamped to 0; inside it is at least
+                // 2⁻²⁴.
                 let ox = first + lanes[lane];
                 let near = (1.0 - (ox * ox + oy * oy) * per_window).max(0.0);
                 let held = f32::from(counts[lane]);
@@ -395,8 +403,8 @@ mod tests {
     use super::*;
     use crate::test_clouds::Random;
 
-    /// How far off the points of a surface are at its slanted end in the middle of a picture, where their density grows with this
-    /// power of the distance from it, if noise of so many pixels moves them: with the spread, and without.
+    /// The measure with the spread, and without, at the slanted end of a surface in the middle of a picture. Density
+    /// grows with this power of the distance from the end; noise is in pixels.
     fn off_at_end(power: f32, noise_px: f32) -> [f32; 2] {
         let [width, height] = [256, 256];
         let ([x, y], window) = ([128, 128], (16.0 + PER_NOISE * noise_px * noise_px).sqrt());
@@ -429,7 +437,7 @@ mod tests {
             for ([off, most], [expected_off, expected_most]) in [(straight, [0.55, 0.80]), (curved, [0.353, 0.478])] {
                 let what =
                     format!("noise of {noise_px} pixels: {off} and {most}, not {expected_off} and {expected_most}");
-                // The kernel ends, and pixels are wide.
+                // The tolerance covers the finite kernel and the width of pixels.
                 assert!((off - expected_off).abs() < 0.05 && (most - expected_most).abs() < 0.05, "{what}");
             }
         }

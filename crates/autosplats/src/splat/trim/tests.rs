@@ -1,4 +1,4 @@
-//! Trimming drawings, and borders of points strewn below lines.
+//! Tests of trimming on drawings, and on borders of points scattered below lines.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::camera::{Camera, Projection};
 use crate::test_clouds::Random;
 use autosplats_cloud::glam::DVec3;
 
-/// At the very edge of a surface that curves away.
+/// The very edge of a surface that curves away.
 const SHOWN: Shown = Shown { depth: 1.0, normal: [1.0, 0.0, 0.0] };
 
 fn view(size: [u32; 2]) -> View {
@@ -19,8 +19,8 @@ fn view(size: [u32; 2]) -> View {
     camera.view(DVec3::ZERO, size).expect("a view")
 }
 
-/// The pixels of a drawing (`#` core, `+` tail that reaches 4 pixels, `*` one that reaches 12, blank empty) that trimming
-/// takes off, as `x`.
+/// A drawing with the pixels that trimming removes as `x`. In the drawing `#` is core, `+` a tail that reaches 4
+/// pixels, `*` one that reaches 12, and blank is empty.
 fn trimmed(drawing: &[&str]) -> Vec<String> {
     let size = [drawing[0].len() as u32, drawing.len() as u32];
     let view = view(size);
@@ -78,7 +78,7 @@ fn a_rim_is_taken_off_and_a_gap_stays() {
 
 #[test]
 fn neighbours_that_take_strides_agree() {
-    // Every other pixel of this row would meet the core at the left end, were lines to begin wherever they do.
+    // Every other pixel of this row would meet the core at the left end if each line began one stride from its pixel.
     let empty = "                    ";
     let mut drawing = vec![empty; 40];
     drawing[20] = "  *# ***********##  ";
@@ -87,8 +87,8 @@ fn neighbours_that_take_strides_agree() {
     assert!(row.bytes().all(|pixel| pixel == row.as_bytes()[0]), "all or none: {row}");
 }
 
-/// What is known of points, given in pixels, of which those drawn have discs of 1.6 pixels, with cores as coarse; and which
-/// pixels stay, by column and row.
+/// Whether a pixel (column, row) stays, for points and drawn splats in pixels. Splats have discs of 1.6 pixels and
+/// cores of 1 pixel.
 fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(usize, usize) -> bool {
     let mut centers = vec![0; TILE_AREA];
     for &[x, y] in drawn {
@@ -117,7 +117,7 @@ fn stays(size: [usize; 2], points: &[[f32; 2]], drawn: &[[f32; 2]]) -> impl Fn(u
 
 #[test]
 fn dense_points_end_where_they_end() {
-    // Evenly strewn points below a slanted line, so many a pixel. Two of each pixel are drawn.
+    // Points scattered evenly below a slanted line, `density` per pixel. Two of each pixel are drawn.
     let size = [TILE, 40];
     let below = |x: f32, y: f32| y - (12.0 + 0.27 * x);
     for (density, most) in [(1.5, 24), (4.0, 18), (40.0, 5)] {
@@ -145,7 +145,7 @@ fn dense_points_end_where_they_end() {
         };
         let (all, some) = (wrong(&points), wrong(&drawn));
         assert!(all <= most, "{density} points a pixel: {all} wrong over {} columns", size[0]);
-        // Where there are many, the outermost are seldom drawn.
+        // Where points are dense, the outermost ones are seldom drawn.
         assert!(
             density < 10.0 || some > 2 * all,
             "{density} points a pixel: {some} wrong by those drawn, {all} by all"
@@ -153,8 +153,8 @@ fn dense_points_end_where_they_end() {
     }
 }
 
-/// Of the pixels within two of a slanted line, below which points lie at depths that `depth` makes of numbers from 0 to 1, in
-/// pixels: the share where points tell whether it is beside the surface, and of those the share that are right.
+/// Results for pixels within two pixels of a slanted line with points below it. `depth` turns a number from 0 to 1 into
+/// a point's depth in pixels. Returns the share of pixels that points decide, and the share of those that are right.
 fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
     let size = [TILE, TILE];
     let line = |x: f32| 12.0 + 0.27 * x;
@@ -185,7 +185,7 @@ fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
 
 #[test]
 fn wide_splats_end_by_points_where_these_lie_close() {
-    // A surface that curves away: of the points of 30 pixels nearly a fifth lie in the last one before it ends.
+    // A surface that curves away: of the points of 30 pixels nearly a fifth lie in the last pixel before the end.
     let [share, right] = told(true, 20, |part| 30.0 * part * part);
     assert!(share > 0.9 && right > 0.85, "of a curved surface {share} told, {right} of them right");
     // The border of a gap among points three pixels apart.
@@ -194,9 +194,9 @@ fn wide_splats_end_by_points_where_these_lie_close() {
     assert!(narrow > 0.1 && wide < 0.02, "of a gap's border {wide} told, {narrow} if splats were narrow");
 }
 
-/// Whether pixels of a picture stay in which points lie below a line, so many in each pixel, strewn evenly, moved by noise of so many
-/// pixels, and drawn with discs of two pixels; by how many pixels they do so above the line, in the columns of the middle. It is known
-/// how sure noise is, or there is said to be none.
+/// Height in pixels up to which pixels above a line stay, in the middle columns. Points are scattered evenly below the
+/// line, `per_pixel` in each pixel. Noise moves them, and they are drawn with discs of two pixels. `sure` is the
+/// certainty of the noise; with `None` the frame has no noise.
 fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32> {
     let size = [TILE, TILE];
     let line = |x: f32| 28.0 + 0.1 * x;
@@ -238,16 +238,16 @@ fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32
 
 #[test]
 fn what_noise_has_blurred_ends_about_where_the_surface_does() {
-    // In pixels, in pairs of them, and in blocks.
+    // Noise levels whose windows are summed in pixels, in pairs of pixels, and in blocks.
     for noise_px in [1.5, 3.0, 5.0] {
         let [with, without] = [Some(0.0), None].map(|sure| above_the_line(3, noise_px, sure));
-        // In some columns there is a point far out, alone, which nothing tells of.
+        // Some columns have an isolated point far out, about which too few points decide.
         let median = |above: &[f32]| {
             let mut above = above.to_vec();
             above.sort_by(f32::total_cmp);
             above[above.len() / 2]
         };
-        // Half of the noise too far in, as ends are straight.
+        // Too far in by half of the noise, as ends are straight.
         assert!((-0.9..0.0).contains(&(median(&with) / noise_px)), "noise of {noise_px} pixels: {with:?}");
         assert!(median(&without) > 1.5 * noise_px, "noise of {noise_px} pixels that is not known: {without:?}");
     }
@@ -260,7 +260,7 @@ fn thin_noise_blurs_if_it_is_sure_and_points_are_close() {
         above.iter().sum::<f32>() / above.len() as f32
     };
     for noise_px in [0.4, 0.5, 0.6] {
-        // A column of sixteen at least, which end by whole pixels.
+        // At least one of sixteen columns differs, as ends are whole pixels.
         let [unsure, sure] = [0.0, 1.0].map(|sure| mean(12, noise_px, sure));
         assert!(sure < unsure, "{noise_px}: {unsure} pixels, sure {sure}");
         assert_eq!(mean(2, noise_px, 1.0), mean(2, noise_px, 0.0), "where 1.25 distances are more than is sure anyway");
@@ -269,7 +269,7 @@ fn thin_noise_blurs_if_it_is_sure_and_points_are_close() {
 
 #[test]
 fn a_surface_before_a_denser_one_is_no_fringe() {
-    // Dense on the left, where another stands behind it, and empty on the right.
+    // Dense on the left, where another surface stands behind; empty on the right.
     let size = [TILE, TILE];
     let mut random = Random::new(57);
     let mut strewn = |count: usize, left: f32, right: f32| {
@@ -338,14 +338,14 @@ fn what_is_empty_lies_where_it_does() {
     };
     assert!(is_near(found(|_, y| y < 20, [32, 28]), [0.0, -1.0]), "up to a straight border");
     assert!(is_near(found(|x, y| x > 40 && y > 40, [35, 35]), [0.5f32.sqrt(); 2]), "into a corner");
-    // The nearest count most: left is nearer than right.
+    // The nearest empty side counts most: left is nearer than right.
     assert!(is_near(found(|x, _| !(27..46).contains(&x), [32, 32]), [-1.0, 0.0]), "of two");
     assert!(found(|x, _| x > 52, [32, 32]).is_none() && found(|_, _| false, [0, 63]).is_none(), "too far away");
 }
 
 #[test]
 fn what_is_thin_stays() {
-    // A wire a fifth of a pixel thick, which passes by the middles of most pixels; and a point alone.
+    // A wire a fifth of a pixel thick, which misses the middles of most pixels, and an isolated point.
     let size = [TILE, 40];
     let mut random = Random::new(53);
     let wire = |_| {
@@ -369,13 +369,13 @@ fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_
     let mut random = Random::new(52);
     let mut all = [0; 3];
     for empty_percent in [60, 5] {
-        // What lies in tiles beyond the picture is of no account.
+        // Pixels of tiles beyond the picture do not matter.
         let rim = |_| if random.below(100) < empty_percent { EMPTY } else { 1.0 };
         let rims: Vec<_> = (0..4 * TILE_AREA).map(rim).collect();
         let outline =
             Outline { rims: &rims, centers: &[], sixteenths: &Sixteenths::default(), view: &view, blurred: None };
         let is_empty = |x: usize, y: usize| x < width && y < height && rims[tiled_index(width, x, y)] == EMPTY;
-        // The upper left pixel of the square.
+        // (x, y) is the upper left pixel of the square.
         let is_square = |x: usize, y: usize| (0..9).all(|at| is_empty(x + at % 3, y + at / 3));
         for tile in [[0, 0], [TILE, 0], [0, TILE], [TILE, TILE]] {
             let edges = outline.edges(tile);
@@ -384,7 +384,8 @@ fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_
                 if column >= width || row >= height {
                     continue;
                 }
-                // Whether it holds for a pixel of a square around this one, but for its corners, moved up and left by so much.
+                // Whether `holds` is true for a pixel of a square without its corners, which begins `back` pixels up
+                // and left of this one.
                 let around = |side: usize, back: usize, holds: &dyn Fn(usize, usize) -> bool| {
                     let places = (0..side * side).map(|at| [at % side, at / side]);
                     let mut places = places.filter(|at| !at.iter().all(|along| along % (side - 1) == 0));
@@ -408,7 +409,7 @@ fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_
 
 #[test]
 fn slits_between_dense_points_open_beside_single_empty_pixels() {
-    // Between two surfaces of many points, a slit that splats have closed but for a pixel of each column.
+    // A slit between two surfaces of dense points; splats have closed it but for a pixel of each column.
     let size = [TILE, 40];
     let mut random = Random::new(58);
     let strewn = (0..20 * size[0] * size[1]).map(|_| size.map(|side| random.unit() * side as f32));
@@ -424,13 +425,13 @@ fn slits_between_dense_points_open_beside_single_empty_pixels() {
         Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred: None };
     let edges = outline.edges([0, 0]);
     let pixels = (3..size[0] - 3).flat_map(|x| (3..size[1] - 3).map(move |y| [x, y]));
-    // Those that stick out as they should, and all, on either side of the slit's border.
+    // Right pixels and all pixels, inside the surfaces and inside the slit.
     let mut counts = [[0, 0], [0, 0]];
     for [x, y] in pixels {
         let inside = depth(x as f32 + 0.5, y as f32 + 0.5);
         let near = edges.near([x, y]);
         assert_ne!(near, Near::Border, "no square of the slit is empty: {x}, {y}");
-        // Further from both sides lie too few points to tell.
+        // Further from the slit's border too few points decide.
         if near == Near::Gap && (0.2..0.5).contains(&inside.abs()) {
             let is_beside = inside < 0.0;
             let [right, all] = &mut counts[usize::from(is_beside)];
@@ -440,7 +441,7 @@ fn slits_between_dense_points_open_beside_single_empty_pixels() {
     }
     let [[right_in, all_in], [right_out, all_out]] = counts;
     assert!(right_in == all_in && all_in > 20, "of surfaces {right_in} of {all_in} stay");
-    // Of a slanted border, the empty pixel is not always the one ahead.
+    // On a slanted border the empty pixel is not always straight ahead.
     assert!(4 * right_out > 3 * all_out && all_out > 20, "of the slit {right_out} of {all_out} go");
 }
 
