@@ -1,12 +1,12 @@
-//! Pictures averaged down.
+//! Averaging pictures down.
 
 use rayon::prelude::*;
 
 use super::{Image, linear_steps, srgb};
 
 impl Image {
-    /// A picture whose pixels are means of `factor`² of this one's each, in linear light; what is not covered has no say in the
-    /// colour. Without [`linear`](Self::linear). Sides that are no multiples of `factor` lose what is left over.
+    /// A smaller picture, each pixel the mean of `factor`² pixels in linear light. Uncovered pixels have no weight in
+    /// the colour. [`linear`](Self::linear) is empty. Pixels beyond a multiple of `factor` are dropped.
     ///
     /// # Panics
     /// If `factor` is 0.
@@ -42,7 +42,7 @@ mod tests {
         let image = Image { width: 4, height: 2, pixels, linear: Vec::new() };
         let small = image.averaged(2);
         assert_eq!([small.width, small.height], [2, 1], "size");
-        // Half the light is 188 of 255 in sRGB; nothing takes part in the alpha alone.
+        // Half the light is 188 of 255 in sRGB. Uncovered pixels count for alpha alone.
         assert_eq!(small.pixels, [[188, 188, 188, 255], [90, 90, 90, 64]], "means");
         assert_eq!(image.averaged(1).pixels, image.pixels, "nothing to average");
     }

@@ -3,7 +3,7 @@
 use autosplats_cloud::FieldValues;
 use rayon::prelude::*;
 
-/// sRGB colours of the ASPRS standard classes 0 to 18 (LAS 1.4, table 17), by what they usually look like on maps.
+/// sRGB colours of the ASPRS standard classes 0 to 18 (LAS 1.4, table 17), after their usual look on maps.
 const ASPRS: [[u8; 3]; 19] = [
     [170, 170, 170], // never classified
     [200, 200, 200], // unclassified
@@ -26,7 +26,8 @@ const ASPRS: [[u8; 3]; 19] = [
     [255, 40, 90],   // high noise
 ];
 
-/// A colour for each point by its class; classes beyond the standard ones get hues far apart from their neighbours'.
+/// A colour for each point by its class. Classes beyond the standard ones get hues far from those of neighbouring
+/// classes.
 pub(crate) fn class_colors(classes: &FieldValues) -> Vec<[u8; 3]> {
     (0..classes.len()).into_par_iter().map(|index| class_color(classes.get(index))).collect()
 }

@@ -1,10 +1,10 @@
-//! Colour maps: a value in its range to a colour.
+//! Colour maps: from a value in a range to a colour.
 
 use super::{ColorMap, linear};
 
-/// Steps of a table: finer than 8 bits a channel can show.
+/// Steps of a colour table: finer than 8 bits a channel can show.
 pub(super) const STEPS: usize = 1024;
-/// Ends and middle of [`ColorMap::Reds`], sRGB.
+/// Four evenly spaced colours of [`ColorMap::Reds`], sRGB, 0 to 255.
 const REDS: [[f32; 3]; 4] = [[205.0, 208.0, 212.0], [240.0, 190.0, 130.0], [225.0, 80.0, 50.0], [140.0, 0.0, 20.0]];
 
 /// A colour map over a range of values, tabulated in linear colours.
@@ -23,8 +23,8 @@ impl Scale {
         self.range
     }
 
-    /// The linear colour of `value`: values beyond the ends get the colours of the ends, values that are unknown (NaN)
-    /// the lower one; a range of no width is all middle.
+    /// The linear colour of `value`. Values beyond the ends get the colours of the ends, and unknown values (NaN) that
+    /// of the lower end. In a range without width every value gets the middle colour.
     pub(super) fn color(&self, value: f32) -> [f32; 3] {
         let [low, high] = self.range;
         let t = if high > low { (value - low) / (high - low) } else { 0.5 };
@@ -39,7 +39,7 @@ impl ColorMap {
     }
 }
 
-/// Linear colours of a colour map, from its lower end to the upper.
+/// Linear colours of a colour map from its lower end to its upper end, [`STEPS`] of them.
 pub(super) fn table(map: ColorMap) -> Vec<[f32; 3]> {
     (0..STEPS).map(|step| color(map, step as f64 / (STEPS - 1) as f64).map(linear)).collect()
 }

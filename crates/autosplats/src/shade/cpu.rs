@@ -15,53 +15,53 @@ use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps,
 use crate::camera::View;
 use crate::splat::GBuffer;
 
-/// Light and colour left on the backs of surfaces.
+/// Shares of light and of colour left on the backs of surfaces.
 pub(super) const BACK_LIGHT: f32 = 0.5;
 pub(super) const BACK_COLOR: f32 = 0.4;
-/// Weights of red, green and blue in how bright a linear colour is.
+/// Weights of red, green and blue in the brightness of a linear colour.
 pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
-/// Steps of the table from linear to 8-bit sRGB: at the dark end, where sRGB is steepest, a step of it is less than one of
-/// the 255.
+/// Steps of the table from linear to 8-bit sRGB. At the dark end, where sRGB is steepest, a step of the table is less
+/// than one of the 255.
 pub(super) const ENCODE_STEPS: usize = 1 << 13;
-/// Least rows that a thread shades at a time; as many as occlusion reaches if that is more.
+/// Least rows that a thread shades at a time; occlusion that reaches further raises the number.
 const BAND: usize = 32;
-/// Pixels looked at to find the usual range of values.
+/// Largest number of pixels sampled to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
 
-/// What shading knows about a frame beside its layers.
+/// Frame data that shading needs beside the layers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scene<'a> {
-    /// Of the picture, without a margin.
+    /// View of the picture, without a margin.
     pub(crate) view: &'a View,
     /// Direction of rising height, world space.
     pub(crate) up: DVec3,
     /// The cloud's origin.
     pub(crate) origin: DVec3,
-    /// How many times as bright the points' colours are shown.
+    /// Factor on the brightness of the points' own colours.
     pub(crate) exposure: f32,
 }
 
 impl Scene<'_> {
-    /// What is missing from the values that shading computes with: heights are told from the cloud's origin, because `f32`
-    /// would not tell near ones apart in survey coordinates.
+    /// Offset from the values that shading computes with to those of the world. Heights are relative to the cloud's
+    /// origin, because `f32` cannot resolve them in survey coordinates.
     pub(super) fn value_offset(&self, mode: &ColorMode) -> f64 {
         if *mode == ColorMode::Height { self.origin.dot(self.up) } else { 0.0 }
     }
 
-    /// The range that was asked for, in values that shading computes with.
+    /// The requested range, in values that shading computes with.
     pub(super) fn given_range(&self, shading: &Shading) -> Option<[f32; 2]> {
         let offset = self.value_offset(&shading.color);
         shading.range.map(|range| range.map(|end| (f64::from(end) - offset) as f32))
     }
 
-    /// A range of values that shading computes with, as values of the world.
+    /// Converts a range of values that shading computes with to values of the world.
     pub(super) fn world_range(&self, mode: &ColorMode, range: [f32; 2]) -> [f64; 2] {
         range.map(|end| f64::from(end) + self.value_offset(mode))
     }
 }
 
-/// Shades `layers` into `image`; also in linear light if `keep_linear`, and as one that follows others. Says between which values the colour map lies, where
-/// the colour mode has one.
+/// Shades `layers` into `image`, also in linear light if `keep_linear`, and averages it with the last picture if
+/// `following`. Returns the range of the colour map in world values, if the colour mode has one.
 pub(crate) fn shade(
     layers: &GBuffer,
     scene: &Scene<'_>,
@@ -100,7 +100,7 @@ pub(crate) fn shade(
     shader.scale.as_ref().map(|scale| scene.world_range(&shading.color, scale.range()))
 }
 
-/// From linear light to 8-bit sRGB and back.
+/// Tables from linear light to 8-bit sRGB and back.
 struct Inks {
     table: &'static [u8],
     linear: [f32; 256],
@@ -112,7 +112,7 @@ impl Inks {
         [r, g, b, 255]
     }
 
-    /// What a pixel shows of which `part` is covered in one colour and the rest is background.
+    /// Colour of a pixel of which `part` is covered in one colour and the rest is background.
     fn over(&self, color: [f32; 3], part: f32, background: [u8; 4]) -> [u8; 4] {
         if background[3] == 0 {
             let [r, g, b, _] = self.encode(color);
@@ -123,22 +123,22 @@ impl Inks {
     }
 }
 
-/// From `a` to `b` by a part of the way.
+/// Linear interpolation from `a` to `b`.
 fn mix(a: [f32; 3], b: [f32; 3], part: f32) -> [f32; 3] {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * part)
 }
 
-/// What shading some rows takes, kept from one to the next.
+/// Buffers to shade a band of rows, kept from one band to the next.
 #[derive(Default)]
 struct Band {
     depths: Depths,
-    /// Light left by occlusion, from the row above the first to the one below the last.
+    /// Light left by occlusion, from the row above the first to the row below the last; 0 to 1.
     left: Vec<f32>,
     edges: Vec<bool>,
 }
 
 impl Band {
-    /// Shades the rows from `first` on.
+    /// Shades the band that begins at row `first`.
     fn shade(
         &mut self,
         shader: &Shader<'_>,
@@ -193,13 +193,13 @@ pub(super) struct Shader<'a> {
     layers: &'a GBuffer,
     scene: &'a Scene<'a>,
     shading: &'a Shading,
-    /// Whether the layer of colours is shown, which may be there though something else is.
+    /// Whether the layer of colours is shown; the layer may exist in other modes too.
     colored: bool,
-    /// Light whatever the normal, and the share of the lights.
+    /// Constant light on every normal, and the factor on the lights.
     given_light: [f32; 2],
     pairs: [Pair; PAIR_COUNT],
     edges: Edges,
-    /// For colour modes that are a value.
+    /// Colour map and range, for colour modes that are a value.
     pub(super) scale: Option<Scale>,
 }
 
@@ -216,8 +216,8 @@ impl<'a> Shader<'a> {
         shader
     }
 
-    /// The linear colour of a pixel, if a surface covers it, with so much light left by occlusion; `edge` says whether it is
-    /// at one.
+    /// The linear colour of a pixel, if a surface covers it. `left` is the light left by occlusion, `edge` whether the
+    /// pixel is at an edge.
     fn pixel(&self, depths: &Depths, x: usize, y: usize, left: f32, edge: bool) -> Option<[f32; 3]> {
         let index = self.layers.index(x, y);
         if !(self.layers.weight[index] > 0.0) {
@@ -232,7 +232,7 @@ impl<'a> Shader<'a> {
         Some(std::array::from_fn(|i| tone(base[i] * light[i] * left)))
     }
 
-    /// The colour of a surface that shows its back as far as the pixel says.
+    /// The colour toned by the pixel's share of back.
     fn tone_back(&self, color: [f32; 3], index: usize) -> [f32; 3] {
         match self.layers.back.get(index) {
             Some(&share) if self.shading.tones_backs() => {
@@ -244,10 +244,10 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The normal that light falls on at an edge. Of points close to a silhouette some are seen although their surface looks
-    /// away; their normals, turned to the eye, catch the light of the other side, and among others make one that is nobody's.
-    /// Where the surface falls back towards its border but the normal there is tilted clearly less towards it than further in,
-    /// that one is taken.
+    /// The normal that light falls on at an edge. Some points close to a silhouette are seen although their surface
+    /// looks away. Their normals, turned to the eye, catch the light of the other side, and mixed with right ones
+    /// belong to no surface. The normal further in is taken where the surface falls back towards its border, but its
+    /// normal there is tilted clearly less.
     fn outward_normal(&self, depths: &Depths, x: usize, y: usize, index: usize) -> Vec3 {
         let normal = Vec3::from(self.layers.normal[index]);
         let size = [self.layers.width as usize, self.layers.height as usize];
@@ -272,7 +272,7 @@ impl<'a> Shader<'a> {
         }
     }
 
-    /// The value that a colour mode shows at a pixel, but for [`Scene::value_offset`].
+    /// The value that the colour mode shows at a pixel, relative to [`Scene::value_offset`].
     fn value(&self, x: usize, y: usize, index: usize) -> f32 {
         let layers = self.layers;
         match self.shading.color {
@@ -312,24 +312,24 @@ impl<'a> Shader<'a> {
     }
 }
 
-/// Light whatever the normal, and the share of the lights, on colours or on what has none.
+/// Constant light on every normal, and the factor on the lights, for the points' own colours or for other ones.
 pub(super) fn given_light(scene: &Scene<'_>, shading: &Shading, colored: bool) -> [f32; 2] {
-    // Colours of classes mean something.
+    // Class colours carry meaning, so exposure does not change them.
     let exposure = if shading.color == ColorMode::Classification { 1.0 } else { scene.exposure };
     if colored { SCANNED_LIGHT.map(|part| part * exposure) } else { [0.0, 1.0] }
 }
 
-/// How much occlusion darkens, on the points' own colours or on others.
+/// Strength of occlusion's darkening, for the points' own colours or for other ones.
 pub(super) fn darkening(shading: &Shading, colored: bool) -> f32 {
     shading.occlusion * DARKENING[usize::from(colored)]
 }
 
-/// Every how many of a picture's pixels is looked at to find the usual range.
+/// Step between the pixels that are sampled to find the usual range.
 pub(super) fn sample_step(pixels: usize) -> usize {
     pixels.div_ceil(RANGE_SAMPLES).max(1)
 }
 
-/// Whether a colour mode shows the colours of points, where they have any.
+/// Whether a colour mode shows the points' colours where there are any.
 pub(super) fn shows_colors(mode: &ColorMode) -> bool {
     matches!(mode, ColorMode::Auto | ColorMode::Rgb | ColorMode::Classification)
 }

@@ -1,22 +1,22 @@
-//! Depths of a band of rows, side by side: layers are stored tile by tile, which reading across would have to undo.
+//! Depths of a band of rows, side by side. Layers are stored tile by tile, which does not suit reads across.
 
 use crate::splat::GBuffer;
 
-/// The widest vector, in lanes: rows are as long as a whole number of them.
+/// Lanes of the widest vector. Rows are padded to a multiple.
 pub(super) const LANES: usize = 16;
 
-/// Depths of some rows of a picture and of a margin around them; infinite where nothing is and beyond the picture.
+/// Depths of some rows of a picture and of a margin around them; infinite where no surface is and beyond the picture.
 #[derive(Default)]
 pub(super) struct Depths {
     values: Vec<f32>,
     stride: usize,
     margin: usize,
-    /// The row of the picture that is the first here; above the picture it is negative.
+    /// Picture row of the first row here; negative above the picture.
     top: isize,
 }
 
 impl Depths {
-    /// Takes `rows` rows from `first` on, and `margin` pixels more on every side.
+    /// Copies `rows` rows from row `first` on, with a margin of `margin` pixels on every side.
     pub(super) fn fill(&mut self, layers: &GBuffer, first: usize, rows: usize, margin: usize) {
         let [width, height] = [layers.width as usize, layers.height as usize];
         self.margin = margin;
@@ -44,7 +44,7 @@ impl Depths {
         self.values[self.start(x, y)]
     }
 
-    /// Row `y` from column `x` on, to the end of what is there of it.
+    /// Row `y` from column `x` on, as long as a padded row of the picture.
     #[inline(always)]
     pub(super) fn row(&self, x: isize, y: isize) -> &[f32] {
         let length = self.stride - 2 * self.margin;

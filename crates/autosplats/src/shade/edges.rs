@@ -1,38 +1,38 @@
 //! Edges: pixels at the border of a surface show a part of what lies on the other side.
 //!
 //! # How it works
-//! Between two neighbouring pixels there is an edge if one is covered and the other is not, or if one lies so far behind
-//! the other that no surface is that steep. A border that is nearly level or upright is a row of edges with a turn at its
-//! end, up or down by a pixel. The true border is taken to cross the row of edges in its middle and the turn at half its
-//! height, so a pixel beside the turn is cut by a triangle or a trapezium, whose area is the part of the other side
-//! [Reshetov: *Morphological Antialiasing*, 2009]. Here edges come from the surface, not from the picture's colours: the
-//! texture of a scan stays as sharp as it is.
+//! Between neighbouring pixels there is an edge if only one is covered, or if one lies further behind the other than
+//! any surface is steep. A border that is nearly level or upright is a row of edges with a turn at its end, up or down
+//! by a pixel. The true border is assumed to cross the row of edges in its middle and the turn at half its height. So
+//! the border cuts a triangle or trapezium off a pixel beside the turn. Its area is the share of the other side
+//! [Reshetov: *Morphological Antialiasing*, 2009]. Here edges come from the surface, not from the picture's colours, so
+//! the texture of a scan stays sharp.
 
 use super::depths::Depths;
 use crate::camera::View;
 
-/// Slope, as depth by distance across the line of sight, from which neighbouring pixels are not on the same surface.
+/// Slope, as depth by distance across the line of sight, from which neighbouring pixels belong to different surfaces.
 const STEEPEST: f32 = 4.0;
-/// How far the ends of a row of edges are looked for, in pixels to either side.
+/// Length of the search for the ends of a row of edges, in pixels to either side.
 pub(super) const SEARCH: isize = 12;
-/// How far from a border it is seen where the surface comes from and how it is tilted, in pixels: the splats of the border itself
-/// may be tilted otherwise.
+/// Distance from a border, in pixels, at which the inner depth and normal are read. The splats of the border itself may
+/// be tilted otherwise.
 pub(super) const INWARD: isize = 3;
-/// A normal at a border is not used if its component towards the border is so much smaller than that of the normal further in; at
-/// a corner of pixels, the sum of both components.
+/// A border's normal is replaced if its component towards the border is smaller than the inner normal's by more than
+/// this. At a corner of pixels the component is the sum of both axes.
 pub(super) const LESS_TILTED: f32 = 0.3;
 /// Sides of a pixel.
 const SIDES: [[isize; 2]; 4] = [[0, -1], [0, 1], [-1, 0], [1, 0]];
 
-/// What is an edge in a picture.
+/// Thresholds of edges in a picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edges {
-    /// What is deeper than this factor times a pixel's depth, plus the offset, lies behind it.
+    /// A depth lies behind another if it is greater than this factor times the other, plus the offset.
     pub(super) factor: f32,
     pub(super) offset: f32,
 }
 
-/// A part of a pixel shows what its neighbour shows.
+/// A neighbour, and the part of the pixel that shows the neighbour's colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Blend {
     pub(super) x: usize,
@@ -40,22 +40,22 @@ pub(super) struct Blend {
     pub(super) part: f32,
 }
 
-/// Where a row of edges turns to.
+/// Where a row of edges turns at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Turn {
-    /// Into the row of the pixel that asks.
+    /// Into the pixel's own row.
     Here,
     Elsewhere,
 }
 
 impl Edges {
-    /// Edges as this view shows them.
+    /// Thresholds for this view.
     pub(super) fn new(view: &View) -> Self {
         let step = STEEPEST / view.focal_px;
         if view.perspective { Self { factor: 1.0 + step, offset: 0.0 } } else { Self { factor: 1.0, offset: step } }
     }
 
-    /// 1 if depth `b` lies behind `a`, -1 if before it, 0 if both may be one surface.
+    /// 1 if depth `b` lies behind `a`, -1 if in front, 0 if both may be one surface.
     #[inline(always)]
     fn step(&self, a: f32, b: f32) -> i32 {
         let behind = |a: f32, b: f32| i32::from(b > a * self.factor + self.offset);
@@ -77,7 +77,7 @@ impl Edges {
         }
     }
 
-    /// Where, seen from a pixel, its surface ends before something behind: the sum of the steps to those neighbours.
+    /// Direction in which the pixel's surface ends in front of something: the sum of the steps to such neighbours.
     pub(super) fn outward(&self, depths: &Depths, size: [usize; 2], x: usize, y: usize) -> [isize; 2] {
         let [x, y] = [x as isize, y as isize];
         let mut sum = [0; 2];
@@ -104,7 +104,7 @@ impl Edges {
         best
     }
 
-    /// How much of a pixel its neighbour at [dx, dy] takes.
+    /// Part of a pixel that its neighbour at [dx, dy] takes, 0 to 1.
     fn part(&self, depths: &Depths, size: [usize; 2], [x, y]: [isize; 2], [dx, dy]: [isize; 2]) -> f32 {
         let kind = self.step(depths.at(x, y), depths.at(x + dx, y + dy));
         if kind == 0 {
@@ -166,7 +166,7 @@ mod tests {
         camera.view(DVec3::ZERO, [SIZE as u32; 2]).expect("a view")
     }
 
-    /// Depths of a picture, by the middle of each pixel.
+    /// Depths of a picture by `of` at the middle of each pixel.
     fn depths(of: impl Fn(f32, f32) -> f32) -> Depths {
         let mut layers = GBuffer::new(SIZE as u32, SIZE as u32);
         for pixel in 0..SIZE * SIZE {
@@ -179,8 +179,8 @@ mod tests {
         depths
     }
 
-    /// Mean squared error of how much of each pixel a shape covers, without and with blending. Pixels near the border of
-    /// the picture, where edges end, do not count.
+    /// Summed squared errors of the covered part of pixels, without and with blending. Pixels near the picture's edges,
+    /// where rows of edges end, do not count.
     fn errors(view: &View, inside: impl Fn(f32, f32) -> bool, behind: f32) -> [f64; 2] {
         let depths = depths(|x, y| if inside(x, y) { 2.0 } else { behind });
         let edges = Edges::new(view);
@@ -208,7 +208,7 @@ mod tests {
                 for slope in [-3.0, -1.0, -0.45, -0.2, 0.08, 0.13, 0.3, 0.7, 1.0, 2.2, 9.0] {
                     let line = |x: f32, y: f32| y - 24.2 < slope * (x - 24.1);
                     let [plain, blended] = errors(view, line, behind);
-                    // Exactly diagonal steps are all alike, and do not tell where between them the border is.
+                    // All steps of an exact diagonal are alike, and do not show where between them the border lies.
                     let limit = if slope.abs() == 1.0 { 0.7 } else { 0.25 };
                     assert!(blended < limit * plain, "slope {slope}, behind {behind}: {plain} becomes {blended}");
                 }
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn a_wrong_blend_is_found() {
-        // The measure above must not be content with anything: blending as if the border were the other way round.
+        // The measure above must reject a wrong blend, as if the border were mirrored.
         let view = view(Projection::PerspectiveFovDeg(40.0));
         let line = |x: f32, y: f32| y - 24.2 < 0.2 * (x - 24.1);
         let depths = depths(|x, y| if line(x, y) { 2.0 } else { 3.0 });
@@ -237,7 +237,7 @@ mod tests {
         assert!(sums[1] > 4.0 * sums[0], "the right blend {} and a wrong one {}", sums[0], sums[1]);
     }
 
-    /// How much of a pixel a shape covers, by 256 samples.
+    /// Part of a pixel that a shape covers, by 256 samples.
     fn covered_part(inside: impl Fn(f32, f32) -> bool, x: usize, y: usize) -> f64 {
         let steps = (0..256).map(|step| [step % 16, step / 16].map(|step| (step as f32 + 0.5) / 16.0));
         steps.filter(|[dx, dy]| inside(x as f32 + dx, y as f32 + dy)).count() as f64 / 256.0
@@ -250,7 +250,7 @@ mod tests {
         for slope in [0.0, 1.0, 3.0] {
             let depths = depths(|x, y| 2.0 + unit * slope * (0.3 * x + 0.7 * y));
             let mut marks = [true; SIZE];
-            // But for the first and last row and column, which have nothing beside them.
+            // The first and last row and column have no neighbours.
             for y in 1..SIZE - 1 {
                 Edges::new(&view).mark(&depths, y as isize, &mut marks);
                 assert_eq!(marks[1..SIZE - 1], [false; SIZE - 2], "slope {slope}, row {y}");

@@ -1,4 +1,4 @@
-//! Shading on the GPU: one pass, and two before it where the range of values is to be found.
+//! Shading on the GPU: one pass, and two before it that find a range which is not given.
 
 mod finish;
 mod texture;
@@ -28,7 +28,7 @@ const GROUP: u32 = 256;
 const SHADE_GROUP: [u32; 2] = [32, 8];
 /// Keys that `range` reads at a time.
 const KEYS: usize = 4096;
-/// Rows of the image begin at multiples of so many pixels: textures are copied in rows of 256 bytes.
+/// Alignment of the image's rows in pixels: textures are copied in rows of multiples of 256 bytes.
 pub(super) const ROW_PIXELS: u32 = 64;
 
 /// Pixels from one row of the image to the next.
@@ -36,33 +36,34 @@ pub(crate) const fn pitch(width: u32) -> u32 {
     width.next_multiple_of(ROW_PIXELS)
 }
 
-/// Words that the table from linear to sRGB takes.
+/// Words of the table from linear to sRGB.
 const fn encode_words() -> usize {
     (ENCODE_STEPS + 1).div_ceil(4)
 }
 
-/// A picture on the device, and what it takes to shade it.
+/// A picture on the device, and the buffers to shade it.
 #[derive(Debug)]
 pub(crate) struct ShadeBuffers {
     pub(crate) size: [u32; 2],
     uniform: wgpu::Buffer,
-    /// Keys of the values among which the range is found.
+    /// Keys of the values whose range is sought.
     keys: wgpu::Buffer,
-    /// Linear colours, a `vec4f` a step.
+    /// Linear colours of the map, a `vec4f` per step.
     color_map: wgpu::Buffer,
     /// The table from linear to sRGB, then the background of each row.
     pub(super) tables: wgpu::Buffer,
     /// RGBA per pixel, 8 bits a channel, rows [`pitch`] apart.
     pub(crate) image: wgpu::Buffer,
-    /// `vec4f` per pixel, rows from the top without gaps: linear light before any rounding. One element if not wanted.
+    /// Linear light before any rounding, a `vec4f` per pixel, rows from the top without gaps. One element if not
+    /// requested.
     pub(crate) linear: wgpu::Buffer,
-    /// What [`color_map`](Self::color_map) and [`tables`](Self::tables) hold.
+    /// Contents of [`color_map`](Self::color_map) and [`tables`](Self::tables).
     map_held: Option<ColorMap>,
     background_held: Option<Background>,
 }
 
 impl ShadeBuffers {
-    /// Room for a picture of `size`; also in linear light if `keep_linear`.
+    /// Buffers for a picture of `size`, also in linear light if `keep_linear`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -87,7 +88,7 @@ impl ShadeBuffers {
         })
     }
 
-    /// Tells the passes of the next frame what to do.
+    /// Uploads the settings of the next frame.
     pub(crate) fn write(&mut self, gpu: &Gpu, uniform: &ShadeUniform, shading: &Shading) {
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(uniform));
         let map = shading.color.usual_map().map(|usual| shading.color_map.unwrap_or(usual));
@@ -108,11 +109,11 @@ impl ShadeBuffers {
 #[derive(Debug)]
 pub(crate) struct ShadePasses {
     range: Pass,
-    /// By [`Shown`], without and with backs told apart.
+    /// By [`Shown`], each without and with toned backs.
     coloring: Vec<Option<ColoringPasses>>,
 }
 
-/// The passes that differ by what a surface is coloured by.
+/// The passes that depend on what colours a surface.
 #[derive(Debug)]
 struct ColoringPasses {
     range_values: Pass,
@@ -134,7 +135,7 @@ impl ColoringPasses {
 }
 
 impl ShadePasses {
-    /// Compiles what is common to all colour modes.
+    /// Compiles the pass common to all colour modes.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -142,9 +143,9 @@ impl ShadePasses {
         Ok(Self { range: Pass::new(gpu, &RANGE, &[])?, coloring: Vec::new() })
     }
 
-    /// Shades `layers` into `buffers`, as [`ShadeBuffers::write`] says, for this colour mode and with a range given or
-    /// not: with others, steps are others. The range goes into `counters`. The first time that something is shown its
-    /// passes are compiled.
+    /// Steps that shade `layers` into `buffers` with the settings of [`ShadeBuffers::write`]. Another colour mode, or
+    /// giving a range or not, needs other steps. A range that is found goes into `counters`. Passes of a colour mode
+    /// are compiled at its first use.
     ///
     /// # Errors
     /// [`Error::Device`].

@@ -13,12 +13,12 @@ const GLYPH: usize = 8;
 const INK: [u8; 4] = [240, 240, 240, 255];
 const SHADE: [u8; 4] = [24, 26, 30, 255];
 
-/// Draws the legend where it hides the least, best in the middle of the right edge; in a picture too small for one,
-/// nothing. `offset` is added to the values of the scale.
+/// Draws the legend where it hides the least of the surface, at best in the middle of the right edge. A picture too
+/// small gets none. `offset` is added to the values of the scale.
 pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: f64, encode: impl Fn(f32) -> u8) {
     let title = &shading.color.title();
     let [width, height] = [image.width as usize, image.height as usize];
-    // One font pixel is this many picture pixels.
+    // Picture pixels per font pixel.
     let unit = (height / 400).max(1);
     let line = (GLYPH + 4) * unit;
     let [low, high] = scale.range();
@@ -57,7 +57,7 @@ pub(super) fn draw(image: &mut Image, shading: &Shading, scale: &Scale, offset: 
     }
 }
 
-/// Pixels of the surface in a part of the picture.
+/// Number of surface pixels in a part of the picture.
 fn hidden(image: &Image, behind: Background, [x0, y0]: [usize; 2], [width, height]: [usize; 2]) -> usize {
     let count = |y: usize| {
         let nothing = background(behind, (y as f32 + 0.5) / image.height as f32);
@@ -66,7 +66,7 @@ fn hidden(image: &Image, behind: Background, [x0, y0]: [usize; 2], [width, heigh
     (y0..y0 + height).map(count).sum()
 }
 
-/// A value with the digits that tell it apart within a range of this width.
+/// A value with the digits needed within a range of this width.
 fn number(value: f32, range: f32) -> String {
     let largest = value.abs().max(range);
     if largest != 0.0 && !(1e-4..1e7).contains(&largest) {
@@ -77,7 +77,7 @@ fn number(value: f32, range: f32) -> String {
 }
 
 fn blend(below: [u8; 4], above: [u8; 4]) -> [u8; 4] {
-    // Three quarters of the panel: text stays readable on any picture.
+    // The panel covers three quarters, so text is readable on any picture.
     let mix = |i: usize| ((u16::from(below[i]) + 3 * u16::from(above[i])) / 4) as u8;
     [mix(0), mix(1), mix(2), 255]
 }

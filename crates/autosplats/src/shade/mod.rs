@@ -1,21 +1,22 @@
 //! Shade: the visible surface in, an image out [Paper, §7].
 //!
 //! # How it works
-//! Each covered pixel has a base colour: that of the points, one tone, or a value (height, depth, a scalar field …) looked
-//! up in a colour map over its range. It is multiplied by the light that its normal catches (`light.rs`) from a key light
-//! over the viewer's left shoulder, a weak fill light from the right and a sky brighter above than below; since normals
-//! face the eye, both sides of a surface are lit alike; where it is known from where points were scanned, the side not seen
-//! from there is darker and has less colour. Occlusion (`occlusion.rs`) takes light away in creases and from
-//! what lies behind something. What would become brighter than white is bent below it. Where surfaces end, pixels show a
-//! part of what is beside them (`edges.rs`); linear light, which is data, is kept without that. Colours are linear until
-//! the last step, which encodes them as sRGB.
+//! Each covered pixel has a base colour: the points' own, one tone, or that of a value in a colour map. Values are
+//! height, depth, a scalar field and others. The base colour is multiplied by the light that the pixel's normal catches
+//! (`light.rs`). A key light comes from over the viewer's left shoulder, a weak fill light from the right, and the sky
+//! is brighter above than below. Normals face the eye, so both sides of a surface are lit alike. Where the sensors'
+//! places are known, the side that they did not see is darker and has less colour.
 //!
-//! A thread shades a band of rows: the depths of the band and of a margin lie side by side then, and occlusion is found for
-//! a vector of pixels at a time.
+//! Occlusion (`occlusion.rs`) takes light away in creases and behind things. Brightness above white is bent below it.
+//! Where surfaces end, pixels show a part of what lies beside them (`edges.rs`). Linear light, which is data, is stored
+//! without that. Colours are linear until the last step, which encodes them as sRGB.
 //!
-//! The range of a value, if none is given, reaches from the 1st to the 99th percentile of those in the picture, of 50,000
-//! of them at most; on the device it is found before shading, so that no frame waits for the host. The legend is drawn by
-//! the host in any case, into pictures in memory.
+//! A thread shades a band of rows. The depths of the band and of a margin lie side by side, so occlusion is computed
+//! for a vector of pixels at a time.
+//!
+//! A range that is not given reaches from the 1st to the 99th percentile of at most 50,000 values of the picture. On
+//! the device the range is found before shading, so no frame waits for the host. The host draws the legend, into
+//! pictures in memory only.
 
 mod average;
 mod classes;
@@ -45,10 +46,10 @@ pub struct Image {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
-    /// sRGB and straight alpha, 8 bits a channel. At edges colours are mixed, and alpha is the part that is covered.
+    /// sRGB with straight alpha, 8 bits a channel. Edges are blended; alpha is the covered part of a pixel.
     pub pixels: Vec<[u8; 4]>,
-    /// The same in linear light before any rounding, without legend and background and with nothing mixed at edges or with pictures
-    /// before: zero where no surface is. Filled if all layers are asked for, otherwise empty.
+    /// Linear light before any rounding; zero where no surface is. Without legend, background, blended edges and
+    /// averaging with earlier pictures. Empty unless all layers are requested.
     pub linear: Vec<[f32; 3]>,
 }
 

@@ -1,15 +1,15 @@
-//! Occlusion: how much of the light that comes from all around is kept away by the surface nearby.
+//! Occlusion: the share of ambient light that the surface nearby blocks.
 //!
 //! # How it works
-//! A pixel looks at pairs of pixels on opposite sides of it, some near and some further off. The lines from the surface
-//! here to the surface there enclose an angle: 180° on a flat surface however it is slanted, less in a crease, at the foot
-//! of a step and between two things that stand before it, more on a ridge. What the angle falls short by is what the pair
-//! takes away, as the square of the sine of half of it: noise bends the surface by little, which the square makes next to
-//! nothing. No normal is needed, so none can be wrong.
+//! A pixel reads pairs of pixels on opposite sides, some near and some further away. The lines from the surface here to
+//! the surface there enclose an angle. On a flat surface the angle is 180°, however it is slanted. In a crease, at the
+//! foot of a step and between two things in front the angle is less, on a ridge more. A pair takes away light by the
+//! square of the sine of half the missing angle. Noise bends the surface only a little, which the square makes
+//! negligible. No normal is needed, so no wrong normal can do harm.
 //!
-//! What stands far before a surface darkens it less and less, down to a rest that still tells the two apart: no black
-//! halos. Where nothing is, nothing occludes. [Bavoil, Sainz: *Image-Space Horizon-Based Ambient Occlusion*, 2008] looks
-//! for horizons in the same manner.
+//! What stands far in front of a surface darkens it less, without black halos. A rest of darkening still separates the
+//! two. Emptiness does not occlude. [Bavoil, Sainz: *Image-Space Horizon-Based Ambient Occlusion*, 2008] searches for
+//! horizons in a similar way.
 
 use pulp::Simd;
 
@@ -17,8 +17,8 @@ use super::depths::Depths;
 use crate::camera::View;
 use crate::simd::F32s;
 
-/// Pairs of pixels: the angle of the line through them in 16ths of a half turn, their distance from the middle in pixels
-/// of a picture [`HEIGHT`] pixels high, and their part in the whole.
+/// Pairs of pixels: angle of the line through them in 16ths of a half turn, distance from the middle, and weight.
+/// Distances are in pixels of a picture [`HEIGHT`] pixels high; weights add up to about 1.
 const PAIRS: [(f32, f32, f32); PAIR_COUNT] = [
     (0.0, 3.0, 0.07),
     (8.0, 3.0, 0.07),
@@ -35,26 +35,26 @@ pub(super) const PAIR_COUNT: usize = 10;
 const HEIGHT: f32 = 900.0;
 /// Least factor on the distances, for small pictures.
 const LEAST_SCALE: f32 = 0.34;
-/// The steepest that something rises beside a pixel, as height by distance: what rises more is further before it, and
+/// Steepest rise beside a pixel that counts in full, as height by distance. A steeper rise is further in front, and
 /// counts for less.
 pub(super) const STEEPEST: f32 = 1.2;
-/// What the furthest counts for, as such a rise.
+/// Rise as which the furthest things in front still count.
 pub(super) const FURTHEST: f32 = 0.4;
-/// What a rise is divided by at least: below it nothing is far.
+/// Least divisor of a rise, against division by zero.
 pub(super) const LEAST_RISE: f32 = 1e-3;
-/// Darkening at strength 1: of one tone, and of the points' own colours, which show shadows themselves.
+/// Darkening at strength 1: of tones, and of the points' own colours, which contain shadows already.
 pub(super) const DARKENING: [f32; 2] = [4.5, 3.3];
 
-/// One pair: the step to the second pixel, from which the first lies opposite.
+/// A pair of opposite pixels: the step to the second one, and by its negative to the first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pair {
     pub(super) step: [isize; 2],
-    /// One by the length of the step.
+    /// Inverse length of the step, per pixel.
     pub(super) inverse_px: f32,
     pub(super) part: f32,
 }
 
-/// The pairs for a picture so many pixels high.
+/// The pairs for a picture of this height in pixels.
 pub(super) fn pairs(height: u32) -> [Pair; PAIR_COUNT] {
     let scale = (height as f32 / HEIGHT).max(LEAST_SCALE);
     PAIRS.map(|(angle, distance_px, part)| {
@@ -64,13 +64,13 @@ pub(super) fn pairs(height: u32) -> [Pair; PAIR_COUNT] {
     })
 }
 
-/// How far the furthest pixel of a pair is, in x or y.
+/// Largest distance of a pixel of the pairs along x or y, in pixels.
 pub(super) fn reach(pairs: &[Pair]) -> usize {
     pairs.iter().flat_map(|pair| pair.step).map(isize::unsigned_abs).max().unwrap_or(0)
 }
 
-/// Finds for row `y` of a picture how much light is left at each pixel, 0 to 1. `left` is as long as the rows of `depths`;
-/// where no surface is it gets anything.
+/// Writes the light left at each pixel of row `y`, 0 to 1. `left` is as long as the rows of `depths`; where no surface
+/// is its values are meaningless.
 #[pulp::with_simd(light_left = pulp::Arch::new())]
 #[inline(always)]
 pub(super) fn light_left_simd<'a, S: Simd>(
@@ -103,13 +103,13 @@ pub(super) fn light_left_simd<'a, S: Simd>(
             let cos = (one - a * b) / ((one + a * a) * (one + b * b)).sqrt();
             occlusion += zero.less(a + b).keep((one - cos) * half * splat(pair.part));
         }
-        // Falls like the exponential at first, costs a division, and is the same on every processor.
+        // Like the exponential for small values, for the cost of a division, and the same on every processor.
         let shadow = occlusion * strength;
         (one / (one + shadow + half * shadow * shadow)).store(left, vector);
     }
 }
 
-/// How steeply the surface rises towards the eye, from a depth to one beside it.
+/// Rise of the surface towards the eye from a depth to one beside it, as height by distance, limited as above.
 #[inline(always)]
 fn rise<S: Simd>(simd: S, depth: F32s<S>, there: F32s<S>, scale: F32s<S>) -> F32s<S> {
     let splat = |value: f32| F32s::splat(simd, value);
@@ -129,8 +129,8 @@ mod tests {
     const SIZE: usize = 60;
     const MIDDLE: usize = SIZE / 2;
 
-    /// The light left at the pixels of row [`MIDDLE`], of depths in pixel sizes beyond a base, by the pixel's place from
-    /// the middle of the picture.
+    /// Light left at the pixels of row [`MIDDLE`]. `of` gives depths in pixel sizes behind a base, by the place
+    /// relative to the picture's middle.
     fn left(of: impl FnMut(f32, f32) -> f32) -> Vec<f32> {
         left_under(Projection::OrthographicHeight(SIZE as f64), of)
     }
@@ -145,14 +145,14 @@ mod tests {
             let at = layers.index(x, y);
             layers.depth[at] = 1000.0 + of(x as f32 - MIDDLE as f32, y as f32 - MIDDLE as f32);
         }
-        // As in a picture 900 pixels high.
+        // The pairs of a picture 900 pixels high.
         let pairs = pairs(HEIGHT as u32);
         let mut depths = Depths::default();
         depths.fill(&layers, 0, SIZE, reach(&pairs) + 1);
         let mut left = vec![f32::NAN; SIZE.next_multiple_of(LANES)];
         light_left(&depths, MIDDLE as isize, &pairs, &view, DARKENING[0], &mut left);
         left.truncate(SIZE);
-        // Where no surface is, anything may stand.
+        // Values without a surface are meaningless.
         for (x, left) in left.iter_mut().enumerate() {
             if layers.depth[layers.index(x, MIDDLE)] == f32::INFINITY {
                 *left = 1.0;
@@ -173,7 +173,7 @@ mod tests {
             let perspective = Projection::PerspectiveFovDeg(40.0);
             let pixel = 1000.0 * 2.0 * 20f32.to_radians().tan() / SIZE as f32;
             let plane = left_under(perspective, |x, y| {
-                // The true plane: 1 / depth is linear in the picture.
+                // A true plane: 1 / depth is linear in the picture.
                 let tilt = (a * x + b * y) * pixel / 1000.0;
                 if tilt < 0.5 { 1000.0 / (1.0 - tilt) - 1000.0 } else { f32::INFINITY }
             });
@@ -186,7 +186,7 @@ mod tests {
         let mut random = Random::new(8);
         let noisy = left(|x, _| 0.5 * x + 0.5 * random.signed());
         assert!(least(&noisy) > 0.9, "noise of half a pixel: {}", least(&noisy));
-        // A depth camera's steps.
+        // Steps of a depth camera.
         let stairs = left(|x, _| (x / 12.0).round() * 1.5);
         assert!(least(&stairs) > 0.9, "steps of 1.5 pixels: {}", least(&stairs));
     }

@@ -1,33 +1,35 @@
-// Finds the usual range of the listed values, their 1st and 99th percentile, as exactly as sorting would.
+// Finds the usual range of the listed values, their 1st and 99th percentile, as exactly as sorting would. One
+// workgroup.
 //
-// Reads: keys. Writes: counters. One workgroup.
-// Both are found a byte at a time: how many keys that begin like the one wanted go on with each of the 256 bytes says
-// which comes next.
+// Reads: keys. Writes: counters.
+//
+// Both keys are found byte by byte. Keys that begin like the one sought are counted by their next byte, and the counts
+// show which byte follows.
 
 #import frame
 #import counters
 #import range_keys
 
-// A multiple of 1024 of vectors, filled up with NO_KEY.
+// Keys, padded with `NO_KEY` to a multiple of 1024 vectors.
 @group(0) @binding(1) var<storage, read> keys: array<vec4u>;
 @group(0) @binding(2) var<storage, read_write> counters: array<u32>;
 
-// Keys by their next byte: those that begin like the lower end, then those that begin like the upper one.
+// Counts of keys by their next byte: keys that begin like the lower end, then those like the upper end.
 var<workgroup> bins: array<atomic<u32>, 512>;
-// Keys in all bins up to each, for both ends; in two copies, one written while the other is read.
+// Cumulative counts for both ends, in two copies: one is written while the other is read.
 var<workgroup> upto: array<vec2u, 512>;
-// What is known of the two keys, and their ranks among those that begin alike.
-// Scalars: invocations that write components of one vector may overwrite each other's.
+// Known leading bytes of the two keys, and their ranks among the keys with the same beginning. Scalars, because
+// invocations that write components of one vector may overwrite each other's.
 var<workgroup> found: array<u32, 2>;
 var<workgroup> ranks: array<u32, 2>;
 
-// Keys one after the other that are equal as far as looked at.
+// A run of successive keys that are equal in the bytes compared so far.
 struct Run {
     key: u32,
     count: u32,
 }
 
-// What the round looks for: where its byte begins, what goes before in the two keys, and whether that is the same.
+// A round: position of its byte, known bytes of the two keys, and whether these are the same.
 struct Round {
     shift: u32,
     begins: vec2u,
@@ -35,7 +37,7 @@ struct Round {
 }
 
 fn count_run(run: Run, round: Round) {
-    // Twice, because the width of the type is no shift.
+    // Shifted twice, as a word cannot be shifted by its width.
     let begin = (run.key >> round.shift) >> 8u;
     let bin = (run.key >> round.shift) & 255u;
     if begin == round.begins.x {
@@ -70,10 +72,11 @@ fn range(@builtin(local_invocation_index) local: u32) {
         atomicStore(&bins[local], 0u);
         atomicStore(&bins[256u + local], 0u);
         workgroupBarrier();
-        // First bytes of neighbours are mostly equal: they are counted together, or all would wait for one bin.
+        // First bytes of neighbouring keys are mostly equal. Runs are counted at once, or all invocations would wait
+        // for one bin.
         var run = Run(0u, 0u);
         for (var stride = 0u; stride < strides; stride++) {
-            // Sixteen keys are on their way at a time.
+            // Sixteen keys are in flight at a time.
             let first = stride * 1024u + local;
             let a = keys[first];
             let b = keys[first + 256u];
@@ -99,7 +102,7 @@ fn range(@builtin(local_invocation_index) local: u32) {
             workgroupBarrier();
         }
         if byte == 0u && local == 0u {
-            // A hundredth of the values is left out at each end.
+            // A hundredth of the values is excluded at each end.
             found = array(0u, 0u);
             let total = upto[copy + 255u].x;
             ranks = array(total / 100u, total - 1u - total / 100u);

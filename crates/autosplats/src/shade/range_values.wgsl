@@ -1,4 +1,4 @@
-// Lists the values of every some pixels as keys that order as the values do, for the usual range to be found among them.
+// Lists the values of sampled pixels as keys in the same order, from which the usual range is found.
 //
 // Reads: surface, cover, extras. Writes: keys.
 

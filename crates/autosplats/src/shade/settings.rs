@@ -1,40 +1,40 @@
-//! What shading can be asked for.
+//! Settings of shading.
 
 /// How splats become an image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Shading {
-    /// What the surface is coloured by.
+    /// Source of the surface's colour.
     pub color: ColorMode,
-    /// Values at the two ends of the colour map; `None` takes the 1st and 99th percentile of the picture.
+    /// World values at the two ends of the colour map; `None` takes the 1st and 99th percentile of the picture.
     pub range: Option<[f32; 2]>,
-    /// Colours for scalar values; `None` takes the one that suits the colour mode.
+    /// Colour map for values; `None` takes the usual one of the colour mode.
     pub color_map: Option<ColorMap>,
-    /// Draw the colour map with its range into the picture, where the colour mode has one.
+    /// Draw the colour map with its range into the picture, if the colour mode has one.
     pub legend: bool,
-    /// Light the surface by its normals; otherwise colours are shown as they are.
+    /// Light the surface by its normals; otherwise colours are shown unlit.
     pub lighting: bool,
-    /// How many times as bright the points' own colours are shown, 0.01 to 100; `None` takes what
-    /// [`usual_exposure`](crate::usual_exposure) says of the cloud, which is more than 1 where its colours are all dark. Only with
-    /// [lighting](Self::lighting). Of points that move it would change with them: give what the first need.
+    /// Factor on the brightness of the points' own colours, 0.01 to 100; only with [lighting](Self::lighting). `None`
+    /// takes [`usual_exposure`](crate::usual_exposure) of the cloud, which is above 1 where all colours are dark. For
+    /// points that move, give the exposure of the first ones, or brightness changes with the points.
     pub exposure: Option<f32>,
-    /// Strength of occlusion, the darkening of creases and of what lies behind something; 0 (off) to 10.
+    /// Strength of occlusion, the darkening of creases and behind things; 0 (off) to 10.
     pub occlusion: f32,
-    /// How the side of a surface is shown that its sensor did not see.
+    /// How to show the side of a surface that its sensor did not see.
     pub backs: Backs,
-    /// What is seen where no surface is.
+    /// What to show where no surface is.
     pub background: Background,
 }
 
 impl Shading {
-    /// Whether backs are told apart where they are known: light does it, as it does all shading.
+    /// Whether backs are toned where they are known; only with lighting.
     pub(crate) fn tones_backs(&self) -> bool {
         self.lighting && self.backs == Backs::Toned
     }
 }
 
-/// How the back of a surface is shown: the side that its sensor did not see. It is known where the cloud says from where it
-/// was [scanned](autosplats_cloud::PointCloud::scans).
+/// How to show the back of a surface, the side that its sensor did not see. Backs are known if the cloud states from
+/// where it was [scanned](autosplats_cloud::PointCloud::scans).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Backs {
@@ -45,7 +45,7 @@ pub enum Backs {
     Same,
 }
 
-/// What the surface is coloured by.
+/// Source of the surface's colour.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -59,11 +59,11 @@ pub enum ColorMode {
     Plain,
     /// World coordinate along the cloud's up axis.
     Height,
-    /// A colour for each class of field `Classification`, by the ASPRS table.
+    /// A colour per class of the field `Classification`, by the ASPRS table.
     Classification,
     /// A scalar field by name, letter case ignored; `Intensity` is one.
     Field(String),
-    /// World-space normal, each component from -1..1 to 0..1.
+    /// World-space normal, each component mapped from -1..1 to 0..1.
     Normal,
     /// Surface variation λ0/(λ0+λ1+λ2), 0 (flat) to 1/3.
     Curvature,
@@ -76,7 +76,7 @@ pub enum ColorMode {
 }
 
 impl ColorMode {
-    /// The colour map that suits it, if it shows a value.
+    /// The usual colour map of the mode, if it shows a value.
     pub fn usual_map(&self) -> Option<ColorMap> {
         match self {
             Self::Height | Self::Depth => Some(ColorMap::Viridis),
@@ -87,7 +87,7 @@ impl ColorMode {
         }
     }
 
-    /// What a legend calls it.
+    /// Title in a legend.
     pub fn title(&self) -> String {
         match self {
             Self::Field(name) => name.clone(),
@@ -97,7 +97,7 @@ impl ColorMode {
     }
 }
 
-/// Colours for scalar values.
+/// Colour map for values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -110,11 +110,11 @@ pub enum ColorMap {
     Turbo,
     /// Black to white.
     Gray,
-    /// Pale grey over orange to dark red: the high end is a warning. The one for radii.
+    /// Pale grey over orange to dark red: the high end is a warning. The usual one for radii.
     Reds,
 }
 
-/// What is seen where no surface is. Colours are sRGB, 8 bits a channel.
+/// What to show where no surface is. Colours are sRGB, 8 bits a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Background {

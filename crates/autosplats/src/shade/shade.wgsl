@@ -1,5 +1,5 @@
-// Colours each pixel: base colour, light, occlusion; the background where no surface is; at edges a part of the
-// neighbour's colour [Paper, §7]. `occlusion.rs` and `edges.rs` tell how.
+// Shades each pixel: base colour, light and occlusion, the background where no surface is, and at edges a part of the
+// neighbour's colour [Paper, §7]. The CPU form is `cpu.rs`, `occlusion.rs` and `edges.rs`.
 //
 // Reads: surface, cover, extras, counters, color_map, tables. Writes: image, linear.
 
@@ -16,25 +16,26 @@
 @group(0) @binding(3) var<storage, read> cover: array<Cover>;
 @group(0) @binding(4) var<storage, read> extras: array<vec4f>;
 @group(0) @binding(5) var<storage, read> counters: array<u32>;
-// Linear colours from the lower end of the range to the upper.
+// Linear colours of the map, from its lower end to its upper end.
 @group(0) @binding(6) var<storage, read> color_map: array<vec4f>;
-// sRGB of the steps of linear light, four to a word; then the background of each row.
+// Table from linear light to sRGB, four steps to a word; then the background of each row.
 @group(0) @binding(7) var<storage, read> tables: array<u32>;
 @group(0) @binding(8) var<storage, read_write> image: array<u32>;
 @group(0) @binding(9) var<storage, read_write> linear: array<vec4f>;
 
-// Whether backs are told apart; light and colour left on them.
+// Whether backs are toned; shares of light and of colour left on them.
 override BACKS: bool;
 override BACK_LIGHT: f32;
 override BACK_COLOR: f32;
 
-// Weights of red, green and blue in how bright a linear colour is.
+// Weights of red, green and blue in the brightness of a linear colour.
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
 
-// How far from a border it is seen where the surface comes from, in pixels.
+// Distance from a border, in pixels, at which the inner depth and normal are read.
 override INWARD: i32;
 
-// The colour of a value; one that is unknown gets the lower end's, and a range of no width is all middle.
+// The linear colour of a value. An unknown value gets the colour of the lower end; in a range without width every value
+// gets the middle colour.
 fn map_color(value: f32) -> vec3f {
     var range = shading.range;
     if shading.find_range == 1u {
@@ -61,7 +62,7 @@ fn base_color(pixel: vec2u, index: u32, surface_here: vec4f) -> vec3f {
     return shading.clay;
 }
 
-// The colour of a surface that shows its back as far as the pixel says.
+// The colour toned by the pixel's share of back.
 fn tone_back(color: vec3f, index: u32) -> vec3f {
     if !BACKS {
         return color;
@@ -78,17 +79,17 @@ fn light(normal: vec3f) -> vec3f {
     return shading.given_light.x + shading.given_light.y * sum;
 }
 
-// A lit colour as it is shown.
+// A lit colour as shown, compressed above the shoulder.
 fn tone(color: vec3f) -> vec3f {
     let above = max(color - shading.shoulder, vec3f(0.0)) / (1.0 - shading.shoulder);
     return min(color, vec3f(shading.shoulder)) + (1.0 - shading.shoulder) * above / (1.0 + above);
 }
 
-// Deeper than any surface: a number, because devices need not know infinity.
+// Deeper than any surface. A finite number, because devices need not support infinity.
 const NOTHING = 1e30;
 
 fn is_inside(pixel: vec2i) -> bool {
-    // Beyond the left and upper edges it wraps around, to beyond the others.
+    // Pixels beyond the left and upper edges wrap around to beyond the others.
     let at = vec2u(pixel);
     return all(at < frame.picture);
 }
@@ -100,14 +101,15 @@ fn depth_at(pixel: vec2i) -> f32 {
     return select(NOTHING, min(depth, NOTHING), inside);
 }
 
-// How steeply the surface rises towards the eye, from a depth to one beside it.
+// Rise of the surface towards the eye from a depth to one beside it, as height by distance, limited as in
+// `occlusion.rs`.
 fn rise(depth: f32, there: f32, scale: f32) -> f32 {
     let steepest = shading.steepest;
     let slope = max((depth - there) * scale, -steepest);
     return min(slope, max(steepest * steepest / max(slope, shading.least_rise), shading.furthest));
 }
 
-// What a pair of pixels takes away of the light.
+// Share of the light that a pair of pixels takes away.
 fn pair_occlusion(index: u32, pixel: vec2i, depth: f32, pixels_per_unit: f32) -> f32 {
     let pair = shading.pairs[index];
     let step = vec2i(pair.xy);
@@ -118,10 +120,10 @@ fn pair_occlusion(index: u32, pixel: vec2i, depth: f32, pixels_per_unit: f32) ->
     return select(0.0, (1.0 - cosine) * 0.5 * pair.w, a + b > 0.0);
 }
 
-// How much light is left beside a surface nearby.
+// Light left by occlusion, 0 to 1.
 fn light_left(pixel: vec2i, depth: f32) -> f32 {
     let scale = 1.0 / pixel_size(depth);
-    // No loop, so that all are read at once.
+    // Unrolled, so that all depths are read at once.
     var occlusion = pair_occlusion(0u, pixel, depth, scale) + pair_occlusion(1u, pixel, depth, scale);
     occlusion += pair_occlusion(2u, pixel, depth, scale);
     occlusion += pair_occlusion(3u, pixel, depth, scale);
@@ -135,7 +137,7 @@ fn light_left(pixel: vec2i, depth: f32) -> f32 {
     return 1.0 / (1.0 + shadow + 0.5 * shadow * shadow);
 }
 
-// 1 if depth b lies behind a, -1 if before it, 0 if both may be one surface.
+// 1 if depth b lies behind a, -1 if in front, 0 if both may be one surface.
 fn edge_step(a: f32, b: f32) -> i32 {
     let behind = b > a * shading.edge_factor + shading.edge_offset;
     let before = a > b * shading.edge_factor + shading.edge_offset;
@@ -147,8 +149,8 @@ fn side_of(index: u32) -> vec2i {
     return select(vec2i(0, step), vec2i(step, 0), index >= 2u);
 }
 
-// The normal that light falls on: where the surface falls back towards its border but the normal there is tilted less towards
-// it than further in, that one. Away from edges nothing has to be looked at.
+// The normal that light falls on. The inner normal is taken at an edge where the surface falls back towards its border,
+// but its normal there is tilted less.
 fn outward_normal(pixel: vec2i, surface_here: vec4f, at_edge: bool) -> vec3f {
     var outward = vec2i(0);
     for (var index = select(4u, 0u, at_edge); index < 4u; index++) {
@@ -180,7 +182,7 @@ fn surface_color(pixel: vec2u, at_edge: bool) -> vec3f {
     return color;
 }
 
-// How far along a row of edges its end is, and 1 if it turns into the row of the pixel that asks.
+// Distance to the end of a row of edges, and 1 if the row turns into the pixel's own row there.
 fn edge_end(pixel: vec2i, side: vec2i, kind: i32, along: vec2i) -> vec2i {
     var last = vec2f(depth_at(pixel), depth_at(pixel + side));
     for (var distance = 1; distance <= shading.edge_search; distance++) {
@@ -200,7 +202,7 @@ fn edge_end(pixel: vec2i, side: vec2i, kind: i32, along: vec2i) -> vec2i {
     return vec2i(shading.edge_search, 0);
 }
 
-// What the border takes of a pixel on the way to one of its ends.
+// Part of a pixel that the border cuts off towards one of its ends.
 fn part_beside(end: vec2i, length: f32) -> f32 {
     let high = 0.5 - f32(end.x - 1) / length;
     let low = 0.5 - f32(end.x) / length;
@@ -208,7 +210,7 @@ fn part_beside(end: vec2i, length: f32) -> f32 {
     return select(0.0, cut, end.y == 1);
 }
 
-// How much of a pixel its neighbour takes.
+// Part of a pixel that its neighbour takes, 0 to 1.
 fn part_of(side: vec2i, pixel: vec2i) -> f32 {
     let kind = edge_step(depth_at(pixel), depth_at(pixel + side));
     var part = 0.0;
@@ -221,7 +223,7 @@ fn part_of(side: vec2i, pixel: vec2i) -> f32 {
     return part;
 }
 
-// What a pixel shows of which a part is covered in one colour and the rest is background.
+// Word of a pixel of which `part` is covered in one colour and the rest is background.
 fn over(color: vec3f, part: f32, background: u32) -> u32 {
     if background == 0u {
         return encode_color(color, shading.encode_steps) | (u32(part * 255.0 + 0.5) << 24u);
@@ -242,15 +244,15 @@ fn put(pixel: vec2u, color: vec3f, rgba: u32) {
     }
 }
 
-// A workgroup shades 32 by 8 pixels, whole cache lines of the image and few rows of neighbours; an invocation four of them, two
-// rows apart.
+// A workgroup shades 32 by 8 pixels: whole cache lines of the image, and few rows of neighbours. An invocation shades
+// four pixels, two rows apart.
 @compute @workgroup_size(32, 2)
 fn shade(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_id) local: vec3u) {
     let columns = (frame.picture.x + 31u) / 32u;
     let group = divide(group_index(workgroup), columns);
     let first = group.yx * vec2u(32u, 8u) + local.xy;
-    // Background first; which of the pixels show more become bits. A software device runs both sides of a branch but a
-    // loop only as often as it must: so where nothing is covered little is computed in vain.
+    // Background first; bits mark the pixels that show more. A software device runs both sides of a branch, but a loop
+    // only as often as needed. So little is computed in vain where nothing is covered.
     var shows = 0u;
     var edges = 0u;
     for (var step = 0u; step < 4u; step++) {

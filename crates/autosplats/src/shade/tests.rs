@@ -1,4 +1,4 @@
-//! Direct checks of pictures small enough to write down.
+//! Tests on pictures small enough to write down.
 
 use autosplats_cloud::glam::DVec3;
 
@@ -45,7 +45,7 @@ fn exposed(layers: &GBuffer, shading: &Shading, exposure: f32) -> Image {
     image
 }
 
-/// Without light, so that colours are what they are.
+/// Settings without light, so that colours are shown unchanged.
 fn flat(color: ColorMode) -> Shading {
     Shading { color, lighting: false, occlusion: 0.0, background: Background::Transparent, ..Shading::default() }
 }
@@ -97,10 +97,10 @@ fn values_take_the_colors_of_their_map() {
     for (pixel, expected) in [0u8, 128, 255, 0, 255, 0, 255, 0].into_iter().enumerate() {
         let [r, g, b, a] = image.pixels[pixel / 4 * 8 + pixel % 4];
         assert!(r == g && g == b && a == 255, "value {}: gray", values[pixel]);
-        // Half of 1023 steps is no step.
+        // Half of the range lies between two of the 1024 steps.
         assert!(r.abs_diff(expected) <= 1, "value {}: {r}, not {expected}", values[pixel]);
     }
-    // The usual range leaves out what is not finite; nothing at all to see is no reason to fail.
+    // The usual range excludes values that are not finite. A picture without any finite value must not fail.
     for scalar in [f32::NAN, f32::INFINITY, 3.0] {
         layers.scalar.fill(scalar);
         shaded(&layers, &flat(field.clone()));
@@ -111,8 +111,7 @@ fn values_take_the_colors_of_their_map() {
 fn normals_and_depth_are_shown_as_documented() {
     let layers = half_a_wall([8, 4]);
     let normal = shaded(&layers, &flat(ColorMode::Normal)).pixels[0];
-    // View z is world z here: -1 becomes 0.
-    // Half of 255 is no step.
+    // View z is world z here: -1 becomes 0. Half of the range lies between two of the 256 steps.
     let near = [128u8, 128, 0, 255].iter().zip(normal).all(|(expected, value)| value.abs_diff(*expected) <= 1);
     assert!(near, "a normal of (0, 0, -1) is shown as {normal:?}");
     let depth = Shading { range: Some([1.0, 3.0]), color_map: Some(ColorMap::Gray), ..flat(ColorMode::Depth) };
@@ -185,7 +184,7 @@ fn backs_are_darker_and_greyer_if_asked_for_and_known() {
 fn occlusion_darkens_behind_a_step_only() {
     let mut layers = half_a_wall([8, 4]);
     for y in 0..4 {
-        // The two leftmost columns stand well before the others.
+        // The two leftmost columns stand well in front of the others.
         for x in 0..2 {
             let index = layers.index(x, y);
             layers.depth[index] = 1.0;
@@ -220,7 +219,7 @@ fn legend_fits_or_is_left_out() {
     assert!(drawn >= 8, "large pictures have legends: {drawn}");
 }
 
-/// A surface at depth 2 that faces the eye, where `inside` says so of a pixel's middle.
+/// A surface at depth 2 that faces the eye, at pixels whose middle is `inside`.
 fn wall(size: [u32; 2], inside: impl Fn(f32, f32) -> bool) -> GBuffer {
     let mut layers = half_a_wall(size);
     for pixel in 0..(size[0] * size[1]) as usize {
@@ -249,7 +248,7 @@ fn silhouettes_are_smooth_and_data_is_not() {
         assert_eq!(clear.linear[at] != [0.0; 3], covered, "linear light at ({x}, {y}) is not mixed");
     }
     assert!(soft > 24, "{soft} pixels are covered in part");
-    // The same over a colour, in linear light.
+    // The same picture over a colour, blended in linear light.
     let over = shaded(&layers, &Shading { background: Background::Color([200, 20, 90]), ..flat(ColorMode::Plain) });
     for (over, clear) in over.pixels.iter().zip(&clear.pixels) {
         for (i, behind) in [200, 20, 90].into_iter().enumerate() {
@@ -264,7 +263,7 @@ fn silhouettes_are_smooth_and_data_is_not() {
 
 #[test]
 fn borders_do_not_catch_the_light_of_the_other_side() {
-    // A cylinder, upright, whose right border is turned away from the key light by a little.
+    // An upright cylinder whose right border is turned slightly away from the key light.
     let size = [40, 9];
     let mut layers = wall(size, |x, _| (10.0..30.0).contains(&x));
     let unit = view(size).pixel_size(2.0);
@@ -278,7 +277,7 @@ fn borders_do_not_catch_the_light_of_the_other_side() {
     let right = shaded(&layers, &Shading::default());
     let at = 4 * 40 + 29;
     let brightness = |image: &Image| image.linear[at].iter().sum::<f32>();
-    // A little less tilted than three pixels further in may be how it is.
+    // A normal tilted a little less than one three pixels further in may be right.
     let [inner, ..] = layers.normal[layers.index(26, 4)];
     let tilted = |component: f32| [component, 0.0, -(1.0 - component * component).sqrt()];
     layers.normal[border] = tilted(inner - 0.2);
@@ -286,13 +285,14 @@ fn borders_do_not_catch_the_light_of_the_other_side() {
     layers.normal[border] = tilted(inner);
     let as_inside = brightness(&shaded(&layers, &Shading::default()));
     assert!(kept > 1.1 * as_inside, "{kept} and {as_inside}");
-    // Beyond edge on, normals that face the eye point the other way; with those before it they make some that face it.
+    // Normals of a surface that looks away point to the other side when turned to the eye. Averaged with right ones
+    // they face the eye.
     for wrong in [[-0.98, 0.0, -0.2], [-0.2, 0.0, -0.98]] {
         layers.normal[border] = wrong;
         let turned = brightness(&shaded(&layers, &Shading::default()));
         assert!(turned < 1.3 * brightness(&right), "{wrong:?}: {turned} and {}", brightness(&right));
     }
-    // One that rises towards its border, as a sheet may, is left alone.
+    // A surface that rises towards its border, as a sheet may, keeps its normals.
     for x in 10..30 {
         let index = layers.index(x, 4);
         layers.depth[index] = 2.0 + unit * (30 - x) as f32;

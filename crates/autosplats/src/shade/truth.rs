@@ -1,4 +1,4 @@
-//! Pictures of scenes against the exact surface, sampled many times a pixel.
+//! Pictures of scenes against the exact surface, with several samples per pixel.
 
 use std::array::from_fn;
 
@@ -19,20 +19,20 @@ const BEHIND: [u8; 3] = [60, 66, 75];
 struct Picture(Vec<[f32; 3]>);
 
 impl Picture {
-    /// Those of a picture `factor` times as wide and high that make a pixel of one `width` wide.
+    /// Pixels of a picture `factor` times as wide and high that form `pixel` of a picture `width` wide.
     fn samples(&self, pixel: usize, width: usize, factor: usize) -> impl Iterator<Item = [f32; 3]> + Clone {
         let [x, y] = [pixel % width * factor, pixel / width * factor];
         (0..factor * factor).map(move |i| self.0[(y + i / factor) * width * factor + x + i % factor])
     }
 
-    /// The same picture, `width` wide, of means of `factor`² pixels each.
+    /// The picture averaged to `width` pixels wide; each pixel is the mean of `factor`² pixels.
     fn averaged(&self, width: usize, factor: usize) -> Self {
         let count = factor * factor;
         let channel = |pixel, i| self.samples(pixel, width, factor).map(|color| color[i]).sum::<f32>() / count as f32;
         Self((0..self.0.len() / count).map(|pixel| from_fn(|i| channel(pixel, i))).collect())
     }
 
-    /// In decibels, of a whole brightness of 1 in sRGB, which is about what the eye sees.
+    /// PSNR in decibels of sRGB values, which are about what the eye perceives; the peak is 1.
     fn psnr(&self, truth: &Self, counts: &[bool]) -> f64 {
         let error = |(a, b): (&[f32; 3], &[f32; 3])| -> f64 {
             (0..3).map(|i| f64::from(srgb(a[i]) - srgb(b[i])).powi(2)).sum::<f64>() / 3.0
@@ -70,7 +70,7 @@ fn traced(exact: &ExactScene, camera: &Camera, [width, height]: [u32; 2]) -> GBu
     layers
 }
 
-/// The same picture with its edges blended and as it would be without.
+/// The picture with blended edges, and without blending.
 fn pictures(image: &Image, layers: &GBuffer) -> [Picture; 2] {
     let steps = linear_steps();
     let behind = BEHIND.map(|channel| steps[channel as usize]);
@@ -86,7 +86,7 @@ struct Quality {
     plain: f64,
 }
 
-/// The quality of a scene's picture where there are silhouettes or steps, from points and from the exact surface.
+/// Quality of a scene's picture at silhouettes and steps, from points and from the exact surface.
 fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
     let (exact, count) = ExactScene::parse(name).expect("a scene");
     let seen = exact.view();
@@ -111,7 +111,7 @@ fn measure(name: &str, size: [u32; 2]) -> [Quality; 2] {
     let [_, fine] = pictures(&shaded(&fine), &fine);
     let [width, height] = size.map(|side| side as usize);
     let truth = fine.averaged(width, SAMPLES as usize);
-    // Where samples differ by much there is an edge.
+    // Pixels whose samples differ by much are at an edge.
     let edges: Vec<bool> = (0..width * height)
         .map(|pixel| {
             let bright = fine.samples(pixel, width, SAMPLES as usize).map(|color| srgb(color[1]));

@@ -1,4 +1,4 @@
-//! What is left to do on the host for a picture in memory.
+//! The host's last steps for a picture in memory.
 
 use rayon::prelude::*;
 
@@ -7,20 +7,20 @@ use super::super::cpu::{Scene, encode, encode_table};
 use super::super::{Image, Shading, legend};
 use super::pitch;
 
-/// A picture as it was read back.
+/// A picture as read back.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReadPicture<'a> {
     pub(crate) size: [u32; 2],
     /// Bytes of [`ShadeBuffers::image`](super::ShadeBuffers::image).
     pub(crate) image: &'a [u8],
-    /// Bytes of [`ShadeBuffers::linear`](super::ShadeBuffers::linear); none if it was not wanted.
+    /// Bytes of [`ShadeBuffers::linear`](super::ShadeBuffers::linear); empty if not requested.
     pub(crate) linear: &'a [u8],
-    /// The counters `RangeLow` and `RangeHigh`: looked at if the range was to be found.
+    /// The counters `RangeLow` and `RangeHigh`; used only if the range is not given.
     pub(crate) range: [u32; 2],
 }
 
-/// Brings a picture into the host's form and draws its legend. Says between which values the colour map lies, where the
-/// colour mode has one.
+/// Converts a picture to the host's form and draws its legend. Returns the range of the colour map in world values, if
+/// the colour mode has one.
 pub(crate) fn finish(
     read: &ReadPicture<'_>,
     scene: &Scene<'_>,

@@ -1,4 +1,4 @@
-//! Shading on the GPU against that on the CPU, from the same layers.
+//! Shading on the GPU against the CPU, from the same layers.
 
 use std::cell::RefCell;
 
@@ -15,13 +15,13 @@ use crate::splat::{GBuffer, upload_layers};
 use crate::test_clouds::{self, EYE, Random};
 use crate::{Renderer, Settings};
 
-/// A device with what shading takes on it.
+/// A device with its shading passes.
 struct Device {
     gpu: Gpu,
     passes: RefCell<ShadePasses>,
 }
 
-/// What the device made of layers.
+/// The device's result.
 struct Shaded {
     image: Image,
     range: [u32; 2],
@@ -81,14 +81,14 @@ fn on_host(layers: &GBuffer, scene: &Scene<'_>, shading: &Shading, keep_linear: 
     image
 }
 
-/// How far two pictures are apart.
+/// Difference of two pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Difference {
-    /// Greatest of a channel, in 255ths.
+    /// Largest difference of a channel, in 255ths.
     worst: u8,
-    /// Share of pixels with any.
+    /// Share of pixels that differ.
     share: f64,
-    /// Greatest of a channel in linear light.
+    /// Largest difference of a channel in linear light.
     linear: f32,
 }
 
@@ -101,7 +101,7 @@ fn difference(a: &Image, b: &Image) -> Difference {
     Difference {
         worst: pixels.iter().copied().max().unwrap_or_default(),
         share: pixels.iter().filter(|&&pixel| pixel > 0).count() as f64 / pixels.len().max(1) as f64,
-        // What is not a number in one only is as far as can be.
+        // NaN in only one picture is the largest difference.
         linear: linear
             .map(|(a, b)| if a.to_bits() == b.to_bits() { 0.0 } else { (a - b).abs() })
             .fold(0.0, |a, b| if b <= a { a } else { b }),
@@ -110,12 +110,12 @@ fn difference(a: &Image, b: &Image) -> Difference {
 
 fn assert_same(host: &Image, device: &Image, shading: &Shading, case: &str) {
     let found = difference(host, device);
-    // Divisions, powers and fused sums may be off by some units in the last place, which moves a channel over the border
-    // between two of 255 steps, and a value over that between two steps of a colour map: of 1024 steps the steepest, those
-    // of Turbo, are two of 255 apart, or 0.02 in linear light.
+    // Divisions, powers and fused sums may be off by a few units in the last place. That may move a channel across one
+    // of 255 steps, or a value across one of the 1024 steps of a colour map. The steepest steps, those of Turbo, are
+    // two of 255 apart, or 0.02 in linear light.
     let (worst, linear) = if shading.color.usual_map().is_some() { (2, 0.02) } else { (1, 1e-5) };
     assert!(found.worst <= worst && found.linear <= linear, "{case}: {found:?}");
-    // Some pixels are many where there are few.
+    // In small pictures a few pixels are a large share.
     let few = 3.0 / host.pixels.len() as f64;
     assert!(found.share <= f64::max(1e-3, few), "{case}: {found:?}");
 }
@@ -125,7 +125,7 @@ fn layers_of(size: [u32; 2]) -> GBuffer {
     GBuffer::new(width, height)
 }
 
-/// Blocks of pixels at any depth and under any light, some of them empty, with every layer but colour.
+/// Blocks of pixels with random depths and normals, some of them empty, with every layer but colour.
 fn blocks(seed: u64, size: [u32; 2]) -> GBuffer {
     let mut random = Random::new(seed);
     let mut layers = layers_of(size);
@@ -154,7 +154,7 @@ fn blocks(seed: u64, size: [u32; 2]) -> GBuffer {
     layers
 }
 
-/// The same with colours.
+/// Blocks with colours.
 fn colored(seed: u64, size: [u32; 2]) -> GBuffer {
     let mut random = Random::new(seed ^ 77);
     let mut layers = blocks(seed, size);
@@ -162,14 +162,14 @@ fn colored(seed: u64, size: [u32; 2]) -> GBuffer {
     layers
 }
 
-/// The same with any shares of backs.
+/// The layers with random shares of back.
 fn with_backs(layers: GBuffer) -> GBuffer {
     let mut random = Random::new(78);
     let back = layers.weight.iter().map(|_| (2.0 * random.unit() - 0.5).clamp(0.0, 1.0)).collect();
     GBuffer { back, ..layers }
 }
 
-/// Colours and backs alone.
+/// The layers without measures.
 fn without_measures(layers: GBuffer) -> GBuffer {
     GBuffer { radius: Vec::new(), k_radius: Vec::new(), curvature: Vec::new(), ..layers }
 }
@@ -215,7 +215,7 @@ fn every_setting_makes_the_same_picture() {
             {
                 for color in modes() {
                     for [lighting, occlusion, ranged] in [[0, 0, 0], [1, 0, 1], [0, 1, 1], [1, 1, 0]] {
-                        // The settings without influence on each other go round.
+                        // Settings that do not influence each other take turns.
                         seed += 1;
                         let shading = Shading {
                             color: color.clone(),
@@ -223,7 +223,7 @@ fn every_setting_makes_the_same_picture() {
                             color_map: MAPS[seed % MAPS.len()],
                             legend: seed.is_multiple_of(2),
                             lighting: lighting == 1,
-                            // What the scene says counts.
+                            // The scene's exposure counts.
                             exposure: None,
                             occlusion: [0.0, 1.5][occlusion],
                             backs: if seed.is_multiple_of(3) { Backs::Same } else { Backs::Toned },
@@ -317,7 +317,7 @@ fn ranges_are_those_of_sorted_values() {
                 2 => [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][random.below(3)],
                 3 => -7.25,
                 4 => [-0.0, 0.0][random.below(2)],
-                // The greatest share their first bytes with what stands for no value.
+                // The greatest values share their first byte with `NO_KEY`.
                 5 => [f32::NAN, f32::MAX, f32::MIN, 1.0, 2.9e38, -2.9e38][random.below(6)],
                 _ => 100.0 + random.unit() * random.unit(),
             };
@@ -388,7 +388,7 @@ fn textures_get_the_picture() {
         let read = device.run(&layers, &scene, &shading, false, format, |buffers, _| {
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             buffers.copy_to_texture(&mut encoder, &target).expect("a texture that fits");
-            // Back into a buffer like the one it came from.
+            // Copies the texture back into a buffer like the original.
             let back = gpu.storage::<u8>("read back", buffers.image.size() as usize).expect("room");
             let layout =
                 wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * pitch(97)), rows_per_image: None };
@@ -430,7 +430,7 @@ fn tables_follow_the_settings() {
     let depth = Shading { color: ColorMode::Depth, ..Shading::default() };
     let mut passes = device.passes.borrow_mut();
     let steps = passes.steps(gpu, &frame, &layers, &counters, &buffers, &depth).expect("passes");
-    // The same buffers and steps, frame after frame.
+    // One set of buffers and steps serves frame after frame.
     for (color_map, background) in MAPS.into_iter().zip(BACKGROUNDS.into_iter().cycle()).cycle().take(8) {
         let shading = Shading { color_map, background, ..depth.clone() };
         buffers.write(gpu, &ShadeUniform::new(&scene, &shading, &layers, false), &shading);

@@ -1,11 +1,11 @@
-//! Pictures into textures that somebody else made.
+//! Copying pictures into the caller's textures.
 
 use wgpu::TextureFormat::{Bgra8Unorm, Bgra8UnormSrgb, Rgba8Unorm, Rgba8UnormSrgb};
 
 use super::{ShadeBuffers, pitch};
 use crate::Error;
 
-/// Whether bytes of a texture are blue, green, red.
+/// Whether the bytes of a format are in the order blue, green, red.
 pub(super) fn swaps_red_blue(format: wgpu::TextureFormat) -> bool {
     matches!(format, Bgra8Unorm | Bgra8UnormSrgb)
 }
@@ -13,7 +13,7 @@ pub(super) fn swaps_red_blue(format: wgpu::TextureFormat) -> bool {
 /// Checks that a picture of `size` can be copied into `texture`.
 ///
 /// # Errors
-/// [`Error::Texture`] says what is wrong with it.
+/// [`Error::Texture`] with the reason.
 pub(crate) fn check_texture(texture: &wgpu::Texture, size: [u32; 2]) -> Result<(), Error> {
     let wrong = |what: String| Err(Error::Texture(what));
     let format = texture.format();
@@ -34,8 +34,9 @@ pub(crate) fn check_texture(texture: &wgpu::Texture, size: [u32; 2]) -> Result<(
 }
 
 impl ShadeBuffers {
-    /// Copies the picture into a texture of the format that [`ShadeUniform::into_format`](super::ShadeUniform::into_format)
-    /// was told; sRGB formats show it as the others do, its bytes are sRGB.
+    /// Copies the picture into a texture whose format was given to
+    /// [`ShadeUniform::into_format`](super::ShadeUniform::into_format). The picture's bytes are sRGB; sRGB and plain
+    /// formats get the same bytes.
     ///
     /// # Errors
     /// Those of [`check_texture`].

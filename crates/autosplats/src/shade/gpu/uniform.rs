@@ -1,4 +1,4 @@
-//! What the passes of shading are told.
+//! Uniform of the shading passes.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -10,7 +10,7 @@ use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
 use crate::splat::{Channels, LayerBuffers};
 
-/// What a surface is coloured by, as `shared/shading.wgsl` has it; from [`Height`](Self::Height) on these are values.
+/// What colours a surface, numbered as in `shared/shading.wgsl`; from [`Height`](Self::Height) on these are values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the colour modes, resolved")]
 pub(crate) enum Shown {
@@ -41,7 +41,7 @@ impl Shown {
     }
 }
 
-/// The settings and constants of shading, as `shared/shading.wgsl` has them.
+/// Settings and constants of shading, in the layout of `shared/shading.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct ShadeUniform {
@@ -78,13 +78,13 @@ pub(crate) struct ShadeUniform {
     pub(crate) pairs: [[f32; 4]; PAIR_COUNT],
 }
 
-/// Whether the range of values is to be found among them.
+/// Whether the range has to be found from the values.
 pub(crate) fn finds_range(shading: &Shading) -> bool {
     shading.color.usual_map().is_some() && shading.range.is_none()
 }
 
 impl ShadeUniform {
-    /// For a picture from `layers`; also in linear light if `keep_linear`.
+    /// The uniform for a picture from `layers`, also in linear light if `keep_linear`.
     pub(crate) fn new(scene: &Scene<'_>, shading: &Shading, layers: &LayerBuffers, keep_linear: bool) -> Self {
         let [width, height] = [scene.view.width, scene.view.height];
         let pixels = width as usize * height as usize;
@@ -129,7 +129,7 @@ impl ShadeUniform {
         }
     }
 
-    /// The same for a texture of this format.
+    /// The uniform for a texture of this format.
     #[must_use]
     pub(crate) fn into_format(self, format: wgpu::TextureFormat) -> Self {
         let swap_red_blue = super::texture::swaps_red_blue(format).into();

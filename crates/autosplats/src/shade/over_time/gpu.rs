@@ -1,4 +1,5 @@
-//! The same on the GPU: an invocation per pixel, which looks back, and one that keeps it.
+//! Temporal smoothing of pictures on the GPU: a pass that looks back and one that keeps the picture, an invocation per
+//! pixel.
 
 use super::{LEAST_SEEN, SAME_PX, SHARE};
 use crate::Error;
@@ -15,17 +16,17 @@ const KEEP_PICTURE: PassSource = PassSource::new("shade/over_time/keep_picture",
 /// Invocations in a workgroup.
 const GROUP: u32 = 256;
 
-/// What the last picture leaves for the next one.
+/// State that the last picture leaves for the next one.
 #[derive(Debug)]
 pub(crate) struct LastPictureBuffers {
-    /// Row by row; infinite where no surface is.
+    /// Depths row by row; infinite where no surface is.
     depths: wgpu::Buffer,
     /// RGBA per pixel, 8 bits a channel, rows without gaps.
     image: wgpu::Buffer,
 }
 
 impl LastPictureBuffers {
-    /// Room for a picture of `size`.
+    /// Buffers for a picture of `size`.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`], [`Error::DeviceMemory`] if the device has too little.
@@ -46,7 +47,7 @@ pub(crate) struct PictureOverTimePasses {
 }
 
 impl PictureOverTimePasses {
-    /// Compiles them.
+    /// Compiles the passes.
     ///
     /// # Errors
     /// [`Error::Device`].
@@ -62,7 +63,7 @@ impl PictureOverTimePasses {
         Ok(Self { average: Pass::new(gpu, &OVER_TIME, &average)?, keep: Pass::new(gpu, &KEEP_PICTURE, &[row_pixels])? })
     }
 
-    /// Averages a picture that was shaded with the last one, and keeps it.
+    /// Averages a shaded picture with the last one, and keeps the result.
     pub(crate) fn steps(
         &self,
         gpu: &Gpu,

@@ -12,7 +12,7 @@
 @group(0) @binding(3) var<storage, read_write> past_depths: array<f32>;
 @group(0) @binding(4) var<storage, read_write> past_image: array<u32>;
 
-// Rows of the image begin at multiples of so many pixels.
+// Alignment of the image's rows in pixels.
 override ROW_PIXELS: u32;
 
 @compute @workgroup_size(256)

@@ -1,14 +1,15 @@
-//! Temporal smoothing of pictures: what a surface shows now, and showed in the last picture, each by half.
+//! Temporal smoothing of pictures: each pixel is the mean of its surface now and in the last picture.
 //!
-//! A far surface has more points than pixels, and each picture shows others of them: detail finer than pixels flickers, as it does in
-//! a picture of one ray a pixel. Pictures that follow each other know more of it together than each alone. So where the surface of a
-//! pixel was seen in the last picture, at the same depth within [`SAME_PX`] pixels, the pixel becomes the mean of both, in linear
-//! light; as the last one was such a mean itself, older pictures fade by half with each. More of the past would be steadier than
-//! the truth, in which light goes with the camera, and blur: the lit picture of a clean bunny lost 4.6 dB with up to seven eighths
-//! of it. Here it gains where detail is fine, and loses 0.1 dB where all is smooth.
+//! A far surface has more points than pixels, and each picture shows others of them. So detail finer than pixels
+//! flickers, as in a picture of one ray a pixel. Successive pictures together contain more detail than each alone. The
+//! last picture must have shown the pixel's surface at the same depth within [`SAME_PX`] pixels. Then the pixel becomes
+//! the mean of both, in linear light. The last picture is such a mean itself, so the weight of older pictures halves
+//! with each one. A larger share of the past would be steadier than the truth, in which light moves with the camera,
+//! and would blur. See docs/decisions/0014-frame-to-frame.md.
 //!
-//! Only pictures of the same points and settings follow each other, and only where those are to be averaged
-//! ([`Reconstruction::steady`](crate::Reconstruction::steady)). Layers, and the image in linear light, stay as they were made.
+//! Only pictures of the same points and settings are averaged, and only where requested
+//! ([`Reconstruction::steady`](crate::Reconstruction::steady)). Layers, and the image in linear light, are not
+//! averaged.
 
 pub(crate) mod gpu;
 #[cfg(test)]
@@ -21,35 +22,35 @@ use crate::camera::{Reprojection, Seen, View};
 use crate::shade::cpu::{encode, encode_table};
 use crate::splat::GBuffer;
 
-/// How much of a pixel is the past.
+/// Share of the last picture in a pixel, 0 to 1.
 pub(super) const SHARE: f32 = 0.5;
-/// Difference in depth, in pixels, up to which a surface is the same.
+/// Largest difference in depth of the same surface, in pixels.
 pub(super) const SAME_PX: f32 = 3.0;
-/// Of the four pixels around the place where a pixel's surface was, those that showed it must have this much of the weight.
+/// Least share, in the bilinear weights of the last picture's four pixels, of pixels that showed the same surface.
 pub(super) const LEAST_SEEN: f32 = 0.1;
 
-/// The last picture, made by settings `M`, as far as the next one looks back at it; keeps its buffers.
+/// State that the last picture, made with settings `M`, leaves for the next one. Keeps its buffers.
 #[derive(Debug)]
 pub(crate) struct LastPicture<M> {
-    /// How it was seen, the identity of its points, and how it was made; `None` if there is none to look back at.
+    /// View and origin of the last picture, identity of its points, and its settings; `None` without a last picture.
     made: Option<(Seen, u64, M)>,
     kept: Kept,
 }
 
-/// What a picture leaves for the next one.
+/// Depths and colours of a picture, kept for the next one.
 #[derive(Debug, Default)]
 struct Kept {
-    /// Row by row; infinite where no surface is.
+    /// Depths row by row; infinite where no surface is.
     depths: Vec<f32>,
     pixels: Vec<[u8; 4]>,
 }
 
-/// A picture that follows others.
+/// A picture that begins, with its view into the last one.
 #[derive(Debug)]
 pub(crate) struct Following<'a> {
     last: &'a mut Kept,
     view: View,
-    /// Into the last picture, if that is one to be averaged with.
+    /// Reprojection into the last picture, if the two are to be averaged.
     past: Option<Reprojection>,
 }
 
@@ -60,19 +61,20 @@ impl<M> Default for LastPicture<M> {
 }
 
 impl<M: PartialEq> LastPicture<M> {
-    /// A picture begins that is seen and `made` like this, without a margin. What one that is given up leaves is forgotten.
+    /// Begins a picture with this view, without a margin, and these settings. The state of a picture that was given up
+    /// is dropped.
     pub(crate) fn begin(&mut self, now: Seen, identity: u64, made: &M) -> Following<'_> {
         let last = self.made.take().filter(|(_, points, before)| *points == identity && before == made);
         let past = last.and_then(|(then, ..)| Reprojection::new(&now, &then));
         Following { last: &mut self.kept, view: now.view, past }
     }
 
-    /// The picture that began is whole.
+    /// Completes the picture that began.
     pub(crate) fn end(&mut self, now: Seen, identity: u64, made: M) {
         self.made = Some((now, identity, made));
     }
 
-    /// Nothing is known of pictures before the next.
+    /// Forgets all earlier pictures.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
     }
@@ -112,12 +114,13 @@ impl Kept {
         });
     }
 
-    /// The colour, in linear light, of a surface at a depth and a place in the last picture, between the pixels that showed it.
+    /// Bilinear colour in linear light of the surface at a depth and a place in the last picture, from the pixels that
+    /// showed it.
     #[inline(always)]
     fn shown_at(&self, depth: f32, [x, y]: [f32; 2], view: &View, steps: &[f32; 256]) -> Option<[f32; 3]> {
         let [width, height] = [view.width as usize, view.height as usize];
         let [x, y] = [x - 0.5, y - 0.5];
-        // What is not a number is in no picture.
+        // NaN is in no picture.
         let inside = (x >= 0.0) & (y >= 0.0) & (x < width as f32 - 1.0) & (y < height as f32 - 1.0);
         if !(inside & (depth > view.near)) {
             return None;

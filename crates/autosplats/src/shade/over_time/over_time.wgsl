@@ -1,4 +1,4 @@
-// Averages the picture with the last one where the same surface was seen. The CPU form, `mod.rs`, says how.
+// Averages the picture with the last one where both show the same surface. The CPU form is `mod.rs`.
 //
 // Reads: surface, past_depths, past_image, tables. Reads and writes: image.
 
@@ -12,7 +12,7 @@
 @group(0) @binding(1) var<storage, read> surface: array<vec4f>;
 @group(0) @binding(2) var<storage, read> past_depths: array<f32>;
 @group(0) @binding(3) var<storage, read> past_image: array<u32>;
-// sRGB of the steps of linear light, four to a word.
+// Table from linear light to sRGB, four steps to a word.
 @group(0) @binding(4) var<storage, read> tables: array<u32>;
 @group(0) @binding(5) var<storage, read_write> image: array<u32>;
 
@@ -20,7 +20,7 @@ override SHARE: f32;
 override SAME_PX: f32;
 override LEAST_SEEN: f32;
 override ENCODE_STEPS: u32;
-// Rows of the image begin at multiples of so many pixels.
+// Alignment of the image's rows in pixels.
 override ROW_PIXELS: u32;
 
 // A pixel's channels in linear light.

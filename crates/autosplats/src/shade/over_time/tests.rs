@@ -4,13 +4,13 @@ use super::*;
 use crate::camera::{Camera, Projection};
 
 const SIZE: [u32; 2] = [8, 4];
-/// A pixel of the orthographic pictures here is one unit.
+/// Depth of a wall. One unit is one pixel of these orthographic pictures.
 const DEPTH: f32 = 100.0;
 const BLACK: [u8; 4] = [0, 0, 0, 255];
 const WHITE: [u8; 4] = [255; 4];
 const HALF: [u8; 4] = [188, 188, 188, 255];
 
-/// Seen from the front, so many pixels further right.
+/// A view from the front, moved right by this many pixels.
 fn seen(right: f64) -> Seen {
     let eye = DVec3::new(right, 0.0, 0.0);
     let camera = Camera {
@@ -34,7 +34,7 @@ fn wall(depth: f32) -> GBuffer {
     layers
 }
 
-/// Shows `layers` in one colour, after what `last` holds.
+/// Shows `layers` in one colour as the picture after `last`.
 fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen: Seen, settings: u32) -> Image {
     let pixels = vec![color; (SIZE[0] * SIZE[1]) as usize];
     let mut image = Image { width: SIZE[0], height: SIZE[1], pixels, linear: Vec::new() };
@@ -43,7 +43,8 @@ fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen:
     image
 }
 
-/// What the second row of pixels shows of a wall seen black and then white, further right, and by which settings: 0 are those of the black one.
+/// The second row of a picture of a white wall, further right and with these settings, after one of a black wall with
+/// settings 0.
 fn second_row(depths: [f32; 2], right: f64, settings: u32) -> Vec<[u8; 4]> {
     let mut last = LastPicture::default();
     let first = show(&mut last, (&wall(depths[0]), BLACK), seen(0.0), 0);
