@@ -16,8 +16,8 @@ pub(super) const DOT_RADIUS_PX: f32 = 0.71;
 /// Distance around a passive point, in first search radii, at which nearer surface must lie on all four sides for the
 /// point to stay hidden. Splats reach about this far over a silhouette, and refinement and trim remove that part again.
 /// The surface seen there in the end has to be reconstructed.
-// Differs from the paper: the paper asks at the point's own pixel only. Grid culling then changes more of a picture, and
-// leaves holes.
+// Differs from the paper: the paper asks at the point's own pixel only. Grid culling then changes more of a picture,
+// and leaves holes.
 pub(super) const RECOVER_REACH: f32 = 1.3;
 /// Cosine of the angle to the line of sight below which a disc is drawn as a dot, because its gradients are no longer
 /// reliable.

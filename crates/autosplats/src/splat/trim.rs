@@ -170,7 +170,7 @@ pub(super) struct Outline<'a> {
     pub(super) centers: &'a [u32],
     pub(super) sixteenths: &'a Sixteenths,
     pub(super) view: &'a View,
-    /// Blurred borders; `None` without noise.
+    /// State of borders that noise has blurred; `None` without noise.
     pub(super) blurred: Option<&'a Blurred>,
 }
 
