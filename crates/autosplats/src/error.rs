@@ -1,90 +1,90 @@
-//! What rendering and estimating normals can fail with.
+//! Errors of rendering and of normal estimation.
 
-/// Everything that rendering and estimating normals can fail with.
+/// Error of rendering or of normal estimation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The camera cannot see: its message says why.
+    /// The camera is unusable. The message names the invalid value.
     #[error("camera: {0}")]
     Camera(String),
-    /// A setting lies outside its range.
+    /// A setting is outside its range.
     #[error("{name} is {value}, must be {range}")]
     Setting {
-        /// Name of the field of [`Settings`](crate::Settings) or [`NormalSettings`](crate::NormalSettings).
+        /// Field of [`Settings`](crate::Settings) or [`NormalSettings`](crate::NormalSettings), or of a struct in it.
         name: &'static str,
-        /// Value given.
+        /// The invalid value.
         value: String,
-        /// What is allowed.
+        /// The valid range.
         range: &'static str,
     },
-    /// The image has no pixels or too many.
+    /// A side of the image is 0 or longer than [`MAX_SIDE`](crate::MAX_SIDE).
     #[error("image size {width}x{height}: each side must be within 1 to {}", crate::MAX_SIDE)]
     ImageSize {
-        /// Width asked for.
+        /// Requested width in pixels.
         width: u32,
-        /// Height asked for.
+        /// Requested height in pixels.
         height: u32,
     },
-    /// More points than a 32-bit index can name.
-    #[error("{0} points are more than the 4,294,967,295 that can be numbered; reduce the cloud first")]
+    /// The cloud has too many points for 32-bit indices; the value is their number.
+    #[error("{0} points are too many, the limit is 4,294,967,294; reduce the cloud first")]
     TooManyPoints(usize),
-    /// The colour mode needs an attribute that the cloud lacks.
+    /// The colour mode needs an attribute that the cloud does not have.
     #[error("the cloud has no {name}; it has {has}")]
     MissingAttribute {
-        /// What was asked for.
+        /// The attribute.
         name: String,
-        /// What there is instead.
+        /// The attributes that the cloud has.
         has: String,
     },
-    /// A layer to be shaded has not one value for each pixel, tile by tile.
-    #[error("the {layer} layer has {values} values, not {wanted}; GBuffer::new sizes layers")]
+    /// A layer to be shaded does not have one value per pixel of its tiles.
+    #[error("the {layer} layer has {values} values, must have {wanted}; create layers with GBuffer::new")]
     Layers {
-        /// Which.
+        /// Name of the layer.
         layer: &'static str,
-        /// Values that it has.
+        /// Number of values in the layer.
         values: usize,
-        /// Values that it has to have.
+        /// Required number of values.
         wanted: usize,
     },
-    /// No surface would be seen: its message says why.
+    /// No surface would be visible. The message says why.
     #[error("nothing to show: {0}")]
     NothingVisible(String),
-    /// There is no GPU to render on, or it cannot do what is needed: its message says why.
+    /// No GPU is available, or the device cannot do what is needed. The message says why.
     #[error("GPU: {0}")]
     Device(String),
-    /// The GPU binds no buffer as large as the frame needs.
+    /// The frame needs a larger buffer than the GPU can bind.
     #[error(
         "GPU: {what} takes {needed} bytes, the device allows {allowed}; use a smaller picture or cloud, or the CPU backend"
     )]
     DeviceLimit {
-        /// What the buffer holds.
+        /// Content of the buffer.
         what: &'static str,
-        /// Bytes it takes.
+        /// Required size in bytes.
         needed: u64,
-        /// Bytes the device allows.
+        /// Largest size in bytes that the device allows.
         allowed: u64,
     },
-    /// The GPU has no memory left for so many bytes, where the number is known.
+    /// The GPU is out of memory. The value is the size of the failed allocation in bytes, if known.
     #[error("GPU: out of memory{}; use a smaller picture or cloud, or the CPU backend",
         .0.map(|bytes| format!(" for {bytes} bytes")).unwrap_or_default())]
     DeviceMemory(Option<u64>),
-    /// The GPU stopped working, by its driver's message; a new renderer may find it working again.
+    /// The GPU stopped working; the value is the driver's message. A new renderer may work again.
     #[error("GPU: the device was lost: {0}; make a new renderer, or use the CPU backend")]
     DeviceLost(String),
-    /// Normals given for a cloud do not belong to it.
-    #[error("normals, curvatures and radii must be one of each per point: {given} {what} for {points} points")]
+    /// Normals, curvatures or radii given with a cloud do not match its number of points.
+    #[error("{given} {what} for {points} points: there must be one normal, curvature and radius per point")]
     Normals {
-        /// What there are too few or too many of: normals, curvatures or radii.
+        /// The list of the wrong length: normals, curvatures or radii.
         what: &'static str,
-        /// How many of them were given.
+        /// Number of values in the list.
         given: usize,
-        /// Points of the cloud.
+        /// Number of points in the cloud.
         points: usize,
     },
-    /// The texture to render into is none that it can: its message says why.
-    #[error("texture to render into: {0}")]
+    /// The target texture is unsuitable. The message says why.
+    #[error("target texture: {0}")]
     Texture(String),
-    /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) asked to stop.
+    /// [`Progress::cancelled`](autosplats_cloud::Progress::cancelled) or a callback asked to stop.
     #[error("cancelled")]
     Cancelled,
 }

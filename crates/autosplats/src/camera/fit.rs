@@ -1,4 +1,4 @@
-//! A camera that shows a whole cloud, for those who name none.
+//! Cameras that show a whole cloud, for callers without a camera of their own.
 
 use autosplats_cloud::{Axes, Crs, PointCloud, Scan};
 use glam::{DQuat, DVec2, DVec3};
@@ -6,81 +6,85 @@ use glam::{DQuat, DVec2, DVec3};
 use super::{Camera, Projection};
 use crate::Error;
 
-/// Points looked at: enough for percentiles, few enough to cost nothing.
+/// Points in the sample: enough for quantiles, few enough to cost nothing.
 const SAMPLES: usize = 100_000;
-/// Share of the points at either end of each axis that may be outliers.
+/// Fraction of the points at each end of each axis that may be outliers.
 const TRIM: f64 = 0.005;
-/// Trimmed ends come back if they reach no further than this part of the extent of the rest.
+/// Trimmed ends are kept if they reach no further than this fraction of the rest's extent.
 const KEEP: f64 = 0.2;
-/// Share of the picture left free at each side.
+/// Fraction of the picture left free at each side.
 const BORDER: f64 = 0.04;
 
-/// Free space around the points in mean distances between them, so that the discs at the rim of a sparse cloud end within
-/// the picture. Without a margin one that is cut by its edge cannot be told from a surface that goes on.
+/// Free space around the points, in mean distances between points. Discs at the rim of a sparse cloud then end within
+/// the picture; a disc cut by the edge looks like a surface that continues.
 const RIM: f64 = 2.5;
 
-/// The eye is no nearer to the points than this part of their extent: what is near would hide how large the rest is.
+/// Least distance from the eye to the points, as a fraction of their extent. Nearer points would hide how large the
+/// rest is.
 const ROOM: f64 = 0.2;
-/// Times that what is in the middle is looked for: the points at the ends of the picture become others.
+/// Iterations to find the middle of the picture, because the outermost points change with the middle.
 const MIDDLE_STEPS: usize = 8;
 
-/// A sensor stands among its points if they reach so many times as far from it, on the ground, as half of them do: seen from
-/// where all of them are in the picture, what is told best would be small.
+/// A sensor stands among its points if the furthest are at least this many times as far, horizontally, as the median. A
+/// view of all points would make the densest part small.
 const FAR_REACH: f64 = 4.0;
-/// How far behind such a sensor to stand and how far above it, and how far ahead of it to look, as parts of the mean of how far
-/// half of its points are and nine of ten.
+/// Position of an eye behind a sensor and above it, and of its target ahead. Unit: geometric mean of the median and the
+/// 0.9 quantile of the horizontal ranges.
 const BEHIND: f64 = 1.15;
 const ABOVE: f64 = 0.75;
 const AHEAD: f64 = 0.45;
-/// Turned about the sensor by so much, in degrees: more is seen of what stands along the way.
+/// Rotation of the eye about the sensor, in degrees. Objects along the way hide each other less.
 const ASIDE_DEG: f64 = 20.0;
-/// Height of the picture over its distance from the eye for which these hold: at 40°.
+/// Height of the picture over its distance from the eye at 40°. `BEHIND`, `ABOVE` and `AHEAD` are meant for this field
+/// of view.
 const UPRIGHT: f64 = 0.728;
-/// No field of view brings the eye nearer than this part of the way, or it would be past the sensor.
+/// Least fraction of the way from the target to the eye that remains for wide fields of view. A nearer eye would pass
+/// the sensor.
 const NEAREST: f64 = 0.4;
-/// What is as close to the way to the eye as this part of the distance is in the way,
+/// Distance from the line of sight within which points are in the way, as a fraction of the unit of `BEHIND`.
 const IN_THE_WAY: f64 = 0.15;
-/// if it is one point in so many.
+/// Fewer than one point in this many do not count as being in the way.
 const A_FEW: usize = 500;
-/// A sensor sees one side if the middle of its points is further from it than this part of the distance.
+/// Horizontal distance of a sensor from the middle of its points above which it sees one side, in the unit of `BEHIND`.
 const ONE_SIDE: f64 = 0.3;
-/// Points not far around their sensors were seen from one side if the mean of the directions to those, on the ground, is longer.
+/// Points are seen from one side if the mean of the horizontal unit vectors towards their sensors is longer than this.
 const ONE_WAY: f64 = 0.6;
-/// And if the nearest of them are, on the ground, at least this part as far away as half are: what is above or below a sensor has
-/// no side.
+/// Least ratio of the nearest points' horizontal range to the median for a side to exist. Points above or below a
+/// sensor have no side.
 const APART: f64 = 0.3;
-/// The share of points that are the nearest.
+/// Quantile of the horizontal ranges that counts as nearest.
 const NEAREST_SHARE: f64 = 0.05;
-/// How far above the ground an eye on that side is, as a part of how far away.
+/// Height of an eye on the seen side over its horizontal distance.
 const RAISED: f64 = 0.47;
 
-/// Where to stand in relation to the cloud.
+/// Position of the camera relative to the cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ViewDirection {
-    /// In perspective, the sensor's own view for points in a camera's frame, and with Z up from behind and above the sensor
-    /// for a scan that is far denser near it, as of a lidar on a car: in the middle of several, or at the origin of points
-    /// without a coordinate system where no sensor is known. Where sensors saw one side, from half right of them and above.
-    /// Otherwise [`Iso`](Self::Iso).
+    /// Chosen from the data. Points in a camera's frame, in perspective, are seen from the camera. A scan that is far
+    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor, in perspective with Z
+    /// up. Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the cloud has no
+    /// coordinate system. Points that sensors saw from one side are seen from half right of and above that side. All
+    /// else as [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.
     Iso,
-    /// From the front: -Y where Z is up, +Z where Y is up.
+    /// From the front: -Y if Z is up, +Z if Y is up.
     Front,
     /// From behind.
     Back,
-    /// From the left hand of somebody at the front.
+    /// From the left-hand side of a viewer at the front.
     Left,
-    /// From the right hand of somebody at the front.
+    /// From the right-hand side of a viewer at the front.
     Right,
-    /// From above, the front at the lower edge.
+    /// From above, with the front at the lower edge.
     Top,
-    /// From below, the front at the upper edge.
+    /// From below, with the front at the upper edge.
     Bottom,
 }
 
-/// Right, front (towards the viewer) and up of a convention.
+/// Unit vectors right, front (towards the viewer) and up of a convention.
 fn frame(axes: Axes) -> [DVec3; 3] {
     match axes {
         Axes::ZUp => [DVec3::X, DVec3::NEG_Y, DVec3::Z],
@@ -89,12 +93,13 @@ fn frame(axes: Axes) -> [DVec3; 3] {
     }
 }
 
-/// Up in world coordinates.
+/// Unit vector up in world coordinates.
 pub(crate) fn up(axes: Axes) -> DVec3 {
     frame(axes)[2]
 }
 
-/// The axes a cloud states, or a guess from its extents: survey coordinates and flat scenes have Z up, models Y.
+/// The axes that a cloud states, or a guess: Z up for a cloud with an origin other than zero or a flat extent, else Y
+/// up.
 pub fn guess_axes(cloud: &PointCloud) -> Axes {
     cloud.axes().unwrap_or_else(|| {
         let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
@@ -108,11 +113,11 @@ pub fn guess_axes(cloud: &PointCloud) -> Axes {
 }
 
 impl Camera {
-    /// A camera that sees all of `cloud` from `direction`, but for a few points far from the others, and but for where it stands
-    /// among them ([`ViewDirection::Auto`]).
+    /// Creates a camera that sees all of `cloud` from `direction`, except a few distant outliers. With
+    /// [`ViewDirection::Auto`] the camera may stand among the points and see a part of them.
     ///
-    /// `aspect` is width over height. With an orthographic `projection` its height is replaced by the one that fits; with
-    /// a perspective one the field of view is kept, but for the sensor's own view, which takes the one that fits.
+    /// `aspect` is width over height. The height of an orthographic `projection` is replaced by one that fits. The
+    /// field of view of a perspective one is kept, except for a sensor's own view.
     ///
     /// # Errors
     /// [`Error::NothingVisible`] if the cloud has no finite point, [`Error::Camera`] if the projection is invalid.
@@ -150,9 +155,9 @@ impl Camera {
         camera.place(cloud, aspect, matches!(own, Some((Axes::Camera, _))))
     }
 
-    /// This camera, moved without being turned to where it sees all of `cloud`, but for a few points far from the others.
-    /// `aspect` is width over height; a perspective camera keeps its field of view, an orthographic one takes the height
-    /// that fits.
+    /// Moves this camera, without turning it, to where it sees all of `cloud`, except a few distant outliers. `aspect`
+    /// is width over height. A perspective camera keeps its field of view; the height of an orthographic one is
+    /// replaced.
     ///
     /// # Errors
     /// Those of [`fit`](Self::fit).
@@ -160,7 +165,8 @@ impl Camera {
         self.place(cloud, aspect, false)
     }
 
-    /// Moves the camera to where it sees all of `cloud`; `from_sensor` to where the sensor stood, if that was the origin.
+    /// Moves the camera to where it sees all of `cloud`. With `from_sensor`, moves it to the world's origin if the
+    /// sensor seems to be there.
     fn place(mut self, cloud: &PointCloud, aspect: f64, from_sensor: bool) -> Result<Self, Error> {
         let camera = &mut self;
         let axes = camera.axes()?;
@@ -174,7 +180,7 @@ impl Camera {
         }
         let middle = ranges.map(|[low, high]| 0.5 * (low + high));
         let extent = ranges.map(|[low, high]| high - low);
-        // All points in one place still need a picture of some size.
+        // Points in a single place still need a picture of some size.
         let least = (1e-6 * cloud.origin().abs().max_element()).max(1e-3);
         let extent = extent.map(|e| e.max(if extent == [0.0; 3] { least } else { 0.0 }));
         let rim = RIM * (extent[0] * extent[1] / cloud.len() as f64).sqrt();
@@ -189,7 +195,7 @@ impl Camera {
             Projection::OrthographicHeight(height) => {
                 let [width, upright] = [0, 1].map(|i| (extent[i] + 2.0 * rim) / (2.0 * half_room));
                 *height = upright.max(width / aspect).max(1e-12);
-                // In front of everything, trimmed points included as far as they are near.
+                // In front of all points, including trimmed ones that are near.
                 2.0 * extent[2] + *height
             }
             Projection::PerspectiveFovDeg(fov) => {
@@ -197,7 +203,8 @@ impl Camera {
                 let eye = eye_before(&kept, 0, slope * aspect, rim).min(eye_before(&kept, 1, slope, rim));
                 let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * ROOM;
                 let distance = (middle[2] - eye).max(least);
-                // What is near is wider than what is far, so that the middle of the picture is not that of the points.
+                // Near points look wider than far points, so that the middle of the picture differs from the middle of
+                // the points.
                 let [x, y] = [0, 1].map(|axis| middle_seen(&kept, axis, middle[2] - distance, rim, middle[axis]));
                 camera.look_at = to_world([x, y, middle[2]]);
                 distance
@@ -208,10 +215,11 @@ impl Camera {
     }
 }
 
-/// How far along the line of sight, the third axis, an eye is that sees `points`, each `rim` wide, between two opposite sides of
-/// a picture, and touching both. Those are apart along `axis`, and turned from the line of sight by `slope`.
+/// Position along the line of sight, the third axis, of an eye whose picture's two opposite sides touch the `points`.
+/// Each point is a disc of radius `rim`. The sides are apart along `axis`; `slope` is the tangent of their angle to the
+/// line of sight.
 fn eye_before(points: &[DVec3], axis: usize, slope: f64, rim: f64) -> f64 {
-    // How far each side is from the line of sight where that begins.
+    // Offset of each side from the line of sight at position 0.
     let [right, left] = points.iter().fold([f64::NEG_INFINITY; 2], |[right, left], p| {
         let narrower = rim - slope * p.z;
         [right.max(p[axis] + narrower), left.max(narrower - p[axis])]
@@ -219,11 +227,11 @@ fn eye_before(points: &[DVec3], axis: usize, slope: f64, rim: f64) -> f64 {
     -0.5 * (right + left) / slope
 }
 
-/// Where along `axis` an eye is, so far along the line of sight, that sees `points`, each `rim` wide, in the middle of the picture:
-/// looked for from `middle` on.
+/// Position along `axis` of an eye that sees `points` in the middle of the picture. Each point is a disc of radius
+/// `rim`; `eye` is the position along the line of sight. The search starts at `middle`.
 fn middle_seen(points: &[DVec3], axis: usize, eye: f64, rim: f64, middle: f64) -> f64 {
     (0..MIDDLE_STEPS).fold(middle, |middle, _| {
-        // On either side what is furthest from the middle of the picture: how far it is seen, where it is, how far from the eye.
+        // The outermost point of the picture on each side: its tangent, position and distance along the line of sight.
         let none = [(f64::NEG_INFINITY, 0.0, 1.0); 2];
         let [(_, right, right_z), (_, left, left_z)] = points.iter().fold(none, |[right, left], p| {
             let z = p.z - eye;
@@ -233,13 +241,13 @@ fn middle_seen(points: &[DVec3], axis: usize, eye: f64, rim: f64, middle: f64) -
             let [high, low] = [p[axis] + rim, p[axis] - rim];
             [further(right, high, high - middle), further(left, low, middle - low)]
         });
-        // As far from both of them.
+        // Both have the same tangent from here.
         (right * left_z + left * right_z) / (left_z + right_z)
     })
 }
 
-/// The camera that sees all of `points` (along `axes`, about `origin`) from the world's origin, where the sensor was if
-/// points are in its frame; `None` if they are not spread about the line ahead, so that it was somewhere else.
+/// The camera that sees all `points` (along `axes`, relative to `origin`) from the world's origin, which is the
+/// sensor's position for points in its frame. `None` if the points do not lie ahead, so that the sensor is elsewhere.
 fn from_origin(
     points: &[DVec3],
     axes: [DVec3; 3],
@@ -251,7 +259,7 @@ fn from_origin(
     let offset = DVec3::from(axes.map(|axis| axis.dot(origin)));
     let points: Vec<DVec3> = points.iter().map(|&p| p + offset).filter(|p| p.z > 0.0).collect();
     let depth = points.iter().map(|p| p.z).sum::<f64>() / points.len().max(1) as f64;
-    // Points next to the sensor would spread over half the sky.
+    // Points next to the sensor would cover half the sky.
     let slopes = points.iter().filter(|p| p.z > 0.1 * depth).map(|&p| DVec3::new(p.x / p.z, p.y / p.z, 1.0));
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let [low, high] = slopes.clone().fold(none, |[low, high], slope| [low.min(slope), high.max(slope)]);
@@ -271,8 +279,8 @@ fn from_origin(
     Ok((fov < 120.0).then_some(camera))
 }
 
-/// The way towards an eye that stands on the side of a cloud that its sensors saw: of the other it would see backs; `None` if no
-/// sensor is known or they saw it all around, or stood among the points.
+/// Direction towards an eye on the side of a cloud that its sensors saw; from the other side it would see backs. `None`
+/// if no sensor is known, or if the sensors saw all sides or stood among the points.
 fn seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
     let sensor = middle_of(cloud.scans())? - cloud.origin();
     let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
@@ -286,13 +294,14 @@ fn seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
     (is_apart && mean.length() > ONE_WAY).then(|| aside * mean.normalize() + RAISED * up)
 }
 
-/// Mean place of the sensors of some scans, in the world; `None` of none.
+/// Mean sensor position of some scans in world coordinates; `None` without scans.
 fn middle_of(scans: &[Scan]) -> Option<DVec3> {
     (!scans.is_empty()).then(|| scans.iter().map(Scan::position).sum::<DVec3>() / scans.len() as f64)
 }
 
-/// The eye behind and above the sensor of a cloud with Z up, in the middle of several, or at the origin of one without
-/// a coordinate system, and the point ahead of it to look at; `None` if it does not stand among the points. `fov` is upright, in degrees.
+/// Eye behind and above the sensor of a cloud with Z up, and its target ahead. Several sensors count as one in their
+/// middle; without scans and coordinate system the sensor is at the origin. `None` if the sensor does not stand among
+/// the points. `fov` is the vertical field of view in degrees.
 fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]> {
     let sensor = match middle_of(cloud.scans()) {
         None if *cloud.crs() != Crs::default() => return None,
@@ -306,14 +315,15 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     let [half, most, all] = [range(0.5)?, range(0.9)?, range(1.0 - 2.0 * TRIM)?];
     let distance = (half * most).sqrt();
     let [low, high] = robust_range(&points, 2);
-    // Most of what is high and thin would be above the picture.
+    // Tall thin things would mostly be above the picture.
     if !(half > 0.0 && all > FAR_REACH * half && high - low < all.min(FAR_REACH * distance)) {
         return None;
     }
     let near = || points.iter().filter(|p| p.truncate().length() <= most);
     let middle = near().sum::<DVec3>() / near().count() as f64;
-    // A sensor that sees one side is seen from behind, others along the way on which points reach furthest, which angles doubled
-    // tell for either end of it: towards X or Y, one of which is ahead in most conventions.
+    // A sensor that sees one side is seen from behind. Other sensors are seen along the direction in which points reach
+    // furthest. The mean of doubled angles gives this direction without a sign; the sign favours +X and +Y, which are
+    // ahead in most conventions.
     let sees_one_side = middle.truncate().length() > ONE_SIDE * distance;
     let doubled = |p: &DVec3| DVec2::new(p.x * p.x - p.y * p.y, 2.0 * p.x * p.y) / p.truncate().length().max(distance);
     let forward = if sees_one_side {
@@ -330,11 +340,11 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
         let look_at = middle + (forward * AHEAD).extend(0.0) * distance;
         [look_at + (eye - look_at) * (UPRIGHT / upright_at_1).max(NEAREST), look_at]
     };
-    // On either side, and from either end, whichever has less in the way; a few points are nothing.
+    // From either side and either end, the position with fewer points in the way; a few points are ignored.
     let places = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(place);
     let in_the_way = |[eye, _]: &[DVec3; 2]| {
         let close = |p: &&DVec3| {
-            // Not the points around the sensor.
+            // Without the points around the sensor.
             let along = (p.dot(*eye) / eye.length_squared()).clamp(0.4, 1.0);
             p.distance(*eye * along) < IN_THE_WAY * distance
         };
@@ -345,7 +355,7 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     Some(best.map(|place| sensor + place))
 }
 
-/// Finite positions about the cloud's origin along `axes`, evenly picked.
+/// Finite positions relative to the cloud's origin along `axes`, from evenly spaced indices.
 fn samples(cloud: &PointCloud, axes: [DVec3; 3]) -> Vec<DVec3> {
     let positions = cloud.positions();
     let step = positions.len().div_ceil(SAMPLES).max(1);
@@ -353,7 +363,7 @@ fn samples(cloud: &PointCloud, axes: [DVec3; 3]) -> Vec<DVec3> {
     finite.map(|p| DVec3::from(axes.map(|axis| axis.dot(p)))).collect()
 }
 
-/// The range along `axis` without outliers; (0, 0) for no points.
+/// Range along `axis` without outliers; (0, 0) without points.
 fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
     let mut values: Vec<f64> = samples.iter().map(|p| p[axis]).collect();
     values.sort_unstable_by(f64::total_cmp);

@@ -1,17 +1,17 @@
-//! Where world coordinates lie in a picture and back, in `f64`: for what is drawn over a picture and for what is pointed at.
+//! Projection between world and picture in `f64`, for overlays and picking.
 //!
-//! The stages use the crate's own `View` in `f32` about a cloud's origin, which is made from this.
+//! The stages use the crate's own `View` instead, in `f32` about a cloud's origin. A `View` is made from a [`Lens`].
 
 use glam::{DVec2, DVec3};
 
 use super::{Camera, Projection};
 use crate::Error;
 
-/// A [`Camera`] made ready for pictures of one size.
+/// A [`Camera`] prepared for pictures of one size.
 ///
 /// Pixel coordinates are those of the picture: (0, 0) is the outer corner of the top-left pixel, whose centre is at
-/// (0.5, 0.5). Depth is the distance from the plane through the eye that the picture is parallel to, in world units, as
-/// in [`GBuffer`](crate::GBuffer).
+/// (0.5, 0.5). Depth is the distance in world units from the plane through the eye parallel to the picture, as in
+/// [`GBuffer`](crate::GBuffer).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     pub(super) eye: DVec3,
@@ -21,17 +21,17 @@ pub struct Lens {
     pub(super) middle: DVec2,
     /// Pixels per unit of x/z (perspective) or of x (orthographic).
     pub(super) focal_px: f64,
-    /// Whether lines of sight meet in the eye.
+    /// Whether all lines of sight meet in the eye.
     pub(super) perspective: bool,
-    /// What is at this depth or nearer is not in the picture.
+    /// Near plane: points at this depth or nearer are not in the picture.
     pub(super) near: f64,
 }
 
 impl Camera {
-    /// Makes the camera ready for pictures of `size` pixels, for those who ask about many points.
+    /// Prepares the camera for pictures of `size` pixels. A [`Lens`] is the quick way to project many points.
     ///
     /// # Errors
-    /// [`Error::Camera`] if the camera cannot see.
+    /// [`Error::Camera`] if the camera is invalid.
     pub fn lens(&self, size: [u32; 2]) -> Result<Lens, Error> {
         let axes = self.axes()?;
         let [width, height] = size.map(f64::from);
@@ -47,23 +47,23 @@ impl Camera {
                 return Err(Error::Camera(format!("orthographic height {world} is not above 0")));
             }
         };
-        // An orthographic eye is a plane to stand behind; a perspective one divides by depth.
+        // An orthographic camera drops what is behind the plane of the eye; a perspective one divides by depth.
         let near = if perspective { (self.look_at - self.eye).length() * 1e-5 } else { 0.0 };
         Ok(Lens { eye: self.eye, axes, middle: 0.5 * DVec2::new(width, height), focal_px, perspective, near })
     }
 
-    /// Where `world` lies in a picture of `size` pixels, and at what depth; see [`Lens::to_pixel`].
+    /// Pixel coordinates and depth of `world` in a picture of `size` pixels; see [`Lens::to_pixel`].
     ///
     /// # Errors
-    /// [`Error::Camera`] if the camera cannot see.
+    /// [`Error::Camera`] if the camera is invalid.
     pub fn to_pixel(&self, world: DVec3, size: [u32; 2]) -> Result<Option<(DVec2, f64)>, Error> {
         Ok(self.lens(size)?.to_pixel(world))
     }
 
-    /// World coordinates of what a picture of `size` pixels shows at `pixel` and `depth`; see [`Lens::unproject`].
+    /// World coordinates of the point at `pixel` and `depth` in a picture of `size` pixels; see [`Lens::unproject`].
     ///
     /// # Errors
-    /// [`Error::Camera`] if the camera cannot see.
+    /// [`Error::Camera`] if the camera is invalid.
     pub fn unproject(&self, pixel: DVec2, depth: f64, size: [u32; 2]) -> Result<DVec3, Error> {
         Ok(self.lens(size)?.unproject(pixel, depth))
     }
@@ -71,8 +71,8 @@ impl Camera {
 
 #[allow(clippy::wrong_self_convention, reason = "the lens maps; it is not converted")]
 impl Lens {
-    /// Pixel coordinates and depth of `world`, also beyond the picture's edges; nothing for what is not in front of the
-    /// eye or not finite.
+    /// Pixel coordinates and depth of `world`, also beyond the picture's edges; `None` if the point is not in front of
+    /// the eye or not finite.
     pub fn to_pixel(&self, world: DVec3) -> Option<(DVec2, f64)> {
         let from_eye = world - self.eye;
         let [x, y, depth] = self.axes.map(|axis| axis.dot(from_eye));
@@ -82,14 +82,14 @@ impl Lens {
         Some((self.middle + DVec2::new(x, y) / self.pixel_size(depth), depth)).filter(|(pixel, _)| pixel.is_finite())
     }
 
-    /// World coordinates of what lies at `pixel` and `depth`.
+    /// World coordinates of the point at `pixel` and `depth`.
     pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
         let [right, down, forward] = self.axes;
         let aside = (pixel - self.middle) * self.pixel_size(depth);
         self.eye + right * aside.x + down * aside.y + forward * depth
     }
 
-    /// The line of sight through `pixel`: where it begins, and its direction as a unit vector.
+    /// Line of sight through `pixel`: its start and its direction as a unit vector, both in world coordinates.
     pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {
         if self.perspective {
             (self.eye, (self.unproject(pixel, 1.0) - self.eye).normalize())
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     const SIZE: [u32; 2] = [640, 360];
-    /// A place where `f32` holds half metres.
+    /// A position where `f32` resolves half metres.
     const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
     fn cameras() -> [Camera; 2] {
@@ -121,7 +121,7 @@ mod tests {
         })
     }
 
-    /// Places about `FAR`, on a lattice that no axis of the cameras is along.
+    /// Offsets from `FAR` on a lattice that is not aligned with the cameras' axes.
     fn places() -> impl Iterator<Item = DVec3> {
         (0..1000).map(|i| DVec3::new(f64::from(i % 10), f64::from(i / 10 % 10), f64::from(i / 100)) * 0.75 - 3.0)
     }
@@ -134,7 +134,7 @@ mod tests {
                 let (pixel, depth) = lens.to_pixel(FAR + place).expect("in front of the eye");
                 let position_view = view.to_view(place.as_vec3().to_array());
                 let [x, y] = view.to_pixel(position_view).map(f64::from);
-                // f32 at some hundred pixels and about ten units.
+                // `f32` at some hundred pixels and about ten units.
                 assert!((pixel - DVec2::new(x, y)).abs().max_element() < 1e-3, "{place}: {pixel} is not {x}, {y}");
                 assert!((depth - f64::from(position_view.z)).abs() < 1e-5, "{place}: depth {depth}");
                 assert!((lens.pixel_size(depth) / f64::from(view.pixel_size(depth as f32)) - 1.0).abs() < 1e-5, "size");
@@ -168,7 +168,7 @@ mod tests {
             for place in places() {
                 let (pixel, depth) = lens.to_pixel(FAR + place).expect("in front of the eye");
                 let back = camera.unproject(pixel, depth, SIZE).expect("sees") - FAR;
-                // One f64 step at 5e6 is 1e-9.
+                // The step of `f64` at 5e6 is 1e-9.
                 assert!(back.abs_diff_eq(place, 1e-8), "{place}: {back}");
                 let (from, direction) = lens.ray(pixel);
                 let way = FAR + place - from;

@@ -1,8 +1,8 @@
-//! Where the picture is taken from.
+//! Cameras: which part of the world a picture shows.
 //!
-//! View space, the working space of every stage: the eye is the origin, x points right, y down and z forward, so depth is
-//! z and grows away from the eye. Distances are world distances. Pixel (0, 0) is the top-left one and covers
-//! `0.0..1.0` in both directions; its centre is at (0.5, 0.5).
+//! All stages work in view space: the eye is the origin, x points right, y down and z forward. Depth is z, so it grows
+//! away from the eye. Distances are in world units. Pixel (0, 0) is the top-left pixel and covers `0.0..1.0` in both
+//! directions; its centre is at (0.5, 0.5).
 
 mod fit;
 mod lens;
@@ -24,42 +24,42 @@ use crate::Error;
 pub struct Camera {
     /// Position of the eye, world coordinates.
     pub eye: DVec3,
-    /// The point in the middle of the picture, world coordinates; not the eye.
+    /// Point in the middle of the picture, world coordinates; differs from the eye.
     pub look_at: DVec3,
-    /// Direction that is upward in the picture, any length; not along the line of sight.
+    /// Direction that is upward in the picture, world coordinates, any length; not along the line of sight.
     pub up: DVec3,
-    /// How points meet the image plane.
+    /// Kind of projection and size of what is seen.
     pub projection: Projection,
 }
 
-/// How points meet the image plane.
+/// How points are projected onto the image plane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Projection {
-    /// Vertical field of view in degrees, within 0.01..=170.
+    /// Perspective, with the vertical field of view in degrees, 0.01 to 170.
     PerspectiveFovDeg(f64),
-    /// Height of the picture in world units, above 0.
+    /// Orthographic, with the height of the picture in world units, above 0.
     OrthographicHeight(f64),
 }
 
-/// A [`Camera`] made ready for one picture of one cloud: rotations and focal lengths in `f32`.
+/// A [`Camera`] prepared for one picture of one cloud, with rotation and focal length in `f32`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct View {
-    /// Size of the screen in pixels: the picture, and a margin around it.
+    /// Width of the screen in pixels: the picture and the margin on both sides.
     pub(crate) width: u32,
-    /// Size of the screen in pixels.
+    /// Height of the screen in pixels: the picture and the margin on both sides.
     pub(crate) height: u32,
-    /// Pixels of the screen on every side that are not in the picture.
+    /// Width in pixels of the margin on every side of the picture.
     pub(crate) margin: u32,
     /// Rotation from world to view space.
     pub(crate) view_from_world: Mat3,
-    /// The eye relative to the cloud's origin, world orientation.
+    /// Position of the eye relative to the cloud's origin, in world orientation.
     pub(crate) eye_local: Vec3,
     /// Pixels per unit of x/z (perspective) or of x (orthographic).
     pub(crate) focal_px: f32,
-    /// Whether lines of sight meet in the eye.
+    /// Whether all lines of sight meet in the eye.
     pub(crate) perspective: bool,
-    /// Points at this depth or nearer are dropped.
+    /// Near plane: points at this depth or nearer are dropped.
     pub(crate) near: f32,
 }
 
@@ -67,7 +67,8 @@ impl Camera {
     /// Unit vectors right, down and forward in world coordinates.
     ///
     /// # Errors
-    /// [`Error::Camera`] if the eye is at the target, up is along the line of sight, or anything is not finite.
+    /// [`Error::Camera`] if `eye` and `look_at` are the same point, `up` is zero or along the line of sight, or a value
+    /// is not finite.
     pub fn axes(&self) -> Result<[DVec3; 3], Error> {
         let invalid = |what: &str| Error::Camera(what.into());
         if !(self.eye.is_finite() && self.look_at.is_finite() && self.up.is_finite()) {
@@ -84,15 +85,15 @@ impl Camera {
         Ok([right, forward.cross(right), forward])
     }
 
-    /// Checks that the camera can see.
+    /// Checks that the camera is valid.
     ///
     /// # Errors
-    /// [`Error::Camera`] says what is wrong with its directions or its projection.
+    /// [`Error::Camera`] names what is wrong with its directions or its projection.
     pub fn check(&self) -> Result<(), Error> {
         self.lens([1, 1]).map(|_| ())
     }
 
-    /// Makes the camera ready for a picture of `size` pixels, without a margin, of a cloud about `origin`.
+    /// Prepares the camera for a picture of `size` pixels, without a margin, of a cloud about `origin`.
     pub(crate) fn view(&self, origin: DVec3, size: [u32; 2]) -> Result<View, Error> {
         let Lens { axes: [right, down, forward], focal_px, perspective, near, .. } = self.lens(size)?;
         Ok(View {
@@ -110,18 +111,18 @@ impl Camera {
 
 #[allow(clippy::wrong_self_convention, reason = "a view is too large to be handed over for every point")]
 impl View {
-    /// The same picture with a margin of so many pixels on every side of it.
+    /// The same picture with a margin of `margin` pixels on every side.
     pub(crate) fn with_margin(self, margin: u32) -> Self {
         let [width, height] = self.picture_size().map(|side| side + 2 * margin);
         Self { width, height, margin, ..self }
     }
 
-    /// Width and height of the picture, without the margin.
+    /// Width and height of the picture in pixels, without the margin.
     pub(crate) fn picture_size(&self) -> [u32; 2] {
         [self.width, self.height].map(|side| side - 2 * self.margin)
     }
 
-    /// How many pixels a pixel of the screen is away from the picture, along the axis where it is more; 0 in the picture.
+    /// Distance in pixels of a screen pixel from the picture, along the axis where it is larger; 0 in the picture.
     #[inline(always)]
     pub(crate) fn beside_picture(&self, [x, y]: [usize; 2]) -> usize {
         let margin = self.margin as usize;
@@ -136,7 +137,7 @@ impl View {
         self.view_from_world * (Vec3::from(position) - self.eye_local)
     }
 
-    /// Pixel coordinates of a view-space position in front of the eye.
+    /// Pixel coordinates on the screen of a view-space position in front of the eye.
     #[inline(always)]
     pub(crate) fn to_pixel(&self, position_view: Vec3) -> [f32; 2] {
         let scale = if self.perspective { self.focal_px / position_view.z } else { self.focal_px };
@@ -149,19 +150,19 @@ impl View {
         if self.perspective { depth / self.focal_px } else { 1.0 / self.focal_px }
     }
 
-    /// From a view-space position towards the eye; not of unit length.
+    /// Direction from a view-space position towards the eye, of any length.
     #[inline(always)]
     pub(crate) fn to_eye(&self, position: Vec3) -> Vec3 {
         if self.perspective { -position } else { Vec3::NEG_Z }
     }
 
-    /// A normal of a surface at a view-space position, on the side of the eye.
+    /// The normal of a surface at a view-space position, flipped if it faces away from the eye.
     #[inline(always)]
     pub(crate) fn turned_to_eye(&self, normal: Vec3, position: Vec3) -> Vec3 {
         if normal.dot(self.to_eye(position)) < 0.0 { -normal } else { normal }
     }
 
-    /// The view-space position that projects to `pixel` at `depth`.
+    /// View-space position that projects to screen coordinates `pixel` at `depth`.
     #[inline(always)]
     pub(crate) fn unproject(&self, pixel: [f32; 2], depth: f32) -> Vec3 {
         let scale = self.pixel_size(depth);

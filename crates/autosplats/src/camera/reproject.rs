@@ -1,10 +1,10 @@
-//! From one frame into the one before it.
+//! Reprojection: from one frame into an earlier one.
 
 use glam::{DVec3, Mat3, Vec3};
 
 use super::View;
 
-/// A view of a cloud: what a later frame needs to look back into it.
+/// View and origin of a frame's cloud, for later frames to look back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
     pub(crate) view: View,
@@ -12,24 +12,24 @@ pub(crate) struct Seen {
     pub(crate) origin: DVec3,
 }
 
-/// Takes view-space positions of a frame into the view space of an earlier one.
+/// Maps view-space positions of a frame to the view space of an earlier frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reprojection {
     pub(crate) rotation: Mat3,
-    /// Added after the rotation.
+    /// Translation after the rotation, world units.
     pub(crate) shift: Vec3,
-    /// The earlier frame's, but for the near plane, which is this one's.
+    /// View of the earlier frame, with the near plane of this one.
     pub(crate) view: View,
 }
 
 impl Reprojection {
-    /// From the frame seen `now` into the `past` one; `None` if one is in perspective and the other is not.
+    /// Reprojection from the frame `now` into the frame `past`; `None` if only one of them is in perspective.
     pub(crate) fn new(now: &Seen, past: &Seen) -> Option<Self> {
         if now.view.perspective != past.view.perspective {
             return None;
         }
         let rotation = past.view.view_from_world.as_dmat3();
-        // The one from the other in f64: clouds far from each other have eyes far from their origins.
+        // In f64: if two clouds are far apart, an eye is far from the other cloud's origin.
         let between = now.view.eye_local.as_dvec3() + (now.origin - past.origin) - past.view.eye_local.as_dvec3();
         Some(Self {
             rotation: (rotation * now.view.view_from_world.as_dmat3().transpose()).as_mat3(),
@@ -38,23 +38,24 @@ impl Reprojection {
         })
     }
 
-    /// Where a view-space position was.
+    /// Position in the earlier view space.
     #[inline(always)]
     pub(crate) fn position(&self, position_view: [f32; 3]) -> Vec3 {
         self.rotation * Vec3::from(position_view) + self.shift
     }
 
-    /// Where on the earlier frame's screen a view-space position was, in pixels; `None` if it was not on it.
+    /// Pixel coordinates on the earlier screen; `None` if the position is outside that screen or not in front of that
+    /// eye.
     #[inline(always)]
     pub(crate) fn place(&self, position_view: Vec3) -> Option<[f32; 2]> {
         let position = self.position(position_view.to_array());
         let [x, y] = self.view.to_pixel(position);
-        // What is not a number is in no picture.
+        // NaN fails these comparisons.
         let inside = (x >= 0.0) & (x < self.view.width as f32) & (y >= 0.0) & (y < self.view.height as f32);
         (inside & (position.z > self.view.near)).then_some([x, y])
     }
 
-    /// The pixel of the earlier frame that showed a view-space position, or whatever was before it: row by row.
+    /// Index, row by row, of the pixel on the earlier screen that a view-space position projects to.
     #[inline(always)]
     pub(crate) fn pixel(&self, position_view: [f32; 3]) -> Option<usize> {
         self.place(position_view.into()).map(|[x, y]| y as usize * self.view.width as usize + x as usize)

@@ -1,4 +1,4 @@
-//! What splats have to carry for a picture.
+//! Attributes that splats carry for a picture.
 
 use autosplats_cloud::{Field, FieldValues, PointCloud};
 
@@ -8,32 +8,32 @@ use crate::fit::orient::has_sensors;
 use crate::shade::{ColorMode, class_colors};
 use crate::splat::Channels;
 
-/// Where the colours of points come from.
+/// Source of the points' colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorSource {
-    /// The points' own.
+    /// The points' own colours.
     Points,
-    /// Their classes.
+    /// Colours of the points' classes.
     Classes,
 }
 
-/// What splats have to carry beside their normals.
+/// Attributes that splats carry besides their normals.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Wanted {
     pub(super) colors: Option<ColorSource>,
-    /// A scalar field, by name.
+    /// Name of a scalar field.
     pub(super) scalar: Option<String>,
-    /// Splat radius, k-radius and curvature.
+    /// Whether splats carry splat radius, k-radius and curvature.
     pub(super) measures: bool,
-    /// Whether the surface shows its back.
+    /// Whether splats carry which side of the surface they show.
     pub(super) backs: bool,
 }
 
 impl Wanted {
-    /// What `settings` ask for.
+    /// Attributes that `settings` need.
     ///
     /// # Errors
-    /// [`Error::MissingAttribute`] if the cloud lacks it.
+    /// [`Error::MissingAttribute`] if the cloud lacks an attribute.
     pub(super) fn new(cloud: &PointCloud, settings: &Settings) -> Result<Self, Error> {
         let mode = &settings.shading.color;
         let own = cloud.colors().map(|_| ColorSource::Points);
@@ -53,13 +53,13 @@ impl Wanted {
         Ok(Self { colors, scalar, measures: settings.all_layers || measured, backs })
     }
 
-    /// What pixels have then.
+    /// Channels of a pixel for these attributes.
     pub(super) fn channels(&self) -> Channels {
         let Self { colors, scalar, measures, backs } = self;
         Channels { color: colors.is_some(), scalar: scalar.is_some(), measures: *measures, backs: *backs }
     }
 
-    /// The colours of the points, made where they are not the cloud's own.
+    /// Colours of the points: the cloud's own, or computed from their classes.
     pub(super) fn colors<'a>(&self, cloud: &'a PointCloud) -> Option<std::borrow::Cow<'a, [[u8; 3]]>> {
         match self.colors? {
             ColorSource::Points => cloud.colors().map(Into::into),
@@ -67,7 +67,7 @@ impl Wanted {
         }
     }
 
-    /// The values of the scalar field.
+    /// Values of the scalar field.
     pub(super) fn scalar<'a>(&self, cloud: &'a PointCloud) -> Option<&'a FieldValues> {
         cloud.field(self.scalar.as_ref()?).map(|field| &field.values)
     }

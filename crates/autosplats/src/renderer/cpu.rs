@@ -1,4 +1,4 @@
-//! The frame on the CPU.
+//! Frames on the CPU.
 
 use std::borrow::Cow;
 use std::time::Instant;
@@ -31,19 +31,19 @@ pub(super) struct CpuRenderer {
     neighborhoods: Neighborhoods,
     surfels: Surfels,
     adapter: Adapter,
-    /// Identity of the cloud that what follows is of.
+    /// Identity of the cloud that `sensors` and `depth_noise` belong to.
     known: Option<u64>,
     sensors: Sensors,
     upward: Upward,
     exposure: Exposure,
-    /// Once a frame of these points was adapted.
+    /// Noise of the cloud's depth cameras; `None` until a frame of the cloud is adapted.
     depth_noise: Option<DepthNoise>,
-    /// Passive points to be reconstructed after all.
+    /// Passive points that the first pass left visible.
     recovered: Vec<u32>,
     splatter: Splatter,
     image: Image,
     linear: [f32; 256],
-    /// Of the last frame.
+    /// View of the last frame; `None` if there is none or it was cancelled.
     view: Option<View>,
     over_time: OverTime<Reconstruction>,
     last_picture: LastPicture<Settings>,
@@ -73,8 +73,10 @@ impl Default for CpuRenderer {
     }
 }
 
+/// Checks that the engine runs on the CPU.
+///
 /// # Errors
-/// [`Error::Device`] if the engine is one of those that run on a GPU only.
+/// [`Error::Device`] if the engine runs on a GPU only.
 pub(super) fn check_engine(engine: SearchEngine) -> Result<(), Error> {
     let engine = match engine {
         SearchEngine::ScreenGrid => return Ok(()),
@@ -90,8 +92,7 @@ impl CpuRenderer {
         self.view.as_ref().map_or_else(Vec::new, |view| point_surfels(&self.surfels, view))
     }
 
-    /// See [`Renderer::render_while`](super::Renderer::render_while); `given` planes are drawn instead of what a search would
-    /// find.
+    /// See [`Renderer::render_while`](super::Renderer::render_while). The planes in `given` replace search and fit.
     pub(super) fn render(
         &mut self,
         cloud: &PointCloud,
@@ -113,7 +114,7 @@ impl CpuRenderer {
             check_engine(settings.reconstruction.engine)?;
         }
         let wanted = Wanted::new(cloud, settings)?;
-        // From here on nothing fails, but it may be given up; then there are no surfels.
+        // From here on, only cancelling stops the frame; then there are no surfels.
         self.view = None;
         let colors = wanted.colors(cloud);
         let attributes = Attributes {
@@ -247,7 +248,7 @@ impl CpuRenderer {
     }
 }
 
-/// What stages work in and keep from frame to frame.
+/// Buffers of the stages, kept from frame to frame.
 struct Buffers<'a> {
     neighborhoods: &'a mut Neighborhoods,
     surfels: &'a mut Surfels,
@@ -256,11 +257,11 @@ struct Buffers<'a> {
     splatter: &'a mut Splatter,
 }
 
-/// From screen points to splats in the depth map.
+/// Reconstruction of a frame: from screen points to splats in the depth map.
 struct Reconstruct<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
-    /// Of all points; 0 if they are surface.
+    /// Radius in pixels of the dots that all points are; 0 if they are drawn as a surface.
     dot_px: f32,
     settings: &'a Settings,
     past: &'a Past,
@@ -270,7 +271,7 @@ struct Reconstruct<'a> {
 }
 
 impl Reconstruct<'_> {
-    /// Searches, fits, adapts and draws the depth of `queries`, adding their surfels to `surfels`.
+    /// Searches, fits, adapts and draws the depth of `queries`, and appends their surfels to `surfels`.
     fn run(
         &self,
         queries: &[u32],
@@ -305,7 +306,7 @@ impl Reconstruct<'_> {
         let rules = FitRules {
             k: settings.k,
             splat_scale: settings.splat_scale,
-            // What adapts them goes by their shape.
+            // The adapt stage depends on the shape of ellipses.
             longest: settings.longest(),
             adaptive: settings.adaptive,
             keep_outliers: settings.outlier_expansions.is_none(),
@@ -331,7 +332,7 @@ impl Reconstruct<'_> {
     }
 }
 
-/// Adds up the time of each stage and asks whether to go on.
+/// Sums up the time of each stage, and asks whether to go on.
 struct Clock<'a> {
     go_on: &'a dyn Fn() -> bool,
     begin: Instant,
@@ -346,6 +347,9 @@ impl<'a> Clock<'a> {
     }
 
     /// Adds the time since the last lap to a stage.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `go_on` returns false.
     fn lap(&mut self, stage: impl Fn(&mut Timings) -> &mut f64) -> Result<(), Error> {
         let now = Instant::now();
         *stage(&mut self.timings) += (now - self.last).as_secs_f64() * 1e3;

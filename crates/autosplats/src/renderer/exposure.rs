@@ -1,21 +1,21 @@
-//! How bright the colours of points are shown.
+//! Exposure: the brightness at which the points' colours are shown.
 
 use autosplats_cloud::PointCloud;
 
 use crate::shade::{Shading, linear_steps};
 
-/// Points looked at.
+/// Number of points in the sample.
 const SAMPLES: usize = 1 << 12;
-/// Brightness that the brightest colours are to have, of the channel that is brightest, linear. Scans whose camera was exposed
-/// well have 0.44 to 1, those that look black without help 0.09 to 0.16.
+/// Target of the brightest channel of the brightest colours, in linear light. Well exposed scans reach at least this
+/// without help.
 const BRIGHT: f32 = 0.4;
-/// The share of colours that are darker than the brightest: lamps and highlights tell nothing.
+/// Quantile of the colours that counts as brightest. Brighter colours, such as lamps and highlights, are ignored.
 const DARKER: f32 = 0.95;
-/// Light is never made more than so many times as bright: what is darker still is noise.
+/// Largest exposure. Still darker colours are noise.
 const MOST: f32 = 8.0;
 
-/// How many times as bright a cloud's own colours are shown if [`Shading::exposure`] is `None`: 1, or up to 8 where they are all
-/// dark, as those of a camera without a flash in a cellar are. Black points count as points without a colour.
+/// Factor on a cloud's own colours if [`Shading::exposure`] is `None`: 1, or up to 8 if all colours are dark, as in a
+/// cellar scanned without a flash. Black points and clouds without colours are ignored.
 #[must_use]
 pub fn usual_exposure(cloud: &PointCloud) -> f32 {
     let Some(colors) = cloud.colors() else { return 1.0 };
@@ -30,14 +30,14 @@ pub fn usual_exposure(cloud: &PointCloud) -> f32 {
     (BRIGHT / linear_steps()[usize::from(channel)]).clamp(1.0, MOST)
 }
 
-/// The last cloud's, as it looks at thousands of points.
+/// Cache of the last cloud's exposure, because estimation reads thousands of points.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Exposure {
     found: Option<(u64, f32)>,
 }
 
 impl Exposure {
-    /// How many times as bright a cloud's colours are shown.
+    /// Exposure of a cloud's colours: the setting, or else the estimate.
     pub(super) fn of(&mut self, cloud: &PointCloud, shading: &Shading) -> f32 {
         let identity = cloud.identity();
         shading.exposure.unwrap_or_else(|| match self.found {

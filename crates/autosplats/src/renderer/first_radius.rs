@@ -1,4 +1,4 @@
-//! The first radius that suits the kd-tree search best [Paper, §8.1]: found by trying, as the paper's authors did.
+//! The best first radius for the kd-tree search [Paper, §8.1], found by trials as in the paper.
 
 use autosplats_cloud::PointCloud;
 
@@ -8,31 +8,32 @@ use crate::camera::Camera;
 use crate::normals::exact_k_radii;
 use crate::search::SearchEngine;
 
-/// Radii tried at most; each is √2 times the one before.
+/// Largest number of trials. Each radius is √2 times the one of the trial before.
 const TRIALS: usize = 24;
-/// Frames that a radius is timed in.
+/// Frames timed per radius.
 const FRAMES: usize = 2;
-/// Relative difference up to which k-radii are alike.
+/// Relative difference up to which k-radii count as equal.
 const ALIKE: f32 = 1e-4;
 
-/// A first radius that was tried.
+/// Result of one first radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadiusTrial {
-    /// World units.
+    /// First radius in world units.
     pub first_radius: f32,
-    /// Milliseconds that building the tree and searching it took; of the whole frame on a device that times no passes.
+    /// Milliseconds to build and search the tree, or for the whole frame if the device does not time passes.
     pub search_ms: f64,
-    /// Share of the visible points whose k-radius is exact to 1e-4.
+    /// Fraction of the visible points whose k-radius is exact to a relative difference of 1e-4.
     pub accuracy: f64,
 }
 
-/// Tries first radii for [`SearchEngine::KdTree`], from one that holds the k neighbours of nine visible points of ten on,
-/// and returns the fastest with which at least `accuracy` of the visible points, 0 to 1, have their exact k-radius. Where
-/// none comes so far, the most accurate one: its own accuracy says that. The engine in `settings` is not looked at, nor is
-/// grid culling: without, all visible points are searched for.
+/// Finds the fastest first radius of [`SearchEngine::KdTree`] with an `accuracy`, 0 to 1, or the most accurate if none
+/// reaches it. Accuracy is the fraction of visible points with their exact k-radius.
+///
+/// The first trial's radius contains the k neighbours of nine in ten visible points. The engine in `settings` is
+/// ignored. Grid culling is off, so that all visible points are searched.
 ///
 /// # Errors
-/// Those of [`Renderer::render`]; [`Error::NothingVisible`] if no point is seen that has neighbours.
+/// Those of [`Renderer::render`]; [`Error::NothingVisible`] if no visible point has neighbours.
 pub fn best_first_radius(
     renderer: &mut Renderer,
     cloud: &PointCloud,
@@ -53,7 +54,7 @@ pub fn best_first_radius(
         }
         Ok::<_, Error>((search_ms, renderer.surfels()?))
     };
-    // Which points are seen does not depend on the radius. Nor does what a renderer refuses.
+    // The visible points do not depend on the radius. This run also fails early if the renderer cannot render.
     let (_, visible) = run(f32::MIN_POSITIVE, 1)?;
     let exact = exact_k_radii(cloud, k)?;
     let radius_of = |surfel: &PointSurfel| exact[surfel.point as usize];
@@ -65,7 +66,7 @@ pub fn best_first_radius(
 
     let mut best: Option<RadiusTrial> = None;
     let mut first_radius = common;
-    // Trials in a row that were no better than the best.
+    // Number of successive trials without an improvement.
     let mut worse = 0;
     for _ in 0..TRIALS {
         let (search_ms, surfels) = run(first_radius, FRAMES)?;
@@ -82,7 +83,7 @@ pub fn best_first_radius(
         }
         worse = if is_better { 0 } else { worse + 1 };
         first_radius *= std::f32::consts::SQRT_2;
-        // Beyond searches only take longer, and bins become coarser.
+        // Larger radii only take longer, and bins become coarser.
         if first_radius > 4.0 * largest || worse == 2 {
             break;
         }

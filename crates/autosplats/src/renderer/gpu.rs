@@ -1,4 +1,4 @@
-//! The frame on the GPU: the steps of all stages, made when buffers change and replayed for each picture.
+//! Frames on the GPU: the steps of all stages, made when buffers change and replayed for each picture.
 
 mod prepared;
 #[cfg(test)]
@@ -34,21 +34,21 @@ use crate::splat::{GBuffer, LayerBuffers};
 #[derive(Debug)]
 pub(super) struct GpuRenderer {
     gpu: Gpu,
-    /// How pictures in memory are timed; those in textures are not.
+    /// How frames in memory are timed. Frames in textures are not timed.
     clock: Clock,
     uploader: Uploader,
     cloud: DeviceCloud,
-    /// Where the sensors of its points stood, and the number of runs of points.
+    /// Buffer of the sensor positions of the points, and its number of runs of points.
     sensors: Option<(wgpu::Buffer, usize)>,
     depth_noise: DepthNoiseBuffer,
     resident: Resident,
-    /// [`FrameUniform`].
+    /// Buffer of [`FrameUniform`].
     frame: wgpu::Buffer,
     passes: Passes,
     prepared: Option<Prepared>,
     upward: Upward,
     exposure: Exposure,
-    /// Of the last frame.
+    /// View of the last frame.
     view: Option<View>,
     readback: Readback,
     image: Image,
@@ -56,7 +56,7 @@ pub(super) struct GpuRenderer {
     times: Vec<PassTime>,
 }
 
-/// What of which cloud is on the device, by its identity.
+/// Identities of the clouds whose points and values are on the device.
 #[derive(Debug, Default)]
 struct Resident {
     points: Option<u64>,
@@ -64,6 +64,8 @@ struct Resident {
 }
 
 impl GpuRenderer {
+    /// Creates a renderer on `gpu`.
+    ///
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
     pub(super) fn new(gpu: Gpu) -> Result<Self, Error> {
@@ -92,8 +94,10 @@ impl GpuRenderer {
         self.gpu.summary()
     }
 
+    /// Checks that the device can run the engine.
+    ///
     /// # Errors
-    /// [`Error::Device`] if the device cannot run the engine.
+    /// [`Error::Device`] if it cannot.
     pub(super) fn check_engine(&self, engine: SearchEngine) -> Result<(), Error> {
         check_engine(&self.gpu, engine)
     }
@@ -110,7 +114,7 @@ impl GpuRenderer {
         self.gpu.clone().checked(|| self.make_resident(cloud, &wanted, report))?
     }
 
-    /// Uploads what is not there yet. `report` is told how much of it is done.
+    /// Uploads what is not on the device yet. `report` receives the finished fraction.
     fn make_resident(
         &mut self,
         cloud: &PointCloud,
@@ -127,10 +131,10 @@ impl GpuRenderer {
         let colors = wanted.colors(cloud);
         let carried = PointValues { colors: colors.as_deref(), scalar: wanted.scalar(cloud) };
         if !self.cloud.fits(cloud.len()) || self.cloud.words() != carried.words() {
-            // Steps hold on to the buffers that they are bound to: these go before the new ones come.
+            // Steps keep the buffers that they bind: the steps go before new buffers come.
             self.prepared = None;
         }
-        // What fails is not there.
+        // Values of a failed upload do not count as resident.
         self.resident.values = None;
         let part = if carried.words() == 0 { 1.0 } else { 0.5 };
         if new_points {
@@ -149,11 +153,11 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Tells the device where the sensors of its points stood.
+    /// Uploads the sensor positions of the points.
     fn upload_sensors(&mut self, sensors: &Sensors) -> Result<(), Error> {
         let len = Some(sensors.len()).filter(|&len| len > 0);
         if self.sensors.as_ref().map(|(_, len)| *len) != len {
-            // Steps hold on to the buffer before.
+            // Steps keep the old buffer.
             self.prepared = None;
             self.sensors = None;
             self.sensors = len.map(|len| Ok::<_, Error>((sensor_buffer(&self.gpu, len)?, len))).transpose()?;
@@ -205,11 +209,11 @@ impl GpuRenderer {
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
         let view = check(cloud, camera, size, settings)?;
-        // What a device that fails refuses arrives as an error, whatever it is asked for.
+        // `checked` turns every failure of the device into an error.
         self.gpu.clone().checked(move || self.frame(cloud, &view, size, settings, go_on))?
     }
 
-    /// Renders what was checked.
+    /// Renders after the checks.
     fn frame(
         &mut self,
         cloud: &PointCloud,
@@ -245,7 +249,7 @@ impl GpuRenderer {
         }
         readback.copy(gpu, &mut recorder.encoder, &wants)?;
         *times = recorder.finish();
-        // What was not submitted left the surfels as they were.
+        // The submitted frame replaces the surfels of the last one.
         *last_view = Some(*screen);
         prepared.seen = Some((now.0, now.1, (settings.clone(), None)));
         let (counters, value_range) = readback.read(gpu, |parts| {
@@ -294,7 +298,7 @@ impl GpuRenderer {
         self.gpu.clone().checked(|| self.frame_in_texture(cloud, &view, texture, settings))?
     }
 
-    /// Renders what was checked into a texture.
+    /// Renders into a texture after the checks.
     fn frame_in_texture(
         &mut self,
         cloud: &PointCloud,
@@ -324,15 +328,16 @@ impl GpuRenderer {
         gpu.check_lost()
     }
 
-    /// Makes buffers and steps for a frame unless the last frame's will do. Returns the margin around the picture.
+    /// Makes buffers and steps for a frame, unless those of the last frame fit. Returns the width in pixels of the
+    /// margin around the picture.
     fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<u32, Error> {
-        // A screen point has nothing larger than its surfel.
+        // A surfel is the largest record per screen point.
         let has_room = |margin: u32, halves| {
             let screen = size.map(|side| side + 2 * margin);
             ScreenBuffers::has_room::<Surfel>(&self.gpu, screen, halves, self.cloud.capacity())
                 && LayerBuffers::has_room(&self.gpu, screen, wanted.channels())
         };
-        // Halves matter everywhere, a margin along the edges.
+        // If memory is short, the margin goes before the halves: it matters along the edges only, halves everywhere.
         let (margin, halves) = (settings.reconstruction.margin(size), settings.reconstruction.halves());
         let (margin, halves) = [(margin, halves), (0, halves), (margin, false)]
             .into_iter()
@@ -351,7 +356,7 @@ impl GpuRenderer {
     }
 }
 
-/// What became of the points, by the device's counters.
+/// Counts of a frame, from the device's counters.
 fn counts(cloud: &PointCloud, counters: &[u32]) -> Counts {
     let count = |counter: Counter| counters[counter as usize] as usize;
     let [not_finite, behind, outside] = [Counter::NotFinite, Counter::Behind, Counter::Outside].map(count);

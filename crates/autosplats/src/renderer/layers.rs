@@ -1,4 +1,4 @@
-//! Shading of layers that a caller has.
+//! Shading of layers that the caller provides.
 
 use glam::DVec3;
 
@@ -9,13 +9,15 @@ use crate::splat::GBuffer;
 
 use super::{MAX_SIDE, Settings};
 
-/// Shades `layers` as a frame would be, on the CPU: another look at a frame's surface without rendering it again, or a
-/// picture of a surface that comes from elsewhere, begun with [`GBuffer::new`]. Heights are told along the camera's up axis;
-/// without an [exposure](Shading::exposure) colours are shown as bright as they are, whatever cloud they were of.
+/// Shades `layers` like a frame, on the CPU: a frame's surface with other settings, or a surface from elsewhere. Create
+/// layers with [`GBuffer::new`].
+///
+/// Heights are measured along the camera's up axis. Without an [exposure](Shading::exposure), colours are shown as they
+/// are.
 ///
 /// # Errors
-/// [`Error::ImageSize`], [`Error::Camera`], [`Error::Setting`]; [`Error::Layers`] if a layer that is needed has not one value
-/// for each pixel.
+/// [`Error::ImageSize`], [`Error::Camera`], [`Error::Setting`]; [`Error::Layers`] if a required layer does not have one
+/// value per pixel.
 pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Result<Image, Error> {
     let GBuffer { width, height, .. } = *layers;
     let sides = 1..=MAX_SIDE;
@@ -38,7 +40,7 @@ pub fn shade_layers(layers: &GBuffer, camera: &Camera, shading: &Shading) -> Res
     if let Some((layer, values)) = always.chain(optional).chain(needed).find(|(_, len)| *len != area) {
         return Err(Error::Layers { layer, values, wanted: area });
     }
-    // Whose colours these are is not known.
+    // The cloud of these colours is unknown.
     let exposure = shading.exposure.unwrap_or(1.0);
     let scene = Scene { view: &view, up: camera.up.normalize(), origin: DVec3::ZERO, exposure };
     let mut image = Image::default();

@@ -1,4 +1,4 @@
-//! A frame, one line per stage.
+//! Frames of a cloud on the CPU or a GPU.
 
 mod attributes;
 mod cpu;
@@ -30,49 +30,51 @@ pub use settings::{Reconstruction, Settings};
 pub use still::{BYTES_PER_PIXEL, still_supersample};
 pub use surfels::PointSurfel;
 
-/// Longest side of an image in pixels.
+/// Longest allowed side of an image in pixels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// What became of the points of one frame, in numbers. But for the last two, points in the margin that a picture may have count.
+/// Numbers of points of one frame, by what became of them. All except `covered` and `value_range` include the margin
+/// around the picture, if there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Counts {
     /// Points in the cloud.
     pub points: usize,
-    /// Points that cannot be seen: the sum of the next three.
+    /// Points that cannot be seen: the sum of `not_finite`, `behind` and `outside`.
     pub dropped: usize,
     /// Points with a coordinate that is NaN or infinite.
     pub not_finite: usize,
     /// Points at or behind the eye.
     pub behind: usize,
-    /// Points outside the picture and, where there is one, the margin around it.
+    /// Points outside the picture and its margin.
     pub outside: usize,
-    /// Points that own a pixel or half of one, the nearest ones there, in the picture or its margin; the rest are hidden behind
-    /// them.
+    /// Points that own a pixel, or half of one, in the picture or its margin because they are the nearest there. The
+    /// remaining points are hidden behind them.
     pub visible: usize,
     /// Visible points reconstructed in the first pass.
     pub active: usize,
-    /// Visible points that grid culling put back, or that lie so far out in the margin that they are but neighbours to others.
+    /// Visible points that are postponed by grid culling, or that are too far out in the margin to be more than
+    /// neighbours.
     pub passive: usize,
-    /// Passive points that turned out not to be hidden and were reconstructed in the second pass.
+    /// Passive points that the first pass left visible and the second pass reconstructed.
     pub recovered: usize,
-    /// Points discarded because they have no neighbour, or because they are no part of a surface that their neighbours are.
+    /// Points discarded because they have no neighbours or do not belong to the surface of their neighbours.
     pub outliers: usize,
-    /// Points that kept fewer than k neighbours, because of a gap or of the bound on search work.
+    /// Points with fewer than k neighbours because of a gap or the bound on search work.
     pub clamped: usize,
-    /// Points whose search met the bound on its work.
+    /// Points whose search reached the bound on its work.
     pub bounded: usize,
     /// Pixels that show a surface.
     pub covered: usize,
-    /// Values at the two ends of the colour map, given or found in the picture; where the colour mode has one.
+    /// Values at the two ends of the colour map, given or found in the picture; `None` if the colour mode has no map.
     pub value_range: Option<[f64; 2]>,
 }
 
-/// Milliseconds spent in each stage of one frame. On a GPU with timestamps from the begin to the end of a stage's passes that
-/// follow each other, what lies between them included.
+/// Milliseconds spent in each stage of one frame. On a GPU with timestamps, a stage counts from the start to the end of
+/// each run of its successive passes, including the time between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs, reason = "one field per stage")]
 pub struct Timings {
-    /// Copying the points to the device, where they were not there already; not part of the frame.
+    /// Copying the points to the device, unless they are there already; not part of `frame`.
     pub upload: f64,
     pub project: f64,
     pub search: f64,
@@ -80,24 +82,25 @@ pub struct Timings {
     pub adapt: f64,
     pub splat: f64,
     pub shade: f64,
-    /// From the first stage's start to the last one's end; reading a picture back from a device is not part of it.
+    /// From the start of the first stage to the end of the last. With timestamps, reading the picture back from a
+    /// device is not part of it.
     pub frame: f64,
 }
 
-/// Where frames are made. Pictures are the same within a step of brightness here and there.
+/// Where frames are rendered. Pictures of the CPU and a GPU differ at most by a step of brightness in a few places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Backend {
-    /// A hardware GPU where there is one, else the CPU.
+    /// A hardware GPU if there is one, else the CPU.
     #[default]
     Auto,
-    /// All threads of the current rayon pool; needs no driver.
+    /// The CPU, on all threads of the current rayon pool; needs no driver.
     Cpu,
-    /// The best device that wgpu finds, though it may be a program on the CPU.
+    /// The best device that wgpu finds, including software devices.
     Gpu,
 }
 
-/// Turns clouds into pictures; keeps its buffers, so that a frame after the first allocates next to nothing.
+/// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little.
 #[derive(Debug)]
 pub struct Renderer {
     form: Form,
@@ -109,15 +112,15 @@ enum Form {
     Gpu(Box<GpuRenderer>),
 }
 
-/// One picture and what is known about it.
+/// A picture and its statistics.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// The picture.
     pub image: &'a Image,
-    /// The visible surface it was shaded from; a GPU hands it out only if [all layers](Settings::all_layers) are asked for,
-    /// and leaves it empty otherwise.
+    /// The visible surface that the picture shows. On a GPU, empty unless [all layers](Settings::all_layers) are
+    /// requested.
     pub layers: &'a GBuffer,
-    /// What became of the points.
+    /// Numbers of points.
     pub counts: Counts,
     /// Time per stage.
     pub timings: Timings,
@@ -132,15 +135,16 @@ impl Default for Renderer {
 }
 
 impl Renderer {
-    /// A renderer that runs on the CPU, in the current rayon thread pool.
+    /// Creates a renderer that runs on the CPU, in the current rayon thread pool.
     pub fn new() -> Self {
         Self { form: Form::Cpu(Box::default()) }
     }
 
-    /// A renderer that runs where `backend` says, on a device of its own.
+    /// Creates a renderer that runs on `backend`, on a device of its own.
     ///
     /// # Errors
-    /// [`Error::Device`] if there is no GPU though one is asked for, or it does not start; [`Error::DeviceMemory`].
+    /// [`Error::Device`] if [`Backend::Gpu`] is requested and there is no GPU or it does not start;
+    /// [`Error::DeviceMemory`].
     pub fn with_backend(backend: Backend) -> Result<Self, Error> {
         let on = |gpu: Gpu| Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(gpu)?)) });
         match backend {
@@ -154,17 +158,18 @@ impl Renderer {
         }
     }
 
-    /// A renderer on the caller's own device. It uses the features `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and
-    /// `TIMESTAMP_QUERY` if the device was made with them; it needs none, but [`SplatCommunication`](crate::SearchEngine::SplatCommunication) needs
-    /// `FLOAT32_BLENDABLE`. Without timestamps passes are not timed, and the time of a frame includes reading it back.
+    /// Creates a renderer on the caller's device. No feature is required, except that
+    /// [`SplatCommunication`](crate::SearchEngine::SplatCommunication) needs `FLOAT32_BLENDABLE`. The renderer uses
+    /// `SHADER_INT64`, `SHADER_INT64_ATOMIC_MIN_MAX` and `TIMESTAMP_QUERY` if the device has them. Without timestamps,
+    /// passes are not timed, and the time of a frame includes reading it back.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device lacks what every WebGPU device has, [`Error::DeviceMemory`].
+    /// [`Error::Device`] if the device lacks what every WebGPU device has; [`Error::DeviceMemory`].
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
         Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
     }
 
-    /// The device that frames are made on; `None` on the CPU.
+    /// The device that renders; `None` on the CPU.
     pub fn adapter(&self) -> Option<AdapterSummary> {
         match &self.form {
             Form::Cpu(_) => None,
@@ -172,10 +177,11 @@ impl Renderer {
         }
     }
 
-    /// Checks whether this renderer can do what `settings` ask for, before there is a cloud.
+    /// Checks whether this renderer supports `settings`, without a cloud.
     ///
     /// # Errors
-    /// [`Error::Setting`] for what lies outside its range, [`Error::Device`] for an engine that does not run here.
+    /// [`Error::Setting`] if a value is outside its range, [`Error::Device`] if the engine does not run on this
+    /// renderer.
     pub fn check(&self, settings: &Settings) -> Result<(), Error> {
         settings.check()?;
         match &self.form {
@@ -184,14 +190,14 @@ impl Renderer {
         }
     }
 
-    /// Renders `cloud` into a picture of `size` (width, height) pixels. A GPU keeps the points: those of a cloud whose
-    /// [identity](PointCloud::identity) it has are not uploaded again.
+    /// Renders `cloud` into a picture of `size` (width, height) pixels. A GPU keeps the points of the last cloud and
+    /// does not upload a cloud of the same [identity](PointCloud::identity) again.
     ///
     /// # Errors
-    /// [`Error::ImageSize`], [`Error::Setting`] and [`Error::Camera`] for what lies outside its range,
-    /// [`Error::TooManyPoints`], [`Error::MissingAttribute`] if the colour mode needs one that the cloud lacks. On a GPU
-    /// also [`Error::DeviceLimit`], [`Error::DeviceMemory`] and [`Error::DeviceLost`]; after the last the renderer is of no
-    /// use any more.
+    /// [`Error::ImageSize`], [`Error::Setting`] and [`Error::Camera`] for values outside their ranges,
+    /// [`Error::TooManyPoints`], [`Error::MissingAttribute`] if the cloud lacks the attribute of the colour mode. On a
+    /// GPU also [`Error::DeviceLimit`], [`Error::DeviceMemory`] and [`Error::DeviceLost`]; after the last, the renderer
+    /// is unusable.
     pub fn render(
         &mut self,
         cloud: &PointCloud,
@@ -202,12 +208,12 @@ impl Renderer {
         self.render_while(cloud, camera, size, settings, &|| true)
     }
 
-    /// [Renders](Self::render) unless `go_on`, asked before the frame begins and after each stage of it, says no: then the
-    /// view has changed, say, and nobody wants this picture any more. A GPU asks while points are uploaded, and works
-    /// without questions from then on.
+    /// [Renders](Self::render) unless `go_on` returns false, for example because the view has changed. The CPU calls
+    /// `go_on` before the frame and after each stage. A GPU calls `go_on` before the frame and while points are
+    /// uploaded.
     ///
     /// # Errors
-    /// Those of [`render`](Self::render), and [`Error::Cancelled`] if `go_on` said no.
+    /// Those of [`render`](Self::render), and [`Error::Cancelled`] if `go_on` returned false.
     pub fn render_while(
         &mut self,
         cloud: &PointCloud,
@@ -225,15 +231,17 @@ impl Renderer {
         }
     }
 
-    /// Renders `cloud` with normals and radii found beforehand instead of on the fly: what [`estimate_normals`] gives for
-    /// the same `k`, on either side. Neither outliers, gaps nor noise are looked for, and splats are circles whatever
-    /// [`ellipses`](Reconstruction::ellipses) says. A point with a normal that is not finite, or a radius that is not finite or
-    /// not above 0, draws nothing and is counted as an outlier. On the CPU only.
+    /// Renders `cloud` with precomputed normals and radii, as [`estimate_normals`] returns them for the same `k`. CPU
+    /// only.
+    ///
+    /// Outliers, gaps and noise are not searched for. Splats are circles, whatever
+    /// [`ellipses`](Reconstruction::ellipses) says. Either side of a normal may face the eye. A point draws nothing and
+    /// counts as an outlier if its normal is not finite, or if its radius is not finite and above 0.
     ///
     /// [`estimate_normals`]: crate::estimate_normals
     ///
     /// # Errors
-    /// Those of [`render`](Self::render); [`Error::Normals`] if there is not one of each for each point, [`Error::Device`]
+    /// Those of [`render`](Self::render); [`Error::Normals`] unless there is one of each per point; [`Error::Device`]
     /// if this renderer runs on a GPU.
     pub fn render_with_normals(
         &mut self,
@@ -254,15 +262,16 @@ impl Renderer {
                 let planes = GivenPlanes { normals, curvature, radius };
                 renderer.render(cloud, camera, size, settings, Some(planes), &|| true)
             }
-            Form::Gpu(_) => Err(Error::Device("normals found beforehand are rendered on the CPU only".into())),
+            Form::Gpu(_) => Err(Error::Device("precomputed normals are rendered on the CPU only".into())),
         }
     }
 
-    /// The surfels of the last frame: what the search and the fit found for each visible point that they took up and whose
-    /// surfel's centre is in the picture, in no order to rely on. Empty before the first frame.
+    /// Surfels of the last frame: the fits of all reconstructed points whose surfel's centre is in the picture, in no
+    /// particular order. Empty before the first frame.
     ///
     /// # Errors
-    /// [`Error::DeviceMemory`], [`Error::DeviceLimit`] and [`Error::DeviceLost`] on a GPU, which they are read back from.
+    /// On a GPU, [`Error::DeviceMemory`], [`Error::DeviceLimit`] and [`Error::DeviceLost`], because the surfels are
+    /// read back.
     pub fn surfels(&mut self) -> Result<Vec<PointSurfel>, Error> {
         match &mut self.form {
             Form::Cpu(renderer) => Ok(renderer.surfels()),
@@ -270,9 +279,9 @@ impl Renderer {
         }
     }
 
-    /// How the k-radius search of the last frame converged: the number of points that were searched for, and after each
-    /// iteration how many of them had not yet been found their radius. Empty before the first frame, on the CPU, and with
-    /// [engines](crate::SearchEngine) that do not iterate.
+    /// Convergence of the last frame's k-radius search: the number of searched points, then the number of unfinished
+    /// points after each iteration. Empty before the first frame, on the CPU, and with [engines](crate::SearchEngine)
+    /// that do not iterate.
     ///
     /// # Errors
     /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
@@ -283,13 +292,13 @@ impl Renderer {
         }
     }
 
-    /// Uploads what `settings` will need of `cloud`, so that the next frame of it starts at once: as soon as the frame
-    /// before is submitted, while the device still renders that. `report` is told the fraction done, and says whether to
-    /// go on. On the CPU there is nothing to do.
+    /// Uploads what the next frame of `cloud` with `settings` needs, so that this frame starts at once. The upload can
+    /// run while the device still renders the frame before. `report` receives the finished fraction, 0 to 1, and
+    /// returns whether to go on. Does nothing on the CPU.
     ///
     /// # Errors
     /// [`Error::MissingAttribute`], [`Error::TooManyPoints`], [`Error::DeviceMemory`], [`Error::DeviceLost`];
-    /// [`Error::Cancelled`] if `report` said no.
+    /// [`Error::Cancelled`] if `report` returned false.
     pub fn upload(
         &mut self,
         cloud: &PointCloud,
@@ -302,12 +311,12 @@ impl Renderer {
         }
     }
 
-    /// Renders into the whole of a caller's texture, made by the device that this renderer runs on, without waiting for it.
-    /// The format is `Rgba8Unorm`, `Bgra8Unorm` or one of their `Srgb` forms, the usage has `COPY_DST`. There is no legend.
+    /// Renders into a whole texture without waiting for the device. The texture must be made by this renderer's device,
+    /// in format `Rgba8Unorm`, `Bgra8Unorm` or one of their `Srgb` forms, with usage `COPY_DST`. No legend is drawn.
     ///
     /// # Errors
-    /// Those of [`render`](Self::render), and [`Error::Texture`] if the texture cannot be rendered into, [`Error::Device`] if
-    /// this renderer runs on the CPU.
+    /// Those of [`render`](Self::render); [`Error::Texture`] if the texture is unsuitable; [`Error::Device`] if this
+    /// renderer runs on the CPU.
     pub fn render_to_texture(
         &mut self,
         cloud: &PointCloud,
@@ -322,7 +331,7 @@ impl Renderer {
     }
 }
 
-/// Checks what was asked for and makes the camera ready.
+/// Checks the request and prepares the camera.
 fn check(cloud: &PointCloud, camera: &Camera, [width, height]: [u32; 2], settings: &Settings) -> Result<View, Error> {
     settings.check()?;
     let sides = 1..=MAX_SIDE;

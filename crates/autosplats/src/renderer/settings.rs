@@ -1,4 +1,4 @@
-//! What a picture can be asked to be.
+//! Settings of a picture, and their ranges.
 
 use std::borrow::Cow;
 
@@ -10,13 +10,13 @@ use crate::search::SearchEngine;
 use crate::shade::Shading;
 use crate::splat::STEADY_FRAMES;
 
-/// A margin is one part in so many of the picture's shorter side.
+/// Shorter side of the picture over the width of its margin.
 const MARGIN_PART: u32 = 12;
-/// Radius of the splats that a handful of points is, as a part of the picture's shorter side; what is drawn of them is 1.4 times as
-/// wide.
+/// Splat radius of the points of a very small cloud, as a fraction of the picture's shorter side. The drawn dots are
+/// 1.4 times as wide.
 const HANDFUL_DOT: f32 = 0.0045;
 
-/// Everything about a picture but the cloud, the camera and the size.
+/// Settings of a picture: everything except the cloud, the camera and the size.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Settings {
@@ -24,69 +24,85 @@ pub struct Settings {
     pub reconstruction: Reconstruction,
     /// How splats become an image.
     pub shading: Shading,
-    /// Layers to fill although the shading does not need them, for writing them out.
+    /// Fill all layers, including those that the shading does not need, for writing them out. Default: off.
     pub all_layers: bool,
 }
 
-/// How points become splats. The default goes beyond [the paper's](Self::paper) in
-/// [`points_per_pixel`](Self::points_per_pixel), [`adaptive`](Self::adaptive) and [`trim`](Self::trim).
+/// How points become splats. Beyond [the paper's settings](Self::paper), the default turns on
+/// [`points_per_pixel`](Self::points_per_pixel), [`adaptive`](Self::adaptive), [`trim`](Self::trim) and
+/// [`coherent`](Self::coherent).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Reconstruction {
-    /// Neighbours per point, 1 to 64.
+    /// Neighbours per point, 1 to 64. Default: 10.
     pub k: u32,
-    /// Most points that a pixel keeps, 1 or 2: the nearest, as in the paper, or the nearest of each half. Two show silhouettes,
-    /// thin parts and whatever has points denser than pixels more truly, and take up to twice as long to search and to fit.
-    /// The engine [`SearchEngine::SplatCommunication`] and devices too small for two have one.
+    /// Most points that a pixel keeps, 1 or 2. Default: 2.
+    ///
+    /// 1 keeps the nearest point, as in the paper. 2 keeps the nearest point of each half of the pixel. Two points
+    /// preserve silhouettes and thin parts where points are denser than pixels; search and fit take up to twice as
+    /// long. [`SearchEngine::SplatCommunication`] and devices with too little memory always use 1. See
+    /// docs/decisions/0001-two-points-a-pixel.md.
     pub points_per_pixel: u32,
-    /// Fit larger neighbourhoods, of up to thousands of points, where points scatter too much for k neighbours to tell the
-    /// surface, and move splats onto what is fitted, as circles. Points in rows, as a spinning lidar leaves them, get ellipses
-    /// that reach the next row, where rows make a surface. Points far from their neighbours and on no surface become dots or,
-    /// unless outliers are kept, are discarded. A neighbourhood of one ends at wider gaps ([`gap_factor`](Self::gap_factor)). Points in
-    /// a margin around the picture count as neighbours, a twelfth of its shorter side wide, where a device has room for it and
-    /// the engine is not [`SearchEngine::SplatCommunication`]. Else a surface without noise or rows is left as it is. A cloud of
-    /// fewer than 64 finite points is drawn as dots, whole and each frame by itself.
+    /// Adapt the reconstruction to noise, scan lines, outliers and tiny clouds. Default: on.
+    ///
+    /// * Noise: where k neighbours are too noisy, up to thousands of points are fitted, and splats move onto the fit as
+    ///   circles.
+    /// * Scan lines, as of a spinning lidar, get ellipses that reach the next line, where the lines form a surface.
+    /// * Points that are far from their neighbours and lie on no surface become dots, or are discarded unless
+    ///   [`outlier_expansions`](Self::outlier_expansions) is `None`.
+    /// * A neighbourhood of a single neighbour ends only at a wider [gap](Self::gap_factor).
+    /// * Points in a margin around the picture count as neighbours. The margin is a twelfth of the picture's shorter
+    ///   side. [`SearchEngine::SplatCommunication`] and devices with too little memory have no margin.
+    /// * A cloud of fewer than 64 finite points is drawn as dots, without trimming or temporal smoothing.
+    ///
+    /// Surfaces without noise and scan lines stay as they are.
     pub adaptive: bool,
-    /// Implementation of the k-radius search.
+    /// Implementation of the k-radius search. Default: [`SearchEngine::ScreenGrid`].
     pub engine: SearchEngine,
-    /// e0: points without a neighbour after this many expansions of their first search radius, each by √k (√10 at least),
-    /// are discarded as outliers; 0 to 8. `None` keeps every point [Paper, §5.3].
+    /// e0: number of expansions of the first search radius, 0 to 8. Default: 1. A point without a neighbour after them
+    /// is discarded as an outlier. Each expansion multiplies the radius by √k, at least by √10. `None` keeps every
+    /// point [Paper, §5.3].
     pub outlier_expansions: Option<u32>,
-    /// λ: a search that has at least one neighbour ends with those it has when its circle's area grows by this factor
-    /// without meeting another; above 1. `None` bridges any gap [Paper, §5.3]. With [`adaptive`](Self::adaptive) it has to
-    /// grow by λ² after a single neighbour.
+    /// λ: growth of a search circle's area that counts as a gap, above 1. Default: 4. A search with at least one
+    /// neighbour ends when its circle grows by this factor without meeting another. With [`adaptive`](Self::adaptive)
+    /// the circle of a single neighbour has to grow by λ². `None` bridges any gap [Paper, §5.3].
     pub gap_factor: Option<f32>,
-    /// Factor on every splat radius, 0.01 to 10.
+    /// Factor on every splat radius, 0.01 to 10. Default: 1.
     pub splat_scale: f32,
-    /// Draw ellipses along the principal axes of each neighbourhood instead of circles [Paper, §6], but for splats that
-    /// [`adaptive`](Self::adaptive) fitted.
+    /// Draw ellipses along the principal axes of each neighbourhood instead of circles [Paper, §6]. Default: off.
+    /// Splats that [`adaptive`](Self::adaptive) fits stay circles.
     pub ellipses: bool,
-    /// Reconstruct points behind the nearest one of their screen cell only where they turn out visible [Paper, §7].
+    /// Reconstruct points behind the nearest point of their screen cell only where they turn out to be visible
+    /// [Paper, §7]. Default: on.
     pub grid_culling: bool,
-    /// Redraw the depth map twice without the splats of hidden points [Paper, §7].
+    /// Redraw the depth map twice without the splats of hidden points [Paper, §7]. Default: on.
     pub depth_refinement: bool,
-    /// End silhouettes where points do, or, if noise has blurred them and the setting is [`adaptive`](Self::adaptive), where points
-    /// become few. Without, silhouettes are too wide by as much as splats are.
+    /// Trim silhouettes to where the points end. Default: on. With [`adaptive`](Self::adaptive), a silhouette that is
+    /// blurred by noise ends where points become sparse. Without trimming, silhouettes are too wide by the width of the
+    /// splats.
     pub trim: bool,
-    /// Temporal coherence: start the search of each point from the k-radius that the last frame of the same [`Renderer`] found
-    /// where the point was then. It saves time and changes no picture. Of [`SearchEngine::ScreenGrid`]; the paper's and its rival
-    /// take each frame by itself.
+    /// Temporal coherence: start the search of each point from the k-radius that the last frame of the same
+    /// [`Renderer`] found at that place. Default: on. Coherence saves time and does not change pictures. Only
+    /// [`SearchEngine::ScreenGrid`] uses it.
     ///
     /// [`Renderer`]: crate::Renderer
     pub coherent: bool,
-    /// Temporal smoothing while nothing but the camera moves: what is fitted to a point is averaged over about eight frames of
-    /// the same [`Renderer`], cloud and settings that follow each other, with weights that fade. Noise shimmers less, and
-    /// normals are nearer to the truth. The image, but not the layers, is then averaged with the last one where the same
-    /// surface was seen, each by half: so detail finer than pixels shimmers less. A frame then depends on those before; one after
-    /// another that was given up, or had another size on a device, begins anew.
+    /// Temporal smoothing while only the camera moves. Default: off. Noise and detail finer than pixels shimmer less,
+    /// and normals become more accurate.
+    ///
+    /// The fit of each point is averaged over about eight successive frames of the same [`Renderer`], cloud and
+    /// settings, with fading weights. Where the last image showed the same surface, the image becomes the mean of both;
+    /// the layers stay as they are. A frame thus depends on earlier ones. Smoothing restarts after a cancelled frame
+    /// and, on a GPU, after a change of size. See docs/decisions/0014-frame-to-frame.md.
     ///
     /// [`Renderer`]: crate::Renderer
     pub steady: bool,
-    /// Temporal smoothing of points that are others in each frame, as live ones are, noisy anew each time: surfaces are averaged
-    /// over about so many frames of the same [`Renderer`], 1 to 32, that follow each other with such a setting. 1, the default,
-    /// takes each frame by itself. What moves lags behind, unless it moves by more than half its k-radius a frame; a frame then
-    /// depends on those before. Frames of the same points are averaged as if they were to be
-    /// [`steady`](Self::steady).
+    /// Number of successive frames, 1 to 32, over which surfaces are averaged when each frame has new points, as from a
+    /// live sensor. Default: 1, each frame by itself.
+    ///
+    /// The frames must be of the same [`Renderer`] and settings. A frame then depends on earlier ones. Moving things
+    /// lag behind, unless they move by more than half their k-radius per frame. Frames of the same points are smoothed
+    /// as with [`steady`](Self::steady).
     ///
     /// [`Renderer`]: crate::Renderer
     pub frames_averaged: u32,
@@ -114,55 +130,56 @@ impl Default for Reconstruction {
 }
 
 impl Reconstruction {
-    /// What the paper does: one point a pixel, k = 10 for all, whole splats, and each frame by itself.
+    /// The paper's settings: one point per pixel, k = 10 everywhere, untrimmed splats, and each frame by itself.
     pub fn paper() -> Self {
         Self { points_per_pixel: 1, adaptive: false, trim: false, coherent: false, ..Self::default() }
     }
 
-    /// Over how many frames surfels are averaged: of the same points, and of others.
+    /// Number of frames over which surfels are averaged: `[if the points are the same, if they are others]`.
     pub(super) fn averaged(&self) -> [u32; 2] {
         [self.frames_averaged.max(if self.steady { STEADY_FRAMES } else { 1 }), self.frames_averaged]
     }
 
-    /// Whether frames depend on those before.
+    /// Whether frames depend on earlier ones.
     pub(super) fn smooths(&self) -> bool {
         self.averaged() != [1; 2]
     }
 
-    /// Longest ellipse, semi-major over semi-minor axis.
+    /// Largest ratio of an ellipse's semi-major to its semi-minor axis; 1 for circles.
     pub(super) fn longest(&self) -> f32 {
         if self.ellipses { LONGEST } else { 1.0 }
     }
 
-    /// K-radius of k neighbours over their splat's radius.
+    /// Ratio of the k-radius of a point with k neighbours to the radius of its splat.
     pub(super) fn k_radius_per_radius(&self) -> f32 {
         0.5 * (self.k as f32).sqrt() / self.splat_scale
     }
 
-    /// Pixels around a picture of this size whose points are neighbours to those within. What fits large neighbourhoods would fit
-    /// one-sided ones along its edges, and see borders of noisy surfaces there. The paper's search ends with the picture: of the
-    /// thousandth of the points that it leaves unfinished few are seen, and more of those around a picture hide much of it.
+    /// Width in pixels of the margin around a picture of `size` pixels; points in the margin serve as neighbours.
+    /// Without a margin, large neighbourhoods would be one-sided along the edges, and noisy surfaces would seem to have
+    /// borders there. The paper's engine has no margin: it leaves one point in a thousand unfinished, and such points
+    /// beside a picture hide much of it. See docs/decisions/0004-margin.md.
     pub(super) fn margin(&self, size: [u32; 2]) -> u32 {
         let wants = self.adaptive && self.engine != SearchEngine::SplatCommunication;
         if wants { size[0].min(size[1]).div_ceil(MARGIN_PART) } else { 0 }
     }
 
-    /// Whether the search of a frame starts from what the last one found.
+    /// Whether the search of a frame starts from the radii of the last frame.
     pub(super) fn remembers(&self) -> bool {
         self.coherent && self.engine == SearchEngine::ScreenGrid
     }
 
-    /// Whether halves of pixels keep a point each.
+    /// Whether each half of a pixel keeps a point.
     pub(super) fn halves(&self) -> bool {
         self.points_per_pixel == 2 && self.engine != SearchEngine::SplatCommunication
     }
 }
 
 impl Settings {
-    /// What a cloud is drawn with in a picture of this size, and the splat radius in pixels of the dots that it is; 0 if it is
-    /// surface. Dots are drawn as they are.
-    // Differs from the paper: a handful tells of no surface, and discs as wide as its points are apart would hide each other and
-    // how few they are.
+    /// Settings to draw `cloud` with in a picture of `size` pixels, and the splat radius in pixels of its points as
+    /// dots; 0 if they are drawn as a surface. Dots are neither adapted, trimmed nor smoothed.
+    // Differs from the paper: a handful of points defines no surface. Discs as wide as their distances would hide each
+    // other and hide that the points are few. See docs/decisions/0025-handful-as-dots.md.
     pub(super) fn of_cloud(&self, cloud: &PointCloud, size: [u32; 2]) -> (Cow<'_, Self>, f32) {
         let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
         let Reconstruction { adaptive, splat_scale, .. } = self.reconstruction;
@@ -178,7 +195,7 @@ impl Settings {
     /// Checks every value against its range.
     ///
     /// # Errors
-    /// [`Error::Setting`] names the first one outside.
+    /// [`Error::Setting`] names the first value outside its range.
     pub fn check(&self) -> Result<(), Error> {
         fn within(name: &'static str, ok: bool, value: impl ToString, range: &'static str) -> Result<(), Error> {
             if ok { Ok(()) } else { Err(Error::Setting { name, value: value.to_string(), range }) }
@@ -247,7 +264,7 @@ mod tests {
             let is_right =
                 |surfel: &&&crate::PointSurfel| (per_radius * surfel.radius / surfel.k_radius - 1.0).abs() < 1e-4;
             let right = drawn.iter().filter(is_right).count();
-            // All but those with fewer neighbours than k, or more at the same distance.
+            // The others have fewer than k neighbours, or several at the k-radius.
             assert!(10 * right > 9 * drawn.len() && right > 500, "k {k}: {right} of {}", drawn.len());
         }
     }

@@ -1,18 +1,19 @@
-//! Pictures that have time.
+//! Still pictures, which may take longer than frames.
 
 use autosplats_cloud::check_memory;
 
 use super::MAX_SIDE;
 
-/// Memory in bytes that stages and layers take for each pixel of a picture, about.
+/// Approximate memory in bytes that stages and layers take per pixel of a picture.
 pub const BYTES_PER_PIXEL: u64 = 100;
-/// Pixels of the largest still that is averaged down: in larger ones details are larger as well, and what is rendered is no larger
-/// than screens are.
+/// Most pixels of a still that is supersampled. In larger pictures details are larger too, and the rendered pictures
+/// stay within common screen sizes.
 const MOST_PIXELS: u64 = 1920 * 1080;
 
-/// How many times as wide and high a still picture of `size` pixels is best rendered, to be
-/// [averaged down](crate::Image::averaged): 2 of up to 1920x1080 pixels, if memory is there for it, else 1. It takes two to four
-/// times as long, and nothing else brings pictures without noise as much nearer to the true surface.
+/// Factor on both sides of a still picture of `size` pixels at which it is best rendered, then [averaged
+/// down](crate::Image::averaged). The factor is 2 for up to 1920x1080 pixels if memory suffices, else 1.
+///
+/// Supersampling takes two to four times as long. For pictures without noise it improves the accuracy most.
 #[must_use]
 pub fn still_supersample(size: [u32; 2]) -> u32 {
     let [width, height] = size.map(|side| 2 * u64::from(side));

@@ -1,11 +1,11 @@
-//! Which way is up in a cloud that does not say so.
+//! The up direction of a cloud that does not state its axes.
 
 use autosplats_cloud::PointCloud;
 use glam::DVec3;
 
 use crate::camera::{guess_axes, up};
 
-/// The last guess, as guessing sorts coordinates of 100,000 points: 10 ms that a frame need not spend.
+/// Cache of the last guess, because guessing sorts the coordinates of 100,000 points.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Upward {
     guessed: Option<(u64, DVec3)>,
@@ -14,7 +14,7 @@ pub(super) struct Upward {
 impl Upward {
     /// Unit vector upward in world coordinates.
     pub(super) fn of(&mut self, cloud: &PointCloud) -> DVec3 {
-        // What is stated is no part of a cloud's identity.
+        // Stated axes are not part of a cloud's identity, so they are not cached.
         if let Some(axes) = cloud.axes() {
             return up(axes);
         }

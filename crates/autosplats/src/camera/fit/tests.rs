@@ -48,7 +48,7 @@ fn all_points_lie_in_the_picture() {
 
 #[test]
 fn what_is_seen_fills_the_picture() {
-    // Ground that goes away from the eye: its near end is wider.
+    // Ground that recedes from the eye: its near end looks wider.
     let ground = (0..10_000).map(|i| [(i % 100) as f32, (i / 100) as f32, 0.0]).collect();
     let cloud = PointCloud::new(DVec3::ZERO, ground);
     for aspect in [0.5, 1.5, 2.5] {
@@ -67,7 +67,8 @@ fn what_is_seen_fills_the_picture() {
     }
 }
 
-/// Ground that a lidar at `sensor` sees 2 to 80 m away, denser near it, at azimuths of so much, and other points about it.
+/// Ground 2 to 80 m from a lidar at `sensor`, denser near the lidar, over `azimuths` radians, and `others`, relative to
+/// the sensor.
 fn swept(sensor: DVec3, azimuths: f64, others: impl IntoIterator<Item = DVec3>) -> PointCloud {
     let ground = (0..4000).map(|i| {
         let azimuth = azimuths * ((f64::from(i) * 0.618034).fract() - 0.5);
@@ -99,7 +100,7 @@ fn a_scan_around_its_sensor_is_seen_from_behind_it() {
 
 #[test]
 fn what_is_in_the_way_is_gone_around() {
-    // A street says which way to look.
+    // The street defines the viewing direction.
     let street = || (0..600).map(|i| DVec3::new(f64::from(i - 300) * 0.25, 3.0, -1.7));
     let free = auto(&swept(DVec3::ZERO, TAU, street()), 40.0, 1.5).eye;
     let before = |count: usize| (0..count).map(move |i| free * (0.6 + 0.2 * i as f64 / count as f64));
@@ -119,7 +120,7 @@ fn a_sensor_that_sees_one_side_is_seen_from_behind() {
     }
 }
 
-/// A wall along X that sensors at these places saw, each a part of it.
+/// A wall along X, divided among sensors at these positions.
 fn wall_seen_from(sensors: &[DVec3]) -> PointCloud {
     let wall: Vec<_> = (0..10_000).map(|i| [0.04 * (i / 100) as f32 - 2.0, 0.0, 0.02 * (i % 100) as f32]).collect();
     let part = wall.len() / sensors.len().max(1);

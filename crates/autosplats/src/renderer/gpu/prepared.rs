@@ -1,4 +1,4 @@
-//! What a frame needs on a device beside points: compiled passes, buffers and steps.
+//! Compiled passes, buffers and steps of a frame on a device.
 
 use std::mem::{Discriminant, discriminant};
 
@@ -23,21 +23,21 @@ use crate::splat::gpu::{LayerRules, SplatBuffers, SplatPasses};
 use crate::splat::over_time::gpu::{OverTimeBuffers, OverTimePasses};
 use crate::splat::{Channels, LayerBuffers};
 
-/// Which engine, whatever its parameters, and k: what search passes are compiled for.
+/// Engine, without its parameters, and k: the search passes are compiled for these.
 type SearchKind = (Discriminant<SearchEngine>, u32);
 
-/// Compiled passes: those of the last engine, k and channels are kept.
+/// Compiled passes. For search and splat, the passes of the last engine, k and channels are kept.
 #[derive(Debug)]
 pub(super) struct Passes {
     project: ProjectPasses,
     search: Option<(SearchKind, Box<dyn EnginePasses>)>,
     past: PastPasses,
     fit: FitPasses,
-    /// Once there was a cloud with sensors.
+    /// Compiled for the first cloud with sensors.
     orient: Option<OrientPasses>,
-    /// Compiled when first asked for.
+    /// Compiled for the first adaptive frame.
     adapt: Option<AdaptPasses>,
-    /// Compiled when first asked for.
+    /// Compiled for the first smoothed frame.
     over_time: Option<(OverTimePasses, PictureOverTimePasses)>,
     splat: Option<(Channels, SplatPasses)>,
     shade: ShadePasses,
@@ -58,7 +58,7 @@ impl Passes {
         })
     }
 
-    /// Compiles what frames of a shape need and earlier ones did not.
+    /// Compiles the missing passes for frames of a shape.
     fn compile(&mut self, gpu: &Gpu, shape: &Shape, settings: &Settings) -> Result<(), Error> {
         if shape.sensors.is_some() && self.orient.is_none() {
             self.orient = Some(OrientPasses::new(gpu)?);
@@ -80,12 +80,12 @@ impl Passes {
     }
 }
 
-/// What a frame's buffers and steps were made for.
+/// The properties of a frame that its buffers and steps depend on.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// Of the picture.
+    /// Width and height of the picture in pixels.
     size: [u32; 2],
-    /// Around it.
+    /// Width of the margin around the picture in pixels.
     margin: u32,
     halves: bool,
     search: SearchKind,
@@ -95,7 +95,7 @@ pub(super) struct Shape {
     depth_refinement: bool,
     trim: bool,
     channels: Channels,
-    /// Runs of points by their sensors.
+    /// Number of runs of points by their sensors; `None` without sensors.
     sensors: Option<usize>,
     tone_backs: bool,
     find_range: bool,
@@ -104,7 +104,8 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// Of a picture, within a margin, of points that `sensors` runs of them were seen by.
+    /// Shape of a frame. `size` is the picture's, without the margin; `sensors` is the number of runs of points by
+    /// their sensors.
     pub(super) fn new(
         size: [u32; 2],
         margin: u32,
@@ -133,31 +134,31 @@ impl Shape {
     }
 }
 
-/// What is on the device whatever the frame.
+/// Device buffers that outlive the steps.
 #[derive(Clone, Copy)]
 pub(super) struct OnDevice<'a> {
     pub(super) cloud: &'a DeviceCloud,
     pub(super) sensors: Option<&'a wgpu::Buffer>,
     pub(super) depth_noise: &'a DepthNoiseBuffer,
-    /// [`FrameUniform`].
+    /// Buffer of [`FrameUniform`].
     pub(super) frame: &'a wgpu::Buffer,
 }
 
-/// How a picture was made, and for a texture of which format.
+/// Settings of a picture, and the format of its texture if it has one.
 pub(super) type Made = (Settings, Option<wgpu::TextureFormat>);
 
 /// A frame ready to be replayed.
 #[derive(Debug)]
 pub(super) struct Prepared {
     shape: Shape,
-    /// How the last frame was seen and made, and the identity of its points, if there was one.
+    /// The last frame, if there is one: view, identity of its points and how it was made.
     pub(super) seen: Option<(Seen, u64, Made)>,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
     pub(super) surfels: wgpu::Buffer,
     pub(super) layers: LayerBuffers,
     pub(super) picture: ShadeBuffers,
-    /// Of an engine that iterates.
+    /// Counts per iteration, for engines that iterate.
     pub(super) convergence: Option<wgpu::Buffer>,
     pub(super) steps: Vec<Step>,
 }
@@ -241,12 +242,12 @@ impl Prepared {
         Ok(Self { shape, seen: None, screen, surfels, layers, picture, convergence, steps })
     }
 
-    /// Whether it serves frames of this shape.
+    /// Whether the steps fit frames of this shape.
     pub(super) fn is_for(&self, shape: &Shape) -> bool {
         self.shape == *shape
     }
 
-    /// Tells the passes what the next frame is to be.
+    /// Writes the uniforms of the next frame.
     pub(super) fn tell(
         &mut self,
         gpu: &Gpu,
@@ -279,7 +280,7 @@ impl Prepared {
             },
             ..FrameUniform::new(&now.view, reconstruction.k)
         };
-        // Steps that are made anew leave nothing to look back at, and those of another k are.
+        // New steps have no last frame to look back at. A change of k always makes new steps.
         let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
         let reprojected = past.and_then(|(past, points, made)| Some((Reprojection::new(&now, &past)?, points, made)));
         let told = reprojected.map_or(told, |(past, points, made)| {

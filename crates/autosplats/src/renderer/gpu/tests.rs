@@ -1,4 +1,4 @@
-//! What holds of all passes, without a device.
+//! Checks of all passes that need no device.
 
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
@@ -6,7 +6,7 @@ use crate::gpu::{INT64_ATOMICS, PassSource};
 
 mod layouts;
 
-/// Those that draw.
+/// Whether a pass is a render pass.
 fn is_raster(pass: &PassSource) -> bool {
     crate::search::splat_communication::gpu::RASTER_PASSES.iter().any(|raster| raster.path == pass.path)
 }
@@ -30,7 +30,7 @@ fn passes() -> impl Iterator<Item = &'static PassSource> {
     stages.into_iter().flatten()
 }
 
-/// What naga calls the features a pass declares: nothing beyond WebGPU's core but that.
+/// Naga's names of the features that a pass declares. Only 64-bit atomics are beyond WebGPU's core.
 fn capabilities(pass: &PassSource) -> Capabilities {
     if pass.needs.contains(INT64_ATOMICS) {
         Capabilities::SHADER_INT64 | Capabilities::SHADER_INT64_ATOMIC_MIN_MAX

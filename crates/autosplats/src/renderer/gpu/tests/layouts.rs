@@ -1,4 +1,4 @@
-//! Structs and constants that Rust and WGSL both have are the same.
+//! Structs and constants have the same layouts and values in Rust and WGSL.
 
 use std::mem::offset_of;
 
@@ -20,7 +20,7 @@ use crate::splat::{BLOCK_PX, Cover, FRINGE_BLOCKS};
 /// Name, offset and size of a field.
 type Field = (String, usize, usize);
 
-/// The name of a struct in WGSL, its size and its fields.
+/// A struct in Rust: its name in WGSL, its size and its fields.
 struct Mirrored {
     name: &'static str,
     size: usize,
@@ -33,7 +33,7 @@ fn field_size<S, F>(_: impl Fn(&S) -> &F) -> usize {
 
 macro_rules! mirrored {
     ($name:literal, $rust:ident { $($field:ident),* $(,)? } $(, filled up with $unused:ident)?) => {{
-        // Fails to compile if one is missing.
+        // Does not compile if a field is missing.
         let $rust { $($field: _,)* $($unused: _)? } = <$rust as bytemuck::Zeroable>::zeroed();
         let fields = vec![$((
             stringify!($field).to_owned(),
@@ -127,7 +127,7 @@ fn mirrored() -> [Mirrored; 10] {
     ]
 }
 
-/// All passes, and what is shared but imported by none of them.
+/// All passes, and the shared files that no pass needs to import.
 fn modules() -> Vec<Module> {
     let shared = ["#import surfel\n", "#import counters\n", "#import rank\n", "#import groups\n"];
     passes().map(PassSource::module).chain(shared.map(parse)).collect()
@@ -151,7 +151,7 @@ fn layout(module: &Module, name: &str) -> Option<(usize, Vec<Field>)> {
     })
 }
 
-/// The `u32` constants of a module, by name.
+/// Names and values of the `u32` constants of a module.
 fn constants(module: &Module) -> Vec<(String, u32)> {
     let constant = |constant: &naga::Constant| match module.global_expressions[constant.init] {
         Expression::Literal(Literal::U32(value)) => Some((constant.name.clone()?, value)),
@@ -165,7 +165,7 @@ fn constant(source: &str, name: &str) -> u32 {
     constants.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
 }
 
-/// As WGSL names the variant of an enum: `NotFinite` is `NOT_FINITE`.
+/// WGSL's name of an enum's variant: `NotFinite` is `NOT_FINITE`.
 fn screaming(variant: &impl std::fmt::Debug) -> String {
     let name = format!("{variant:?}");
     let words = name.char_indices().map(|(at, c)| if at > 0 && c.is_uppercase() { format!("_{c}") } else { c.into() });
