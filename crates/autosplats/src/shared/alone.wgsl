@@ -1,6 +1,6 @@
-// Balls that an invocation sums up by itself. Imports: quadric. See `together`.
+// Balls that each invocation sums up by itself. Imports: quadric. Alternative: `together`.
 
-// The first cells of a ball that are an invocation's own, four in a row, and how far it is to the next: columns and rows.
+// First cells of a ball that the invocation reads, four side by side, and the step to its next cells: columns and rows.
 fn own_start() -> vec2u {
     return vec2u(0u);
 }

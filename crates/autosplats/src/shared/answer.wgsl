@@ -1,5 +1,5 @@
-// Splats by which points answer those that ask: as large as the feedback radius. Imports: screen, splat_box, radius_search.
-// The including pass binds `points` and `feedback`.
+// Splats by which points answer: as large as the feedback radius [Paper, §4]. Imports: screen, splat_box,
+// radius_search. The including pass binds `points` and `feedback`.
 
 struct Splat {
     @builtin(position) position: vec4f,
@@ -7,13 +7,14 @@ struct Splat {
     @location(1) @interpolate(flat) pixel: u32,
 }
 
-// What the point of a pixel asked.
+// Search that the point of a pixel asked for.
 fn asked_at(pixel: vec2u) -> Search {
     let told = textureLoad(feedback, pixel, 0);
     return Search(told.x, told.y, told.z);
 }
 
-// A vertex of a splat. Whom nobody asks draws nothing; or, if it is to pass along what it asked itself, its own pixel.
+// A vertex of a splat. A point that no search reaches draws nothing, or only its own pixel if it passes along its own
+// search.
 fn answer_vertex(vertex: u32, passes_along: bool) -> Splat {
     let point = points[vertex / BOX_VERTICES];
     let pixel = pixel_xy(point.pixel);

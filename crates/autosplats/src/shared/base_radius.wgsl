@@ -1,4 +1,5 @@
-// Radius of the balls around a surfel. Imports: frame, density, screen, surfel. The including pass binds `density`.
+// Base radius of the balls around a surfel. Imports: frame, density, screen, surfel. The including pass binds
+// `density`.
 
 #import density
 #import screen
@@ -6,13 +7,13 @@
 
 override LEAST_REACH: f32;
 
-// First search radius of a surfel's point.
+// First search radius of a surfel's point, world units.
 fn initial_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
     let cell = density[density_cell(pixel_xy(surfel.pixel), cell_px, cell_columns)];
     return first_radius(cell.x, cell_px, surfel.center.z);
 }
 
-// Radius that the balls around a surfel are multiples of.
+// Radius in world units whose multiples are the radii of the balls around a surfel.
 fn base_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
     return max(surfel.k_radius, LEAST_REACH * initial_radius(surfel, cell_px, cell_columns));
 }

@@ -1,5 +1,6 @@
-// Borders that noise has blurred. The CPU form, `trim/blurred.rs`, says how. Imports: frame, layers, blocks, noise. The including
-// pass binds `measured`, `blocks` and `cover`, and has `AROUND_PX`, `of_pixel_at`, and `SILENT`, `YES` and `NO`.
+// Borders that are blurred by noise: see the CPU form, `trim/blurred.rs`. Imports: frame, layers, blocks, noise. The
+// including pass binds `measured`, `blocks` and `cover`, and defines `AROUND_PX`, `of_pixel_at`, `SILENT`, `YES` and
+// `NO`. "Marked" sixteenths of pixels hold points. See docs/decisions/0003-borders-of-noise.md.
 
 #import blocks
 #import noise
@@ -7,60 +8,62 @@
 override LEAST_NOISE_PX: f32;
 // Squared radius of a window over the variance of its kernel.
 override PER_VARIANCE: f32;
-// And over the variance of the noise.
+// Squared radius of a window over the variance of the noise, beyond that of the window without noise.
 override PER_NOISE: f32;
-// How far a surface is tilted of which all noise counts.
+// Sine of a surface's tilt from which all noise counts.
 override TILTED: f32;
-// Of the noise, what blurs a border.
+// Fraction of the noise that blurs a border.
 override BLURS: f32;
-// Radius of the window without noise, and of the widest, in pixels.
+// Radius of the window without noise, and largest radius, in pixels.
 override LEAST_RADIUS_PX: f32;
 override WIDEST_RADIUS_PX: f32;
-// Windows with a larger radius than this are summed up in pairs of pixels, and those larger than twice this in blocks.
+// Windows of a larger radius are summed up in 2x2 pixels, and in blocks from twice this radius.
 override FINE_RADIUS_PX: f32;
-// How much of the mean square counts against the mean.
+// Factor of the mean square that is subtracted from the mean.
 override SPREAD: f32;
-// How far it may be off then with hardly any noise, and with so much in pixels and more.
+// Largest allowed offset of the mean, in `blur_unit`: without noise, and with noise of `SURE_NOISE_PX` pixels or more.
 override OFF_UNSURE: f32;
 override OFF_SURE: f32;
 override SURE_NOISE_PX: f32;
-// If it is sure to be noise, as much as so many mean distances of the sixteenths with points in the window is enough.
+// If noise is certain, `SURE_NOISE_PX` drops to this multiple of the mean distance between the window's marked
+// sixteenths.
 override SURE_DISTANCES: f32;
 override FEWEST_BLURRED: u32;
 override FRINGE_NOISES: f32;
-// How far it is off at least half way to what is empty, as a part of that.
+// Largest allowed offset half-way to the empty region, as a fraction of that at the pixel.
 override OFF_HALF_WAY: f32;
-// Blocks beyond the fringe that tell where it is empty.
+// Width in blocks of the region beyond the fringe that is searched for empty blocks.
 override BEYOND_FRINGE: f32;
 // Reach of a splat in splat radii.
 override SUPPORT: f32;
 
-// Widest fringe in blocks.
+// Largest width of a fringe in blocks.
 const FRINGE_BLOCKS = 16u;
 
-// Noise in pixels, where a splat with this reach covers a pixel that shows such a normal and depth.
+// Noise in pixels at a pixel with this normal and depth, covered by a splat of this reach.
 fn noise_px(pixel: vec2u, shown: vec4f, reach_px: f32) -> f32 {
     let eye = to_eye(unproject(vec2f(pixel) + 0.5, shown.w));
     let facing = dot(shown.xyz, eye) / length(eye);
     let aside = min(sqrt(max(1.0 - facing * facing, 0.0)) / TILTED, 1.0);
     let size = pixel_size(shown.w);
-    // As the splat radius comes from it.
+    // Inverse of the splat radius's formula.
     let k_radius = reach_px / SUPPORT * size * (0.5 * sqrt(f32(frame.k)) / frame.splat_scale);
     return BLURS * aside * noise_at(k_radius) / size;
 }
 
-// How far a fringe reaches, in pixels.
+// Width of a fringe in pixels.
 fn fringe_px(reach_px: f32, noise: f32) -> f32 {
     return min(reach_px + FRINGE_NOISES * noise, f32(BLOCK_PX * FRINGE_BLOCKS));
 }
 
-// Whether a pixel is beside a surface whose border such a noise has blurred, if points tell.
+// Whether a pixel lies beside a surface whose border is blurred by `noise` pixels; `SILENT` if the points do not
+// suffice.
 fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
-    // Of points beyond the screen nothing is known.
+    // Points beyond the screen are unknown.
     let to_edge = min(pixel, frame.size - 1u - pixel);
     let widest = min(WIDEST_RADIUS_PX, f32(min(to_edge.x, to_edge.y)));
     let window = min(sqrt(LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_NOISE * noise * noise), widest);
-    // In one narrower than splats are wide, points tell of their distances from each other, or of rows.
+    // In windows narrower than splats, points reflect only their distances from each other, or scan lines.
     if window < max(AROUND_PX, reach_px / SUPPORT) {
         return SILENT;
     }
@@ -72,7 +75,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     let apart = window * sqrt(3.14159265 / here.count);
     let sure_px = SURE_NOISE_PX + noise_sure() * (min(SURE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
     let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / sure_px, 0.0);
-    // What is off by less altogether is so that way as well.
+    // The length of the offset bounds its part in any direction.
     if length(here.offset) / blur_unit(blur) <= may_be {
         return NO;
     }
@@ -99,13 +102,13 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     return select(YES, NO, goes_on);
 }
 
-// Steps of a pixel from a pixel to one that is empty, up to `most`; 0 if there is none. A function of its own: Mesa's llvmpipe 22.3
-// makes wrong code of a loop that returns from within what calls another loop.
+// Number of steps from a pixel to an empty one, up to `most`; 0 if there is none. A function of its own, because Mesa's
+// llvmpipe 22.3 miscompiles a returning loop in a function that calls another loop.
 fn steps_to_empty(pixel: vec2u, ahead: vec2f, most: u32) -> u32 {
     for (var step = 1u; step <= most; step++) {
         let at = floor(vec2f(pixel) + 0.5 + ahead * f32(step));
         if any(at < vec2f(0.0)) || any(at >= vec2f(frame.size)) {
-            // Beyond the screen the surface goes on.
+            // Beyond the screen the surface is assumed to continue.
             return 0u;
         }
         let there = vec2u(at);
@@ -121,8 +124,8 @@ fn is_empty_block(block: vec2u) -> bool {
     return (blocks[block.y * block_counts().x + block.x] & EMPTY_BLOCK) != 0u;
 }
 
-// Towards the blocks that are empty within so many pixels of a pixel's middle, the nearest of which count most; 0 if there are none,
-// or as many on all sides.
+// Sum of the offsets of the empty blocks within `radius` pixels of a pixel's middle; near blocks weigh most. 0 if there
+// are none, or as many on all sides.
 fn to_empty(pixel: vec2u, radius: f32) -> vec2f {
     let reach = u32(radius);
     let first = (max(pixel, vec2u(reach)) - reach) / BLOCK_PX;
@@ -140,21 +143,21 @@ fn to_empty(pixel: vec2u, radius: f32) -> vec2f {
     return sum;
 }
 
-// Of the sixteenths with points around a pixel.
+// Moments of the marked sixteenths around a pixel.
 struct Moments {
     // Mean offset from the pixel's middle, in pixels.
     offset: vec2f,
     count: f32,
-    // Means of squares: of x, of x and y, of y.
+    // Means of the products xx, xy and yy.
     squares: vec3f,
 }
 
-// How far a mean is off in w²/√(w² + σ²), in pixels, of the variances of the window and the noise.
+// Unit of offsets, w²/√(w² + σ²), in pixels, from the variances of the window and the noise.
 fn blur_unit(blur: vec2f) -> f32 {
     return blur.x / sqrt(blur.x + blur.y);
 }
 
-// How far the mean is off away from `ahead`, less a part of the mean square along it.
+// Offset of the mean away from `ahead`, less a fraction of the mean square along `ahead`.
 fn off(points: Moments, ahead: vec2f, blur: vec2f) -> f32 {
     let unit = blur_unit(blur);
     let mean = -dot(points.offset, ahead) / unit;
@@ -163,7 +166,7 @@ fn off(points: Moments, ahead: vec2f, blur: vec2f) -> f32 {
     return mean - SPREAD * clamp((square - of_noise) / (unit * unit), 0.0, 1.0);
 }
 
-// How many sixteenths hold points in a square of a grid of such, whose side is 1, 2 or 4 pixels.
+// Number of marked sixteenths in a square of a grid; `side` is 1, 2 or 4 pixels.
 fn held_by(square: vec2u, side: u32) -> f32 {
     var held = 0u;
     if side == BLOCK_PX {
@@ -186,8 +189,8 @@ fn held_by(square: vec2u, side: u32) -> f32 {
     return f32(held);
 }
 
-// The moments of the sixteenths with points in a window of such a radius around the middle of a pixel, which lies within the
-// screen, and how many they are.
+// Moments and number of the marked sixteenths in a window of this radius around the middle of a pixel. The window lies
+// within the screen.
 fn moments(pixel: vec2u, window: f32) -> Moments {
     var sums = vec3f(0.0);
     var squares = vec3f(0.0);

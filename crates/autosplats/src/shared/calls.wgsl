@@ -1,4 +1,5 @@
-// Which surfels noise calls to be turned. Imports: frame, noise, surfel. The including pass binds `measured`.
+// Decides which surfels have to be fitted anew because of noise. Imports: frame, noise, surfel. The including pass
+// binds `measured`.
 
 #import noise
 #import surfel
@@ -17,25 +18,27 @@ fn sheet_level() -> u32 {
     return u32(measured[3]);
 }
 
-// Standard error of a normal, radians, that no larger ball need better.
+// Standard error of a normal, in radians, that needs no larger ball.
 fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {
     let pixel = pixel_size(depth);
     let dense = TINY_REACH_PX * pixel / k_radius;
     return ENOUGH + TINY_SLOPE * min(dense * dense, MOST_TINY) * max(TINY_PX - noise / pixel, 0.0);
 }
 
-// Most that points may scatter about larger balls' quadrics, world units, where the noise is `known` as that of a depth camera.
+// Largest scatter about larger balls' quadrics, world units; `known` says whether the noise is known as that of a depth
+// camera.
 fn most_scatter(noise: f32, known: bool) -> f32 {
     return select(SCATTER, SCATTER_KNOWN, known) * noise;
 }
 
-// Whether the first neighbours of a surfel are a row. Steps of a depth camera's depths, whose noise is known, are rows too,
-// but the surface is not in them.
+// Whether the first neighbours of a surfel form a scan line. Depth steps of a camera with known noise look alike but
+// are not on the surface.
 fn is_row(surfel: Surfel, known_noise: f32) -> bool {
     return surfel.radius > 0.0 && surfel.major_ratio > ROW && known_noise == 0.0;
 }
 
-// Whether the noise calls for more than a surfel's first neighbours, whose error is about that of k points over the k-radius.
+// Whether noise calls for more than the first neighbours. Their normal's standard error is about the noise over the
+// k-radius.
 fn calls(surfel: Surfel, noise: f32, enough: f32) -> bool {
     return surfel.radius > 0.0 && noise > enough * surfel.k_radius;
 }

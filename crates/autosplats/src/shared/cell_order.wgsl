@@ -1,20 +1,20 @@
-// Cell order: the screen is cut into strips, a cell is a pixel wide and a strip high, cells follow each other along the
-// strip, pixels down the cell, and slots of a pixel one after the other. Imports: frame.
+// Cell order of screen points. The screen is cut into strips; a cell is a pixel wide and a strip high. Cells follow
+// each other along the strip, pixels down the cell, and slots within the pixel. Imports: frame.
 
 #import divide
 
 struct CellSlot {
-    // Of the keys.
+    // Index among the keys.
     slot: u32,
     pixel: vec2u,
-    // Whether the slot is the first of its cell, and the cell.
+    // Whether the slot is the first of its cell, and the cell's index.
     first: bool,
     cell: u32,
 }
 
-// The slot at a place in cell order.
+// The slot at a position in cell order.
 fn cell_slot(at_slot: u32, strip_px: u32) -> CellSlot {
-    // One slot a pixel, or two.
+    // One or two slots per pixel.
     let at = at_slot >> frame.halves;
     let half = at_slot & frame.halves;
     let strip = divide(at, strip_px * frame.size.x).x;

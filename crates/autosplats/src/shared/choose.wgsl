@@ -1,5 +1,5 @@
 // The choice of a quadric's scale: see the CPU form. Imports: frame, quadric. The including pass binds `levels` and
-// `clusters`.
+// `clusters`. See docs/decisions/0006-scale-by-agreement.md.
 
 #import quadric
 
@@ -9,7 +9,7 @@ override THICKEST: f32;
 override AGREE: f32;
 override FARTHEST: f32;
 
-// The same surface with heights along its normal at the point, to second order, if it is near to the point.
+// The same surface with heights along its normal at the point. Accurate to second order near the point.
 fn upright(quadric: Quadric) -> Quadric {
     let u = any_orthonormal(quadric.axis);
     let v = cross(quadric.axis, u);
@@ -31,12 +31,13 @@ fn upright(quadric: Quadric) -> Quadric {
     return found;
 }
 
-// Between an upright quadric and that of a larger ball with the same axis: the smaller one at a share of 0, the larger at 1.
+// Interpolates from an upright quadric to that of a larger ball with the same axis: `smaller` at share 0, `larger` at
+// share 1.
 fn towards(smaller: Quadric, larger: Quadric, share: f32) -> Quadric {
     var found = larger;
     found.radius = mix(smaller.radius, larger.radius, share);
     found.slope = share * larger.slope;
-    // In radii of their own balls; as curvatures in world units they compare.
+    // Bends are in radii of their own balls; curvatures in world units can be compared.
     found.bend = found.radius * mix(smaller.bend / smaller.radius, larger.bend / larger.radius, vec3f(share));
     let u = any_orthonormal(larger.axis);
     let v = cross(larger.axis, u);
@@ -47,23 +48,26 @@ fn towards(smaller: Quadric, larger: Quadric, share: f32) -> Quadric {
     return found;
 }
 
-// The upright quadric around `center` from balls that grow until its error is small enough; of no clusters if none is better than
-// the first neighbours. Radii are multiples of `least_radius`. The smallest ball has to agree with the `first` normal, whose
-// standard error follows it, negative if it is not known. Each ball counts as far as it agrees with what the smaller ones gave,
-// and one that does not, or scatters more, is the last.
+// The upright quadric around `center`, from balls that grow until its standard error is below `enough`. Without
+// clusters if no ball beats the first neighbours. The radii are `least_radius` times powers of `STEP`.
+//
+// `first` is the normal of the first neighbours and its standard error, negative if unknown; the smallest ball has to
+// agree with it. Each ball weighs by its agreement with the smaller ones. A ball that disagrees or has more than
+// `scatter` ends the search.
 fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f32, scatter: f32) -> Quadric {
     var radius = least_radius;
-    // A normal to agree with, and its error; negative if there is none yet.
+    // The normal to agree with, and its standard error; negative if there is none yet.
     var reliable = first;
     var best = Quadric();
-    // Where nothing is reliable, the least error.
+    // The quadric of least error, in case none is reliable.
     var fallback = Quadric();
-    // Heights of the first ball are along its plane's normal, those of larger ones along the normal found before.
+    // The heights of the first ball are along its plane's normal, those of larger balls along the last quadric's
+    // normal.
     var plane = Plane();
     var has_axis = false;
     for (var scale = 0u; scale < SCALES; scale++) {
         radius *= STEP;
-        // Points of a ball that the noise fills are no surface. The largest ball has to do where there is no better.
+        // A ball that is filled by noise has no surface; the largest is used as a last resort.
         let thin = noise < THICKEST * radius;
         if !thin && scale + 1u < SCALES {
             continue;

@@ -1,7 +1,7 @@
-// The clusters of cells: the first ones of all, then those that follow, which most cells have none of. Imports: levels. The
-// including pass binds `clusters`.
+// Storage of the cells' clusters: the first `BUNCH` of all cells, then the others, which most cells do not have.
+// Imports: levels. The including pass binds `clusters`.
 
-// Where a cluster of a cell is.
+// Index of a cell's cluster.
 fn cluster_at(cell: u32, slab: u32) -> u32 {
     let before = select(0u, arrayLength(&clusters) / (SLABS / BUNCH), slab >= BUNCH);
     return before + cell * BUNCH + slab % BUNCH;

@@ -1,4 +1,4 @@
-// How much the passes of splat communication draw, told from one to the next.
+// Amounts of work of splat communication's passes, handed from pass to pass.
 
 // Two triangles.
 const BOX_VERTICES = 6u;
@@ -15,14 +15,14 @@ struct Arguments {
     // Boxes of one pixel: all screen points, and the queries.
     points: Draw,
     queries: Draw,
-    // Of the iterations; without instances once they have ended.
+    // Draws of the iterations; no instances after the last one.
     clear: Draw,
     boxes: Draw,
-    // Of the passes after them.
+    // Draws of the passes after the iterations.
     last_clear: Draw,
     last_boxes: Draw,
     // Workgroups that count converged points.
     count: vec3u,
-    // How many iterations there were.
+    // Number of iterations so far.
     iterations: u32,
 }

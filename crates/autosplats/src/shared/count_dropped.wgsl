@@ -1,9 +1,9 @@
-// Counts points that own no pixel because they cannot, by reason: one atomic addition per workgroup and reason.
-// Imports: project_point, counters. The including pass binds `counters` as atomics.
+// Counts the points that cannot own a pixel, by reason: one atomic addition per workgroup and reason. Imports:
+// project_point, counters. The including pass binds `counters` as atomics.
 
 var<workgroup> dropped: array<atomic<u32>, 3>;
 
-// Call from all; a barrier follows.
+// To be called by all invocations; ends with a barrier.
 fn count_dropped_clear(local: u32) {
     if local < 3u {
         atomicStore(&dropped[local], 0u);
@@ -12,11 +12,11 @@ fn count_dropped_clear(local: u32) {
 }
 
 fn count_dropped(slot: u32) {
-    // NOT_FINITE, BEHIND and OUTSIDE are 0, 1, 2, and so count the slots that stand for them down from the greatest.
+    // The counters NOT_FINITE, BEHIND and OUTSIDE are 0, 1 and 2; their slots count down from the largest number.
     atomicAdd(&dropped[SLOT_NOT_FINITE - slot], 1u);
 }
 
-// Call from all; a barrier goes before.
+// To be called by all invocations; begins with a barrier.
 fn count_dropped_finish(local: u32) {
     workgroupBarrier();
     if local < 3u {

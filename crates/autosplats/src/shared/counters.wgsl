@@ -1,4 +1,4 @@
-// What is counted and chosen on the device, as indices into one buffer, so that some passes can bind it as atomics.
+// Counts and choices of the device, as indices into one buffer, so that some passes can bind it as atomics.
 
 const NOT_FINITE = 0u;
 const BEHIND = 1u;
@@ -6,14 +6,15 @@ const OUTSIDE = 2u;
 // Screen points, and blocks of the screen that hold any.
 const VISIBLE = 3u;
 const BLOCKS = 4u;
-// Height of a strip of cells and side of a density cell in pixels, density cells in a row.
+// Height of a strip of cells in pixels, side of a density cell in pixels, and density cells per row.
 const STRIP_PX = 5u;
 const CELL_PX = 6u;
 const CELL_COLUMNS = 7u;
 const ACTIVE = 8u;
 const PASSIVE = 9u;
 const RECOVERED = 10u;
-// Points whose neighbourhood a gap or the bound on work cut short, those that met the bound, and surfels discarded.
+// Points with fewer than k neighbours because of a gap or the bound on work, points that reached the bound, and
+// discarded surfels.
 const CLAMPED = 11u;
 const BOUNDED = 12u;
 const OUTLIERS = 13u;
@@ -22,8 +23,8 @@ const RANGE_LOW = 14u;
 const RANGE_HIGH = 15u;
 // Pixels that show a surface.
 const COVERED = 16u;
-// Splats too large for one invocation.
+// Splats that are too large for one invocation.
 const LARGE = 17u;
-// Queries of each round that the search of four at a time left to that of one.
+// Queries of each round that `search_four` leaves to `search`.
 const LEFT_ACTIVE = 18u;
 const LEFT_RECOVERED = 19u;

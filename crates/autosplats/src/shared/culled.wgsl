@@ -1,5 +1,5 @@
-// Whether grid culling puts a screen point back [Paper, §7, Grid Culling]. Imports: frame, density, screen, counters. The
-// including pass binds `density` and `counters`.
+// Whether grid culling postpones a screen point [Paper, §7, Grid Culling]. Imports: frame, density, screen, counters.
+// The including pass binds `density` and `counters`.
 
 fn is_culled(point: ScreenPoint) -> bool {
     let cell_px = counters[CELL_PX];

@@ -1,5 +1,5 @@
-// The low-resolution grid of [Paper, §5.1]: square cells of about k screen points; x of a cell is its number of screen points,
-// y the bits of its nearest depth. Imports: frame. The including pass binds `density` and `counters`.
+// The low-resolution grid of [Paper, §5.1]: square cells of about k screen points. x of a cell is its number of screen
+// points, y the bits of its nearest depth. Imports: frame. The including pass binds `density` and `counters`.
 
 #import divide
 
@@ -8,18 +8,18 @@ fn density_cell(pixel: vec2u, cell_px: u32, columns: u32) -> u32 {
     return divide(pixel.y, cell_px).x * columns + divide(pixel.x, cell_px).x;
 }
 
-// Depth beyond which points of a cell are probably hidden: the nearest, and the width of the cell in world units there
-// [Paper, §7, Grid Culling].
+// Depth beyond which points of a cell are probably hidden: the nearest depth, plus the cell's width in world units
+// there [Paper, §7, Grid Culling].
 fn culling_depth(nearest: f32, cell_px: u32) -> f32 {
     return nearest + f32(cell_px) * pixel_size(nearest);
 }
 
-// First search radius in world units: that of the circle which holds k points at the cell's density [Paper, §5.1].
+// First search radius in world units: of the circle that holds k points at the cell's density [Paper, §5.1].
 fn first_radius(count: u32, cell_px: u32, depth: f32) -> f32 {
     return first_radius_px(count, cell_px) * pixel_size(depth);
 }
 
-// The same in pixels.
+// First search radius in pixels.
 fn first_radius_px(count: u32, cell_px: u32) -> f32 {
     let area_px = f32(cell_px * cell_px);
     return sqrt(area_px * f32(frame.k) / (3.14159265 * f32(count)));

@@ -1,5 +1,5 @@
-// The depth map, pushed back by ε: as integers that order as the depths do, also those behind an orthographic eye, so that
-// an atomic minimum keeps the nearest.
+// Keys of the depth map, whose depths are pushed back by ε. Keys are integers in the order of the depths, negative ones
+// included, so that an atomic minimum keeps the nearest.
 
 fn depth_key(depth: f32) -> u32 {
     let bits = bitcast<u32>(depth);

@@ -1,29 +1,29 @@
-// What is known of the noise of depth cameras, as `adapt/depth/` has it. Imports: frame. The including pass binds
-// `depth_noise`: all runs, one at least.
+// Known noise of depth cameras, as in `adapt/depth/`. Imports: frame. The including pass binds `depth_noise`: all runs,
+// at least one. See docs/decisions/0009-depth-cameras.md.
 
-// How depths scatter that one sensor measured, those of the points from one index on.
+// Depth noise of one sensor and the first of its points.
 struct DepthRun {
-    // Where it stood, about the cloud's origin.
+    // Position of the sensor relative to the cloud's origin.
     position: vec3f,
     // Index of the first point.
     first: u32,
-    // Where it looked: a unit vector, in the axes of the cloud.
+    // Viewing direction of the sensor: unit vector in the axes of the cloud.
     axis: vec3f,
-    // Standard deviation at depth 1 along the axis; 0 if nothing is known.
+    // Standard deviation at depth 1 along the axis, 0 if unknown, and the power of depth by which it grows.
     factor: f32,
     power: f32,
     padding: array<u32, 3>,
 }
 
-// What is known of the noise at a surfel.
+// Known noise at a surfel.
 struct Known {
-    // Unit direction along which it was made, view space.
+    // Unit direction from the sensor, along which the noise acts, view space.
     ray: vec3f,
-    // Standard deviation; 0 if nothing is known.
+    // Standard deviation in world units; 0 if unknown.
     noise: f32,
 }
 
-// At a place in view space; of a cloud's point.
+// Known noise at a position in view space; `point` is the index in the cloud.
 fn known_at(place: vec3f, point: u32) -> Known {
     var low = 0u;
     var high = arrayLength(&depth_noise);
@@ -40,7 +40,7 @@ fn known_at(place: vec3f, point: u32) -> Known {
     let axis = m[0] * run.axis.x + m[1] * run.axis.y + m[2] * run.axis.z;
     let from_sensor = place - to_view(run.position);
     let depth = dot(from_sensor, axis);
-    // What is in the sensor itself, or behind it, was not seen by it.
+    // A sensor does not see points at its own place or behind it.
     if run.factor > 0.0 && depth > 0.0 {
         let noise = run.factor * select(pow(depth, run.power), 1.0, run.power == 0.0);
         return Known(normalize(from_sensor), noise);
@@ -48,7 +48,7 @@ fn known_at(place: vec3f, point: u32) -> Known {
     return Known();
 }
 
-// The same if it is more than what was `measured`.
+// Known noise, if it exceeds the measured noise.
 fn known_beyond(measured_noise: f32, place: vec3f, point: u32) -> Known {
     let known = known_at(place, point);
     if known.noise > measured_noise {

@@ -1,8 +1,8 @@
-// Division of whole numbers: software devices divide them one by one, floats side by side.
+// Division of whole numbers. Software devices divide integers one by one, but floats side by side.
 
-// Quotient and remainder, of numbers up to 2³¹ if the quotient is below 2²⁰.
+// Quotient and remainder of numbers up to 2³¹; the quotient must be below 2²⁰.
 fn divide(number: u32, by: u32) -> vec2u {
-    // At most one off: the float is right to some 2⁻²² of the quotient.
+    // At most one off, because the float is exact to about 2⁻²² of the quotient.
     let quotient = u32(f32(number) / f32(by));
     let rest = i32(number - quotient * by);
     let is_high = rest < 0;

@@ -1,18 +1,18 @@
 // Eigenvectors of symmetric 3×3 matrices by cyclic Jacobi rotations: see the CPU form. Imports: nothing.
 
-// Sweeps over the three entries off the diagonal.
+// Number of sweeps over the three entries off the diagonal.
 override SWEEPS: u32;
 
 struct Eigen {
-    // Ascending.
+    // Eigenvalues, ascending.
     values: vec3f,
-    // Unit vectors, of the least, the middle and the largest value.
+    // Unit eigenvectors of the least, the middle and the largest eigenvalue.
     least: vec3f,
     middle: vec3f,
     largest: vec3f,
 }
 
-// One rotation that zeroes the entry (p, q), r being the third axis.
+// Result of a rotation that zeroes the entry (p, q); r is the third axis.
 struct Rotated {
     p: f32,
     q: f32,
@@ -24,7 +24,7 @@ struct Rotated {
 
 fn rotate(p: f32, q: f32, pq: f32, pr: f32, qr: f32, vector_p: vec3f, vector_q: vec3f) -> Rotated {
     let difference = 0.5 * (q - p);
-    // tan of the smaller angle: sign(δ)·a/(|δ| + √(δ² + a²)); for a zero entry the least divisor makes it 0.
+    // tan of the smaller angle: sign(δ)·a/(|δ| + √(δ² + a²)). For a zero entry, the least divisor makes it 0.
     let length = sqrt(difference * difference + pq * pq);
     let signed = select(pq, -pq, difference < 0.0);
     let tan = signed / max(abs(difference) + length, 1.1754943508222875e-38);
@@ -54,7 +54,7 @@ fn eigen(diagonal: vec3f, rest: vec3f) -> Eigen {
         d = vec3f(a.p, a.q, d.z);
         xz = a.pr;
         yz = a.qr;
-        // The entry (x, y) is 0 now.
+        // The entry (x, y) is 0 here.
         let b = rotate(d.x, d.z, xz, 0.0, yz, a.vector_p, z);
         d = vec3f(b.p, d.y, b.q);
         xy = b.pr;

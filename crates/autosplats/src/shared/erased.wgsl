@@ -1,8 +1,8 @@
-// Erasing a splat's depth, pixel by pixel. Imports: frame, splat, depth_map, fragment, redraw. The including pass binds
+// Erases a splat's depth, pixel by pixel. Imports: frame, splat, depth_map, fragment, redraw. The including pass binds
 // `depth_map` and `cells` as atomics.
 
-// Keys this near are taken to be one, and pixels this near to the rim to be covered: passes may round the same sums
-// differently. What is erased without need is drawn again.
+// Tolerances, because passes may round the same sums differently: keys this close count as equal, and pixels this close
+// to the rim count as covered. Depths erased needlessly are drawn again.
 const ROUNDING = 64u;
 const WIDER_RIM = 1.0 + 1e-4;
 

@@ -1,21 +1,22 @@
-// Fills a cell with points or with clusters: see the CPU form. Imports: frame, levels, divide. The including pass binds
-// `clusters` to be written.
+// Fills a cell with points or clusters: see the CPU form. Imports: frame, levels, divide. The including pass binds
+// `clusters` for writing. See docs/decisions/0008-eight-slabs.md.
 
 #import clusters
 #import divide
 
-// How depth is cut into slabs about as thick as a cell is wide.
+// Partition of depth into slabs that are about as thick as a cell is wide.
 struct Slabs {
-    // Perspective: low bits of a depth that do not count, so that slabs get thicker as cells get wider with depth.
+    // Perspective: number of low bits of a depth that are ignored. Slabs thus get thicker with depth, like the width of
+    // cells.
     shift: u32,
-    // Parallel: slabs per world unit.
+    // Orthographic: slabs per world unit.
     per_unit: f32,
 }
 
 fn slabs_of(side_px: u32) -> Slabs {
     let side = f32(side_px);
-    // Depths between two powers of two share 2²³ steps. The difference of bits is the logarithm rounded down, without a
-    // division that may be off.
+    // Between two powers of two there are 2²³ floats. The difference of the bits is the rounded-down logarithm, without
+    // a division, which may be inexact.
     let doublings = (bitcast<u32>(max(frame.focal_px, side)) - bitcast<u32>(side)) >> 23u;
     return Slabs(23u - min(doublings, 23u), frame.focal_px / side);
 }
@@ -28,14 +29,14 @@ fn slab_of(slabs: Slabs, depth: f32) -> u32 {
     return u32(depth * slabs.per_unit);
 }
 
-// Of each cluster: sum of positions and number of points; slab of depth, in slabs of this cell.
+// Per cluster: sum of positions and number of points.
 var<private> sums: array<vec4f, SLABS>;
 var<private> slab_at: array<u32, SLABS>;
 var<private> used: u32;
 // How often the thickness of this cell's slabs was doubled.
 var<private> doubled: u32;
 
-// Adds a sum to its slab, unless there is none and no room for one.
+// Adds a sum to its slab; returns false if the slab is new and there is no room for it.
 fn put(sum: vec4f, slab: u32) -> bool {
     var at = 0u;
     while at < used && slab_at[at] != slab {
@@ -50,7 +51,7 @@ fn put(sum: vec4f, slab: u32) -> bool {
     return true;
 }
 
-// Makes slabs twice as thick.
+// Doubles the thickness of all slabs.
 fn double_thickness() {
     let full_sums = sums;
     let full_slabs = slab_at;

@@ -1,4 +1,4 @@
-// What was fitted to a point in the last frame, in its view space.
+// Fit of a point in the last frame, in that frame's view space.
 
 struct Fitted {
     // From the point to the surfel's centre.
@@ -7,6 +7,6 @@ struct Fitted {
     source: u32,
     // Unit normal.
     normal: vec3f,
-    // Over how many frames it is the mean.
+    // Number of frames averaged.
     frames: f32,
 }

@@ -2,15 +2,15 @@
 
 override DOT_RADIUS_PX: f32;
 
-// Key of no depth: behind everything.
+// Key of no depth, behind everything.
 const NO_DEPTH = 0xffffffffu;
 
-// A row of a splat: what does not change along it.
+// A row of pixels of a splat: the values that are constant along the row.
 struct Line {
     row: u32,
-    // Of the pixels' centres from the splat's.
+    // Offset of the pixels' centres from the splat's centre.
     dy: f32,
-    // The plane of the disc, and the disc's coordinates, level with the centre.
+    // The disc's plane and coordinates at the centre's column.
     plane: f32,
     u: f32,
     v: f32,
@@ -33,10 +33,10 @@ fn line_of(splat: Splat, row: u32) -> Line {
     );
 }
 
-// First and last column of a splat in a row, with one more to either side for rounding; the first is the greater one if it has
-// none. A splat seen at an angle fills little of its bounds.
+// First and last column of a splat in a row, with one more on either side for rounding. The first exceeds the last if
+// the row is empty. A splat seen at an angle fills little of its bounds.
 fn span_of(splat: Splat, line: Line, bounds: vec2u) -> vec2i {
-    // The disc is where u² + v² <= w², all three of them linear along the row.
+    // The disc is where u² + v² <= w²; all three are linear along the row.
     let in_perspective = frame.perspective == 1u;
     let level = vec3f(line.u, line.v, select(1.0, line.plane, in_perspective));
     let slope = vec3f(splat.u.x, splat.v.x, select(0.0, splat.plane.x, in_perspective));
@@ -53,15 +53,15 @@ fn span_of(splat: Splat, line: Line, bounds: vec2u) -> vec2i {
     let middle = splat.center_px.x - 0.5;
     let first = i32(firsts(bounds).x);
     let last = i32(lasts(bounds).x);
-    // Where the disc has no end in the row, or it is not a number, the bounds have to do.
+    // Where the disc has no end in the row or the result is NaN, the bounds are used.
     if !(a > 0.0) || !(high - low < 65536.0) {
         return vec2i(first, last);
     }
     return vec2i(max(first, i32(floor(middle + low)) - 1), min(last, i32(ceil(middle + high)) + 1));
 }
 
-// The depth of a splat, pushed back by ε, at a pixel, as a key; NO_DEPTH outside the disc and the dot, whose rim is where their
-// squared distances are `rim`. The same sums as where splats are drawn by the patch.
+// Key of a splat's depth at a pixel, pushed back by ε; NO_DEPTH outside the disc and the dot. `rim` is the squared
+// distance at their rim. The sums equal those of `patch`.
 fn pushed_depth(splat: Splat, line: Line, column: u32, rim: f32) -> u32 {
     let dx = f32(column) + 0.5 - splat.center_px.x;
     let plane = line.plane + splat.plane.x * dx;
@@ -76,7 +76,7 @@ fn pushed_depth(splat: Splat, line: Line, column: u32, rim: f32) -> u32 {
     let disc = u * u + v * v;
     let dot = (dx * dx + line.dy * line.dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
     if select(dot, disc, disc < dot) <= rim {
-        // The dot reaches beyond the disc, where its plane is of no use.
+        // The dot reaches beyond the disc, where the disc's plane is meaningless.
         let hit = min(max(depth, line.nearest), line.furthest);
         return depth_key(hit + splat.epsilon);
     }
@@ -86,7 +86,7 @@ fn pushed_depth(splat: Splat, line: Line, column: u32, rim: f32) -> u32 {
 fn draw_depth(splat: Splat, line: Line, column: u32) {
     let key = pushed_depth(splat, line, column, 1.0);
     let at = line.row * frame.size.x + column;
-    // Most splats lose; a plain load tells them so.
+    // Most splats lose; a plain load shows this.
     if key != NO_DEPTH && key < atomicLoad(&depth_map[at]) {
         atomicMin(&depth_map[at], key);
     }

@@ -1,6 +1,6 @@
-// When a neighbourhood ends at a gap: see the host's SearchRules. Imports: frame.
+// Gap rule of neighbourhoods [Paper, §5.3]: see `SearchRules` on the CPU. Imports: frame.
 
-// How much further than its furthest neighbour a neighbourhood of so many may go without another.
+// Factor on the distance of the furthest of `neighbors` neighbours, up to which the next one must follow.
 fn gap_growth_after(neighbors: u32) -> f32 {
     let is_single = frame.adaptive == 1u && neighbors == 1u;
     return select(frame.gap_growth, frame.gap_growth * frame.gap_growth, is_single);

@@ -1,4 +1,4 @@
-// Workgroups that were dispatched in rows, numbered again: more than 65535 need a second dimension.
+// Index of a workgroup in a dispatch of several rows, which more than 65535 workgroups need.
 
 const GROUPS_PER_ROW = 32768u;
 

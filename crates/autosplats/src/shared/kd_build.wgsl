@@ -1,64 +1,64 @@
-// Large nodes of the kd-tree while it is built. Imports: range_keys.
+// Nodes of the kd-tree during its construction. Imports: range_keys.
 
-// Points of a small node at most.
+// Most points of a small node.
 const KD_SMALL = 64u;
-// Points of a large node that one workgroup takes up.
+// Points of a large node per workgroup.
 const KD_CHUNK = 256u;
 
-// A node that may have to be split, in the list of its level.
+// A node of the current level that may have to be split.
 struct KdLarge {
     node: u32,
     // Its run of points.
     first: u32,
     len: u32,
-    // Its first chunk among those of all large nodes of the level.
+    // Index of its first chunk among those of the level's large nodes.
     first_chunk: u32,
-    // Tight box of its points, as keys, so that it can be found by atomic minima and maxima.
+    // Tight box of its points, as keys for atomic minima and maxima.
     low: vec3u,
-    // How it is split: 0 to 2 at `plane`, or one of the next two.
+    // Axis of the split at `plane`, 0 to 2, or `KD_FINITE_LEFT` or `KD_UNSPLIT`.
     axis: u32,
     high: vec3u,
     plane: f32,
     parent_len: u32,
-    // Points that go to its left child.
+    // Number of points in its left child.
     left: u32,
-    // Where its children are in the list of the next level, if they are large.
+    // Indices of its large children in the list of the next level.
     next_left: u32,
     next_right: u32,
 }
 
-// Where what of a large node is among its sixteen words.
+// Sizes and offsets of a large node in words.
 const KD_LARGE_WORDS = 16u;
 const KD_LOW_WORD = 4u;
 const KD_HIGH_WORD = 8u;
 
-// The root: points that are finite go left.
+// Split of the root: finite points go left.
 const KD_FINITE_LEFT = 3u;
-// Not at all.
+// No split.
 const KD_UNSPLIT = 4u;
 const KD_NONE = 0xffffffffu;
-// Coordinates beyond count as not finite: their squares must not overflow.
+// Larger coordinates count as not finite, because their squares would overflow.
 const KD_FARTHEST = 1e18;
 
-// A node of few points: it becomes a tree by itself.
+// A node of few points, which one workgroup turns into a subtree.
 struct KdSmall {
     node: u32,
     first: u32,
     len: u32,
-    // Which of the two lists of points it lies in.
+    // Which of the two lists holds its points.
     list: u32,
 }
 
 struct KdState {
-    // Levels split so far.
+    // Number of levels split so far.
     level: u32,
-    // Nodes made.
+    // Number of nodes made.
     nodes: u32,
-    // Nodes to be split, and their chunks.
+    // Number of large nodes to be split, and of their chunks.
     large: u32,
     chunks: u32,
     small: u32,
-    // Points that are finite.
+    // Number of finite points.
     finite: u32,
 }
 
@@ -71,7 +71,7 @@ fn kd_coordinate(position: vec3f, axis: u32) -> f32 {
 }
 
 fn kd_goes_left(point: vec4u, axis: u32, plane: f32) -> bool {
-    // Magnitudes order as their bits do, and above all of them are those of what is not a number.
+    // Magnitudes have the order of their bits; those of NaN are above all others.
     let is_finite = all((point.xyz & vec3u(0x7fffffffu)) <= vec3u(bitcast<u32>(KD_FARTHEST)));
     return select(kd_coordinate(kd_position(point), axis) < plane, is_finite, axis == KD_FINITE_LEFT);
 }

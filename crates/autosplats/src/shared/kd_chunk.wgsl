@@ -1,7 +1,7 @@
-// A chunk of a large node of the kd-tree, the work of one workgroup. The pass binds `large`. Imports: kd_build.
+// A chunk of a large node of the kd-tree: the work of one workgroup. The pass binds `large`. Imports: kd_build.
 
 struct KdTask {
-    // Its run of points; empty if there is no such chunk.
+    // Run of points; empty if there is no such chunk.
     first: u32,
     end: u32,
     large: u32,
@@ -15,7 +15,7 @@ fn kd_task(chunk: u32, state: KdState) -> KdTask {
     if chunk >= state.chunks {
         return KdTask(0u, 0u, 0u, KD_UNSPLIT, 0.0);
     }
-    // The last large node whose first chunk is this one or before it.
+    // The last large node whose first chunk is at most this one.
     var low = 0u;
     var high = state.large;
     while high - low > 1u {

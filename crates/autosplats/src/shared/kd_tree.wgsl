@@ -1,32 +1,32 @@
 // The kd-tree over all points of the cloud, and walks over its leaves. The pass binds `nodes`.
 
 struct KdNode {
-    // The tight box of its points; empty, so that nothing meets it, if it has none.
+    // Tight box of the node's points; inverted if there are none, so that no sphere meets it.
     low: vec3f,
-    // Of an inner node the first of its two children, which lie side by side; of a leaf its first point.
+    // Inner node: the first of its two adjacent children. Leaf: its first point.
     first: u32,
     high: vec3f,
     // Points of a leaf; 0 for an inner node.
     len: u32,
 }
 
-// The root's children are the finite points and the others, which no walk meets.
+// The root's children are the finite points and the others, which no walk visits.
 const KD_FINITE = 1u;
-// Levels of the tree at most.
+// Most levels of the tree.
 const KD_DEPTH = 64u;
 const KD_MOST = 3.4028234663852886e38;
 
-// A point of the tree: the bits of its position relative to the cloud's origin, and its index in the cloud.
+// A point of the tree: bits of its position relative to the cloud's origin, and its index in the cloud.
 alias KdPoint = vec4u;
 
-// A walk over the leaves that a sphere meets, the near ones first.
+// A walk over the leaves that a sphere meets, near ones first.
 struct KdWalk {
     center: vec3f,
     squared: f32,
-    // Nodes still to be seen, all of which the sphere meets.
+    // Stack of nodes to visit, all of which meet the sphere.
     open: array<u32, KD_DEPTH>,
     depth: u32,
-    // Nodes and points seen: the bound on its work.
+    // Number of visited nodes and points, which bounds the work.
     seen: u32,
 }
 
@@ -50,7 +50,7 @@ fn kd_walk(center: vec3f, radius: f32) -> KdWalk {
     return walk;
 }
 
-// The next leaf: its first point and how many they are, none at the end.
+// The next leaf: its first point and number of points; 0 points at the end of the walk.
 fn kd_next_leaf(walk: ptr<function, KdWalk>) -> vec2u {
     if (*walk).depth == 0u {
         return vec2u(0u);

@@ -1,4 +1,4 @@
-// Which dispatch is which of the passes that build the kd-tree and search it.
+// Indices of the dispatches that build and search the kd-tree.
 
 const WORK_LARGE = 0u;
 const WORK_CHUNKS = 1u;

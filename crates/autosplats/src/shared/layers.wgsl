@@ -1,10 +1,10 @@
-// Layers as splatting leaves them, row by row.
+// Layers of the visible surface, as the splat stage leaves them, row by row.
 
-// Beside a buffer of normals with their depth: what covers a pixel.
+// Cover of a pixel. Normal and depth are in another buffer.
 struct Cover {
-    // Sum of kernel weights; 0 where no surface is.
+    // Sum of kernel weights; 0 without a surface.
     weight: f32,
-    // What trimming knows: `EMPTY_RIM`, or how far the heaviest splat reaches in pixels, below 0 in a core.
+    // Input of trimming: `EMPTY_RIM`, or the reach of the heaviest splat in pixels, negative in a core.
     rim: f32,
     // Index in the cloud of the heaviest splat's point.
     point: u32,
@@ -14,7 +14,7 @@ struct Cover {
 const EMPTY_RIM = 0.0;
 
 fn not_a_number() -> f32 {
-    // Kept from being folded: a constant expression must be finite.
+    // A variable, because constant expressions must be finite.
     var bits = 0x7fc00000u;
     return bitcast<f32>(bits);
 }

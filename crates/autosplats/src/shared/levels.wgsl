@@ -1,16 +1,17 @@
-// Screen points summed up in cells of several sizes, finest first, each level's twice as wide as those before. Imports: nothing.
+// Levels of cells that sum up the screen points, finest first; cells double in width from level to level. Imports:
+// nothing.
 
-// Slabs of depth in a cell. A cell has that many clusters, those used first: the mean of some points, view space, and their
-// number, 0 after the last.
+// Slabs of depth in a cell, each with a cluster: the mean position of some points, view space, and their number. The
+// used clusters come first; the others have number 0.
 const SLABS = 8u;
-// Those of them that lie side by side.
+// Clusters of a cell that are stored side by side.
 const BUNCH = 4u;
 
 struct Level {
-    // Side of a cell in pixels; 0 if there is no such level.
+    // Side of a cell in pixels; 0 if the level does not exist.
     side_px: u32,
     columns: u32,
     rows: u32,
-    // Its first cell.
+    // Index of its first cell.
     first: u32,
 }

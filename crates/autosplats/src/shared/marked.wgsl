@@ -1,6 +1,7 @@
-// Which splats a refinement draws again. Imports: frame, splat, redraw. The including pass binds `changes` and `cells`.
+// Which splats a refinement draws again [Paper, §7, Depth Refinement]. Imports: frame, splat, redraw. The including
+// pass binds `changes` and `cells`.
 
-// Those that just revived, and those that may be seen where depths were erased.
+// Splats that revived, and splats that may be visible where depths were erased.
 fn is_redrawn(index: u32, bounds: vec2u) -> bool {
     return changes[index] == REVIVED || meets_marked(bounds);
 }

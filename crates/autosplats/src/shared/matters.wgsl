@@ -1,7 +1,8 @@
-// Whether a screen point's splat may matter to the picture: it lies in it, or not far beside for how dense points are there.
-// Imports: frame, density, screen, counters, picture. The including pass binds `density` and `counters`.
+// Whether a screen point's splat may affect the picture: the point is in the picture or near its edge. Near is relative
+// to the local point density. Imports: frame, density, screen, counters, picture. The including pass binds `density`
+// and `counters`.
 
-// In first search radii: project/mod.rs says what for.
+// Largest distance from the picture in first search radii: see `project/mod.rs`.
 override MARGIN_REACH: f32;
 
 fn matters(point: ScreenPoint) -> bool {

@@ -1,6 +1,6 @@
-// Surfels that move. Imports: frame, surfel.
+// Moving surfels. Imports: frame, surfel.
 
-// A surfel with another centre, unless that is off the screen: it would have no pixel to be hidden at.
+// The surfel with another centre. Unchanged if that centre is off the screen, because depth refinement needs its pixel.
 fn moved(surfel: Surfel, center: vec3f) -> Surfel {
     var out = surfel;
     let at = to_pixel(center);

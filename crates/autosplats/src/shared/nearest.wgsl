@@ -1,26 +1,27 @@
-// The k nearest of many: squared distances in order, the least first, in up to sixteen vectors of four, which are to stay in
-// registers: nothing indexes them but constants. Imports: frame.
+// List of the k least squared distances, ascending, in up to sixteen vectors of four. All indices are constants, so
+// that the vectors stay in registers. Imports: frame.
 
 override K: u32;
 
-// The first ⌈k/4⌉ vectors are in use.
+// Number of vectors in use, ⌈k/4⌉.
 override QUADS: u32;
 
 alias Nearest = array<vec4f, 16>;
 
-// Places not taken hold MOST. The k-th place is the last: what the vectors have too many is taken by less than any distance.
+// The empty list. Unused places hold MOST. Surplus places at the front hold -1, below any distance, so that the k-th
+// place is the last one.
 fn nearest_none() -> Nearest {
     let m = vec4f(MOST);
     let first = select(m, vec4f(-1.0), vec4u(0u, 1u, 2u, 3u) < vec4u(4u * QUADS - K));
     return Nearest(first, m, m, m, m, m, m, m, m, m, m, m, m, m, m, m);
 }
 
-// Each place takes the lesser of its own and the greater of its left neighbour and the new one.
+// Each place takes the lesser of its own value and the greater of its left neighbour and the new value.
 fn nearest_sift(own: vec4f, left: f32, squared: f32) -> vec4f {
     return min(own, max(vec4f(left, own.xyz), vec4f(squared)));
 }
 
-// Lets one more in: no branch, and no place waits for another.
+// Inserts a squared distance, without branches or dependences between places.
 fn nearest_add(list: ptr<function, Nearest>, squared: f32) {
     if QUADS > 15u {
         (*list)[15] = nearest_sift((*list)[15], (*list)[14].w, squared);
@@ -70,7 +71,7 @@ fn nearest_add(list: ptr<function, Nearest>, squared: f32) {
     (*list)[0] = nearest_sift((*list)[0], squared, squared);
 }
 
-// Takes out the least; the others move up.
+// Removes and returns the first place; the others move up.
 fn nearest_take(list: ptr<function, Nearest>) -> f32 {
     let least = (*list)[0].x;
     (*list)[0] = vec4f((*list)[0].yzw, (*list)[1].x);
@@ -120,7 +121,7 @@ fn nearest_take(list: ptr<function, Nearest>) -> f32 {
     return least;
 }
 
-// The k-th.
+// The k-th least squared distance.
 fn nearest_last(list: ptr<function, Nearest>) -> f32 {
     return (*list)[QUADS - 1u].w;
 }

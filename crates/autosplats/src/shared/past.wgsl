@@ -1,12 +1,12 @@
-// Temporal coherence: what the last frame found where a point was then; search/past/mod.rs tells more. Imports: frame, reproject.
-// The including pass binds `past`, of each pixel of that frame the bits of a k-radius, 0 where there is none; a single element if
-// no radii are kept.
+// Temporal coherence: the k-radius that the last frame found at a point's position; see `search/past/mod.rs`. Imports:
+// frame, reproject. The including pass binds `past`: the bits of a k-radius per pixel of the last frame, 0 where there
+// is none. `past` has a single element if no radii are kept.
 
-// Least and most radius to start from, in first search radii.
+// Least and largest plausible radius, in first search radii.
 override LEAST_LIKELY: f32;
 override MOST_LIKELY: f32;
 
-// The radius to start from for a point with this first search radius; 0 if the last frame does not tell.
+// Radius to start the search of a point from; 0 if the last frame has no plausible one.
 fn past_radius(position_view: vec3f, initial_radius: f32) -> f32 {
     if !has_past() {
         return 0.0;

@@ -1,16 +1,16 @@
-// Draws splats into a patch of pixels, a workgroup each; an invocation draws a column of eight pixels, as the components of
-// two vectors, so that what it reads of a splat serves eight. Imports: frame, splat.
+// Draws splats into a patch of pixels, one workgroup per patch. An invocation draws a column of eight pixels, as the
+// components of two vectors, so that each read of a splat serves eight pixels. Imports: frame, splat.
 //
-// The including pass binds `tree` and `splats`, and has two functions: `load(slot, index)` reads what it needs of a splat
-// beside its geometry, and `draw(slot)` draws a splat that may cover the invocation's own pixels. A pixel draws its
+// The including pass binds `tree` and `splats`, and defines two functions. `load(slot, index)` reads what it needs of a
+// splat besides its geometry. `draw(slot)` draws a splat that may cover the invocation's pixels. Each pixel draws its
 // splats in the order of their list.
 //
-// How it works: the workgroup descends the tree, testing the children of some nodes at a time, an invocation per child. Hits
-// become bits in workgroup memory and from there a list in order. Splats that are found are drawn, 64 at a time: each
-// invocation loads one; the splats that meet each column and each eight rows of the patch become bits, and an invocation's
-// splats are those of its column and its rows.
+// How it works: the workgroup descends the tree and tests the children of several nodes at a time, one child per
+// invocation. Hits become bits in workgroup memory, and the bits become an ordered list. The splats found are drawn 64
+// at a time: each invocation loads one. The splats that meet each column, and each band of eight rows, become bits. An
+// invocation draws the splats that meet both its column and its band.
 
-// Columns and rows of a patch, and rows of an invocation.
+// Columns and rows of a patch, and rows per invocation.
 const PATCH = vec2u(16u, 32u);
 const OWN = 8u;
 // Invocations in a workgroup, and splats drawn at a time.
@@ -18,13 +18,13 @@ const GROUP = 64u;
 // Words of bits for the children that are tested at a time.
 const HIT_WORDS = 16u;
 
-// A splat's geometry.
+// Geometry of a splat.
 struct Brush {
     center_px: vec2f,
     plane: vec2f,
     u: vec2f,
     v: vec2f,
-    // Of the plane at the centre.
+    // Value of the plane at the centre.
     start: f32,
     epsilon: f32,
     // Nearest and furthest depth of the disc.
@@ -45,36 +45,36 @@ override DOT_RADIUS_PX: f32;
 var<workgroup> found_nodes: u32;
 // Flags of the children that are hit; twice, so that one half can be cleared while the other is in use.
 var<workgroup> hits: array<atomic<u32>, 2u * HIT_WORDS>;
-// Where the half in use begins.
+// First word of the half in use.
 var<private> hits_half: u32;
-// Nodes found at each level: see `list_start`.
+// Lists of the nodes found at each level: see `list_start`.
 var<workgroup> listed: array<u32, 1280>;
 var<workgroup> brushes: array<Brush, GROUP>;
-// The patch's columns in the low 16 bits, above them its bands of eight rows that each splat meets.
-// Scalars: invocations that write components of one vector may overwrite each other's.
+// Per splat, the patch's columns that it meets in the low 16 bits, above them the bands of eight rows. Scalars, because
+// writes of components of one vector by several invocations may overwrite each other.
 var<workgroup> met: array<u32, GROUP>;
-// The same the other way around: the splats that meet each column, then each band, sixteen to a word.
+// The transpose: the splats that meet each column, then each band, sixteen to a word.
 var<workgroup> meeting: array<u32, 80>;
 
-// The invocation's pixels, as offsets in the patch: column and first row.
+// Offset of the invocation's pixels in the patch: column and first row.
 fn own_offset(local: u32) -> vec2u {
     return vec2u(local % PATCH.x, OWN * (local / PATCH.x));
 }
 
-// Number of workgroups that have a patch.
+// Columns and rows of patches.
 fn patches() -> vec2u {
     return (frame.size + PATCH - 1u) / PATCH;
 }
 
-// Draws all living splats into the patch whose first pixel is `corner`. Loops break at their end: each is
-// passed once for most patches, and a software device pays for a pass that only ends a loop.
+// Draws all living splats into the patch with first pixel `corner`. Loops break at their end: most patches need a
+// single pass, and software devices pay for a pass that only ends a loop.
 fn draw_patch(corner: vec2u, local: u32) {
     let end = tree[0].x;
     if local < 2u * HIT_WORDS {
         atomicStore(&hits[local], 0u);
     }
     workgroupBarrier();
-    // Nodes above the tree.
+    // Roots: groups of nodes of the top level.
     let size = 1u << (FAN_BITS * (TOP + 1u));
     let roots = (end + size - 1u) / size;
     var root = 0u;
@@ -93,7 +93,7 @@ fn draw_patch(corner: vec2u, local: u32) {
                     loop {
                         prepare(corner, local, at, found);
                         draw_prepared(local);
-                        // The next ones replace these.
+                        // The next splats overwrite these.
                         workgroupBarrier();
                         at += GROUP;
                         if at >= found {
@@ -122,18 +122,18 @@ fn draw_patch(corner: vec2u, local: u32) {
     }
 }
 
-// Nodes whose children at a level are tested at a time.
+// Number of nodes whose children at a level are tested at a time.
 fn most_parents(level: u32) -> u32 {
     return select(16u, 32u, level == SPLATS);
 }
 
-// Where the list of a level begins.
+// Start of a level's list in `listed`.
 fn list_start(level: u32) -> u32 {
     return select(256u + 256u * level, 0u, level == SPLATS);
 }
 
-// Lists the children at `level` that meet the patch, of the nodes in the list above from place `at` to `listed_end`, of as
-// many as are tested at a time. Returns how many.
+// Lists the children at `level` that meet the patch, and returns their number. Tests the children of the nodes from
+// `at` to `listed_end` in the list of the level above, at most `most_parents` of these.
 fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, end: u32) -> u32 {
     let last = corner + PATCH - 1u;
     let start = level_start(level);
@@ -141,7 +141,7 @@ fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, end: u3
     let size = 1u << (FAN_BITS * level);
     let nodes = (end + size - 1u) / size;
     let parents = min(max(listed_end, at) - at, most_parents(level));
-    // A word is two parents' children, a row of the workgroup four's.
+    // A word holds the children of two parents; a round of the workgroup tests those of four.
     let rows = (parents + 3u) / 4u;
     let above = list_start(level + 1u) + at;
     let half = hits_half;
@@ -191,7 +191,8 @@ fn find(level: u32, at: u32, listed_end: u32, corner: vec2u, local: u32, end: u3
     return workgroupUniformLoad(&found_nodes);
 }
 
-// The node at a place after `at` in the list above a level, which begins at `above`; those above the top are all.
+// Node at position `place` after `at` in the list of the level above, which begins at `above`. Above the top level, all
+// nodes count as listed.
 fn parent_at(level: u32, at: u32, above: u32, place: u32) -> u32 {
     if level == TOP {
         return at + place;
@@ -199,7 +200,7 @@ fn parent_at(level: u32, at: u32, above: u32, place: u32) -> u32 {
     return listed[above + place];
 }
 
-// Loads up to 64 of the splats listed, from place `at` on.
+// Loads up to 64 listed splats from position `at`.
 fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
     var meets = 0u;
     if at + local < found {
@@ -224,7 +225,7 @@ fn prepare(corner: vec2u, local: u32, at: u32, found: u32) {
     }
     met[local] = meets;
     workgroupBarrier();
-    // An invocation per column and sixteen splats; those of the first columns take bands of rows too.
+    // An invocation per column and sixteen splats; the invocations of the first columns also do the bands.
     let line = local % PATCH.x;
     let part = local / PATCH.x;
     var column = 0u;
@@ -281,7 +282,7 @@ fn fragments(brush: Brush, x: f32, y: vec4f) -> Fragments {
     }
     let disc = u * u + v * v;
     let dot = (dx * dx + dy * dy) * (1.0 / (DOT_RADIUS_PX * DOT_RADIUS_PX));
-    // The dot reaches beyond the disc, where its plane is of no use; the disc may not be a number there.
+    // The dot reaches beyond the disc, where the disc's plane is meaningless and `disc` may be NaN.
     let low = vec4f(brush.low);
     return Fragments(select(dot, disc, disc < dot), min(max(depth, low), vec4f(brush.high)));
 }

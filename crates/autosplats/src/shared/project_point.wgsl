@@ -1,4 +1,4 @@
-// Where a point goes [Paper, §3]. Imports: frame, half.
+// Projection of a point [Paper, §3]. Imports: frame, half.
 
 // A run of the cloud's points, in a buffer of its own.
 struct Chunk {
@@ -15,16 +15,16 @@ const SLOT_BEHIND = 0xfffffffeu;
 const SLOT_OUTSIDE = 0xfffffffdu;
 
 struct Projected {
-    // Index of a slot of the keys, or why there is none.
+    // Index among the keys, or the reason why there is none.
     slot: u32,
     depth: f32,
-    // Where the point lies, in sixteenths of pixels: column and row.
+    // Position in sixteenths of pixels: column and row.
     sixteenths: vec2u,
 }
 
 fn project_point(position: vec3f) -> Projected {
     let position_view = to_view(position);
-    // Finite coordinates so large that their transform is not count as not finite too.
+    // Finite coordinates whose transform overflows count as not finite too.
     if !(is_finite(position_view.x) && is_finite(position_view.y) && is_finite(position_view.z)) {
         return Projected(SLOT_NOT_FINITE, 0.0, vec2u(0u));
     }

@@ -1,6 +1,6 @@
-// How many workgroups an indirect dispatch starts. The including pass binds `arguments`. Imports: groups.
+// Number of workgroups of an indirect dispatch. The including pass binds `arguments`. Imports: groups.
 
-// `kind` tells which dispatch; workgroups take `per_group` of `items`.
+// Sets the arguments of dispatch number `kind`; each workgroup takes `per_group` of the `items`.
 fn put_work(kind: u32, items: u32, per_group: u32) {
     let number = (items + per_group - 1u) / per_group;
     arguments[3u * kind] = min(number, GROUPS_PER_ROW);

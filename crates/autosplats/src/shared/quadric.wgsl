@@ -1,15 +1,16 @@
-// A height field with six coefficients over a ball's points: see the CPU form. Imports: frame, levels, eigen,
-// orthonormal. The including pass binds `levels` and `clusters`, and imports `alone` or `together`, which say who sums up a ball.
+// Quadrics, height fields with six coefficients over a ball's points: see the CPU form. Imports: frame, levels, eigen,
+// orthonormal. The including pass binds `levels` and `clusters`. It imports `alone` or `together`, which define who
+// sums up a ball.
 //
-// A ball has hundreds of cells, and a device waits longer for one than it takes to add it: four are read at a time, so that
-// their loads are on their way together.
+// A ball has hundreds of cells, and waiting for a load takes longer than the sums. So four cells are read at a time,
+// with overlapping loads.
 
 #import levels
 #import clusters
 #import eigen
 #import orthonormal
 
-// Balls tried around each point, and how much wider each is than the one before.
+// Number of balls around each point, and the ratio of successive radii.
 const SCALES = 6u;
 override STEP: f32;
 
@@ -25,28 +26,28 @@ struct Ball {
     center: vec3f,
     radius: f32,
     level: Level,
-    // Cells that may reach into it, both included.
+    // First and last column and row of cells that may reach into the ball.
     low: vec2u,
     high: vec2u,
 }
 
 struct Plane {
-    // Unit axis of least spread of the clusters; of either sign.
+    // Unit axis of least spread of the clusters, of either sign.
     axis: vec3f,
-    // Of the clusters, from the ball's centre; radii.
+    // Mean of the clusters relative to the ball's centre, in radii.
     mean: vec3f,
-    // Along the axis, between, and where the spread is largest; squared radii.
+    // Least, middle and largest variance, in squared radii; the least is along `axis`.
     variances: vec3f,
     // Sum of the clusters' weights.
     weight: f32,
-    // Clusters in the ball; with fewer than LEAST_OF_PLANE there is no plane.
+    // Number of clusters in the ball; with fewer than LEAST_OF_PLANE there is no plane.
     len: u32,
 }
 
 struct Quadric {
-    // Unit normal of the surface at the point's place; of either sign.
+    // Unit normal of the surface at the point, of either sign.
     normal: vec3f,
-    // How far the surface is from the point along `axis`, world units.
+    // Height of the surface above the point along `axis`, world units.
     height: f32,
     // Unit direction of the heights.
     axis: vec3f,
@@ -55,17 +56,17 @@ struct Quadric {
     // Standard error of the normal's slope, in radians per world unit of scatter.
     error: f32,
     curvature: f32,
-    // Clusters in the ball.
+    // Number of clusters in the ball.
     len: u32,
-    // Of the ball, or between those of several.
+    // Radius of the ball in world units, or interpolated between balls.
     radius: f32,
-    // Slopes at the point along `any_orthonormal` of the axis, and at right angles to both; 0 if it is upright.
+    // Slopes at the point along `any_orthonormal` of the axis, and at right angles to both; 0 for an upright quadric.
     slope: vec2f,
-    // Coefficients of the squares and the product of the two, xx, xy and yy, in radii.
+    // Coefficients of xx, xy and yy along these directions, in radii.
     bend: vec3f,
 }
 
-// A ball in the coarsest cells of which its radius is at least so many, or the finest.
+// A ball in the coarsest cells of which its radius is at least `cells_per_radius` wide, or else in the finest.
 fn ball_around(center: vec3f, radius: f32, cells_per_radius: f32) -> Ball {
     let at = to_pixel(center);
     let radius_px = radius / pixel_size(center.z);
@@ -84,7 +85,7 @@ fn ball_around(center: vec3f, radius: f32, cells_per_radius: f32) -> Ball {
     return Ball(center, radius, level, low, high);
 }
 
-// Position of a cluster from the ball's centre in radii, and its weight; all 0 if it is not within.
+// Position of a cluster relative to the ball's centre in radii, and its weight; all 0 outside the ball.
 fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
     let offset = (cluster.xyz - ball.center) * per_radius;
     let rest = 1.0 - (offset.x * offset.x + offset.y * offset.y + offset.z * offset.z);
@@ -92,13 +93,13 @@ fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
     return select(vec4f(0.0), vec4f(offset, weight), rest > 0.0);
 }
 
-// A cluster of a cell, of no points if that is after the last one.
+// A cluster of a cell; one without points if the cell is after `last`.
 fn cluster_up_to(cell: u32, last: u32, slab: u32) -> vec4f {
     let cluster = clusters[cluster_at(min(cell, last), slab)];
     return select(vec4f(0.0), cluster, cell <= last);
 }
 
-// Surface variation.
+// Surface variation, 0 to 1/3.
 fn curvature_of(plane: Plane) -> f32 {
     let sum = plane.variances.x + plane.variances.y + plane.variances.z;
     return select(0.0, plane.variances.x / sum, sum > 0.0);
@@ -109,14 +110,14 @@ fn plane_of(ball: Ball) -> Plane {
     return plane_beside(ball, vec3f(0.0), 0.0);
 }
 
-// Sums over clusters.
+// Sums over clusters for a plane.
 struct PlaneSums {
-    // Weights times positions, and weights.
+    // Sum of weights times positions, and sum of weights.
     first: vec4f,
-    // Of squares xx, yy, zz, and of products yz, xz, xy.
+    // Weighted sums of the squares xx, yy, zz, and of the products yz, xz, xy.
     squares: vec3f,
     products: vec3f,
-    // Clusters.
+    // Number of clusters.
     len: f32,
 }
 
@@ -130,7 +131,7 @@ fn add_to_plane(sums: ptr<function, PlaneSums>, p: vec4f, side: vec3f, limit: f3
     (*sums).len += select(0.0, 1.0, counts);
 }
 
-// The plane through the clusters of a ball that are at least `limit` radii from the centre towards `side`.
+// The plane through the clusters of a ball that are at least `limit` radii from the centre in direction `side`.
 fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
     let per_radius = 1.0 / ball.radius;
     var own = PlaneSums();
@@ -168,7 +169,7 @@ fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
     return Plane(found.least, mean, variances, first.w, len);
 }
 
-// A row of the equations: four columns, the two of the slopes, and the right-hand side.
+// A row of the equations: the columns of xx, xy, yy and 1, the two of the slopes, and the right-hand side.
 struct Row {
     left: vec4f,
     right: vec3f,
@@ -178,7 +179,7 @@ fn without(row: Row, pivot: Row, factor: f32) -> Row {
     return Row(row.left - factor * pivot.left, row.right - factor * pivot.right);
 }
 
-// Sums over clusters of weight times the following, in radii, with x and y across the axis and h along it.
+// Sums over clusters for a quadric: weight times the following, in radii, with x and y across the axis and h along it.
 struct QuadricSums {
     // 1, x, y.
     first: vec3f,
@@ -193,7 +194,7 @@ struct QuadricSums {
     heights: vec4f,
     // hxx, hxy, hyy.
     curved: vec3f,
-    // Clusters.
+    // Number of clusters, not weighted.
     len: f32,
 }
 
@@ -255,7 +256,7 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     let w = first.x;
     let ridge = RIDGE * w;
     let least = LEAST_PIVOT * w;
-    // Slopes last, so that what is left of their rows when the others are eliminated is their own.
+    // Slopes come last: eliminating the other rows leaves the slopes' own matrix.
     let r0 = Row(vec4f(fourth.x + ridge, fourth.y, fourth.z, second.x), vec3f(third.x, third.y, curved.x));
     var r1 = Row(vec4f(fourth.y, fourth.z + ridge, fourth.w, second.y), vec3f(third.y, third.z, curved.y));
     var r2 = Row(vec4f(fourth.z, fourth.w, sums.last + ridge, second.z), vec3f(third.z, third.w, curved.z));
@@ -264,7 +265,7 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     var r5 = Row(vec4f(third.yzw, first.z), vec3f(second.yz, heights.z));
     var rest = heights.w;
 
-    // What rounding leaves of a row that others explain must not be divided by.
+    // `least` keeps rounding residues of dependent rows from being divisors.
     let i0 = 1.0 / max(r0.left.x, least);
     rest -= r0.right.z * r0.right.z * i0;
     r1 = without(r1, r0, r1.left.x * i0);
@@ -305,7 +306,7 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     let yy = (r2.right.z - dot(vec3f(r2.left.w, r2.right.xy), known)) * i2;
     let xy = (r1.right.z - dot(vec3f(r1.left.w, r1.right.xy), known) - r1.left.z * yy) * i1;
     let xx = (r0.right.z - dot(vec3f(r0.left.w, r0.right.xy), known) - r0.left.y * xy - r0.left.z * yy) * i0;
-    // Trace of the inverse of the 2×2 matrix that is left for the slopes.
+    // Trace of the inverse of the slopes' remaining 2×2 matrix.
     let tilt = r4.right.y * i4;
     let trace = i4 + (1.0 + tilt * tilt) * i5;
     let squares = select(0.0, rest, rest > 0.0) / (f32(len) - 6.0);

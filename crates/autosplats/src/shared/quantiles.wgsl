@@ -1,14 +1,14 @@
-// Which surfels of the sample a quantile is of, and what it tells. Imports: nothing.
+// Parts of the sample that quantiles of the scatter are computed for, and kinds of results. Imports: nothing.
 
-// The densest third, the sparsest, all, and all by the steady shares.
+// The densest third, the sparsest third, the whole sample, and the whole sample adjusted by the steady shares.
 const DENSEST = 0u;
 const SPARSEST = 1u;
 const ALL = 2u;
 const STEADY_ALL = 3u;
-// How many there are.
+// Number of parts.
 const PARTS = 4u;
 
-// Too few balls could be fitted; the quantile of all; that of those in which the surface is thin, which are enough.
+// Kinds: too few balls for a result; a quantile of all balls; a quantile of the balls in which the surface is thin.
 const NONE_TELL = 0u;
 const ALL_TELL = 1u;
 const THIN_TELL = 2u;

@@ -1,15 +1,16 @@
-// The search for a point's k-radius, step by step [Paper, §5.2, §5.3]; the rules are stated in search/mod.rs. Imports: frame.
+// The search for a point's k-radius, step by step [Paper, §5.2, §5.3]; `search/mod.rs` states the rules. Imports:
+// frame.
 
 #import gaps
 
-// Between which distances the k-th neighbour is being looked for: a and b of the paper.
+// State of a search: the bounds of the k-radius, a and b in the paper.
 struct Search {
-    // While the radius expands, the distance to the furthest neighbour, below 0; see first_sample.
+    // Lower bound. While the radius expands, the negated distance to the furthest neighbour; see `first_sample`.
     low: f32,
-    // Below 0 before the first step; 0 if the point is not a query and only answers. Once the search has ended, the radius
-    // of the neighbourhood.
+    // Upper bound. Negative before the first step; 0 if the point is not a query and only answers. After the end of the
+    // search, the radius of the neighbourhood.
     high: f32,
-    // Neighbours up to `low`; or, below 0, how the search ended.
+    // Number of neighbours up to `low`; if negative, how the search ended.
     count: f32,
 }
 
@@ -18,17 +19,17 @@ const FOUND = -1.0;
 const OUTLIER = -2.0;
 // A gap, or the end of the points, follows the furthest neighbour.
 const CLAMPED_AT_GAP = -3.0;
-// Iterations ended before the k-th neighbour was met, or any, and before a rule said that there is none.
+// The iterations ended before the k-th neighbour was found and before a rule ended the search.
 const OUT_OF_STEPS = -4.0;
 
-// Least expansion of a radius: steps of √(k/σ) creep when one neighbour is missing that is far away.
+// Least expansion of a radius. Steps of √(k/σ) alone creep towards a single missing neighbour far away.
 const LEAST_GROWTH = 1.15;
-// A bracket so narrow, relative to its radius, separates no distances any more.
+// Relative width below which a bracket cannot separate distances.
 const NARROWEST = 0x1p-22;
-// Points further apart have squared distances that do not round to 0.
+// Least distance whose square does not round to 0.
 const LEAST_DISTANCE = 2e-19;
 
-// The roots, not the squares, are compared everywhere: bounds are distances that points have.
+// Roots are compared everywhere, not squares: bounds are distances of points.
 fn apart(p: vec3f, q: vec3f) -> f32 {
     let v = q - p;
     return sqrt(fma(v.z, v.z, fma(v.y, v.y, v.x * v.x)));
@@ -46,22 +47,22 @@ fn has_neighbors(search: Search) -> bool {
     return search.count == FOUND || search.count == CLAMPED_AT_GAP || search.count == OUT_OF_STEPS;
 }
 
-// Whether a point at this distance is among those that the search is to be told of: the delta region; all of the
-// neighbourhood once it has ended.
+// Whether a point at this distance contributes to the search: it lies in the delta region. After the end of the search,
+// it lies in the neighbourhood.
 fn is_within(search: Search, distance: f32) -> bool {
     return distance <= search.high && (distance > abs(search.low) || search.count <= 0.0);
 }
 
-// How much a radius with so many neighbours expands at most: α of [Paper, §5.2].
+// Largest expansion of a radius with `count` neighbours: α of [Paper, §5.2].
 //
-// Differs from the paper: α aims at k + 1 neighbours, since any radius from the k-th to there will do. Aiming at the k-th itself
-// misses it every second time, which costs an iteration.
+// Differs from the paper: α aims at k + 1 neighbours, because any radius from the k-th neighbour to the next will do.
+// Aiming at the k-th itself misses in every second case, which costs an iteration.
 fn expansion(count: f32) -> f32 {
     return max(sqrt((f32(frame.k) + 1.0) / max(count, 1.0)), LEAST_GROWTH);
 }
 
-// Where the samples begin: a. The textures have no channel for both a and d_max; as an expanding radius has d_max alone, its a
-// is found again from b, rounded downwards.
+// Lower end of the samples: a. The textures have no channel for both a and d_max. An expanding radius stores d_max
+// alone; its a is computed from b, rounded down.
 fn first_sample(search: Search) -> f32 {
     return max(abs(search.low), search.high / expansion(search.count) * (1.0 - 0x1p-22) * f32(search.low < 0.0));
 }
@@ -77,17 +78,17 @@ fn ended(radius: f32, how: f32) -> Search {
     return Search(radius, radius, how);
 }
 
-// A radius that holds what one pass found at this distance for every other: WGSL owes no two of them the same bits.
+// A radius that includes a point at this distance in every pass. WGSL does not guarantee equal bits between passes.
 fn up_to(distance: f32) -> f32 {
     return distance * (1.0 + 0x1p-21);
 }
 
-// What a point knows after a gathering pass: what it had asked, as it was passed along with the distance to the furthest
-// neighbour that answered, and how many did by sample.
+// Data of a point after a gathering pass: its search, as handed on, the distance to the furthest neighbour that
+// answered, and counts.
 struct Known {
     asked: Search,
     furthest: f32,
-    // Neighbours up to each sample radius.
+    // Number of neighbours up to each sample radius.
     counts: vec4f,
 }
 
@@ -96,7 +97,7 @@ fn recall(radii: vec4f, counters: vec4f) -> Known {
     return Known(asked, max(abs(radii.x), radii.w), max(asked.count, 0.0) + counters);
 }
 
-// What to ask next. `others` is the number of all other screen points.
+// The next step of a search. `others` is the number of all other screen points.
 fn advance(known: Known, initial_radius: f32, others: f32) -> Search {
     let asked = known.asked;
     if has_ended(asked) {
@@ -120,7 +121,7 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
         if is_all || radius >= limit {
             return ended(0.0, OUTLIER);
         }
-        // As the gap rule below has it, so that two neighbours met at once have no gap between them.
+        // Limited by the gap rule below, so that two neighbours found at once have no gap between them.
         let growth = min(sqrt(max(f32(frame.k), 10.0)), frame.gap_growth);
         return Search(radius, min(min(radius * growth, limit), MOST), 0.0);
     }
@@ -128,7 +129,7 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
     if is_all || radius >= reach {
         return ended(up_to(known.furthest), CLAMPED_AT_GAP);
     }
-    // Differs from the paper: no step is wider than a gap, or it would step over one.
+    // Differs from the paper: no step is wider than a gap, so that none is stepped over.
     let step = min(radius * expansion(count), frame.gap_growth * max(radius, initial_radius));
     return Search(-known.furthest, min(min(step, reach), MOST), count);
 }
@@ -137,7 +138,7 @@ fn bracket(known: Known) -> Search {
     let k = f32(frame.k);
     let radii = sample_radii(known.asked);
     let counts = known.counts;
-    // The last sample below k neighbours and the first with them.
+    // The last sample with fewer than k neighbours, and the first with at least k.
     var low = vec2f(first_sample(known.asked), known.asked.count);
     var high = vec2f(radii.x, counts.x);
     for (var sample = 1u; sample < 4u; sample++) {
@@ -146,7 +147,7 @@ fn bracket(known: Known) -> Search {
             high = vec2f(radii[sample], counts[sample]);
         }
     }
-    // Where several points share the k-th distance, no bracket comes between them, and all belong.
+    // If several points share the k-th distance, no bracket separates them, and all of them belong.
     if high.y == k {
         return ended(high.x, FOUND);
     }
@@ -156,7 +157,7 @@ fn bracket(known: Known) -> Search {
     return Search(low.x, high.x, low.y);
 }
 
-// The neighbourhood that a search ends with, whether or not it has found what it looked for.
+// The neighbourhood of a search after the last iteration, whether or not the search has ended.
 fn settle(known: Known, initial_radius: f32, others: f32) -> Search {
     let search = advance(known, initial_radius, others);
     if has_ended(search) {
@@ -165,6 +166,6 @@ fn settle(known: Known, initial_radius: f32, others: f32) -> Search {
     if known.counts.w >= f32(frame.k) {
         return ended(search.high, FOUND);
     }
-    // Without neighbours the lower bound is what is furthest, and nothing lies within it.
+    // Without neighbours `furthest` is the lower bound, and the neighbourhood is empty.
     return ended(select(up_to(known.furthest), 0.0, known.counts.w == 0.0), OUT_OF_STEPS);
 }

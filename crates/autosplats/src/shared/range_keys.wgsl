@@ -1,6 +1,7 @@
-// Values as numbers that order as they do: negative ones with all bits turned, the others above them.
+// Keys of values: unsigned numbers in the same order. Negative values have all bits inverted; the others have the sign
+// bit set.
 
-// Stands for no value: it would be one that is not a number.
+// Key of no value; the value would be NaN.
 const NO_KEY = 0xffffffffu;
 
 fn value_key(value: f32) -> u32 {
@@ -8,7 +9,7 @@ fn value_key(value: f32) -> u32 {
     return bits ^ select(0x80000000u, 0xffffffffu, (bits >> 31u) == 1u);
 }
 
-// The bits of the value of a key.
+// Bits of the value of a key.
 fn key_bits(key: u32) -> u32 {
     return key ^ select(0xffffffffu, 0x80000000u, (key >> 31u) == 1u);
 }

@@ -1,13 +1,13 @@
-// Ranks of flags within a workgroup: how many of the flags before one are set. In order, hence deterministic, and without
-// a scan: flags become the bits of a few words.
+// Ranks of flags within a workgroup: the number of set flags before each. Deterministic and without a scan, because
+// flags are the bits of a few words.
 
 const RANK_WORDS = 64u;
 
 var<workgroup> rank_bits: array<atomic<u32>, RANK_WORDS>;
-// Flags set before each word.
+// Number of set flags before each word.
 var<workgroup> rank_before: array<u32, RANK_WORDS>;
 
-// Call from all, before any flag is set; a barrier follows.
+// To be called by all invocations before any flag is set; ends with a barrier.
 fn rank_clear(local: u32) {
     if local < RANK_WORDS {
         atomicStore(&rank_bits[local], 0u);
@@ -19,7 +19,7 @@ fn rank_set(flag: u32) {
     atomicOr(&rank_bits[flag / 32u], 1u << (flag % 32u));
 }
 
-// Call from all, after all flags are set; barriers surround it.
+// To be called by all invocations after all flags are set; begins and ends with a barrier.
 fn rank_finish(local: u32) {
     workgroupBarrier();
     if local < RANK_WORDS {

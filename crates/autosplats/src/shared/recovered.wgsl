@@ -1,2 +1,3 @@
-// Set in the index of a passive point that is reconstructed after all. There are fewer points than pixels, so that it is free.
+// Flag in the index of a passive point that is reconstructed after all. Screen points are fewer than 2³⁰, so the bit is
+// free.
 const BACK = 0x80000000u;

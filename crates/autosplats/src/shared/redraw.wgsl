@@ -1,11 +1,11 @@
-// What a refinement changes, so that only that is drawn again. Imports: frame.
+// Changes by a depth refinement, so that only changed parts are drawn again [Paper, §7]. Imports: frame.
 
-// What became of a splat.
+// Change of a splat.
 const AS_BEFORE = 0u;
 const DIED = 1u;
 const REVIVED = 2u;
 
-// Side of a cell in pixels, as bits. A cell is marked if depths in it were erased.
+// Binary logarithm of a cell's side in pixels. A cell is marked if depths in it were erased.
 const CELL_BITS = 3u;
 
 fn cell_columns() -> u32 {

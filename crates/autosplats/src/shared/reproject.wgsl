@@ -1,29 +1,30 @@
-// From this frame into the last one, which had the same size; the CPU form is camera/reproject.rs. Imports: frame.
+// From this frame into the last one, of the same size: see the CPU form, `camera/reproject.rs`. Imports: frame.
 
 const NO_PIXEL = 0xffffffffu;
 
-// Whether anything is known of the last frame.
+// Whether there is a last frame.
 fn has_past() -> bool {
     return frame.past_focal_px != 0.0;
 }
 
-// Where a view-space position was in the last frame's view space.
+// Position in the last frame's view space of a view-space position.
 fn past_position(position_view: vec3f) -> vec3f {
     return frame.past_rotation * position_view + frame.past_shift;
 }
 
-// Where in the last frame's picture such a position was, in pixels.
+// Pixel coordinates on the last screen of a position in the last frame's view space.
 fn past_place(position: vec3f) -> vec2f {
     let scale = select(frame.past_focal_px, frame.past_focal_px / position.z, frame.perspective == 1u);
     return position.xy * scale + 0.5 * vec2f(frame.size);
 }
 
-// Whether a position at such a place was in that picture. What is not a number is in none.
+// Whether a position with these pixel coordinates was on the last screen; false for NaN.
 fn was_inside(position: vec3f, place: vec2f) -> bool {
     return position.z > frame.near && all(place >= vec2f(0.0)) && all(place < vec2f(frame.size));
 }
 
-// The pixel that showed such a position, or whatever was before it: row by row, NO_PIXEL if it was not in the picture.
+// Index, row by row, of the last screen's pixel that a position in the last frame's view space projects to; NO_PIXEL if
+// it was outside.
 fn past_pixel(position: vec3f) -> u32 {
     let place = past_place(position);
     if !was_inside(position, place) {
@@ -33,7 +34,7 @@ fn past_pixel(position: vec3f) -> u32 {
     return pixel.y * frame.size.x + pixel.x;
 }
 
-// The position in the last frame's view space that its pixel showed at a depth.
+// Position in the last frame's view space at a depth behind one of its pixels.
 fn past_unproject(pixel: u32, depth: f32) -> vec3f {
     let at = vec2f(vec2u(pixel % frame.size.x, pixel / frame.size.x)) + 0.5;
     let unit = select(1.0 / frame.past_focal_px, depth / frame.past_focal_px, frame.perspective == 1u);

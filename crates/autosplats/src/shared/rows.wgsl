@@ -1,5 +1,5 @@
-// Rows, and the areas that they belong to: see the CPU form. Imports: frame, surfel, quadric. The including pass binds `levels`
-// and `clusters`.
+// Scan lines (rows) and the surface areas that contain them: see the CPU form. Imports: frame, surfel, quadric. The
+// including pass binds `levels` and `clusters`. See docs/decisions/0012-scan-lines.md.
 
 #import quadric
 #import surfel
@@ -25,32 +25,33 @@ override LONGEST: f32;
 
 struct Area {
     plane: Plane,
-    // Of the ball; 0 if there is none.
+    // Radius of the ball in world units; 0 if there is no area.
     radius: f32,
 }
 
-// Whether what a plane was fitted to is an area with the `row` in it.
+// Whether a plane's points are flat and contain the scan line with direction `row`.
 fn is_flat(plane: Plane, row: vec3f) -> bool {
     let is_thin = plane.variances.x <= FLAT * plane.variances.y;
     return is_thin && abs(dot(plane.axis, row)) <= ROW_TILT && abs(dot(plane.axis, plane.mean)) <= OFF_ROW;
 }
 
-// Whether a plane was fitted to something as wide as this part of its length, by variances.
+// Whether a plane's points form an area: their width has at least this ratio to their length, by variances.
 fn is_area(plane: Plane, least: f32) -> bool {
     return plane.len >= LEAST_CLUSTERS && plane.variances.y > least * plane.variances.z;
 }
 
-// Whether an area is one in the ball beyond as well, and grows faster than a line.
+// Whether an area is also one in the larger ball, and its weight grows faster than that of a line.
 fn goes_on(near: Plane, radius: f32, far: Plane, beyond: f32) -> bool {
     return is_area(far, AREA) && far.weight * radius > near.weight * beyond;
 }
 
-// How far apart rows of points k-radius / (k/2) apart are, k-radii, if a ball of so many k-radii holds points of this `weight`.
+// Distance between scan lines in k-radii, from the weight of a ball of `in_k_radii`. Points on a line are k-radius /
+// (k/2) apart.
 fn rows_apart(in_k_radii: f32, weight: f32) -> f32 {
     return EVEN_WEIGHT * in_k_radii * in_k_radii * f32(frame.k) / (2.0 * weight);
 }
 
-// Of the areas on the two sides of a `row`, the flatter, of those that go on in the ball `beyond`.
+// The flatter of the areas on the two sides of a scan line, among those that continue in the ball `beyond`.
 fn area_beside(ball: Ball, beyond: Ball, row: vec3f) -> Area {
     let across_eye = cross(row, select(vec3f(0.0, 0.0, 1.0), ball.center, frame.perspective == 1u));
     let length_squared = dot(across_eye, across_eye);
@@ -67,18 +68,18 @@ fn area_beside(ball: Ball, beyond: Ball, row: vec3f) -> Area {
         }
         side = -side;
     }
-    // As if the other side were as full.
+    // Weight as if the other side were equally full.
     found.plane.weight *= HALVES;
     return found;
 }
 
-// Whether what is behind a ball's disc square to `axis` shows through it.
+// Whether the background shows through a ball's disc square to `axis`.
 fn is_seen_through(ball: Ball, axis: vec3f) -> bool {
     let cells = seen(ball, axis, OFF_AREA * ball.radius).cells;
     return cells.y > SEEN_THROUGH * (cells.y + cells.x);
 }
 
-// The first ball around a surfel of a row that holds an area with the row in it.
+// The area that contains a surfel's scan line, from the first ball that holds an area.
 fn area(surfel: Surfel, least_radius: f32) -> Area {
     let center = surfel.center;
     let row = surfel.major_axis;
@@ -107,7 +108,7 @@ fn area(surfel: Surfel, least_radius: f32) -> Area {
     return found;
 }
 
-// A surfel of a row, turned to its area; thin if there is none.
+// A surfel of a scan line, turned to its area; without an area, a thin line.
 fn turned(surfel: Surfel, found: Area) -> Surfel {
     var out = surfel;
     if found.radius == 0.0 {

@@ -1,6 +1,6 @@
-// How far the points of a ball scatter: bits of a standard deviation in world units, with THICK if it is a large part of the
-// radius. Imports: nothing.
+// Scatter of a ball's points: bits of a standard deviation in world units, with `THICK` set if it is large relative to
+// the radius. Imports: nothing.
 
 const THICK = 0x80000000u;
-// The ball holds too little to fit.
+// The ball holds too few clusters for a fit.
 const TOO_FEW = 0xffffffffu;

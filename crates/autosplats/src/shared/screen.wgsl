@@ -1,4 +1,4 @@
-// Screen points: the nearest point of each pixel or half of one, listed in cell order.
+// Screen points: the nearest point of each pixel or half of one, in cell order.
 
 struct ScreenPoint {
     // View space.

@@ -1,7 +1,7 @@
-// What all queries of a search's workgroup need to know. Imports: counters, window, window_points. The including pass binds
-// `counters` as atomics.
+// Data shared by all queries of a search's workgroup. Imports: counters, window, window_points. The including pass
+// binds `counters` as atomics.
 
-// 0: the active points; 1: the recovered ones, which follow them.
+// 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 override FIRST_REACH: f32;
 override SLACK: f32;
@@ -12,10 +12,10 @@ override BOUND_STEP: f32;
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
 struct Task {
-    // Among the queries of both rounds.
+    // First query of the round among those of both rounds.
     first: u32,
     len: u32,
-    // Queries that `search_four` left to `search`.
+    // Number of queries that `search_four` leaves to `search`.
     left: u32,
     visible: u32,
     strip_px: u32,
@@ -25,12 +25,12 @@ struct Task {
 
 var<workgroup> task: Task;
 
-// Which counter has the number of queries left.
+// Index of the counter of the queries left.
 fn left_counter() -> u32 {
     return select(LEFT_ACTIVE, LEFT_RECOVERED, ROUND == 1u);
 }
 
-// Call from one; a barrier must follow.
+// To be called by one invocation; a barrier must follow.
 fn task_load() {
     let active_points = atomicLoad(&counters[ACTIVE]);
     task.first = select(0u, active_points, ROUND == 1u);
@@ -42,7 +42,7 @@ fn task_load() {
     task.cell_columns = atomicLoad(&counters[CELL_COLUMNS]);
 }
 
-// Whether the bound on searches is beyond this radius: it is one of radii BOUND_STEP apart.
+// Whether the bound on searches is larger than this radius. Possible bounds are a factor BOUND_STEP apart.
 fn is_unbounded(center: vec3f, radius: f32) -> bool {
     let beyond = window_of_sphere(center, 1.01 * BOUND_STEP * radius);
     return window_len(beyond, task.strip_px, MAX_CANDIDATES) <= MAX_CANDIDATES;

@@ -1,64 +1,65 @@
-// What shading is told beside the frame, and the values that it can show. Imports: frame, layers. The including pass
-// binds `surface`, `cover` and `extras`.
+// Uniform of shading, beside the frame's, and the values that shading can show. Imports: frame, layers. The including
+// pass binds `surface`, `cover` and `extras`.
 
 struct ShadeUniform {
-    // Directions to the lights in view space, and their linear colours.
+    // Directions to the lights in view space (`key`, `fill`), and their linear colours.
     key: vec3f,
-    // How far the key light reaches around.
+    // Amount by which the key light reaches surfaces turned away from it.
     key_wrap: f32,
     key_light: vec3f,
-    // Brightness from which a lit colour rises less.
+    // Brightness above which lit colours are compressed.
     shoulder: f32,
     fill: vec3f,
-    // How much occlusion darkens.
+    // Strength of the darkening by occlusion.
     darkening: f32,
     fill_light: vec3f,
-    // The steepest that something rises beside a pixel, and what the furthest counts for.
+    // Steepest rise beside a pixel that occludes in full, and the rise that far things count as.
     steepest: f32,
-    // Light of the ground and of the sky, on surfaces that face down and up.
+    // Light of ground and sky, on surfaces that face down and up.
     ground: vec3f,
     furthest: f32,
     sky: vec3f,
-    // What a rise is divided by at least.
+    // Least divisor for a rise.
     least_rise: f32,
     // Linear colour of a surface without colours.
     clay: vec3f,
-    // What is deeper than this factor times a pixel's depth, plus the offset, is not the same surface.
+    // A depth larger than a pixel's depth times this factor plus the offset belongs to another surface.
     edge_factor: f32,
     // Direction of rising height, world space.
     up: vec3f,
     edge_offset: f32,
-    // Light whatever the normal, and the share of the lights above.
+    // Light independent of the normal, and the share of the lights above.
     given_light: vec2f,
-    // Ends of the colour map, if they are not to be found.
+    // Ends of the colour map, unless `find_range` is set.
     range: vec2f,
     find_range: u32,
     lighting: u32,
     keep_linear: u32,
-    // Bytes of the image are blue, green, red.
+    // 1 if the bytes of the image are blue, green, red.
     swap_red_blue: u32,
     // Pixels from one row of the image to the next.
     pitch: u32,
-    // Every how many pixels one is looked at to find the range, and how many these are.
+    // Sampling of pixels to find the range: step, and number of samples.
     sample_step: u32,
     samples: u32,
-    // Steps of the table from linear to sRGB.
+    // Number of steps of the table from linear to sRGB.
     encode_steps: u32,
-    // Where in the tables the backgrounds of rows begin.
+    // Start of the rows' backgrounds in the tables.
     backgrounds: u32,
-    // Where among the extras the measures begin.
+    // Start of the measures in `extras`.
     measures: u32,
-    // How far the ends of a row of edges are looked for, in pixels.
+    // Distance in pixels within which the ends of a row of edges are searched.
     edge_search: i32,
-    // A normal at a border is not used if it is tilted so much less towards it than one further in.
+    // Difference of tilt towards a border from which a pixel uses the normal further in instead of its own.
     less_tilted: f32,
-    // Pairs of pixels for occlusion: the step to the second one, one by its length in pixels, and the pair's part.
+    // Pairs of pixels for occlusion: step to the second pixel, inverse length of the step in pixels, and weight of the
+    // pair.
     pairs: array<vec4f, 10>,
 }
 
 @group(0) @binding(1) var<uniform> shading: ShadeUniform;
 
-// What a surface can be coloured by: from SHOW_HEIGHT on these are values.
+// What a surface can be coloured by: values, from SHOW_HEIGHT on.
 const SHOW_CLAY = 0u;
 const SHOW_COLOR = 1u;
 const SHOW_NORMAL = 2u;
@@ -77,13 +78,14 @@ fn is_covered(depth: f32) -> bool {
     return is_finite(depth);
 }
 
-// From view to world space.
+// Rotates a direction from view to world space.
 fn to_world(direction: vec3f) -> vec3f {
     let m = frame.view_from_world;
     return vec3f(dot(m[0], direction), dot(m[1], direction), dot(m[2], direction));
 }
 
-// The value shown at a pixel of the picture, `index` on the screen. Heights are told from the cloud's origin.
+// Value shown at a pixel of the picture; `index` is the pixel's index on the screen. Heights are relative to the
+// cloud's origin.
 fn shown_value(pixel: vec2u, index: u32, depth: f32) -> f32 {
     switch SHOWN {
         case SHOW_HEIGHT: {

@@ -1,42 +1,43 @@
-// Quadrics that the surfels around share: see the CPU form, which has `bend` as a matrix. Imports: orthonormal.
+// Sheets, quadrics shared by neighbouring surfels: see the CPU form, where `bend` is a matrix. Imports: orthonormal.
+// See docs/decisions/0007-shared-sheets.md.
 
 #import orthonormal
 
 // Most sheets of a cell.
 const SHEETS = 4u;
 
-// In place of the radius: no sheet, as nobody has asked for any yet, or as none was found.
+// Values in place of the radius: the sheet is not requested yet, or there is none.
 const UNKNOWN = 0.0;
 const NONE = -1.0;
 
-// An upright quadric over the balls that it was fitted to.
+// An upright quadric and the extent of the balls that it was fitted to.
 struct Sheet {
     center: vec3f,
-    // Of the quadric.
+    // Radius of the quadric in world units.
     radius: f32,
     // Unit normal at the centre, and direction of the heights.
     axis: vec3f,
-    // At the centre; radii, as `bend`.
+    // Height at the centre, in radii, as is `bend`.
     height: f32,
     bend: vec3f,
-    // Standard error of its normal, radians.
+    // Standard error of the normal, radians.
     error: f32,
     curvature: f32,
-    // Standard deviation of points from it, world units.
+    // Standard deviation of points from the sheet, world units.
     scatter: f32,
-    // How much it counts beside others, by its error and its scatter.
+    // Weight among other sheets, from error and scatter.
     trust: f32,
 }
 
-// Where a place is over a sheet.
+// A position relative to a sheet.
 struct Over {
     u: vec3f,
     v: vec3f,
-    // Along `u` and `v`, in radii.
+    // Coordinates along `u` and `v`, in radii.
     at: vec2f,
-    // Of the sheet above the place, along its axis; world units.
+    // Height of the sheet above the position along its axis, world units.
     height: f32,
-    // 1 above the ball's centre, 0 at its border, negative beyond.
+    // 1 on the ball's axis, 0 at its border, negative beyond.
     near: f32,
 }
 
@@ -52,7 +53,7 @@ fn under(sheet: Sheet, place: vec3f) -> Over {
     return Over(u, v, vec2f(x, y), height, 1.0 - (x * x + y * y));
 }
 
-// Unit normal.
+// Unit normal of the sheet at the position.
 fn sheet_normal(sheet: Sheet, over: Over) -> vec3f {
     let slope_x = 2.0 * sheet.bend.x * over.at.x + sheet.bend.y * over.at.y;
     let slope_y = 2.0 * sheet.bend.z * over.at.y + sheet.bend.y * over.at.x;

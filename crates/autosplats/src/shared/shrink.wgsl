@@ -1,5 +1,5 @@
-// Surfels that are no surface, and how small they become: see the CPU form. Imports: frame, surfel, quadric, through. The including
-// pass binds `measured`.
+// Shrinks surfels that lie on no surface: see the CPU form. Imports: frame, surfel, quadric, through. The including
+// pass binds `measured`. See docs/decisions/0010-outliers.md.
 
 #import through
 
@@ -23,16 +23,16 @@ override ALL_AROUND: f32;
 override CELLS_TO_COUNT: f32;
 override SUPPORT: f32;
 
-// Radius of a surfel that is drawn as a dot.
+// Radius in world units of a surfel that is drawn as a dot.
 fn dot_radius(surfel: Surfel) -> f32 {
     return min(surfel.radius, DOT_PX * pixel_size(surfel.center.z));
 }
 
-// Radius of a surfel that may be no surface, as its neighbours are far away and fill the space between, or are cut off from all
-// others; `initial_radius` is its first search radius. 0 if it is to be dropped.
+// Radius of a surfel after the outlier test; 0 if the surfel is dropped. Outliers have neighbours that are far away and
+// fill space, or that are cut off from all other points. `initial_radius` is the first search radius.
 fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
     let usual = measured[2];
-    // A handful of points has nothing that is usual.
+    // Too few points have no usual k-radius.
     if usual == 0.0 {
         return surfel.radius;
     }
@@ -51,7 +51,7 @@ fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
         let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
         let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
         if around.len >= LEAST_OF_PLANE && is_crowd && (is_aside || is_outside) {
-            // More than any limit: the host's infinity, which has no literal here.
+            // Above any limit, in place of infinity, for which WGSL has no literal.
             stray = 2.0 * STRAY_DROPPED;
         } else if around.len >= LEAST_OF_PLANE && around.len < LEAST_CLUSTERS && is_aside {
             stray = max(stray, STRAY_DOT);
@@ -63,8 +63,9 @@ fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
     return select(surfel.radius, dot_radius(surfel), stray >= STRAY_DOT);
 }
 
-// Radius of a surfel, whose points scatter by `noise`: its share of what is seen where it is, unless it is one of a surface; a dot at
-// least. Of an ellipse the circle within is asked, and the ellipse shrinks.
+// Radius of a surfel in proportion to its share of the points seen at its disc, unless it belongs to a surface; at
+// least a dot. `noise` is the scatter of its points. The share of an ellipse is that of its inscribed circle. See
+// docs/decisions/0011-seen-through.md.
 fn opened(surfel: Surfel, noise: f32) -> f32 {
     let least = dot_radius(surfel);
     if !(surfel.radius > least) {
@@ -73,7 +74,7 @@ fn opened(surfel: Surfel, noise: f32) -> f32 {
     let radius = SUPPORT * surfel.radius;
     let disc = ball_around(surfel.center, radius, CELLS_TO_COUNT);
     let points = seen(disc, surfel.normal, max(ON_DISC * radius, ON_DISC_NOISE * noise)).points;
-    // Its own point is on it, and may have moved.
+    // The surfel's own point is on the disc, even if it was moved.
     let on = max(points.x, 1.0);
     let share = on / (on + points.y);
     if !(share < LEAST_ON) {

@@ -1,13 +1,16 @@
 // Boxes that points draw over pixels [Paper, §4], two triangles each. Imports: frame, communication, window.
 
-// The f of [Paper, §4]: depths of the mask. The bits of positive numbers ascend as these do; the 24 highest of them fit a
-// f32, whatever the unit of the cloud, to 1 part in 65536. Differs from the paper, whose planes at z_near and z_far would
-// have to be found first; it lets a few more points through.
+// The f of [Paper, §4]: depth in the mask. The bits of positive numbers ascend with the numbers; the highest 24 fit an
+// f32, exact to 1 part in 65536 in any unit.
+//
+// Differs from the paper: its planes at z_near and z_far would have to be found first. This f lets slightly more points
+// through.
 fn mask_depth(depth: f32) -> f32 {
     return f32(bitcast<u32>(depth) >> 7u) * 0x1p-24;
 }
 
-// Depth of the splat of a sphere. Points up to z + r pass; the margin is for the step that they may share with the border.
+// Depth of the splat of a sphere. Points up to z + r pass; the margin covers the step that they may share with the
+// border.
 fn splat_depth(center: vec3f, radius: f32) -> f32 {
     return mask_depth(center.z + radius) + 0x1p-23;
 }
@@ -35,7 +38,7 @@ fn splat_vertex(center: vec3f, radius: f32, pixel: vec2u, vertex: u32) -> vec4f 
     return pixel_vertex(pixel, vertex, depth);
 }
 
-// A splat that covers nothing.
+// A splat that covers no pixel.
 fn no_vertex() -> vec4f {
     return vec4f(2.0, 2.0, 1.0, 1.0);
 }

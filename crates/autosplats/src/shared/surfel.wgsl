@@ -1,10 +1,10 @@
-// Neighbourhoods and surfels, as the search and the fit leave them.
+// Neighbourhoods and surfels: the results of search and fit.
 
-// Sums over a point's neighbours, about the point itself, which is not counted.
+// Sums over a point's neighbours, relative to the point itself, which is not counted.
 struct Neighborhood {
     // Σ(q - p), view space.
     offset: vec3f,
-    // 0 if the point is an outlier.
+    // Number of neighbours; 0 if the point is an outlier.
     count: f32,
     // Σ(q - p)(q - p)ᵀ: xx, xy, xz.
     second_x: vec3f,
@@ -17,7 +17,7 @@ struct Neighborhood {
 
 // An oriented disc in view space.
 struct Surfel {
-    // The point itself, or where the surface is that was fitted to noisy ones.
+    // The point, or the surface position that was fitted to noisy points.
     center: vec3f,
     // Semi-minor axis, world units; 0 if the point was discarded.
     radius: f32,

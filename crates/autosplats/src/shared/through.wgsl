@@ -1,18 +1,19 @@
-// What is seen on a disc and through it: see the CPU form. Imports: frame, quadric. The including pass binds `levels` and
-// `clusters`.
+// Points seen on a disc and through it: see the CPU form. Imports: frame, quadric. The including pass binds `levels`
+// and `clusters`. See docs/decisions/0011-seen-through.md.
 
 #import quadric
 
-// What is seen where a disc is: on it, and behind it.
+// Counts on a disc and behind it.
 struct Seen {
-    // Cells that hold something on the disc, and others that hold something behind it.
+    // Cells with points on the disc, and other cells with points behind it.
     cells: vec2f,
-    // Points on it, and behind it: each of these counts for as many as would fall there if it lay on the disc's plane.
+    // Points on the disc, and behind it. A point behind counts as many as would fall there if it lay on the disc's
+    // plane.
     points: vec2f,
 }
 
-// What is seen on and through a ball's disc square to `axis`, in the ball's cells; what is no further from the plane, on either
-// side, is on it.
+// Counts on and behind a ball's disc square to `axis`, in the ball's cells. Points within `half_thickness` of the plane
+// are on the disc.
 fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
     let start = own_start();
     let step = own_step();
@@ -46,12 +47,12 @@ fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
 // Points of a cluster on the disc, and behind it.
 fn seen_of(ball: Ball, axis: vec3f, half_thickness: f32, cluster: vec4f) -> vec2f {
     let off = dot(axis, ball.center) - dot(axis, cluster.xyz);
-    // Where the line of sight meets the plane.
+    // Intersection of the line of sight with the plane.
     let along = select(vec3f(0.0, 0.0, 1.0), cluster.xyz, frame.perspective == 1u);
     let way = off / dot(axis, along);
     let apart = cluster.xyz + along * way - ball.center;
     let is_within = cluster.w > 0.0 && dot(apart, apart) < ball.radius * ball.radius;
-    // Distance from the eye on the plane over that of the point.
+    // Distance of the plane from the eye over that of the point, along the line of sight.
     let nearer = select(1.0, max(1.0 + way, 0.0), frame.perspective == 1u);
     let is_on = abs(off) <= half_thickness;
     let is_behind = is_within && !is_on && way < 0.0;
@@ -61,7 +62,8 @@ fn seen_of(ball: Ball, axis: vec3f, half_thickness: f32, cluster: vec4f) -> vec2
     );
 }
 
-// A cell's points, and before them whether it holds any on the disc, else any behind it.
+// Counts of a cell: 1 if it has points on the disc, else 1 if it has points behind the disc, and both numbers of
+// points.
 fn with_cell(points: vec2f) -> vec4f {
     let is_on = points.x > 0.0;
     return vec4f(select(0.0, 1.0, is_on), select(0.0, 1.0, !is_on && points.y > 0.0), points);

@@ -1,17 +1,18 @@
-// Balls that the invocations of a workgroup sum up together, for the few that take long: what one would do after the other they
-// do side by side. All ask for the same ball, in uniform control flow, and get the same answer. Imports: quadric.
+// Balls that the invocations of a workgroup sum up together: for the few that take long. All invocations ask for the
+// same ball, in uniform control flow, and get the same sums. Imports: quadric. Alternative: `alone`.
 
-// How many they are, 8, 16 or 32.
+// Number of invocations: 8, 16 or 32.
 override TOGETHER: u32;
-// Rows of cells that they take at a time.
+// Rows of cells per step.
 const ROWS = 8u;
-// Vectors that the largest sums take.
+// Vectors of the largest sums.
 const MOST_PARTS = 6u;
 
-// To be set before the first ball.
+// Index of the invocation, to be set before the first ball.
 var<private> own_place: u32;
 
-// What each has, vector by vector. Rows are one place longer than any needs, so that not all begin in the same bank of memory.
+// Sums of each invocation, vector by vector. Rows are one element longer than needed, so that they start in different
+// memory banks.
 const PART_ROW = 33u;
 var<workgroup> parts: array<vec4f, MOST_PARTS * PART_ROW>;
 var<workgroup> totals: array<vec4f, MOST_PARTS>;
@@ -28,7 +29,7 @@ fn tell(part: u32, own: vec4f) {
     parts[part * PART_ROW + own_place] = own;
 }
 
-// The sums over all invocations of the first parts that each has told, in their order.
+// Sums over all invocations of the first `count` vectors, in the order of the invocations.
 fn sum_up(count: u32) -> array<vec4f, MOST_PARTS> {
     workgroupBarrier();
     if own_place < MOST_PARTS {

@@ -1,20 +1,21 @@
 // Windows: rectangles of the screen. Imports: frame.
 
-// Added to projected bounds in pixels, against the rounding of projected coordinates.
+// Margin in pixels around projected bounds, for the rounding of projected coordinates.
 override MARGIN_PX: f32;
 
-// Pixels, all sides included; whole numbers.
+// First and last pixels, both included; whole numbers.
 struct Window {
     low: vec2f,
     high: vec2f,
 }
 
-// The window of the whole picture.
+// The window of the whole screen.
 fn picture() -> Window {
     return Window(vec2f(0.0), vec2f(frame.size) - 1.0);
 }
 
-// Slopes of the two lines through the eye that touch the circle of `radius` about (x, z), which lies in front of it.
+// Slopes of the two lines through the eye that touch the circle of `radius` about (x, z), which lies in front of the
+// eye.
 fn tangents(x: f32, z: f32, radius: f32) -> vec2f {
     let length = sqrt(max(x * x + z * z - radius * radius, 0.0));
     return vec2f(
@@ -23,12 +24,12 @@ fn tangents(x: f32, z: f32, radius: f32) -> vec2f {
     );
 }
 
-// Where points within `radius` of `center` (view space) can be.
+// Window that contains all points within `radius` of `center` (view space).
 fn window_of_sphere(center: vec3f, radius: f32) -> Window {
     var x = vec2f(center.x - radius, center.x + radius);
     var y = vec2f(center.y - radius, center.y + radius);
     if frame.perspective == 1u {
-        // A sphere around the eye's plane projects everywhere.
+        // A sphere that meets the eye's plane projects everywhere.
         if !(center.z > 1.0001 * radius) {
             return picture();
         }

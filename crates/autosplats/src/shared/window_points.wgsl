@@ -1,10 +1,10 @@
 // Screen points in windows. Imports: frame, window. The including pass binds `cell_start`.
 
-// Strips that the invocation has gone through and half of the screen points it has read: about the rounds of its loops, of which
-// software devices end an invocation silently after 65535.
+// Approximate number of loop rounds: strips visited, plus half the screen points read. Software devices end an
+// invocation silently after 65535 rounds.
 var<private> rounds: u32;
 
-// The window grown to what is read anyway: whole strips.
+// The window grown to whole strips, which are read anyway.
 fn window_grown(window: Window, strip_px: f32) -> Window {
     let top = floor(window.low.y / strip_px) * strip_px;
     let bottom = floor(window.high.y / strip_px) * strip_px + strip_px - 1.0;
@@ -20,13 +20,13 @@ fn window_strips(window: Window, strip_px: u32) -> vec2u {
     return vec2u(u32(window.low.y), u32(window.high.y)) / strip_px;
 }
 
-// The screen points of a strip that lie in a window: from x on, below y. They are contiguous.
+// Screen points of a strip in the window's columns, which are contiguous: first index, and end.
 fn window_run(window: Window, strip: u32) -> vec2u {
     let row = strip * frame.size.x;
     return vec2u(cell_start[row + u32(window.low.x)], cell_start[row + u32(window.high.x) + 1u]);
 }
 
-// Number of screen points in the window, or how many it has room for where these are few.
+// Number of screen points in the window, or an upper bound if that is at most `few`.
 fn window_len(window: Window, strip_px: u32, few: u32) -> u32 {
     let sides = window.high - window.low + 1.0;
     let room = u32(sides.x * sides.y) << frame.halves;
