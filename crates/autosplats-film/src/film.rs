@@ -1,4 +1,4 @@
-//! Pictures to ffmpeg.
+//! Films, made by ffmpeg from raw pictures.
 
 use std::ffi::OsString;
 use std::io::{Read as _, Write as _};
@@ -11,42 +11,43 @@ use tempfile::TempPath;
 
 use crate::Error;
 
-/// Whether films can be made.
+/// Whether films can be made: whether ffmpeg starts.
 pub fn has_ffmpeg() -> bool {
     let mut probe = Command::new("ffmpeg");
     probe.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     probe.status().is_ok_and(|status| status.success())
 }
 
-/// A film in the making. It appears when it is [finished](Self::finish); one that is dropped leaves nothing behind.
+/// A film in the making. The file appears when the film is [finished](Self::finish). A dropped film leaves nothing
+/// behind.
 #[derive(Debug)]
 pub struct Film {
     path: PathBuf,
-    /// Until it is put in place.
+    /// The unfinished file; `None` once it is in place.
     part: Option<TempPath>,
     size: [u32; 2],
     child: Child,
     input: Option<ChildStdin>,
-    /// Reads what ffmpeg complains of, so that it never waits for a reader.
+    /// Reads ffmpeg's messages, so that ffmpeg never waits for a reader.
     words: Option<JoinHandle<String>>,
 }
 
 impl Film {
-    /// Begins a film of `size` (width, height) pixels with `rate` pictures a second. What is at `path` stays until the film is
-    /// finished.
+    /// Begins a film of `size` (width, height) pixels with `rate` pictures per second. A file at `path` stays until the
+    /// film is finished.
     ///
     /// # Errors
-    /// [`Error::Io`] if nothing can be written there, [`Error::NoFfmpeg`].
+    /// [`Error::Io`] if the folder is not writable, [`Error::NoFfmpeg`] if ffmpeg does not start.
     pub fn begin(path: &Path, size: [u32; 2], rate: f64) -> Result<Self, Error> {
         Self::with(path, size, |part| ffmpeg(part, size, rate))
     }
 
-    /// Hands pictures to a command that writes to the path it is given.
+    /// Begins a film with a command that writes to the given path and reads pictures from its standard input.
     fn with(path: &Path, size: [u32; 2], command: impl FnOnce(&Path) -> Command) -> Result<Self, Error> {
         let part = temporary(path).map_err(|source| Error::Io { path: path.into(), source })?;
         let mut command = command(&part);
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
-        // Ctrl-C is for us: what is not finished is removed then.
+        // Ctrl-C must only reach this process, which then removes the unfinished file.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(Error::NoFfmpeg)?;
@@ -54,7 +55,7 @@ impl Film {
         let words = child.stderr.take().map(|mut pipe| {
             std::thread::spawn(move || {
                 let mut words = Vec::new();
-                // What cannot be read was not said.
+                // Unreadable messages are dropped.
                 let _ = pipe.read_to_end(&mut words);
                 String::from_utf8_lossy(&words).into_owned()
             })
@@ -65,20 +66,20 @@ impl Film {
     /// Adds a picture.
     ///
     /// # Errors
-    /// [`Error::Ffmpeg`] if it has ended, with what it said.
+    /// [`Error::Ffmpeg`] with the last message of ffmpeg if it has ended.
     ///
     /// # Panics
-    /// If the picture has another size than the film.
+    /// If the picture's size differs from the film's.
     pub fn add(&mut self, picture: &Image) -> Result<(), Error> {
         assert_eq!([picture.width, picture.height], self.size, "all pictures of a film have its size");
         let written = self.input.as_mut().map(|pipe| pipe.write_all(picture.pixels.as_flattened()));
         if matches!(written, Some(Ok(()))) { Ok(()) } else { Err(self.complaint()) }
     }
 
-    /// Ends the film, and puts it in place.
+    /// Completes the film and puts its file in place.
     ///
     /// # Errors
-    /// [`Error::Ffmpeg`] if it failed, [`Error::Io`] if the film cannot be put in place.
+    /// [`Error::Ffmpeg`] if ffmpeg failed, [`Error::Io`] if the file cannot be put in place.
     pub fn finish(mut self) -> Result<(), Error> {
         self.input = None;
         let status = self.child.wait().map_err(|error| Error::Ffmpeg(error.to_string()))?;
@@ -91,14 +92,14 @@ impl Film {
         self.part.take().map_or(Ok(()), place)
     }
 
-    /// The last that ffmpeg said.
+    /// Error with the last message of ffmpeg.
     fn complaint(&mut self) -> Error {
         self.input = None;
-        // It has ended, or ends as nothing more comes.
+        // It has ended, or ends because its input does.
         let _ = self.child.wait();
         let words = self.words.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         let last = words.lines().rev().find(|line| !line.trim().is_empty());
-        Error::Ffmpeg(last.unwrap_or("it failed without a word").trim().into())
+        Error::Ffmpeg(last.unwrap_or("it failed without a message").trim().into())
     }
 }
 
@@ -112,14 +113,14 @@ impl Drop for Film {
     }
 }
 
-/// A file beside `path` with its extension, by which ffmpeg knows what to make.
+/// A file beside `path` with the same extension, which tells ffmpeg the format.
 fn temporary(path: &Path) -> std::io::Result<TempPath> {
     let mut suffix = OsString::from(".");
     suffix.push(path.extension().unwrap_or_default());
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".autosplats-").suffix(&suffix);
-    // Temporary files are for their owner alone unless told otherwise; the film is a file like any.
+    // Temporary files are private by default; a film has usual permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     Ok(builder.tempfile_in(folder)?.into_temp_path())
@@ -130,7 +131,7 @@ fn ffmpeg(path: &Path, [width, height]: [u32; 2], rate: f64) -> Command {
     let mut command = Command::new("ffmpeg");
     command.args(["-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba"]);
     command.args(["-s", &format!("{width}x{height}"), "-r", &rate.to_string(), "-i", "-"]);
-    // Most players want even sides and this kind of colour.
+    // Most players require even sides and this pixel format.
     command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(path);
     command
 }
@@ -141,7 +142,7 @@ mod tests {
 
     const SIZE: [u32; 2] = [500, 500];
 
-    /// A film of three pictures by a shell script that is told the file's name as `$0`.
+    /// A film of three pictures, made by a shell script with the file's name as `$0`.
     fn film(path: &Path, script: &str) -> Result<(), Error> {
         let mut film = Film::with(path, SIZE, |part| {
             let mut command = Command::new("sh");
@@ -161,7 +162,7 @@ mod tests {
         let words = |script: &str| film(&path, script).expect_err("it fails").to_string();
         assert_eq!(words("echo bad >&2; exit 1"), "ffmpeg: bad", "it died before all was read");
         assert_eq!(words("cat > \"$0\"; echo late >&2; exit 1"), "ffmpeg: late", "at the end");
-        assert_eq!(words("cat > \"$0\"; exit 1"), "ffmpeg: it failed without a word");
+        assert_eq!(words("cat > \"$0\"; exit 1"), "ffmpeg: it failed without a message");
         // More than a pipe holds.
         assert_eq!(words("yes | head -c 300000 >&2; cat > \"$0\"; exit 1"), "ffmpeg: y", "it never waits for a reader");
         let dropped = Film::with(&path, SIZE, |part| {

@@ -1,4 +1,4 @@
-//! Pictures that follow each other: numbered files, or a film that ffmpeg makes of them.
+//! Successive pictures as numbered files, or as a film made by ffmpeg.
 //!
 //! ```no_run
 //! use autosplats_film::{Film, Target};
@@ -24,30 +24,30 @@ pub use target::{Frames, Target, has_number};
 
 use std::path::PathBuf;
 
-/// Why there is no film.
+/// Errors of making pictures and films.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A name that tells neither pictures nor a film.
+    /// A name that is unsuitable for pictures and films.
     #[error("{}: {why}", path.display())]
     Name {
-        /// What was given.
+        /// The name.
         path: PathBuf,
-        /// What is wrong with it.
+        /// What is wrong with the name.
         why: String,
     },
-    /// The system refused to write.
+    /// A file cannot be written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// File concerned.
+        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// ffmpeg cannot be started.
-    #[error("ffmpeg does not start ({0}), which makes films; install it, or have pictures written as name_%05d.png")]
+    /// ffmpeg does not start. The value is the system's error.
+    #[error("films need ffmpeg, which does not start ({0}); install it, or write pictures as name_%05d.png")]
     NoFfmpeg(std::io::Error),
-    /// ffmpeg ended before the film did.
+    /// ffmpeg failed. The value is its last message.
     #[error("ffmpeg: {0}")]
     Ffmpeg(String),
 }

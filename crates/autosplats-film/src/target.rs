@@ -1,4 +1,4 @@
-//! What the name of an output means.
+//! Meaning of the name of an output.
 
 use std::path::{Path, PathBuf};
 
@@ -6,15 +6,15 @@ use crate::Error;
 
 /// Most digits of a number in a name.
 const MAX_DIGITS: usize = 12;
-/// Digits of a number where the name says nothing of it.
+/// Least digits of a number without a pattern in the name.
 const DIGITS: usize = 5;
 
-/// Where pictures that follow each other go.
+/// Target of successive pictures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// A PNG file each.
+    /// A PNG file per picture.
     Frames(Frames),
-    /// One film.
+    /// One film, with its path.
     Film(PathBuf),
 }
 
@@ -23,17 +23,17 @@ pub enum Target {
 pub struct Frames {
     folder: PathBuf,
     before: String,
-    /// At least so many of the number between the two; none if there is one picture, which has no number.
+    /// Least digits of the number between `before` and `after`; `None` for a single picture without a number.
     digits: Option<usize>,
     after: String,
 }
 
 impl Target {
-    /// What a path means: a film by its extension (`.mp4`, `.mkv`, `.webm`, `.mov`), otherwise numbered PNG files, with the number
-    /// in place of `%d`, `%05d` or the like, or else at the end of the name, five digits wide.
+    /// Parses a path. The extensions `.mp4`, `.mkv`, `.webm` and `.mov` mean a film, `.png` numbered pictures. The
+    /// number replaces `%d`, `%05d` or the like, or else is appended to the name with at least five digits.
     ///
     /// # Errors
-    /// [`Error::Name`] if it is neither, or has several numbers.
+    /// [`Error::Name`] if the extension is another one or the name has several numbers.
     pub fn new(path: &Path) -> Result<Self, Error> {
         let refuse = |why: &str| Error::Name { path: path.into(), why: why.into() };
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
@@ -47,7 +47,7 @@ impl Target {
                     None => (name[..name.len() - 4].to_owned() + "_", DIGITS, ".png".into()),
                 };
                 if number(&after).is_some() {
-                    return Err(refuse("a name has one number"));
+                    return Err(refuse("the name has more than one number"));
                 }
                 Ok(Self::Frames(Frames { folder, before, digits: Some(digits), after }))
             }
@@ -55,7 +55,7 @@ impl Target {
         }
     }
 
-    /// The same for one picture: a name that tells no place for a number is taken as it is.
+    /// Parses a path for a single picture: a name without a place for a number is used as it is.
     ///
     /// # Errors
     /// Those of [`new`](Self::new).
@@ -69,7 +69,7 @@ impl Target {
         })
     }
 
-    /// The first file that is there already and would be replaced by so many pictures, counted from 0.
+    /// The first existing file that this many pictures, numbered from 0, would replace.
     pub fn existing(&self, pictures: usize) -> Option<PathBuf> {
         match self {
             Self::Film(path) => Some(path.clone()).filter(|path| path.exists()),
@@ -79,7 +79,7 @@ impl Target {
 }
 
 impl Frames {
-    /// The file of a picture.
+    /// File of the picture with this number.
     pub fn file(&self, number: usize) -> PathBuf {
         let Self { folder, before, digits, after } = self;
         folder.join(match *digits {
@@ -88,19 +88,19 @@ impl Frames {
         })
     }
 
-    /// All of them, for a message.
+    /// Path of all pictures, for messages: "…" stands for the number.
     pub fn pattern(&self) -> PathBuf {
         let number = if self.digits.is_some() { "…" } else { "" };
         self.folder.join(format!("{}{number}{}", self.before, self.after))
     }
 }
 
-/// Whether a name says where a number goes, as `f_%05d.png`.
+/// Whether a file name has a place for a number, as in `f_%05d.png`.
 pub fn has_number(name: &str) -> bool {
     number(name).is_some()
 }
 
-/// Where the number goes, and how many digits it has at least.
+/// Range of the number's place in a name, and the least digits.
 fn number(name: &str) -> Option<(std::ops::Range<usize>, usize)> {
     name.match_indices('%').find_map(|(start, _)| {
         let rest = &name[start + 1..];

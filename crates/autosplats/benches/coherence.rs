@@ -1,8 +1,8 @@
-//! What temporal coherence saves: `cargo bench -p autosplats --bench coherence [-- quick] [gpu] [SCENE]`.
+//! Time saved by temporal coherence: `cargo bench -p autosplats --bench coherence [-- quick] [gpu] [SCENE]`.
 //!
-//! Cameras that orbit and walk, and points that are new in each frame, rendered by two renderers in turns: one starts its
-//! searches from the last frame's k-radii, the other from densities. Their pictures have to be equal. `gpu` is for a device;
-//! `quick` only shows that the benchmark runs. Times are medians.
+//! Two renderers take turns: one starts its searches from the last frame's k-radii, the other from densities. Cameras
+//! orbit and walk, or points are new in each frame. The pictures have to be equal. `gpu` selects a device; `quick` only
+//! shows that the benchmark runs. Times are medians.
 
 #[allow(dead_code, reason = "others use the rest")]
 mod common;
@@ -13,19 +13,19 @@ use autosplats::{Backend, Camera, Reconstruction, Renderer, Settings, Timings};
 
 use common::{SIZE, args, machine, median, scene, short};
 
-/// Frames of each motion; the first of them has no past.
+/// Frames of each motion; the first frame has no past.
 const FRAMES: usize = 8;
 
-/// How the picture changes from frame to frame.
+/// Change of the picture from frame to frame.
 #[derive(Clone, Copy, Debug)]
 enum Motion {
     /// Nothing moves.
     Still,
-    /// The camera turns about what it looks at, so many degrees a frame.
+    /// The camera turns about its target, in degrees per frame.
     Orbit(f64),
-    /// The eye goes forward by this part of the distance to what it looks at.
+    /// The eye moves towards its target by this fraction of the distance per frame.
     Walk(f64),
-    /// The points are those of an animation's next moment, at 24 a second.
+    /// The points are those of an animation at 24 frames per second.
     Animation,
 }
 
@@ -46,7 +46,7 @@ impl Motion {
     }
 }
 
-/// What a renderer took for a motion.
+/// Median times of a motion, in milliseconds.
 struct Measured {
     search: f64,
     frame: f64,
@@ -98,7 +98,7 @@ fn main() {
     }
 }
 
-/// The points of each frame; one cloud for all if they do not move.
+/// Cloud of each frame; a single cloud if the points do not move.
 fn clouds(name: &str, points: usize, motion: Motion, frames: usize, still: PointCloud) -> Vec<PointCloud> {
     let Motion::Animation = motion else { return vec![still; frames] };
     let (scene, _) = Scene::parse(name).expect("a scene of this name");

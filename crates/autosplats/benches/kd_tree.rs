@@ -1,12 +1,12 @@
-//! Against the fastest kd-tree: `cargo bench -p autosplats --bench kd_tree [-- quick]`.
+//! Comparison with the fastest kd-tree: `cargo bench -p autosplats --bench kd_tree [-- quick]`.
 //!
 //! # How it works
-//! Search and fit are timed against kiddo's `ImmutableKdTree`, which builds a tree of the very same visible points and
-//! finds the ten nearest neighbours of each, without fitting anything; the whole frame against the same for all points.
-//! Both run on the same threads. What is compared alternates, so that whatever else the computer does meets all of them; the
-//! table shows medians, and of the ratios also the least and greatest of all rounds.
+//! Search and fit are timed against kiddo's `ImmutableKdTree`. kiddo builds a tree of the same visible points and finds
+//! the ten nearest neighbours of each, without a fit. The whole frame is timed against the same for all points. Both
+//! run on the same threads and alternate, so that other load affects both. The table shows medians, and for ratios also
+//! the extremes of all rounds.
 //!
-//! kiddo is asked in each of the ways it can be, and the one that is fastest for the case counts.
+//! kiddo is queried in each possible way; the fastest way for the case counts.
 
 mod common;
 
@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use common::{SIZE, args, frame, machine, median, scene, short};
 
-/// The point itself is found too.
+/// Ten neighbours and the point itself.
 const NEAREST: NonZero<usize> = NonZero::new(11).expect("not zero");
 
 fn main() {
@@ -62,14 +62,14 @@ fn main() {
 
 /// Times one cloud and prints a line of the table.
 fn compare(name: &str, order: &str, cloud: &PointCloud, camera: &Camera, rounds: usize) {
-    // What the kd-tree is asked for: no more than k neighbours.
+    // The same task as the kd-tree's: k neighbours, and nothing more.
     let reconstruction = Reconstruction::paper();
     let settings = Settings { reconstruction, ..Settings::default() };
     let mut unculled = settings.clone();
     unculled.reconstruction.grid_culling = false;
     let mut renderer = Renderer::new();
     let visible = visible_points(&mut renderer, cloud, camera, &unculled);
-    // The first frame makes the buffers, as the first of many does.
+    // The first frame makes the buffers.
     let (_, count) = frame(&mut renderer, cloud, camera, &settings);
     assert_eq!(visible.len(), count, "the kd-tree must get the points that the search gets");
     let (query, _) = Query::ALL
@@ -115,7 +115,7 @@ fn compare(name: &str, order: &str, cloud: &PointCloud, camera: &Camera, rounds:
     );
 }
 
-/// Milliseconds, each taken once.
+/// Milliseconds of one round.
 struct Round {
     search: f64,
     culled: f64,
@@ -124,13 +124,13 @@ struct Round {
     kiddo_all: f64,
 }
 
-/// Ways to ask kiddo for the neighbours of many points.
+/// Ways to query kiddo for the neighbours of many points.
 #[derive(Clone, Copy)]
 enum Query {
     /// One query after the other on rayon's threads.
     Single,
     SingleUnsorted,
-    /// Its own parallel batch, each answer looked at and dropped.
+    /// kiddo's own parallel batch; each answer is read and dropped.
     Batch,
     BatchUnsorted,
 }
@@ -172,7 +172,7 @@ impl Query {
     }
 }
 
-/// The points that own a pixel, in the cloud's order.
+/// Points that own a pixel, in the cloud's order.
 fn visible_points(renderer: &mut Renderer, cloud: &PointCloud, camera: &Camera, unculled: &Settings) -> Vec<[f32; 3]> {
     frame(renderer, cloud, camera, unculled);
     let mut indices: Vec<u32> =
@@ -181,7 +181,7 @@ fn visible_points(renderer: &mut Renderer, cloud: &PointCloud, camera: &Camera, 
     indices.into_iter().map(|index| cloud.positions()[index as usize]).collect()
 }
 
-/// A gently waved sheet that fills the picture, points strewn evenly: nearly all of them are visible.
+/// A wavy sheet of random points that fills the picture; nearly all of the points are visible.
 fn sheet(points: usize) -> (PointCloud, Camera) {
     let [width, height] = SIZE.map(f64::from);
     let columns = (points as f64 * width / height).sqrt().ceil() as usize;
@@ -202,7 +202,7 @@ fn sheet(points: usize) -> (PointCloud, Camera) {
     (PointCloud::new(DVec3::ZERO, positions.collect()), camera)
 }
 
-/// A random-looking number for each number, no two the same.
+/// A pseudo-random number for each number, all different.
 fn scrambled(number: u64) -> u64 {
     let mut bits = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -234,7 +234,7 @@ impl Bounds {
         Self { low, extent: (high - low).max(Vec3::splat(f32::MIN_POSITIVE)) }
     }
 
-    /// Place on a Z curve through the box, 20 bits an axis.
+    /// Position on a Z curve through the box, 20 bits per axis.
     fn morton(&self, position: [f32; 3]) -> u64 {
         let cell = ((Vec3::from(position) - self.low) / self.extent * 1_048_575.0).to_array();
         let spread = |cell: f32| (0..20).fold(0u64, |bits, bit| bits | (cell as u64 >> bit & 1) << (3 * bit));

@@ -1,11 +1,10 @@
 //! Normals of whole clouds against the fastest kd-tree: `cargo bench -p autosplats --bench normals [-- quick]`.
 //!
-//! Normal, curvature and density radius of every point, tree and all, beside kiddo, which builds its tree of the same points
-//! and finds the same number of nearest neighbours of each without doing anything with them, asked in the faster of two
-//! ways. Both run on the same threads and alternate; each column shows medians. Processor time is that of all threads
-//! together, the figure to compare with programs that use one.
+//! The estimate of normal, curvature and density radius of every point, including the tree, is timed. kiddo builds a
+//! tree of the same points and only finds as many nearest neighbours of each, in the faster of two ways. Both run on
+//! the same threads and alternate; columns show medians. Processor time is the sum over all threads, for comparison
+//! with single-threaded programs.
 
-// Not all that the benchmarks share is used by each.
 #[allow(dead_code, reason = "the other benchmarks use the rest")]
 mod common;
 
@@ -61,7 +60,7 @@ fn compare(name: &str, cloud: &PointCloud, k: u32, rounds: usize) {
     );
 }
 
-/// Milliseconds.
+/// Times in milliseconds.
 struct Times {
     wall: f64,
     processor: f64,
@@ -74,7 +73,7 @@ fn timed(work: impl FnOnce()) -> Times {
     Times { wall: start.elapsed().as_secs_f64() * 1e3, processor: processor_ms() - before }
 }
 
-/// Milliseconds that this process's threads have run so far; NaN where the system does not tell.
+/// Processor time of this process so far in milliseconds; NaN if the system does not provide it.
 fn processor_ms() -> f64 {
     let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
     let nanoseconds = threads.flatten().filter_map(|thread| {
@@ -84,7 +83,7 @@ fn processor_ms() -> f64 {
     nanoseconds.sum::<f64>() / 1e6
 }
 
-/// Has kiddo find the nearest neighbours of all points; each point finds itself, too.
+/// Finds the nearest neighbours of all points with kiddo; each point also finds itself.
 fn neighbors(points: &[[f32; 3]], k: u32, batch: bool) {
     type Metric = SquaredEuclidean<f32>;
     let nearest = NonZero::new(k as usize + 1).expect("not zero");

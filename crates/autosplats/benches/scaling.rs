@@ -1,7 +1,8 @@
-//! What a frame costs as the cloud grows: `cargo bench -p autosplats --bench scaling [-- quick | full]`.
+//! Cost of a frame by the size of the cloud: `cargo bench -p autosplats --bench scaling [-- quick | full]`.
 //!
-//! The cathedral at rising counts, seen from within by the same camera. `full` goes on to 100 million points, which takes
-//! minutes to generate and about 2 GB; `quick` only shows that the benchmark runs. Times are medians of seven frames.
+//! The cathedral with rising numbers of points, seen from within by the same camera. `full` goes up to 100 million
+//! points, which takes minutes to generate and about 2 GB. `quick` only shows that the benchmark runs. Times are
+//! medians of seven frames.
 
 mod common;
 
@@ -53,7 +54,7 @@ fn main() {
     }
 }
 
-/// The most memory this process has had, where the system tells.
+/// Peak memory of this process in megabytes, if the system provides it.
 fn peak_megabytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,11 +1,12 @@
 //! Raw points in, a lit surface out, every frame.
 //!
-//! The method is Preiner, Jeschke and Wimmer, "Auto Splats: Dynamic Point Cloud Visualization on the GPU" (EGPGV 2012): no
-//! normals, no radii and no preprocessing are needed, because the surface is found anew for the points visible in each
-//! frame. A frame is six stages, each a module of this crate that owns the type that leaves it:
+//! The method is Preiner, Jeschke and Wimmer, "Auto Splats: Dynamic Point Cloud Visualization on the GPU" (EGPGV 2012).
+//! It needs no normals, no radii and no preprocessing: each frame reconstructs the surface from its visible points. A
+//! frame has six stages. Each is a module of this crate that owns the type of its result:
 //!
 //! ```text
-//! PointCloud --project--> ScreenPoints --search--> Neighborhoods --fit--> Surfels --adapt--> Surfels --splat--> GBuffer --shade--> Image
+//! PointCloud --project--> ScreenPoints --search--> Neighborhoods --fit--> Surfels
+//!            --adapt--> Surfels --splat--> GBuffer --shade--> Image
 //! ```
 //!
 //! ```
@@ -22,8 +23,8 @@
 //! # Ok::<(), autosplats::Error>(())
 //! ```
 //!
-//! [`estimate_normals`] computes for all points of a cloud what a picture shows of those seen: normal, curvature and density
-//! radius, from the exact nearest neighbours in space.
+//! [`estimate_normals`] computes normal, curvature and density radius of all points of a cloud, visible or not. It uses the
+//! exact nearest neighbours in space.
 
 mod adapt;
 mod camera;

@@ -1,11 +1,11 @@
-//! What the benchmarks share: scenes with their cameras, medians, and what they ran on.
+//! Shared parts of the benchmarks: scenes with cameras, medians, and the machine.
 
 use std::path::Path;
 
 use autosplats::cloud::{PointCloud, Scene};
 use autosplats::{Camera, Projection, Renderer, Settings, Timings};
 
-/// The size of every picture, the paper's.
+/// Size of every picture in pixels, as in the paper.
 pub(crate) const SIZE: [u32; 2] = [1760, 900];
 
 /// Arguments without those that Cargo adds.
@@ -13,7 +13,7 @@ pub(crate) fn args() -> Vec<String> {
     std::env::args().skip(1).filter(|arg| !arg.starts_with("--")).collect()
 }
 
-/// The made-up scene `name` with `count` points, and the camera that shows it best.
+/// The generated scene `name` with `count` points, and its camera.
 pub(crate) fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
     let (scene, _) = Scene::parse(name).expect("a scene of this name");
     let cloud = scene.sample(count, &|_| true).expect("enough memory");
@@ -33,7 +33,7 @@ pub(crate) fn frame(
     (frame.timings, frame.counts.visible)
 }
 
-/// The middle value, or the mean of the two middle ones.
+/// Median; the mean of the two middle values if their number is even.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
@@ -41,7 +41,7 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     if values.len().is_multiple_of(2) { 0.5 * (values[middle - 1] + values[middle]) } else { values[middle] }
 }
 
-/// A number with its thousand, million or nothing: 36K, 1M.
+/// A number in thousands or millions, if large: 36K, 1M.
 pub(crate) fn short(count: usize) -> String {
     match count {
         1_000_000.. if count.is_multiple_of(1_000_000) => format!("{}M", count / 1_000_000),
@@ -57,7 +57,7 @@ pub(crate) fn machine() -> String {
     format!("{}, {threads} threads, {width}x{height} pixels, k = 10", processor())
 }
 
-/// The processor's name.
+/// Name of the processor.
 pub(crate) fn processor() -> String {
     let info = std::fs::read_to_string(Path::new("/proc/cpuinfo")).unwrap_or_default();
     let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));

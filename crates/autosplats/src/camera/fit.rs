@@ -62,10 +62,10 @@ const RAISED: f64 = 0.47;
 #[non_exhaustive]
 pub enum ViewDirection {
     /// Chosen from the data. Points in a camera's frame, in perspective, are seen from the camera. A scan that is far
-    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor, in perspective with Z
-    /// up. Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the cloud has no
-    /// coordinate system. Points that sensors saw from one side are seen from half right of and above that side. All
-    /// else as [`Iso`](Self::Iso).
+    /// denser near its sensor, as of a lidar on a car, is seen from behind and above the sensor. This needs perspective
+    /// and Z up. Several sensors count as one in their middle. An unknown sensor is assumed at the origin if the cloud
+    /// has no coordinate system. Points that sensors saw from one side are seen from half right of and above that side.
+    /// All else as [`Iso`](Self::Iso).
     #[default]
     Auto,
     /// From the front, half right and above.
@@ -98,8 +98,8 @@ pub(crate) fn up(axes: Axes) -> DVec3 {
     frame(axes)[2]
 }
 
-/// The axes that a cloud states, or a guess: Z up for a cloud with an origin other than zero or a flat extent, else Y
-/// up.
+/// The axes that a cloud states, or else a guess. Clouds with an origin other than zero or a flat extent have Z up,
+/// others Y up.
 pub fn guess_axes(cloud: &PointCloud) -> Axes {
     cloud.axes().unwrap_or_else(|| {
         let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);

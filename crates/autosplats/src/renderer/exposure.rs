@@ -14,8 +14,8 @@ const DARKER: f32 = 0.95;
 /// Largest exposure. Still darker colours are noise.
 const MOST: f32 = 8.0;
 
-/// Factor on a cloud's own colours if [`Shading::exposure`] is `None`: 1, or up to 8 if all colours are dark, as in a
-/// cellar scanned without a flash. Black points and clouds without colours are ignored.
+/// Factor on a cloud's own colours if [`Shading::exposure`] is `None`. The factor is 1, or up to 8 if all colours are
+/// dark, as in a cellar scanned without a flash. Black points and clouds without colours are ignored.
 #[must_use]
 pub fn usual_exposure(cloud: &PointCloud) -> f32 {
     let Some(colors) = cloud.colors() else { return 1.0 };

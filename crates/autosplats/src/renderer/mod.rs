@@ -69,8 +69,8 @@ pub struct Counts {
     pub value_range: Option<[f64; 2]>,
 }
 
-/// Milliseconds spent in each stage of one frame. On a GPU with timestamps, a stage counts from the start to the end of
-/// each run of its successive passes, including the time between them.
+/// Milliseconds spent in each stage of one frame. On a GPU with timestamps, the time of a stage includes that between
+/// its successive passes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs, reason = "one field per stage")]
 pub struct Timings {

@@ -177,7 +177,7 @@ impl Reconstruction {
 
 impl Settings {
     /// Settings to draw `cloud` with in a picture of `size` pixels, and the splat radius in pixels of its points as
-    /// dots; 0 if they are drawn as a surface. Dots are neither adapted, trimmed nor smoothed.
+    /// dots. The radius is 0 if the points are drawn as a surface. Dots are neither adapted, trimmed nor smoothed.
     // Differs from the paper: a handful of points defines no surface. Discs as wide as their distances would hide each
     // other and hide that the points are few. See docs/decisions/0025-handful-as-dots.md.
     pub(super) fn of_cloud(&self, cloud: &PointCloud, size: [u32; 2]) -> (Cow<'_, Self>, f32) {

@@ -38,7 +38,7 @@ struct Frame {
     // 1 if the last picture had the same points and settings and is to be averaged with.
     same_picture: u32,
     // The last frame, of the same size and kind of projection: transform from this view space into that one, and focal
-    // length in pixels, 0 if there is no last frame.
+    // length in pixels. The focal length is 0 if there is no last frame.
     past_rotation: mat3x3f,
     past_shift: vec3f,
     past_focal_px: f32,

@@ -63,9 +63,9 @@ fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
     return select(surfel.radius, dot_radius(surfel), stray >= STRAY_DOT);
 }
 
-// Radius of a surfel in proportion to its share of the points seen at its disc, unless it belongs to a surface; at
-// least a dot. `noise` is the scatter of its points. The share of an ellipse is that of its inscribed circle. See
-// docs/decisions/0011-seen-through.md.
+// Radius of a surfel, reduced if few of the points seen at its disc lie on the disc. Unchanged if the surfel belongs to
+// a surface; at least a dot. `noise` is the scatter of its points. The share of an ellipse is that of its inscribed
+// circle. See docs/decisions/0011-seen-through.md.
 fn opened(surfel: Surfel, noise: f32) -> f32 {
     let least = dot_radius(surfel);
     if !(surfel.radius > least) {

@@ -62,7 +62,7 @@ fn seen_of(ball: Ball, axis: vec3f, half_thickness: f32, cluster: vec4f) -> vec2
     );
 }
 
-// Counts of a cell: 1 if it has points on the disc, else 1 if it has points behind the disc, and both numbers of
+// Counts of a cell: whether it has points on the disc, else whether it has points behind the disc, and both numbers of
 // points.
 fn with_cell(points: vec2f) -> vec4f {
     let is_on = points.x > 0.0;

@@ -1,7 +1,7 @@
-//! Both backends make the same picture of whatever they are given.
+//! Both backends make the same picture of the same input.
 //!
-//! The GPU may be any that is there, also one that is a program on the processor. Where there is none these tests say that
-//! they check nothing, and where `CI` is set they fail.
+//! Any GPU serves, including software devices. Without one, these tests report that they check nothing; with `CI` set,
+//! they fail.
 
 mod devices;
 mod splat_communication;
@@ -17,8 +17,8 @@ use autosplats::{
 
 const SIZE: [u32; 2] = [480, 300];
 
-/// Pixels that may differ by more than two steps of brightness: divisions on a device may be off in the last place, which
-/// moves a few points of ten thousand to the next pixel.
+/// Fraction of the pixels that may differ by more than two steps of brightness. Divisions on a device may be off in the
+/// last place, which moves a few points in ten thousand to the next pixel.
 const UNLIKE: f64 = 1e-3;
 
 fn gpu() -> Option<Renderer> {
@@ -32,7 +32,7 @@ fn gpu() -> Option<Renderer> {
     }
 }
 
-/// A pixel has one point, as it has where two cannot be bound and in splat communication.
+/// Settings with one point per pixel, as on small devices and in splat communication.
 fn a_point_a_pixel() -> Settings {
     let reconstruction = Reconstruction { points_per_pixel: 1, ..Reconstruction::default() };
     Settings { reconstruction, ..Settings::default() }
@@ -47,14 +47,14 @@ fn scene(name: &str, count: usize) -> (PointCloud, Camera) {
     (scene.sample(count, &|_| true).expect("points"), camera)
 }
 
-/// Part of the pixels that differ by more than two steps in any channel.
+/// Fraction of the pixels that differ by more than two steps in any channel.
 fn unlike(a: &Image, b: &Image) -> f64 {
     assert_eq!([a.width, a.height], [b.width, b.height], "sizes");
     let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
     a.pixels.iter().zip(&b.pixels).filter(differs).count() as f64 / a.pixels.len() as f64
 }
 
-/// Renders on both and compares pictures and counts.
+/// Renders on both backends and compares pictures and counts.
 fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 2], settings: &Settings, case: &str) {
     let mut cpu = Renderer::new();
     let host = cpu.render(cloud, camera, size, settings).expect("a picture on the CPU");
@@ -79,7 +79,7 @@ fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 
     near(a.covered, b.covered, "covered");
     let [a, b] = [a, b].map(|counts| counts.value_range);
     let alike = match (a, b) {
-        // Percentiles of nearly the same values; a part of the range is half a colour step.
+        // Percentiles of nearly the same values; the tolerance is half a colour step.
         (Some(a), Some(b)) => (0..2).all(|end| (a[end] - b[end]).abs() <= 0.02 * (a[1] - a[0]) + 1e-6 * a[end].abs()),
         (a, b) => a == b,
     };
@@ -89,7 +89,7 @@ fn compare(gpu: &mut Renderer, cloud: &PointCloud, camera: &Camera, size: [u32; 
     }
 }
 
-/// Coverage, depths, normals and what splats carry agree but for a few pixels.
+/// Asserts that coverage, depths, normals and attributes agree except in a few pixels.
 fn compare_layers(a: &GBuffer, b: &GBuffer, case: &str) {
     let [width, height] = [a.width as usize, a.height as usize];
     let near = |a: f32, b: f32| a.to_bits() == b.to_bits() || (a - b).abs() <= 1e-3 * a.abs().max(1e-2);
@@ -151,7 +151,7 @@ fn depth_cameras_and_what_comes_after() {
         projection: Projection::PerspectiveFovDeg(42.0),
     };
     let mut pictures = Vec::new();
-    // One renderer for all: what is known of one cloud must not be held of the next.
+    // One renderer for all clouds: knowledge of a cloud must not affect the next.
     for scans in
         [vec![scan(0..2 * half)], vec![], vec![scan(0..half), scan(half..2 * half)], vec![scan(0..half)], vec![]]
     {
@@ -167,8 +167,8 @@ fn depth_cameras_and_what_comes_after() {
 #[test]
 fn every_test_cloud_with_both_projections() {
     let Some(mut gpu) = gpu() else { return };
-    // Layers of what is not adapted: where a cloud is not a surface, as clumps, rounding decides between two fits that all
-    // splats around share, and what shows in layers, though not in the picture, is the other one.
+    // Layers without adaptation. In clumps, which are no surface, rounding decides between two fits shared by all
+    // splats around. The layers then differ, though the picture does not.
     let fixed = Reconstruction { adaptive: false, ..Reconstruction::default() };
     let layers = Settings { reconstruction: fixed, all_layers: true, ..Settings::default() };
     for (name, mut positions) in crate::test_clouds::all(4000) {
@@ -225,7 +225,7 @@ fn whole_splats() {
     assert!(1.01 * trimmed as f64 <= whole as f64, "whole splats cover {whole} pixels, trimmed ones {trimmed}");
 }
 
-/// A scene whose points are off by `sigma` in the mean square along each axis.
+/// A scene with noise of standard deviation `sigma` along each axis.
 fn noisy_scene(name: &str, count: usize, sigma: f32) -> (PointCloud, Camera) {
     let (cloud, camera) = scene(name, count);
     let moved = crate::test_clouds::noisy(cloud.positions().to_vec(), sigma);
@@ -244,12 +244,12 @@ fn adapted_to_noise() {
             let settings = Settings { reconstruction, all_layers: true, ..Settings::default() };
             let case = format!("{name} {count} {sigma} {k}");
             compare(&mut gpu, &cloud, &camera, SIZE, &settings, &case);
-            // And as before once it is no longer asked for.
+            // Without adaptation, the picture is unchanged.
             let settings = Settings { reconstruction: Reconstruction::paper(), ..Settings::default() };
             compare(&mut gpu, &cloud, &camera, SIZE, &settings, &case);
         }
     }
-    // A device with nothing beyond WebGPU's core does it as well.
+    // A device with only WebGPU's core features gives the same picture.
     let (cloud, camera) = noisy_scene("statue", 60_000, 0.01);
     let (device, queue) = devices::own_device(128 << 20).expect("a device");
     let mut own = Renderer::with_device(device, queue).expect("a renderer");
@@ -327,7 +327,7 @@ fn the_same_frame_twice_is_the_same_to_the_byte() {
     assert!(first == picture(&cloud), "what was rendered in between leaves no trace");
 }
 
-/// A renderer that has seen other views, sizes and points before makes the same picture, to the byte.
+/// A renderer that has rendered other views, sizes and points makes the same picture, to the byte.
 #[test]
 fn the_frames_before_leave_no_trace() {
     let (cloud, camera) = scene("herd", 100_000);
@@ -390,8 +390,8 @@ fn nothing_to_see_is_no_trouble() {
     assert!(refused(counts([64, 48], &coloured)).contains("no colours"), "and attributes");
 }
 
-/// Dots where the points are, however far apart these are: neither surface nor nothing. Two are close together on the screen, one
-/// far behind the other.
+/// Few points are drawn as dots at their positions, at any distance from each other. Two of them are close together on
+/// the screen but far apart in depth.
 #[test]
 fn a_handful_of_points_is_dots() {
     let places =

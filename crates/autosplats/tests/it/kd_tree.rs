@@ -42,7 +42,7 @@ fn different(a: &Image, b: &Image, steps: u8) -> f64 {
     a.pixels.iter().zip(&b.pixels).filter(differs).count() as f64 / a.pixels.len() as f64
 }
 
-/// Neighbours seen and neighbours in the cloud are much the same where pixels are no coarser than the points.
+/// Visible neighbours and neighbours in the cloud are nearly the same if pixels are no coarser than the points.
 #[test]
 fn pictures_are_nearly_those_of_the_screen_grid() {
     let Some(mut gpu) = gpu() else { return };
@@ -54,7 +54,7 @@ fn pictures_are_nearly_those_of_the_screen_grid() {
     let grid = gpu.render(&cloud, &CAMERA, SIZE, &settings).expect("a picture");
     assert_eq!(counts.visible, grid.counts.visible, "what is seen does not depend on the search");
     assert!(counts.covered.abs_diff(grid.counts.covered) * 100 < counts.covered, "nor how much is covered");
-    // The silhouette's normals differ: there the screen grid lacks the neighbours behind.
+    // Normals differ at the silhouette, where the screen grid does not see the neighbours behind.
     let unlike = different(&image, grid.image, 12);
     assert!(unlike < 0.04, "{unlike} of the pixels differ");
 }
@@ -69,7 +69,7 @@ fn every_test_cloud_and_every_k() {
                 let frame = gpu.render(&cloud, &CAMERA, SIZE, &kd_tree(first_radius, k));
                 let counts = frame.unwrap_or_else(|error| panic!("{name}: {error}")).counts;
                 let visible = counts.visible > 0;
-                // In a radius of nothing there is nobody, but for points that lie in the same place; a handful is dots.
+                // A tiny radius contains only points at the same position. A cloud of few points is drawn as dots.
                 let is_surface = cloud.len() >= 64;
                 assert!(first_radius > 1e-20 || counts.covered == 0 || !is_surface, "{name}, k = {k}: {counts:?}");
                 assert!(
@@ -81,8 +81,8 @@ fn every_test_cloud_and_every_k() {
     }
 }
 
-/// Unlike with the screen grid, where one of them is seen: their neighbours are all in the same place, so there is no
-/// surface.
+/// A visible point whose neighbours are all at its position has no surface. The screen grid finds other neighbours,
+/// because only one such point is visible.
 #[test]
 fn points_in_one_place_have_no_surface() {
     let Some(mut gpu) = gpu() else { return };

@@ -1,4 +1,4 @@
-//! What must hold for any cloud, seen through the public API.
+//! Properties of the pictures of any cloud, through the public API.
 
 use std::collections::HashMap;
 
@@ -12,7 +12,7 @@ use autosplats::{
 
 const SIZE: [u32; 2] = [150, 110];
 
-/// A picture with all that is known about it.
+/// A picture with its layers and counts.
 struct Picture {
     image: Image,
     layers: GBuffer,
@@ -34,13 +34,13 @@ fn cloud(positions: &[[f32; 3]]) -> PointCloud {
     PointCloud::new(DVec3::ZERO, positions.to_vec())
 }
 
-/// Every layer filled, values shown as they are.
+/// Settings that fill every layer and show values unlit.
 fn settings() -> Settings {
     let shading = Shading { color: ColorMode::Plain, lighting: true, occlusion: 0.0, ..Shading::default() };
     Settings { shading, all_layers: true, ..Settings::default() }
 }
 
-/// The visible surface pixel by pixel: weight, depth, normal, radius, k-radius, curvature.
+/// The visible surface per pixel: weight, depth, normal, radius, k-radius, curvature.
 fn pixels(layers: &GBuffer) -> Vec<[f32; 8]> {
     let [width, height] = [layers.width as usize, layers.height as usize];
     let indices = (0..width * height).map(|pixel| layers.index(pixel % width, pixel / width));
@@ -51,7 +51,7 @@ fn pixels(layers: &GBuffer) -> Vec<[f32; 8]> {
     values.collect()
 }
 
-/// Equal to the bit but for which of several equal points was taken.
+/// Asserts equal bits, except for the choice among equal points.
 fn assert_same(a: &Picture, b: &Picture, what: &str) {
     assert_eq!(a.counts, b.counts, "{what}: counts");
     assert!(a.image == b.image, "{what}: image");
@@ -59,8 +59,8 @@ fn assert_same(a: &Picture, b: &Picture, what: &str) {
     assert!(bits(a) == bits(b), "{what}: layers");
 }
 
-/// The part of the pixels where two pictures differ in coverage, or by more than 1 % in depth or splat radius, `b` in
-/// units of `unit`.
+/// Fraction of the pixels where two pictures differ in coverage, or by more than 1 % in depth or splat radius. `b` is
+/// in units of `unit`.
 fn difference(a: &GBuffer, b: &GBuffer, unit: f64) -> f64 {
     let near = |a: f32, b: f32| (f64::from(a) - f64::from(b) / unit).abs() <= 0.01 * f64::from(a).abs();
     let differs = |(a, b): &(&[f32; 8], &[f32; 8])| {
@@ -84,8 +84,8 @@ fn difference_sees_another_picture() {
     assert!(difference(&sphere.layers, &sphere.layers, 1.02) > 0.3, "not noticed: another unit");
 }
 
-/// The points but for those as deep, to f32, as another one near them on the screen: such ties go to the lower index, so
-/// there the order does matter. Copies may stay.
+/// Removes points that are as deep, to f32, as another point near them on the screen. Such ties go to the lower index,
+/// so the order of points would matter. Copies of a point stay.
 fn without_ties(positions: &[[f32; 3]], camera: &Camera) -> Positions {
     let axes = camera.axes().expect("a valid camera");
     let mut taken: HashMap<[i64; 2], Vec<([f32; 3], f64)>> = HashMap::new();
@@ -97,11 +97,11 @@ fn without_ties(positions: &[[f32; 3]], camera: &Camera) -> Positions {
             Projection::PerspectiveFovDeg(fov) => 0.5 / (0.5 * fov.to_radians()).tan() / depth,
             Projection::OrthographicHeight(height) => 1.0 / height,
         };
-        // Squares about as large as a pixel, wherever its borders are: with those around it a square holds the pixel.
+        // Squares of about a pixel, independent of the pixels' borders: a square and those around it contain the pixel.
         let square = [x, y].map(|c| (c * scale * f64::from(SIZE[1])).floor() as i64);
         let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| [square[0] + dx, square[1] + dy]));
         let others = || around.clone().filter_map(|square| taken.get(&square)).flatten();
-        // Steps of f32 at the depth of the clouds: 5e-7.
+        // Steps of f32 at these depths are 5e-7.
         if others().all(|&(other, other_depth)| other == position || (other_depth - depth).abs() > 2e-6) {
             taken.entry(square).or_default().push((position, depth));
             kept.push(position);
@@ -130,7 +130,7 @@ fn same_bytes_again_and_with_any_number_of_threads() {
         for (name, positions) in crate::test_clouds::all(20_000) {
             let cloud = cloud(&positions);
             let first = render(&cloud, &camera, SIZE, &settings());
-            // One renderer for all: nothing of the last frame shows.
+            // One renderer for all frames: the last frame must not show.
             let frame = renderer.render(&cloud, &camera, SIZE, &settings()).expect("a picture");
             let again = Picture { image: frame.image.clone(), layers: frame.layers.clone(), counts: frame.counts };
             assert_same(&first, &again, name);
@@ -145,7 +145,7 @@ fn same_bytes_again_and_with_any_number_of_threads() {
     }
 }
 
-/// Cloud and camera moved and turned together: the same picture but for rounding.
+/// Cloud and camera moved and turned together give the same picture up to rounding.
 #[test]
 fn only_the_relative_place_matters() {
     let turn = DQuat::from_euler(EulerRot::XYZ, 0.4, -1.1, 2.0);
@@ -165,7 +165,8 @@ fn only_the_relative_place_matters() {
             let [a, b] = [(&positions, camera), (&moved, moved_camera)]
                 .map(|(positions, camera)| render(&cloud(positions), &camera, SIZE, &settings()));
             let difference = difference(&a.layers, &b.layers, 1.0);
-            // Moved coordinates are rounded at 16, to 1e-6; a few points change pixels and with them who is nearest there.
+            // Moved coordinates are rounded at 16, to 1e-6. A few points change pixels, and with them the nearest
+            // points there.
             assert!(difference < 0.01, "{difference} of the picture changes: {:?}", camera.projection);
             // Survey coordinates: a far origin changes nothing at all.
             let far = DVec3::new(4_500_000.0, 5_000_000.0, 300.0);
@@ -183,7 +184,7 @@ fn units_do_not_matter() {
     for camera in cameras() {
         for positions in [crate::test_clouds::sphere(4000), crate::test_clouds::density_ramp(4000)] {
             let base = render(&cloud(&positions), &camera, SIZE, &settings());
-            // Powers of two change no rounding, powers of ten do.
+            // Powers of two do not change rounding, powers of ten do.
             for (unit, limit) in [(1.0 / 1048576.0, 1e-9), (1048576.0, 1e-9), (1e-6, 0.01), (1e3, 0.01), (1e6, 0.01)] {
                 let scaled: Positions = positions.iter().map(|p| p.map(|c| (f64::from(c) * unit) as f32)).collect();
                 let projection = match camera.projection {
@@ -200,14 +201,15 @@ fn units_do_not_matter() {
     }
 }
 
-/// The same points, the same pixels: the more neighbours, the further the furthest.
+/// For the same points and pixels, the k-radius does not decrease with k.
 #[test]
 fn k_radius_does_not_decrease_with_k() {
     for camera in cameras() {
         for (name, positions) in crate::test_clouds::all(3000) {
             let mut before: Vec<f32> = Vec::new();
             for k in [1, 2, 5, 10, 11, 30, 64] {
-                // Dots, so that each pixel with a point shows this point's own k-radius; and none that noise would move.
+                // Dots, so that each pixel with a point shows this point's own k-radius; without adaptation, which may
+                // move them.
                 let reconstruction = Reconstruction {
                     k,
                     outlier_expansions: None,
@@ -224,7 +226,7 @@ fn k_radius_does_not_decrease_with_k() {
                         *value = value.max(layers.k_radius[i]);
                     }
                 }
-                // A pixel averages the dots that reach into it: rounding of the mean.
+                // A pixel averages the dots that reach into it, which rounds the mean.
                 let alone = |i: &usize| before.get(*i).is_some_and(|&r| r > 0.0) && k_radius[*i] > 0.0;
                 let smaller = (0..positions.len()).filter(alone).filter(|&i| k_radius[i] < 0.9999 * before[i]).count();
                 assert_eq!(smaller, 0, "{name}: k-radii that fall at k = {k}");
@@ -243,7 +245,7 @@ fn normals_of_a_plane_are_the_planes() {
         let mut covered = 0;
         for pixel in pixels(&picture.layers).iter().filter(|pixel| pixel[0] > 0.0) {
             let normal = DVec3::new(f64::from(pixel[2]), f64::from(pixel[3]), f64::from(pixel[4]));
-            // f32 rounding of positions, 1e-7, over neighbourhoods 0.05 wide.
+            // f32 rounds positions to 1e-7; neighbourhoods are 0.05 wide.
             assert!((normal - expected).length() < 1e-4, "{normal} is not {expected}");
             assert!(pixel[7] < 1e-6, "a plane has no curvature: {}", pixel[7]);
             covered += 1;
@@ -267,20 +269,21 @@ fn one_color_stays_that_color() {
                 let alpha = color[3];
                 let expected = if alpha > 0 { [r, g, b, alpha] } else { [0; 4] };
                 assert_eq!(*color, expected, "{name}: pixel {pixel}");
-                // At edges alpha is the part that is covered.
+                // At edges alpha is the covered fraction.
                 assert_eq!(alpha >= 128, picture.layers.weight[index] > 0.0, "{name}: pixel {pixel}, alpha {alpha}");
             }
         }
     }
 }
 
-/// Points that are nowhere or astronomically far, between the others, leave the picture as it is.
+/// Points that are not finite or astronomically far away do not change the picture.
 #[test]
 fn poison_changes_nothing() {
     let poison = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1e38, 1e38, 1e30, -1e25];
     let rules = [
         Reconstruction::default(),
-        // Far points kept in the picture make slabs of cells thicker, and a pixel of a silhouette may come free: not adaptive.
+        // Not adaptive: far points in the picture make slabs of cells thicker, which may uncover a pixel of a
+        // silhouette.
         Reconstruction {
             k: 64,
             outlier_expansions: None,
@@ -313,12 +316,12 @@ fn poison_changes_nothing() {
                         freed += 1;
                     }
                 }
-                // Silhouettes end by the noise, which is measured with far points among the others, and by all points around.
+                // Silhouettes depend on the noise level and on all points around them, and far points affect both.
                 assert!(freed <= 10, "{name}: {freed} pixels come free");
                 let dropped = picture.counts.dropped - clean.counts.dropped;
                 let seen = 300 - dropped;
                 assert!(seen < 50, "{name}: {seen} far points are in the picture");
-                // Far points that are finite are points: with them a handful is none.
+                // Finite far points count as points: fewer than 64 points may become a surface.
                 if seen == 0 && positions.len() >= 64 {
                     assert!(clean.image == picture.image, "{name}: the image changes");
                 }
@@ -381,12 +384,11 @@ fn extreme_clouds_and_sizes() {
     }
 }
 
-/// A noisy surface that goes on beyond the picture is the same along its edges as in a larger picture's middle.
-/// So is where it ends, where points become few towards the edges: nothing ends there.
+/// A surface that becomes sparse towards the picture's edges does not end there.
 #[test]
 fn what_becomes_sparse_does_not_end_at_the_edges() {
     let mut random = Random::new(51);
-    // Three times as dense every 0.3 to the left.
+    // Three times as dense every 0.3 towards -x.
     let positions: Positions = (0..150_000)
         .map(|_| {
             let x = 1.2 + 0.27 * (1e-6 + 0.5 + 0.5 * random.signed()).max(1e-6).ln();
@@ -426,14 +428,14 @@ fn edges_are_as_if_the_picture_were_larger() {
         let (a, b) = (picture.index(x, y), larger.index(x + MORE as usize, y + MORE as usize));
         let cosine: f32 = picture.normal[a].iter().zip(larger.normal[b]).map(|(a, b)| a * b).sum();
         let is_within = (STRIP..width - STRIP).contains(&x) && (STRIP..height - STRIP).contains(&y);
-        // Of a pixel that only one of them covers it is 0.
+        // The cosine is 0 where only one of the pictures is covered.
         if is_within { &mut within } else { &mut along }.push(cosine.min(1.0).acos().to_degrees());
     }
     let [along, within] = [along, within].map(|angles| angles.iter().sum::<f32>() / angles.len() as f32);
     assert!(along < 1.5 * within + 0.1, "normals differ by {along}° along edges, and by {within}° elsewhere");
 }
 
-/// What cannot be rendered says so.
+/// Impossible requests return an error that names the reason.
 #[test]
 fn settings_out_of_range_are_errors() {
     let cloud = cloud(&crate::test_clouds::plane(10));
@@ -467,7 +469,7 @@ fn settings_out_of_range_are_errors() {
     assert!(matches!(outcome, Err(Error::MissingAttribute { .. })), "no error: unknown field");
 }
 
-/// Grid culling saves work: what it puts back and does not need was hidden anyway.
+/// Grid culling saves work: postponed points that are not recovered are hidden anyway.
 #[test]
 fn grid_culling_changes_next_to_nothing() {
     let clouds = [
@@ -483,8 +485,8 @@ fn grid_culling_changes_next_to_nothing() {
             let all = render(&cloud(positions), &camera, SIZE, &settings);
             assert_eq!(all.counts.passive, 0, "{name}: nothing is culled");
             let difference = difference(&all.layers, &culled.layers, 1.0);
-            // Splats of hidden points may lie within ε of the surface at its rim and between its points; a passive point
-            // that a wide splat hides by mistake is missing.
+            // Splats of hidden points may lie within ε of the surface, at its rim and between its points. A passive
+            // point that a wide splat hides by mistake is missing.
             assert!(difference < 0.02, "{name}: {difference} of the picture differs, {:?}", camera.projection);
         }
     }

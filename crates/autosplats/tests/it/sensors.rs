@@ -1,4 +1,4 @@
-//! Which side of a surface is shown, where the cloud says from where it was scanned.
+//! Sides of a surface, for clouds with the positions of their sensors.
 
 use autosplats::cloud::glam::{DMat4, DVec3, Vec3};
 use autosplats::cloud::{PointCloud, Scan};
@@ -9,7 +9,7 @@ const ORIGIN: DVec3 = DVec3::new(5e5, 5e6, 200.0);
 /// Half the side of the box.
 const SIDE: f64 = 2.0;
 
-/// Points on five faces of a box about the origin, seen from `sensor`; the wall at -y, the fourth face, is missing.
+/// Points on five faces of a box about the origin, seen from `sensor`. The face at -y is missing.
 fn room(sensor: Option<DVec3>) -> PointCloud {
     const ROWS: u32 = 60;
     let step = |i: u32| SIDE * ((f64::from(i) + 0.5) / f64::from(ROWS) * 2.0 - 1.0);
@@ -32,7 +32,7 @@ fn camera(eye: DVec3) -> Camera {
     Camera { eye: ORIGIN + eye, look_at: ORIGIN, up: DVec3::Z, projection }
 }
 
-/// Before the missing wall, and behind the opposite one.
+/// Eyes in front of the missing wall, and behind the opposite wall.
 const BEFORE: DVec3 = DVec3::new(0.4, -8.0, 0.5);
 const BEHIND: DVec3 = DVec3::new(0.4, 8.0, 0.5);
 
@@ -55,7 +55,7 @@ fn backends() -> Vec<(&'static str, Renderer)> {
     [Some(("CPU", Renderer::new())), gpu.ok().map(|gpu| ("GPU", gpu))].into_iter().flatten().collect()
 }
 
-/// Mean share of backs where a surface is.
+/// Mean share of backs among the covered pixels.
 fn share(layers: &GBuffer) -> f32 {
     let covered = layers.weight.iter().zip(&layers.back).filter(|(weight, _)| **weight > 0.0);
     let (sum, count) = covered.fold((0.0, 0.0_f32), |(sum, count), (_, back)| (sum + back, count + 1.0));
@@ -68,7 +68,7 @@ fn brightness(image: &Image) -> f64 {
     channels.map(|&channel| f64::from(channel)).sum::<f64>() / (3 * image.pixels.len()) as f64
 }
 
-/// Part of the pixels that differ by more than two steps in any channel.
+/// Fraction of the pixels that differ by more than two steps in any channel.
 fn unlike(a: &Image, b: &Image) -> f64 {
     let differs = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|i| a[i].abs_diff(b[i]) > 2);
     a.pixels.iter().zip(&b.pixels).filter(differs).count() as f64 / a.pixels.len() as f64
@@ -80,7 +80,7 @@ fn a_room_shows_its_outside_from_behind() {
     for (name, mut renderer) in backends() {
         let mut both = |eye| [Backs::Toned, Backs::Same].map(|backs| draw(&mut renderer, &cloud, eye, backs));
         let [toned, same] = both(BEFORE);
-        // But for edges, which have any side.
+        // At edges either side may show.
         let other = unlike(&toned.0, &same.0);
         assert!(other < 1e-3, "{name}: what the sensor saw looks as ever: {other}");
         assert!(share(&toned.1) < 1e-3, "{name}: nor has it a back: {}", share(&toned.1));
@@ -99,7 +99,7 @@ fn surfels_face_their_sensor() {
     let sensor = DVec3::new(0.3, 0.0, 0.2);
     let clouds = [Some(sensor), None].map(room);
     for (name, mut renderer) in backends() {
-        // However it is shown.
+        // The setting affects the image only.
         for backs in [Backs::Toned, Backs::Same] {
             let settings = Settings { all_layers: false, ..settings(backs) };
             for (cloud, towards) in clouds.iter().zip([sensor, BEHIND]) {
@@ -110,8 +110,8 @@ fn surfels_face_their_sensor() {
                     let at = Vec3::from(cloud.positions()[surfel.point as usize]);
                     Vec3::from(surfel.normal).dot(towards.as_vec3() - at) < 0.0
                 });
-                // At edges between faces, where every fifteenth point lies, no side is sure; and seen from behind more of
-                // those that do lie there, as a pixel keeps two.
+                // One point in fifteen lies at edges between faces, where the side is uncertain. From behind more of
+                // these are seen, because a pixel keeps two points.
                 let away = away.count();
                 assert!(away * 20 < surfels.len(), "{name}: {away} of {} look away from {towards}", surfels.len());
             }
@@ -141,7 +141,7 @@ fn another_sensor_of_the_same_points_is_noticed() {
         let count = cloud.len();
         let outside = DMat4::from_translation(ORIGIN + 2.0 * BEHIND);
         let scan = |points| Scan { name: None, world_from_sensor: outside, points };
-        // More runs, too, so that the device needs another buffer.
+        // A different number of runs needs another buffer on the device.
         let other = [vec![scan(0..count)], vec![scan(0..count / 5), scan(count / 5 + 1..count / 5 + 2)], vec![]];
         let clouds = other.map(|scans| cloud.clone().with_scans(scans));
         let mut share_of = |cloud: &PointCloud| share(&draw(&mut renderer, cloud, BEHIND, Backs::Toned).1);

@@ -1,4 +1,4 @@
-//! Temporal smoothing: noise of live points is averaged over frames, what moves is not held back.
+//! Temporal smoothing: noise of live points is averaged over frames, and moving things do not lag.
 
 use crate::test_clouds::Random;
 use autosplats::cloud::PointCloud;
@@ -7,7 +7,7 @@ use autosplats::{Backend, Camera, Error, GBuffer, Projection, Reconstruction, Re
 
 const SIZE: [u32; 2] = [240, 180];
 
-/// Both backends, as far as they are there.
+/// Renderers of all available backends.
 fn renderers() -> Vec<Renderer> {
     let gpu = Renderer::with_backend(Backend::Gpu);
     if let Err(error) = &gpu {
@@ -26,7 +26,7 @@ fn camera(eye: DVec3) -> Camera {
     Camera { eye, look_at: DVec3::ZERO, up: DVec3::Y, projection: Projection::PerspectiveFovDeg(40.0) }
 }
 
-/// A gently waved surface at this height, two units wide, each point off by noise.
+/// A wavy surface at `height`, two units wide, of points with noise.
 fn wave(height: f32, sigma: f32, random: &mut Random) -> PointCloud {
     let point = |random: &mut Random| {
         let [x, y] = [random.signed(), random.signed()];
@@ -88,7 +88,7 @@ fn another_surface_is_not_held_back() {
     }
 }
 
-/// Around a surface without noise the picture is what it would be anyway.
+/// Smoothing does not change a surface without noise.
 #[test]
 fn a_moving_camera_sees_the_same_surface() {
     for mut renderer in renderers() {
@@ -120,14 +120,14 @@ fn mean_degrees(a: &[Vec3], b: &[Vec3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| a.cross(*b).length().atan2(a.dot(*b)).to_degrees()).sum::<f32>() / a.len() as f32
 }
 
-/// Noise looks another in each view, though the points are the same. With their past normals change less, and are as good.
+/// Noise looks different in each view of the same points. Smoothed normals change less and are as accurate.
 #[test]
 fn the_same_points_are_steady_while_the_camera_moves() {
     for mut renderer in renderers() {
         let adapter = renderer.adapter();
         let cloud = wave(0.0, 0.02, &mut Random::new(6));
         let truth = wave(0.0, 0.0, &mut Random::new(6));
-        // A fifth of a pixel a frame: pixels go on showing the same place.
+        // A fifth of a pixel per frame: pixels keep showing the same place.
         let view = |frame: i32| camera(DVec3::new(0.3 + 0.002 * f64::from(frame), 0.2, 3.0));
         let still = Settings { all_layers: true, ..Settings::default() };
         let truth = normals(renderer.render(&truth, &view(9), SIZE, &still).expect("a picture").layers, &view(9));
@@ -146,7 +146,7 @@ fn the_same_points_are_steady_while_the_camera_moves() {
     }
 }
 
-/// Pictures that follow each other are averaged, on both backends alike, in which nothing but rounding differs.
+/// Successive pictures are averaged, with the same result on both backends up to rounding.
 #[test]
 fn steady_pictures_flicker_less() {
     let cloud = wave(0.0, 0.004, &mut Random::new(9));
@@ -175,7 +175,7 @@ fn steady_pictures_flicker_less() {
     }
 }
 
-/// Frames of other settings, another size, another projection or one that was given up have nothing to be averaged with.
+/// A frame is not averaged with one of other settings, size or projection, or with a cancelled one.
 #[test]
 fn what_is_not_alike_begins_anew() {
     let cloud = wave(0.0, 0.02, &mut Random::new(8));
@@ -210,7 +210,7 @@ fn what_is_not_alike_begins_anew() {
             renderer.render(&cloud, &view(4), [side, 180], &usual).expect("a picture of another size");
         }
     }
-    // A point in the middle tells that the past is used at all, and that a frame given up ends it.
+    // Checks that the past is used at all, and that a cancelled frame ends it.
     let mut renderer = Renderer::new();
     let mut last = |given_up: bool| {
         for frame in 0..3 {
@@ -229,7 +229,7 @@ fn what_is_not_alike_begins_anew() {
     assert!(anew == alone && averaged != alone, "given up: {}, not: {}", anew == alone, averaged == alone);
 }
 
-/// What was fitted to a point belongs to it alone: detail as fine as points is as right after some frames as in one by itself.
+/// Detail as fine as the points is as accurate after several frames as in a single one.
 #[test]
 fn detail_is_not_blurred() {
     for mut renderer in renderers() {
@@ -265,7 +265,8 @@ fn detail_is_not_blurred() {
     }
 }
 
-/// The same frames give the same bytes, and both backends about the same depths: of other points in each, and of the same.
+/// Repeated frames give the same bytes, and both backends about the same depths, for new points in each frame and for
+/// the same points.
 #[test]
 fn the_same_frames_again_are_the_same() {
     let film = |renderer: &mut Renderer| {

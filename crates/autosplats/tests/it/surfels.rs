@@ -1,4 +1,4 @@
-//! What a frame found, on the host, and frames from planes found beforehand.
+//! Surfels of a frame on the host, and frames with precomputed normals.
 
 use crate::test_clouds::EYE;
 use autosplats::cloud::PointCloud;

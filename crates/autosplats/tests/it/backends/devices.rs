@@ -6,7 +6,7 @@ use autosplats::{Backend, Error, Renderer, Settings, wgpu};
 
 use super::*;
 
-/// A device of the caller's own: no optional feature, and bindings of no more than `binding` bytes.
+/// A device of the caller's own, without optional features and with bindings of at most `binding` bytes.
 pub(super) fn own_device(binding: u64) -> Option<(wgpu::Device, wgpu::Queue)> {
     own_device_with(wgpu::Features::empty(), binding)
 }
@@ -30,7 +30,7 @@ fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
     assert!(!own.adapter().expect("a device").int64_atomics, "the device has no 64-bit atomics");
     assert!(cloud.len() * 12 > 2 * (4 << 20), "the points take three bindings");
     compare(&mut own, &cloud, &camera, [170, 120], &Settings::default(), "three bindings");
-    // Two points a pixel have room, but not around the picture as well: its edges are others, and little else.
+    // There is room for two points per pixel, but not for a margin: only the picture's edges differ.
     let size = [200, 140];
     let near = Camera { eye: camera.eye + 0.6 * (camera.look_at - camera.eye), ..camera };
     let host = Renderer::new().render(&cloud, &near, size, &Settings::default()).expect("a picture").image.clone();
@@ -42,13 +42,13 @@ fn a_cloud_larger_than_a_binding_on_the_callers_own_device() {
     let [all, inside] = [unlike(&host, device), unlike(&inner(&host), &inner(device))];
     assert!(inside <= 4.0 * UNLIKE, "{inside} of the pixels that are not along edges differ");
     assert!(all > 2.0 * inside, "{all} of all pixels, {inside} of those that are not along edges");
-    // Surfels of two points a pixel would take more than the device binds: it makes do with one.
+    // Surfels of two points per pixel exceed the device's bindings: one point is used instead.
     let size = [250, 170];
     compare(&mut own, &cloud, &camera, size, &a_point_a_pixel(), "a point a pixel");
     let asked = own.render(&cloud, &camera, size, &a_point_a_pixel()).expect("a picture").image.clone();
     let made = own.render(&cloud, &camera, size, &Settings::default()).expect("a picture").image;
     assert_eq!(&asked, made, "no room for two points a pixel");
-    // And a picture that is too large for the device is refused, not garbage.
+    // A picture that is too large for the device is an error, not garbage.
     match own.render(&cloud, &camera, [2000, 2000], &Settings::default()) {
         Err(Error::DeviceLimit { needed, allowed, .. }) => assert!(needed > allowed, "{needed} {allowed}"),
         other => panic!("{:?}", other.map(|frame| frame.counts)),
@@ -148,7 +148,7 @@ fn read_texture(
 #[test]
 fn an_upload_can_be_stopped() {
     let Some(mut gpu) = gpu() else { return };
-    // More than goes at once.
+    // More points than one upload step takes.
     let cloud = PointCloud::new(DVec3::ZERO, crate::test_clouds::plane(12_000_000));
     let stopped = gpu.upload(&cloud, &Settings::default(), &|fraction| fraction < 0.1);
     assert!(matches!(stopped, Err(Error::Cancelled)), "{stopped:?}");

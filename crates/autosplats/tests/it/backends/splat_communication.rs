@@ -4,7 +4,7 @@ use super::devices::{own_device, own_device_with};
 use super::*;
 
 fn by(engine: SearchEngine) -> Settings {
-    // The exact search would have a margin around the picture otherwise, which this one has not.
+    // Not adaptive, because the exact search would then have a margin, which splat communication has not.
     let reconstruction = Reconstruction { points_per_pixel: 1, adaptive: false, engine, ..Reconstruction::default() };
     Settings { reconstruction, ..Settings::default() }
 }
@@ -13,8 +13,8 @@ fn by_communication() -> Settings {
     by(SearchEngine::SplatCommunication)
 }
 
-/// The paper's own search finds what the exact one finds, but for the thousandth of the points that it leaves unfinished, and
-/// does so in ten iterations at most.
+/// The paper's search finds the same as the exact one, except for unfinished points, at most one in a thousand. It
+/// takes at most ten iterations.
 #[test]
 fn splat_communication_in_every_scene() {
     let Some(mut gpu) = gpu() else { return };
@@ -31,7 +31,7 @@ fn splat_communication_in_every_scene() {
         assert!(unlike <= 2.0 * UNLIKE, "{name}: {unlike} of the pixels differ");
 
         let found = radii(&mut gpu);
-        // What the last thousandth hides or lets through may be recovered or not.
+        // Points hidden or exposed by unfinished points may be recovered or not.
         let both: Vec<_> = found.iter().filter_map(|(point, found)| Some((found, exact_radii.get(point)?))).collect();
         assert!(both.len() * 1000 >= 999 * exact_radii.len(), "{name}: the same points are searched for");
         let wrong = both.iter().filter(|(found, exact)| !((*found - *exact).abs() <= 1e-5 * *exact)).count();
@@ -69,7 +69,8 @@ fn splat_communication_is_refused_where_it_cannot_run() {
     assert!(own.check(&Settings::default()).is_ok(), "other engines run");
     compare(&mut own, &cloud, &camera, SIZE, &Settings::default(), "after a refusal");
 
-    // With that one feature, and WebGPU's default limits, it runs; so it does in debug builds, which check indirect draws.
+    // The engine runs with this one feature and WebGPU's default limits, also in debug builds, which check indirect
+    // draws.
     let (device, queue) = own_device_with(wgpu::Features::FLOAT32_BLENDABLE, 128 << 20).expect("a device");
     let mut able = Renderer::with_device(device, queue).expect("a renderer");
     let found = able.render(&cloud, &camera, SIZE, &by_communication()).expect("a picture").image.clone();
