@@ -1,5 +1,5 @@
-// Known noise of depth cameras, as in `adapt/depth/`. Imports: frame. The including pass binds `depth_noise`: all runs,
-// at least one. See docs/decisions/0009-depth-cameras.md.
+// Noise that is known of depth cameras, as in `adapt/depth/`. Imports: frame. The including pass binds `depth_noise`:
+// all runs, at least one. See docs/decisions/0009-depth-cameras.md.
 
 // Depth noise of one sensor and the first of its points.
 struct DepthRun {
@@ -15,7 +15,7 @@ struct DepthRun {
     padding: array<u32, 3>,
 }
 
-// Known noise at a surfel.
+// Noise that is known at a surfel.
 struct Known {
     // Unit direction from the sensor, along which the noise acts, view space.
     ray: vec3f,
@@ -23,7 +23,7 @@ struct Known {
     noise: f32,
 }
 
-// Known noise at a position in view space; `point` is the index in the cloud.
+// Noise that is known at a position in view space; `point` is the index in the cloud.
 fn known_at(place: vec3f, point: u32) -> Known {
     var low = 0u;
     var high = arrayLength(&depth_noise);
@@ -48,7 +48,7 @@ fn known_at(place: vec3f, point: u32) -> Known {
     return Known();
 }
 
-// Known noise, if it exceeds the measured noise.
+// Noise that is known, if it exceeds the measured noise.
 fn known_beyond(measured_noise: f32, place: vec3f, point: u32) -> Known {
     let known = known_at(place, point);
     if known.noise > measured_noise {
