@@ -1,10 +1,10 @@
-//! Ways of the camera, which films are made of: lists of cameras, one a picture.
+//! Camera paths for films: one camera per picture.
 
 use autosplats::cloud::glam::{DQuat, DVec3};
 use autosplats::{Camera, Projection};
 
-/// Cameras of a turn about the vertical through the pivot, `pictures` of them, `degrees` in all; the last one is not where
-/// the first one is, so that the film can be played in a loop.
+/// Cameras of a turn of `degrees` in all about the vertical through the pivot, `pictures` of them. The last camera
+/// stops one step short of the full angle, so that the film loops.
 pub(crate) fn turntable(camera: &Camera, up: DVec3, degrees: f64, pictures: usize) -> Vec<Camera> {
     let turned = |picture: usize| {
         let turn = DQuat::from_axis_angle(up, (degrees * picture as f64 / pictures.max(1) as f64).to_radians());
@@ -13,7 +13,8 @@ pub(crate) fn turntable(camera: &Camera, up: DVec3, degrees: f64, pictures: usiz
     (0..pictures).map(turned).collect()
 }
 
-/// Cameras of a smooth way through `keys`, `pictures` of them, the first and the last at the first and the last key.
+/// Cameras of a smooth path through `keys`, `pictures` of them. The first and the last camera are the first and the
+/// last key.
 pub(crate) fn path(keys: &[Camera], pictures: usize) -> Vec<Camera> {
     match keys {
         [] => Vec::new(),
@@ -33,7 +34,7 @@ fn at(keys: &[Camera], time: f64) -> Camera {
     let around = [span.saturating_sub(1), span, span + 1, (span + 2).min(keys.len() - 1)].map(|key| keys[key]);
     let smooth = |value: fn(&Camera) -> DVec3| {
         let [a, b, c, d] = around.map(|key| value(&key));
-        // Catmull and Rom: through b and c, in b parallel to the way from a to c.
+        // Catmull-Rom spline: it passes through b and c, and its tangent at b is parallel to c - a.
         let t = part;
         0.5 * (2.0 * b
             + (c - a) * t
@@ -60,7 +61,7 @@ fn at(keys: &[Camera], time: f64) -> Camera {
         }
     };
     let camera = Camera { eye, look_at, up, projection };
-    // Where the smooth way runs through itself, the nearer key will do.
+    // Where the interpolated camera is invalid, the nearer key is used.
     if camera.check().is_ok() {
         camera
     } else if part < 0.5 {

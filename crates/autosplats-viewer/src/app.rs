@@ -1,4 +1,4 @@
-//! The application: what is open, what is shown, and the round of each frame of the window.
+//! The application: its state, and the work of each window frame.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -28,15 +28,15 @@ use crate::tools::Tools;
 use crate::turns::Turns;
 use crate::{Options, keys, output, panels, storage, viewport};
 
-/// Seconds after the last movement until the picture is made whole.
+/// Seconds from the last movement until the whole picture is rendered.
 const REST: f64 = 0.12;
 
-/// The viewer.
+/// The state of the viewer.
 pub(crate) struct App {
     pub(crate) history: History,
     pub(crate) loader: Loader,
     pub(crate) playing: Playing,
-    /// The layer that a file's points go to, where there is one already.
+    /// The layer that receives the points of a job, once the layer exists.
     pub(crate) loading: HashMap<JobId, LayerId>,
     pub(crate) render: RenderThread,
     pub(crate) navigation: Navigation,
@@ -48,58 +48,58 @@ pub(crate) struct App {
     /// The last picture.
     pub(crate) shot: Option<Box<Picture>>,
     pub(crate) device: Option<AdapterSummary>,
-    /// Which way is up, if the user says so; guessed otherwise.
+    /// The up axis that the user chose; `None` uses the guessed one.
     pub(crate) up_axis: Option<Axes>,
     pub(crate) rate: Rate,
     /// Width over height of the picture in the window.
     pub(crate) aspect: f64,
-    /// Where the picture is in the window.
+    /// The picture's rectangle in the window, screen points.
     pub(crate) view_rect: egui::Rect,
-    /// What was opened last, the newest first.
+    /// Recently opened inputs, newest first.
     pub(crate) recent: Vec<Kept>,
-    /// Where the session is kept.
+    /// File of the session, written on exit.
     pub(crate) state: Option<PathBuf>,
-    /// Files are read again when they change.
+    /// Whether files are read again when they change.
     pub(crate) watch: bool,
     pub(crate) watches: HashMap<PathBuf, Watch>,
-    /// What each layer was read from.
+    /// The input that each layer was read from.
     pub(crate) inputs: HashMap<LayerId, Input>,
-    /// How what is being read is to be seen.
+    /// How each input that is being read will be shown.
     pub(crate) appearances: HashMap<JobId, Appearance>,
-    /// Files that are read again, and whose points they are.
+    /// Jobs that read a file again, and the layer that receives the points.
     pub(crate) reloads: HashMap<JobId, LayerId>,
     pub(crate) guessed_axes: Option<Axes>,
-    /// What the thread that read what is open alone knows of it, at a version of the document.
+    /// What the reading thread found about the only open input, and the document version that this holds for.
     pub(crate) glance: Option<(u64, Glance)>,
-    /// Where the program stood by itself, for a picture so much wider than high. As long as nobody has moved, it stands
-    /// anew when points arrive and when the picture changes its shape.
+    /// The camera that the program chose by itself, and the picture's width over height at the time. Until the user
+    /// moves, a new camera is chosen when points arrive or the picture changes its shape.
     pub(crate) first_camera: Option<(Camera, f64)>,
-    /// Grows with each change of the document.
+    /// Version of the document; every change increases it.
     pub(crate) version: u64,
     pub(crate) counted: Counted,
-    /// What the picture that was wished for last shows.
+    /// What the last requested picture shows.
     wished: Option<WishKey>,
-    /// Whether that picture has not come yet.
+    /// Whether the last requested picture is still to come.
     awaited: bool,
-    /// Whether the first input is not to be fitted into the picture, as a camera was given.
+    /// Whether a camera was given, so that the first input is not fitted into the picture.
     pub(crate) camera_given: bool,
-    /// Inputs that could not be read, which a session keeps.
+    /// Inputs that could not be read. A session keeps them.
     pub(crate) failed: Vec<(Input, Appearance)>,
-    /// Whether something else than the mouse moves the view.
+    /// Whether a film preview has moved the view since the last window frame.
     stirred: bool,
-    /// When something moved last, seconds.
+    /// Time of the last movement, seconds.
     moved: f64,
     pub(crate) quit: bool,
-    /// Cameras that a film goes through.
+    /// Key cameras of a film.
     pub(crate) keys: Vec<Camera>,
     pub(crate) recording: Option<Recording>,
-    /// Of the window's pixels; without a device nothing of the window is drawn.
+    /// Pixel format of the window; `None` without a device, and then no picture is drawn in the window.
     pub(crate) format: Option<eframe::wgpu::TextureFormat>,
-    /// Where pictures and the window are drawn by the same processor.
+    /// Present if the CPU draws the window, and so competes with rendering.
     pub(crate) turns: Option<Turns>,
 }
 
-/// All that a picture depends on.
+/// Everything that a picture depends on.
 #[derive(Clone, PartialEq)]
 struct WishKey {
     version: u64,
@@ -107,12 +107,12 @@ struct WishKey {
     size: [u32; 2],
     look: Look,
     axes: Axes,
-    /// Whether another one is to follow soon.
+    /// Whether another picture is to follow soon.
     hurried: bool,
 }
 
 impl App {
-    /// An application that begins to read its inputs; `context` is the window's.
+    /// Creates the application and starts to read the inputs of `options`. `context` belongs to the window.
     pub(crate) fn new(options: Options, look: Look, recent: Vec<Kept>, context: &egui::Context) -> Self {
         let mut app = Self {
             history: History::default(),
@@ -163,17 +163,17 @@ impl App {
         app
     }
 
-    /// Says that the view moves, so that pictures have to hurry.
+    /// Notes that the view moves, so that pictures are rendered within the time limit.
     pub(crate) fn stir(&mut self) {
         self.stirred = true;
     }
 
-    /// Which way is up.
+    /// The up axis: as chosen, else as guessed, else Z.
     pub(crate) fn axes(&self) -> Axes {
         self.up_axis.or(self.guessed_axes).unwrap_or(Axes::ZUp)
     }
 
-    /// Unit vector upward.
+    /// Unit vector upward, world space.
     pub(crate) fn up(&self) -> DVec3 {
         match self.axes() {
             Axes::ZUp => DVec3::Z,
@@ -182,13 +182,13 @@ impl App {
         }
     }
 
-    /// The points as they are shown now, if they have been shown yet.
+    /// The points of the last picture, if they still match the document.
     pub(crate) fn shown(&self) -> Option<Arc<Shown>> {
         let shown = &self.shot.as_ref()?.shown;
         shown.shows(self.document()).then(|| Arc::clone(shown))
     }
 
-    /// Takes in what the threads have to say.
+    /// Receives what the threads have sent.
     fn receive(&mut self, context: &egui::Context) {
         self.follow_files();
         self.follow_streams(context);
@@ -199,7 +199,7 @@ impl App {
         }
     }
 
-    /// Takes in what came of a picture or a task.
+    /// Receives the result of a picture or a task.
     fn take(&mut self, answer: Answer, now: f64) {
         self.awaited &= matches!(answer, Answer::Finer(_) | Answer::Device(_) | Answer::Done(_));
         match answer {
@@ -216,7 +216,7 @@ impl App {
             Answer::Empty => self.shot = None,
             Answer::Device(device) => self.device = device,
             Answer::Failed(why) => {
-                // The picture that failed may have been the film's.
+                // The failed picture may belong to the film.
                 output::stop(&mut self.recording);
                 self.messages.failure(why);
             }
@@ -224,7 +224,7 @@ impl App {
         }
     }
 
-    /// What came of a task.
+    /// Applies the outcome of a task.
     fn done(&mut self, outcome: Outcome) {
         match outcome {
             Outcome::Picked { purpose: Purpose::Pivot, point } => {
@@ -240,7 +240,7 @@ impl App {
         }
     }
 
-    /// What a picture of the present view is made of.
+    /// The render request for the present view.
     pub(crate) fn wish(&self, size: [u32; 2], moving: bool) -> Wish {
         Wish {
             document: self.document().clone(),
@@ -249,7 +249,7 @@ impl App {
             settings: self.look.settings.clone(),
             dots: self.look.dots.then_some(self.look.dot_size),
             backend: self.look.backend,
-            // What moves has one direction upward, whatever may be guessed of single frames.
+            // A playing input keeps one up axis; a guess per frame could change from frame to frame.
             axes: self.up_axis.or(self.guessed_axes.filter(|_| !self.playing.is_empty())),
             budget_ms: self
                 .both_ms(moving)
@@ -257,13 +257,13 @@ impl App {
         }
     }
 
-    /// Milliseconds that a picture and the window may take: as the view moves, or until the next frame of what is played.
+    /// Milliseconds for a picture and a window frame together, while the view moves or an input plays; `None` at rest.
     fn both_ms(&self, moving: bool) -> Option<f64> {
         let least_ms = self.look.moving_ms;
         if moving { Some(least_ms) } else { self.playing.frame_ms(least_ms) }
     }
 
-    /// Asks for a picture if it would be another one than was asked for last.
+    /// Requests a picture if anything that it depends on has changed.
     pub(crate) fn ask(&mut self, context: &egui::Context, size: [u32; 2], busy: bool) {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
@@ -282,18 +282,18 @@ impl App {
         if self.document().layers.is_empty() {
             self.shot = None;
             if self.wished.take().is_some() {
-                // Lets go of the points.
+                // An empty document frees the points that the renderer holds.
                 self.render.wish(self.wish(size, false));
             }
             return;
         }
         let mut look = self.look.clone();
-        // It lies over the picture here, where it stays as large when pictures become coarse.
+        // The window draws the legend itself, so that its size stays the same in coarse pictures.
         look.settings.shading.legend = false;
-        // Noise would look another in each picture.
+        // Without averaging, noise would differ from picture to picture.
         look.settings.reconstruction.steady = moving;
         if self.both_ms(false).is_none() {
-            // At rest it is of its points alone, not of a coarser picture before it.
+            // A picture at rest shows its own points only, without the coarser pictures before it.
             look.settings.reconstruction.frames_averaged = 1;
         }
         let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
@@ -306,7 +306,7 @@ impl App {
         }
     }
 
-    /// Waits for the picture asked for, where it and the window take turns.
+    /// Waits for the requested picture, if the window and the pictures take turns.
     fn take_turns(&mut self, context: &egui::Context) {
         let Some(turns) = &mut self.turns else { return };
         turns.begin();
@@ -321,14 +321,14 @@ impl App {
         }
     }
 
-    /// Has what is at a pixel of the picture found.
+    /// Requests the point at a pixel of the picture.
     pub(crate) fn pick(&mut self, size: [u32; 2], pixel: [f32; 2], purpose: Purpose) {
         let wish = Box::new(self.wish(size, false).of_points());
         self.render.task(Task::Pick { wish, pixel, purpose });
     }
 }
 
-/// What the keys do that are held down.
+/// The flight that the held keys ask for.
 fn flight(context: &egui::Context) -> Flight {
     use egui::Key;
     context.input(|input| {

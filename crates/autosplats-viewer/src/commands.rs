@@ -1,9 +1,9 @@
-//! What the user can have done by a key or from a menu, each once: menus, shortcuts, tooltips and help are made of this list.
+//! All commands of the user. Menus, shortcuts, tooltips and the help window are made from this list.
 
 use autosplats::ViewDirection;
 use eframe::egui::{Key, KeyboardShortcut, Modifiers};
 
-/// Something to be done.
+/// A command of the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Command {
     Open,
@@ -47,23 +47,23 @@ pub(crate) enum Command {
     Tool(Tool),
 }
 
-/// What the left button does in the picture.
+/// What the left mouse button does in the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Tool {
     /// Turns the view.
     #[default]
     Navigate,
-    /// Says what is known of a point.
+    /// Shows the coordinates and attributes of a point.
     Inspect,
-    /// Measures from point to point.
+    /// Measures between points.
     Measure,
-    /// Moves and turns what is selected.
+    /// Moves and turns the selection.
     Move,
-    /// Selects what is in a rectangle.
+    /// Selects the points in a rectangle.
     Rectangle,
-    /// Selects what is in a line drawn freely.
+    /// Selects the points inside a free-hand line.
     Lasso,
-    /// Selects what a brush passes over.
+    /// Selects the points that a brush passes over.
     Brush,
 }
 
@@ -71,7 +71,7 @@ impl Tool {
     pub(crate) const ALL: [Self; 7] =
         [Self::Navigate, Self::Inspect, Self::Measure, Self::Rectangle, Self::Lasso, Self::Brush, Self::Move];
 
-    /// What the bar of tools calls it.
+    /// Name in the tool bar.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Navigate => "Navigate",
@@ -84,14 +84,14 @@ impl Tool {
         }
     }
 
-    /// Whether it selects points.
+    /// Whether the tool selects points.
     pub(crate) fn selects(self) -> bool {
         matches!(self, Self::Rectangle | Self::Lasso | Self::Brush)
     }
 }
 
 impl Command {
-    /// All of them, in the order of the menus.
+    /// All commands, in menu order.
     pub(crate) const ALL: [Self; 52] = [
         Self::Open,
         Self::Export,
@@ -147,7 +147,7 @@ impl Command {
         Self::Tool(Tool::Move),
     ];
 
-    /// What menus call it.
+    /// Label in menus.
     pub(crate) fn label(self) -> &'static str {
         match self {
             Self::Open => "Open…",
@@ -205,7 +205,7 @@ impl Command {
         }
     }
 
-    /// The key that does it.
+    /// Keyboard shortcut.
     pub(crate) fn shortcut(self) -> Option<KeyboardShortcut> {
         let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
         let command = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
@@ -242,7 +242,7 @@ impl Command {
             Self::Projection => plain(Key::Num5),
             Self::UpAxis => plain(Key::U),
             Self::Level => plain(Key::J),
-            // The clipboard's own keys: egui reports them as events.
+            // The clipboard's own keys, which egui reports as events.
             Self::CopyView => command(Key::C),
             Self::PasteView => command(Key::V),
             Self::Dots => plain(Key::Tab),
@@ -267,7 +267,7 @@ impl Command {
         }
     }
 
-    /// What a tooltip says.
+    /// Text of the tooltip.
     pub(crate) fn tooltip(self) -> &'static str {
         match self {
             Self::Open => "Add point clouds, meshes or depth images to what is open",
@@ -319,7 +319,7 @@ impl Command {
         }
     }
 
-    /// The key as menus show it.
+    /// Shortcut as menus show it.
     pub(crate) fn key(self, context: &eframe::egui::Context) -> String {
         self.shortcut().map_or_else(String::new, |shortcut| context.format_shortcut(&shortcut))
     }

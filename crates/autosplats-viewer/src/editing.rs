@@ -1,4 +1,4 @@
-//! What is open, and how it is changed: so that it can be undone, so that it cannot, and so that it outlasts undo.
+//! The open document and its changes: with an undo step, without one, and to the whole history.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use autosplats::cloud::PointCloud;
 use crate::app::App;
 use crate::document::{Counts, Document, LayerId, label};
 
-/// What panels say of the document, as of a version of it.
+/// Counts that panels show, for one version of the document.
 #[derive(Default)]
 pub(crate) struct Counted {
     version: u64,
@@ -18,22 +18,22 @@ pub(crate) struct Counted {
     pub(crate) layers: HashMap<LayerId, Counts>,
     /// Bytes of all points.
     pub(crate) bytes: usize,
-    /// Bytes that undo keeps besides.
+    /// Bytes that the undo history holds in addition.
     pub(crate) old_bytes: usize,
 }
 
 impl App {
-    /// What is open.
+    /// The open document.
     pub(crate) fn document(&self) -> &Document {
         self.history.current()
     }
 
-    /// Grows with each change of the document.
+    /// Version of the document; every change increases it.
     pub(crate) fn version(&self) -> u64 {
         self.version
     }
 
-    /// Numbers of points of all that is open, and of each layer; counted anew only after changes, and after drags.
+    /// Point counts of the document and of each layer. They are computed only after a change, and not during a drag.
     pub(crate) fn counts(&mut self) -> &Counted {
         if self.counted.version != self.version && !self.tools.gizmo.is_busy() {
             let document = self.document();
@@ -48,7 +48,7 @@ impl App {
         &self.counted
     }
 
-    /// Changes the document in a way that can be undone.
+    /// Changes the document as an undo step.
     pub(crate) fn edit(&mut self, label: impl Into<String>, edit: impl FnOnce(&mut Document)) {
         let mut document = self.document().clone();
         edit(&mut document);
@@ -56,7 +56,7 @@ impl App {
         self.version += 1;
     }
 
-    /// Changes points in a way that can be undone; `edit` says how many it reached.
+    /// Changes points as an undo step. `edit` returns the number of points that it changed; with 0 there is no step.
     pub(crate) fn edit_points(&mut self, verb: &str, edit: impl FnOnce(&mut Document) -> usize) {
         let mut document = self.document().clone();
         let points = edit(&mut document);
@@ -66,7 +66,7 @@ impl App {
         }
     }
 
-    /// Changes the document in a way that is not worth undoing.
+    /// Changes the document without an undo step.
     pub(crate) fn change<T>(&mut self, change: impl FnOnce(&mut Document) -> T) -> T {
         let mut document = self.document().clone();
         let result = change(&mut document);
@@ -75,25 +75,26 @@ impl App {
         result
     }
 
-    /// Changes the document in a way that outlasts undo: files come and go, inputs are shown or not.
+    /// Changes the document and its whole history, for changes that undo must keep: files that come and go, and
+    /// visibility.
     pub(crate) fn settle(&mut self, change: impl Fn(&mut Document)) {
         self.history.everywhere(change);
         self.version += 1;
     }
 
-    /// Gives a layer other points.
+    /// Replaces the points of a layer.
     pub(crate) fn fill(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
         self.history.reload(id, cloud);
         self.version += 1;
     }
 
-    /// Takes back the last edit; says which it was.
+    /// Undoes the last edit and returns its label.
     pub(crate) fn undo(&mut self) -> Option<String> {
         self.version += 1;
         self.history.undo()
     }
 
-    /// Does again what was taken back last; says what.
+    /// Redoes the edit that was undone last and returns its label.
     pub(crate) fn redo(&mut self) -> Option<String> {
         self.version += 1;
         self.history.redo()

@@ -1,4 +1,4 @@
-//! The one place that asks the system for files, as a browser has none.
+//! The one place that asks the system for files, since a browser has none.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -9,13 +9,13 @@ use eframe::egui;
 
 use crate::threads::spawn;
 
-/// The path of a dropped file, where files have paths.
+/// Path of a dropped file, if the platform has paths.
 pub(crate) fn dropped(file: &dyn egui::DroppedFile) -> Option<PathBuf> {
     Some(file.path()).filter(|path| path.is_absolute()).map(Path::to_path_buf)
 }
 
-/// Asks for files to open, beside the window; they arrive when the user has chosen: none if the dialog was cancelled, nothing
-/// at all if there is no dialog.
+/// Opens the system's file dialog on a thread of its own. The receiver yields the chosen paths: an empty list if the
+/// dialog was cancelled, `None` if there is no dialog.
 pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Option<Vec<PathBuf>>> {
     let (sender, receiver) = channel();
     let context = context.clone();
@@ -24,23 +24,25 @@ pub(crate) fn ask_for_inputs(context: &egui::Context) -> Receiver<Option<Vec<Pat
             autosplats::cloud::formats().flat_map(|(_, extensions)| extensions).copied().collect();
         let dialog =
             rfd::FileDialog::new().set_title("Open").add_filter("Point clouds, meshes, depth images", &extensions);
-        // Tests have nobody to ask.
+        // Tests have no user to ask.
         let files = if cfg!(test) { None } else { dialog.add_filter("All files", &["*"]).pick_files() };
-        // Where the dialog is another program, which may be missing, what is cancelled is an empty list; elsewhere it is none.
+        // On Linux the dialog is another program, which may be missing. `rfd` then returns `None`, and an empty list
+        // for a cancelled dialog. Elsewhere `None` means cancelled.
         let _ = sender.send(files.or_else(|| (!cfg!(target_os = "linux")).then(Vec::new)));
         context.request_repaint();
     });
     receiver
 }
 
-/// Asks where to write a file. Nothing arrives if the dialog was cancelled, and likewise if there is none.
+/// Opens the system's dialog for an output file. The receiver yields `None` if the dialog was cancelled or does not
+/// exist.
 pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -> Receiver<Option<PathBuf>> {
     let (sender, receiver) = channel();
     let context = context.clone();
     let (title, name) = (title.to_owned(), name.to_owned());
     spawn("dialog", move || {
         let chosen = if cfg!(test) {
-            // What tests write without a dialog is put aside.
+            // Tests write to the temporary folder, without a dialog.
             Some(std::env::temp_dir().join(format!("{}-{name}", std::process::id())))
         } else {
             rfd::FileDialog::new().set_title(title).set_file_name(name).save_file()
@@ -51,7 +53,7 @@ pub(crate) fn ask_for_output(context: &egui::Context, title: &str, name: &str) -
     receiver
 }
 
-/// Encodes a picture.
+/// Encodes a picture as PNG.
 pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> std::io::Result<()> {
     let encoder = image::codecs::png::PngEncoder::new(writer);
     let (width, height) = (picture.width, picture.height);
@@ -65,18 +67,18 @@ pub(crate) fn encode_png(picture: &Image, writer: &mut dyn std::io::Write) -> st
     .map_err(std::io::Error::other)
 }
 
-/// A file beside `path` for what will be there when it is complete.
+/// A temporary file in the folder of `path`, to be renamed once complete.
 pub(crate) fn temporary(path: &Path, suffix: &OsStr) -> std::io::Result<tempfile::NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".autosplats-").suffix(suffix);
-    // Temporary files are for their owner alone unless told otherwise; the result is a file like any.
+    // By default, temporary files are private to their owner; the result should have usual permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder)
 }
 
-/// Writes a file so that it appears complete or not at all.
+/// Writes a file atomically: it appears complete or not at all.
 pub(crate) fn write(
     path: &Path,
     content: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>,

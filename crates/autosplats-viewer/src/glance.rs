@@ -1,5 +1,5 @@
-//! Where to stand before what is read, found out by the thread that reads it: to look at a hundred thousand points takes longer
-//! than a frame of the window may.
+//! The first view of an input, found by the thread that reads the input. A look at a hundred thousand points takes
+//! longer than a window frame may.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,51 +13,51 @@ use crate::loading::Input;
 /// Vertical field of view of the first picture, degrees.
 pub(crate) const FOV_DEG: f64 = 40.0;
 
-/// What the first picture depends on besides points.
+/// What the first view depends on besides the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame {
     /// Width over height.
     pub(crate) aspect: f64,
-    /// Which way is up, if the user says so.
+    /// The up axis, if the user chose one.
     pub(crate) up: Option<Axes>,
 }
 
-/// The frame of the window's picture, as the threads that read know it.
+/// The frame of the window's picture, shared with the threads that read.
 #[derive(Clone, Debug)]
 pub(crate) struct Known(Arc<Mutex<Frame>>);
 
 impl Known {
-    /// Until the window is drawn.
+    /// Starts with `frame`, until the window is drawn.
     pub(crate) fn new(frame: Frame) -> Self {
         Self(Arc::new(Mutex::new(frame)))
     }
 
-    /// As it is now.
+    /// The current frame.
     pub(crate) fn get(&self) -> Frame {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// It is another one now.
+    /// Sets the current frame.
     pub(crate) fn set(&self, frame: Frame) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = frame;
     }
 }
 
-/// What is known of an input at the first glance.
+/// What a first look at an input finds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Glance {
-    /// Which way is up, as far as the points tell.
+    /// Up axis, guessed from the points.
     pub(crate) axes: Axes,
-    /// The box around most of it.
+    /// Box around most of the points, world coordinates.
     pub(crate) bounds: Option<[DVec3; 2]>,
-    /// Where it is seen alone, if it can be seen.
+    /// Camera that shows the input alone; `None` if no camera can.
     pub(crate) camera: Option<Camera>,
-    /// In this frame.
+    /// The frame that `camera` is for.
     pub(crate) frame: Frame,
 }
 
 impl Glance {
-    /// Looks at the points of an input.
+    /// Examines the points of an input.
     pub(crate) fn of(input: &Input, cloud: &Arc<PointCloud>, frame: Frame) -> Self {
         let axes = guess_axes(cloud);
         let mut alone = Document::default();

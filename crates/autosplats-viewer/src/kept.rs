@@ -1,4 +1,4 @@
-//! What is kept of an input, in a session and between starts: its name, and how it is read, played and shown.
+//! How an input is stored in sessions and settings: its source, and how it is read, played and shown.
 
 use std::path::Path;
 use std::time::Duration;
@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 use crate::app::App;
 use crate::loading::{Appearance, Input};
 
-/// An input, as a file has it.
+/// An input as stored in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Kept {
-    /// Path of a file, from a state's own folder if it is no absolute one; the name of a scene; an address.
+    /// Path of a file (relative to the session's folder unless absolute), name of a scene, or address of a stream.
     pub(crate) source: String,
     #[serde(default = "yes")]
     pub(crate) visible: bool,
     #[serde(default)]
     pub(crate) tint: Option<[u8; 3]>,
-    /// From its own to world coordinates, by columns.
+    /// From the input's own to world coordinates, by columns.
     #[serde(default)]
     pub(crate) pose: DMat4,
     #[serde(default, skip_serializing_if = "Reading::is_usual")]
@@ -29,7 +29,7 @@ pub(crate) struct Kept {
     play: Play,
 }
 
-/// How an input is read, where that was told.
+/// How an input is read, where this differs from the default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Reading {
@@ -41,11 +41,11 @@ struct Reading {
     keep_no_returns: bool,
 }
 
-/// How an input is played, where that was told; called as the program's flags are.
+/// How an input is played, where this differs from the default. The names are those of the program's flags.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct Play {
-    /// Whether it is played though it may stand still.
+    /// Whether the input is played though its source may be static.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     played: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -70,38 +70,38 @@ struct Play {
 }
 
 impl Kept {
-    /// An input that looks so.
+    /// Stores an input and its appearance.
     pub(crate) fn of(input: &Input, appearance: Appearance) -> Self {
         let Appearance { visible, tint } = appearance;
         let (source, pose) = (App::source_name(input), input.world_from_input);
         Self { source, visible, tint, pose, options: Reading::of(&input.options), play: Play::of(input) }
     }
 
-    /// An input of which nothing else is known.
+    /// An input of which only the source is known.
     pub(crate) fn named(source: String) -> Self {
         let (options, play) = (Reading::default(), Play::default());
         Self { source, visible: true, tint: None, pose: DMat4::IDENTITY, options, play }
     }
 
-    /// The last part of its name.
+    /// File name without folders.
     pub(crate) fn short_name(&self) -> String {
         let name = Path::new(&self.source).file_name();
         name.map_or_else(|| self.source.clone(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// Whether it moves, or may.
+    /// Whether the input moves, or may move.
     pub(crate) fn moves(&self) -> bool {
         self.play.played || Input::parse(&self.source).is_ok_and(|input| input.moves())
     }
 
-    /// What is wrong with it, if anything is.
+    /// Why the stored values are invalid; `None` if they are valid.
     pub(crate) fn problem(&self) -> Option<String> {
         let decay = self.play.decay?;
         let wrong = Duration::try_from_secs_f64(decay).is_err();
         wrong.then(|| format!("{}: decay is a number of seconds, not {decay}", self.source))
     }
 
-    /// The input, and how it looks; paths are from `folder`.
+    /// The input and its appearance. Relative paths are resolved against `folder`.
     ///
     /// # Errors
     /// [`Error::UnknownScene`] and [`Error::BadScene`].
@@ -121,7 +121,7 @@ impl Reading {
         Self { columns, depth_camera, keep_no_returns }
     }
 
-    /// Whether nothing was told.
+    /// Whether all values are defaults.
     fn is_usual(&self) -> bool {
         *self == Self::default()
     }
@@ -149,7 +149,7 @@ impl Play {
         }
     }
 
-    /// Whether nothing was told.
+    /// Whether all values are defaults.
     fn is_usual(&self) -> bool {
         *self == Self::default()
     }
@@ -176,7 +176,7 @@ fn is_zero(number: &u64) -> bool {
 mod tests {
     use super::*;
 
-    /// One of which everything was told.
+    /// An input with all values set.
     fn told() -> Input {
         let depth_camera = Some(DepthCamera { fx: 525.0, fy: 525.5, cx: 319.5, cy: 239.5, scale: 5000.0 });
         let columns = Some(vec!["x".into(), "-".into(), "y".into()]);

@@ -1,4 +1,4 @@
-//! Keys to commands, and commands to what is done.
+//! From keys to commands, and from commands to actions.
 
 use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
@@ -10,13 +10,13 @@ use crate::commands::{Command, Tool};
 use crate::loading::Input;
 use crate::panels;
 
-/// Whether something is open that has the keys to itself: a menu, or a question that has to be answered first.
+/// Whether a menu or a modal question is open, which then receives all keys.
 fn is_behind(context: &egui::Context) -> bool {
     context.memory(|memory| memory.top_modal_layer()).is_some() || egui::Popup::is_any_open(context)
 }
 
-/// Looks at keys before egui does, which uses some itself. F6 goes from part to part whatever has the focus; Tab, which
-/// otherwise goes from control to control, changes the picture as long as nothing has it.
+/// Takes keys before egui does, which uses some of them itself. F6 moves the focus between parts of the window. Tab
+/// moves between controls; while no control has the focus, Tab switches between points and surface.
 pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::RawInput) {
     app.panels.left = false;
     if is_behind(context) {
@@ -32,7 +32,7 @@ pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::Ra
             _ => {
                 app.panels.focus.by_keys |= *key == Key::Tab;
                 app.panels.entered |= *pressed && *key == Key::Enter && modifiers.is_none() && !focused;
-                // Escape in a panel gives the focus back and nothing else; in a dialog it closes it.
+                // Escape in a panel only returns the focus to the picture; in a dialog it closes the dialog.
                 app.panels.left |= *pressed && *key == Key::Escape && focused && !app.panels.has_window();
                 return true;
             }
@@ -44,7 +44,7 @@ pub(crate) fn claim(app: &mut App, context: &egui::Context, input: &mut egui::Ra
     });
 }
 
-/// Does what keys ask for.
+/// Runs the commands of the keys that were pressed.
 pub(crate) fn perform(app: &mut App, context: &egui::Context) {
     for command in std::mem::take(&mut app.panels.claimed) {
         run(app, context, command);
@@ -53,7 +53,7 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
     if is_behind(context) || context.egui_wants_keyboard_input() {
         return;
     }
-    // The clipboard's keys come as events of their own.
+    // The clipboard's keys arrive as events of their own.
     let (copy, paste) = context.input(|input| {
         let copy = input.events.iter().any(|event| matches!(event, Event::Copy));
         let paste = input.events.iter().find_map(|event| match event {
@@ -70,7 +70,7 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
     }
     let pressed = context.input_mut(|input| {
         let mut commands = Command::ALL;
-        // Those with more modifiers first: the plain ones would match, too.
+        // Shortcuts with more modifiers come first, since plain ones would match too.
         commands.sort_by_key(|command| {
             let modifiers = command.shortcut().map_or(Modifiers::NONE, |shortcut| shortcut.modifiers);
             2 - u8::from(modifiers.shift) - u8::from(modifiers.command)
@@ -90,7 +90,7 @@ pub(crate) fn perform(app: &mut App, context: &egui::Context) {
         if input.consume_key(Modifiers::NONE, Key::Backspace) && app.tools.measured.pop().is_none() {
             pressed.push(Command::DeleteSelected);
         }
-        // What is in the user's hands is put down first; Escape gives it up.
+        // During a drag only Escape works, which cancels the drag.
         pressed.retain(|command| *command == Command::SelectNone || !app.tools.gizmo.is_dragging());
         pressed
     });
@@ -108,7 +108,7 @@ fn dropped(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// Has a command done.
+/// Runs a command.
 pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
     match command {
         Command::Open => app.panels.dialogs.open(context),
@@ -118,7 +118,7 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::SaveState => panels::ask_for_session(app),
         Command::CloseAll => {
             if app.document().layers.is_empty() {
-                // There is nothing to undo, but what is being read may be given up.
+                // Nothing can be undone, but inputs that are being read are cancelled.
                 app.loader.cancel_all();
                 app.playing.give_up_waiting();
             } else {
@@ -146,7 +146,7 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             }
         }
         Command::SelectNone => {
-            // Escape goes back a step each time: what is dragged, a window, what the tool has, the tool, the selection.
+            // Each Escape undoes one step: a drag, an open window, what the tool holds, the tool, the selection.
             let dragged = crate::gizmo::cancel(app) || app.tools.cancel_drag();
             if dragged || app.panels.close_window() || app.tools.cancel() {
                 return;
@@ -217,7 +217,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
     }
 }
 
-/// The camera turned half about the vertical through what it looks at; straight down becomes straight up.
+/// The camera turned by half a turn about the vertical through the point it looks at. A view straight down becomes one
+/// straight up.
 fn opposite(camera: &Camera, up: DVec3) -> Camera {
     let Camera { eye, look_at, .. } = *camera;
     let away = eye - look_at;
@@ -229,7 +230,7 @@ fn opposite(camera: &Camera, up: DVec3) -> Camera {
     }
 }
 
-/// Stands where a copied camera stood.
+/// Moves to a copied camera.
 fn paste_view(app: &mut App, text: &str) {
     match serde_json::from_str::<Camera>(text).map_err(|error| error.to_string()) {
         Ok(camera) => match camera.check() {

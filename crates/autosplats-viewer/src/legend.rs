@@ -1,4 +1,4 @@
-//! The legend over the picture: which colours are which values. Pictures that are saved have the renderer's own.
+//! The legend over the picture: which colours stand for which values. Saved pictures have the renderer's own legend.
 
 use autosplats::{ColorMap, ColorMode};
 use eframe::egui::{self, Color32, Mesh, Rect, pos2, vec2};
@@ -7,16 +7,16 @@ use crate::app::App;
 use crate::overlay::round;
 use crate::tools::ruler;
 
-/// Width of the colour bar.
+/// Width of the colour bar, screen points.
 const BAR: f32 = 14.0;
-/// Least height between two values.
+/// Smallest height between two values, screen points.
 const STEP: f32 = 26.0;
-/// Around everything.
+/// Margin around the legend, screen points.
 const MARGIN: f32 = 8.0;
-/// Pieces of the colour bar.
+/// Segments of the colour bar.
 const PIECES: u16 = 64;
 
-/// Draws it at the right edge, if the last picture shows values.
+/// Draws the legend at the right edge, if the last picture shows values.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
     let shading = &app.look.settings.shading;
     let Some([low, high]) = app.shot.as_ref().and_then(|shot| shot.counts.value_range) else { return };
@@ -52,7 +52,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
     }
 }
 
-/// What is shown, and its unit.
+/// Name of the shown value, and its unit.
 fn title(color: &ColorMode, app: &App) -> String {
     let unit = match color {
         ColorMode::Height | ColorMode::Depth | ColorMode::Radius | ColorMode::KRadius => ruler(app).unit(),
@@ -61,7 +61,7 @@ fn title(color: &ColorMode, app: &App) -> String {
     unit.map_or_else(|| color.title(), |unit| format!("{} ({unit})", color.title()))
 }
 
-/// The bar of colours.
+/// Mesh of the colour bar.
 fn colors(map: ColorMap, bar: Rect) -> Mesh {
     let mut mesh = Mesh::default();
     for piece in 0..=PIECES {
@@ -79,13 +79,14 @@ fn colors(map: ColorMap, bar: Rect) -> Mesh {
     mesh
 }
 
-/// Round values from `low` to `high`, `most` of them or about half as many, with the digits that tell them apart.
+/// Round values from `low` to `high`, at most about `most` of them and at least half as many. Labels have enough digits
+/// to differ.
 fn ticks(low: f64, high: f64, most: f64) -> Vec<(f64, String)> {
     let width = high - low;
     if !(width > 0.0 && width.is_finite()) {
         return vec![(low, format!("{low:.4}"))];
     }
-    // The next larger round number: what is round is so upside down, too.
+    // The next larger round step: the reciprocal of a round number is round too.
     let step = 1.0 / round(most / width);
     let [first, last] = [(low / step - 1e-6).ceil(), (high / step + 1e-6).floor()];
     let decimals = (0..=12).find(|&decimals| {
@@ -97,7 +98,7 @@ fn ticks(low: f64, high: f64, most: f64) -> Vec<(f64, String)> {
         Some(decimals) if largest < 1e9 && step >= 1e-6 => format!("{value:.*}", decimals.unsigned_abs() as usize),
         _ => format!("{value:.3e}"),
     };
-    // Adding zero makes -0 zero.
+    // Adding zero turns -0 into 0.
     let values = (0..=(last - first).max(0.0) as u32).map(|number| (first + f64::from(number)) * step + 0.0);
     values.map(|value| (value, label(value))).collect()
 }

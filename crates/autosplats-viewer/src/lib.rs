@@ -1,7 +1,7 @@
 //! A window that shows raw points as a lit surface.
 //!
-//! [`run`] opens it. The window never waits: files are read (`loading`) and pictures made (`render`) by threads of their
-//! own, which send what they have; `app` is the round of a frame of the window.
+//! [`run`] opens the window. The window never waits: threads of their own read files (`loading`) and render pictures
+//! (`render`), and send their results. `app` holds the work of each window frame.
 
 mod animation;
 mod app;
@@ -44,27 +44,27 @@ use eframe::egui;
 
 pub use self::loading::Input;
 
-/// What the window begins with.
+/// Options at the start of the viewer.
 #[derive(Debug, Default)]
 pub struct Options {
-    /// What is opened.
+    /// Inputs to open.
     pub inputs: Vec<Input>,
-    /// Where the session is kept: had again if it is there, and written at the end.
+    /// File of the session: restored if it exists, and written on exit.
     pub state: Option<PathBuf>,
-    /// Read files again when they change.
+    /// Whether to read files again when they change.
     pub watch: bool,
-    /// Where pictures are made; as last time if it is not said.
+    /// Backend for rendering; `None` keeps that of the last start.
     pub backend: Option<Backend>,
 }
 
-/// Why there is no window.
+/// Why no window could be opened.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is no display, or nothing that draws on it.
+    /// There is no display, or no way to draw on it.
     #[error("no window can be opened: {0}; 'autosplats render' makes pictures without one")]
     Window(String),
-    /// The file of a session cannot be had again.
+    /// The session file could not be read.
     #[error("{0}")]
     State(String),
 }
@@ -72,7 +72,7 @@ pub enum Error {
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`Error::Window`], and [`Error::State`] if there is a file of a session that cannot be understood.
+/// [`Error::Window`], and [`Error::State`] if the session file exists but is invalid.
 pub fn run(options: Options) -> Result<(), Error> {
     let path = options.state.as_deref().filter(|path| path.exists());
     let state = path.map(state::State::read).transpose().map_err(Error::State)?;
@@ -103,7 +103,7 @@ pub fn run(options: Options) -> Result<(), Error> {
     eframe::run_native("autosplats", native, create).map_err(|error| Error::Window(error.to_string()))
 }
 
-/// Colours that can be read: egui's own red is too dark on a dark ground.
+/// Sets readable colours: egui's own red is too dark on a dark background.
 fn colors(context: &egui::Context) {
     let red = |dark: bool| if dark { [255, 128, 118] } else { [176, 24, 16] };
     let amber = |dark: bool| if dark { [255, 180, 70] } else { [150, 84, 0] };

@@ -1,4 +1,4 @@
-//! Reading beside the window: points are shown as they arrive, and changed files read again.
+//! Reads inputs on threads of their own: points are shown as they arrive, and changed files are read again.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -13,34 +13,34 @@ use eframe::egui;
 use crate::glance::{Frame, Glance, Known};
 use crate::threads::spawn;
 
-/// Most points that are shown before a file is read to its end.
+/// Largest number of points shown before a file is read to its end.
 const PREVIEW_POINTS: usize = 4_000_000;
-/// Time between two looks at a file that is watched; it is read again when two looks in a row find it changed and the same.
+/// Time between two checks of a watched file. The file is read again when two successive checks see the same change.
 const WATCH: Duration = Duration::from_millis(400);
 
-/// Names a piece of work.
+/// Identifies a reading job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct JobId(u64);
 
-/// Something to be opened.
+/// Something to open.
 #[derive(Clone, Debug)]
 pub struct Input {
-    /// What the list calls it.
+    /// Name in the list of inputs.
     pub name: String,
-    /// Where its points come from.
+    /// Where the points come from.
     pub source: Source,
-    /// How to read it.
+    /// How to read the input.
     pub options: ReadOptions,
-    /// How to play it.
+    /// How to play the input.
     pub play: PlayOptions,
-    /// Whether it is played though it may stand still.
+    /// Whether the input is played though its source may be static.
     pub played: bool,
-    /// From its own to world coordinates.
+    /// From the input's own to world coordinates.
     pub world_from_input: DMat4,
 }
 
 impl Input {
-    /// What a name means: a scene or a file, read in the usual way and left where it is.
+    /// Parses a name: a scene, a file or an address, with default options and the identity as its pose.
     ///
     /// # Errors
     /// [`Error::UnknownScene`] and [`Error::BadScene`].
@@ -50,30 +50,30 @@ impl Input {
         Ok(Self::usual(name, source))
     }
 
-    /// A file that was dropped or chosen.
+    /// A file that was dropped or chosen in a dialog.
     pub(crate) fn file(path: PathBuf) -> Self {
         let name = path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into());
         let source = Source::parse(&path.display().to_string()).unwrap_or(Source::File(path));
         Self::usual(name, source)
     }
 
-    /// Read in the usual way and left where it is.
+    /// An input with default options and the identity as its pose.
     fn usual(name: String, source: Source) -> Self {
         let (options, play) = (ReadOptions::default(), PlayOptions::default());
         Self { name, source, options, play, played: false, world_from_input: DMat4::IDENTITY }
     }
 
-    /// Whether its points change.
+    /// Whether the points change over time.
     pub(crate) fn moves(&self) -> bool {
         self.played || self.source.moves()
     }
 }
 
-/// How an input is to be seen once it has points.
+/// How an input is shown once it has points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Appearance {
     pub(crate) visible: bool,
-    /// One colour for all its points instead of their own.
+    /// One colour for all points; `None` shows their own colours.
     pub(crate) tint: Option<[u8; 3]>,
 }
 
@@ -83,49 +83,49 @@ impl Default for Appearance {
     }
 }
 
-/// What happens to a job.
+/// What happened to a job.
 pub(crate) enum News {
-    /// Some of the points, to be shown until all are there.
+    /// Part of the points, shown until all have arrived.
     Preview(Arc<PointCloud>, Glance),
-    /// All points, and what the reader has to say.
+    /// All points, and the reader's notes.
     Read(Arc<PointCloud>, Glance, Vec<String>),
-    /// Why there are none.
+    /// Why reading failed.
     Failed(String),
-    /// Nothing was wanted any more.
+    /// The job was cancelled.
     Cancelled,
 }
 
-/// A file that is being read.
+/// A job that reads an input.
 pub(crate) struct Job {
     pub(crate) id: JobId,
     pub(crate) input: Input,
     state: Arc<State>,
 }
 
-/// What reader and window share.
+/// State shared by the reader and the window.
 #[derive(Default)]
 struct State {
-    /// Part that is done, in 65,536ths.
+    /// Progress, in 65,536ths.
     done: AtomicU32,
     cancelled: AtomicBool,
 }
 
 impl Job {
-    /// Part that is done, 0 to 1.
+    /// Progress, 0 to 1.
     pub(crate) fn fraction(&self) -> f32 {
         self.state.done.load(Ordering::Relaxed) as f32 / 65_536.0
     }
 
-    /// Ends it as soon as the reader notices.
+    /// Cancels the job; the reader stops at its next check.
     pub(crate) fn cancel(&self) {
         self.state.cancelled.store(true, Ordering::Relaxed);
     }
 }
 
-/// Reads files, one after the other, as each is read by all cores.
+/// Reads inputs one after the other, since each is read by all cores.
 pub(crate) struct Loader {
     context: egui::Context,
-    /// Of the window's picture.
+    /// Frame of the window's picture.
     pub(crate) frame: Known,
     orders: Sender<Order>,
     receiver: Receiver<(JobId, News)>,
@@ -141,7 +141,7 @@ struct Order {
 }
 
 impl Loader {
-    /// Starts the thread that reads; `context` is asked to draw again with each piece of news.
+    /// Starts the reading thread. `context` is asked for a repaint with each piece of news.
     pub(crate) fn start(context: egui::Context) -> Self {
         let (orders, queue) = channel::<Order>();
         let (sender, receiver) = channel();
@@ -152,7 +152,7 @@ impl Loader {
             for order in queue {
                 let work = std::panic::AssertUnwindSafe(|| read(&order, &known, &sender, &asked));
                 let read = std::panic::catch_unwind(work);
-                // What goes wrong in one file must not keep the next from being read.
+                // A panic in one file must not stop the following files.
                 let news = read.unwrap_or_else(|_| {
                     News::Failed(format!("{}: reading it failed, which is a bug of this program", order.input.name))
                 });
@@ -163,12 +163,12 @@ impl Loader {
         Self { context, frame, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
     }
 
-    /// The window's.
+    /// The window's context.
     pub(crate) fn context(&self) -> &egui::Context {
         &self.context
     }
 
-    /// Reads something; what comes of it arrives under the number returned.
+    /// Queues an input and returns the number of its job.
     pub(crate) fn read(&mut self, input: Input) -> JobId {
         self.next += 1;
         let id = JobId(self.next);
@@ -178,22 +178,22 @@ impl Loader {
         id
     }
 
-    /// What is being read or waits for it, in order.
+    /// Jobs in progress and waiting, in order.
     pub(crate) fn jobs(&self) -> &[Job] {
         &self.jobs
     }
 
-    /// Ends a job.
+    /// Cancels a job.
     pub(crate) fn cancel(&self, id: JobId) {
         self.jobs.iter().filter(|job| job.id == id).for_each(Job::cancel);
     }
 
-    /// Ends all jobs.
+    /// Cancels all jobs.
     pub(crate) fn cancel_all(&self) {
         self.jobs.iter().for_each(Job::cancel);
     }
 
-    /// What has happened since; jobs that have ended are forgotten, and handed over for the last time.
+    /// News since the last call. Jobs that have ended are dropped, so each one's last news is returned once.
     pub(crate) fn news(&mut self) -> Vec<(Input, JobId, News)> {
         let news: Vec<_> = self.receiver.try_iter().collect();
         let mut told = Vec::new();
@@ -204,7 +204,7 @@ impl Loader {
             if matches!(news, News::Read(..) | News::Failed(_) | News::Cancelled) {
                 self.jobs.remove(at);
             }
-            // What was finished before the reader heard of it is not wanted either.
+            // A job that finished before the reader saw the cancellation counts as cancelled.
             match news {
                 News::Preview(..) if cancelled => {}
                 News::Read(..) if cancelled => told.push((input, id, News::Cancelled)),
@@ -214,7 +214,7 @@ impl Loader {
         told
     }
 
-    /// Notices when a file changes, until what is returned is dropped.
+    /// Watches a file for changes until the returned value is dropped.
     pub(crate) fn watch(&self, path: PathBuf) -> Watch {
         let alive = Arc::new(());
         let watched = Arc::downgrade(&alive);
@@ -229,7 +229,7 @@ impl Loader {
                 if now == known || now.is_none() {
                     pending = None;
                 } else if pending != Some(now) {
-                    // It may still be written: the next look decides.
+                    // The file may still be written; the next check decides.
                     pending = Some(now);
                 } else {
                     known = now;
@@ -242,13 +242,13 @@ impl Loader {
         Watch { _alive: alive }
     }
 
-    /// Files that have changed since this was asked last.
+    /// Files that have changed since the last call.
     pub(crate) fn changed(&self) -> impl Iterator<Item = PathBuf> + '_ {
         self.changes.1.try_iter()
     }
 }
 
-/// A file is watched as long as this lives.
+/// Keeps a file watched while alive.
 pub(crate) struct Watch {
     _alive: Arc<()>,
 }
@@ -272,7 +272,7 @@ fn read(order: &Order, frame: &Known, sender: &Sender<(JobId, News)>, context: &
     }
 }
 
-/// Listens to a reader.
+/// Receives progress, notes and points from a reader.
 struct Follower<'a> {
     order: &'a Order,
     frame: &'a Known,
@@ -282,21 +282,21 @@ struct Follower<'a> {
     preview: Mutex<Preview>,
 }
 
-/// The points so far.
+/// The points read so far.
 #[derive(Default)]
 struct Preview {
     parts: Vec<PointCloud>,
-    /// Points in `parts`.
+    /// Number of points in `parts`.
     points: usize,
-    /// Points of them that were shown last.
+    /// Number of points shown last.
     shown: usize,
-    /// Every so many points one is kept.
+    /// Keeps one of `step` points.
     step: usize,
 }
 
 impl Preview {
-    /// Takes points in, and gives all so far where there are enough more than were shown last: each time half as many again,
-    /// so that putting them together costs no more than reading them.
+    /// Adds points. Returns all points so far once there are 1.5 times as many as shown last, so that merging costs no
+    /// more than reading.
     fn add(&mut self, mut points: PointCloud) -> Option<PointCloud> {
         self.step = self.step.max(1);
         let step = self.step;
@@ -325,7 +325,7 @@ impl Progress for Follower<'_> {
     fn report(&self, fraction: f32) {
         let done = (fraction.clamp(0.0, 1.0) * 65_536.0) as u32;
         let before = self.order.state.done.swap(done, Ordering::Relaxed);
-        // A bar a hundred pixels long moves a hundred times.
+        // A progress bar 100 pixels long needs 100 repaints.
         if before / 656 != done / 656 {
             self.context.request_repaint();
         }

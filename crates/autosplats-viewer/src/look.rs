@@ -1,28 +1,28 @@
-//! How the points are shown: what the look panel changes and settings keep between starts.
+//! How points are shown: changed in the look panel, kept between starts.
 
 use autosplats::{Backend, Settings};
 use serde::{Deserialize, Serialize};
 
-/// Milliseconds a picture may take while the eye moves: 30 a second.
+/// Time limit of a picture while the view moves, milliseconds: 30 pictures a second.
 const MOVING_MS: f64 = 1000.0 / 30.0;
 
-/// Everything about the picture but what is in it and where it is seen from.
+/// Everything about the picture except its content and its camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Look {
-    /// What the renderer is asked for.
+    /// Settings of the renderer.
     pub(crate) settings: Settings,
-    /// Points as dots in place of the surface.
+    /// Whether to draw points as dots instead of the surface.
     pub(crate) dots: bool,
-    /// Width of a dot in pixels.
+    /// Width of a dot, pixels.
     pub(crate) dot_size: u32,
-    /// Where pictures are made.
+    /// Backend for rendering.
     pub(crate) backend: Backend,
-    /// Milliseconds a picture may take while the eye moves; larger is sharper and less smooth.
+    /// Time limit of a picture while the view moves, milliseconds. A larger limit is sharper and less smooth.
     pub(crate) moving_ms: f64,
-    /// What two fingers do that are drawn over a touchpad.
+    /// What a two-finger drag on a touchpad does.
     pub(crate) two_fingers: TwoFingers,
-    /// The little axes, the scale bar and the figures over the picture.
+    /// Whether to draw the axes and the scale bar over the picture.
     pub(crate) overlay: bool,
 }
 
@@ -40,15 +40,15 @@ impl Default for Look {
     }
 }
 
-/// What two fingers do that are drawn over a touchpad; pinched they zoom in any case.
+/// What a two-finger drag on a touchpad does. A pinch always zooms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum TwoFingers {
-    /// As a wheel does.
+    /// Zooms, as a wheel does.
     #[default]
     Zoom,
-    /// They turn the view.
+    /// Turns the view.
     Orbit,
-    /// They move it sideways.
+    /// Moves the view sideways.
     Pan,
 }

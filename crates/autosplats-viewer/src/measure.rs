@@ -1,7 +1,7 @@
-//! Lengths, angles and areas between picked points, in words.
+//! Lengths, angles and areas between picked points, and their texts.
 //!
-//! All of it is in `f64` world coordinates. Where the heights of a coordinate system have another unit than its plane, both
-//! become metres first, since there is no length across two units.
+//! All values are in `f64` world coordinates. If heights and plane coordinates have different units, both are converted
+//! to metres first, since a length has one unit.
 
 use autosplats::cloud::{
     Crs, Unit,
@@ -11,15 +11,16 @@ use autosplats::cloud::{
 /// Measures in the unit of a coordinate system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ruler {
-    /// What coordinates are multiplied by.
+    /// Factors from coordinates to `unit`.
     scale: DVec3,
     unit: Option<Unit>,
-    /// Upward, of length 1.
+    /// Unit vector upward.
     up: DVec3,
 }
 
 impl Ruler {
-    /// A ruler for coordinates of `crs`, `up` being upward; without a unit where none is known or where it is no length.
+    /// A ruler for coordinates of `crs`. There is no unit if none is known, if it is degrees, or if mixed units cannot
+    /// be converted.
     ///
     /// # Panics
     /// If `up` is zero.
@@ -45,12 +46,12 @@ impl Ruler {
         self.way(from, to).length()
     }
 
-    /// Length of a line through points.
+    /// Length of a polyline.
     pub(crate) fn polyline(&self, points: &[DVec3]) -> f64 {
         points.windows(2).map(|ends| self.distance(ends[0], ends[1])).sum()
     }
 
-    /// How much higher `to` is than `from`.
+    /// Height of `to` above `from`.
     pub(crate) fn height_difference(&self, from: DVec3, to: DVec3) -> f64 {
         self.way(from, to).dot(self.up)
     }
@@ -60,15 +61,16 @@ impl Ruler {
         self.way(from, to).reject_from_normalized(self.up).length()
     }
 
-    /// Angle at `corner` between the ways to the other two, in degrees; nothing if one of them is at the corner.
+    /// Angle at `corner` between the lines to the other two points, degrees; `None` if one of them is at the corner.
     pub(crate) fn angle(&self, from: DVec3, corner: DVec3, to: DVec3) -> Option<f64> {
         let (a, b) = (self.way(corner, from), self.way(corner, to));
-        // Exact for small and for flat angles, where the cosine is not.
+        // Accurate for small and flat angles, where the arc cosine is not.
         let angle = a.cross(b).length().atan2(a.dot(b)).to_degrees();
         (a != DVec3::ZERO && b != DVec3::ZERO && angle.is_finite()).then_some(angle)
     }
 
-    /// Area of a polygon of points; of its shadow on the plane that fits it best, if it is not flat.
+    /// Area of a polygon; if it is not flat, the area of its projection onto the plane perpendicular to its vector
+    /// area.
     pub(crate) fn area(&self, corners: &[DVec3]) -> f64 {
         let Some(&first) = corners.first() else { return 0.0 };
         let doubled = corners.windows(2).map(|ends| self.way(first, ends[0]).cross(self.way(first, ends[1])));
@@ -80,12 +82,12 @@ impl Ruler {
         with_unit(length, self.unit.map(symbol))
     }
 
-    /// The sign of the unit, if there is one.
+    /// Symbol of the unit, if there is one.
     pub(crate) fn unit(&self) -> Option<&'static str> {
         self.unit.map(symbol)
     }
 
-    /// A length of few digits with its unit, as on a scale bar.
+    /// A length of few digits with its unit, for a scale bar.
     pub(crate) fn round_text(&self, length: f64) -> String {
         let digits = if (1e-4..1e7).contains(&length) { length.to_string() } else { format!("{length:e}") };
         self.unit.map_or_else(|| digits.clone(), |unit| format!("{digits} {}", symbol(unit)))
@@ -112,7 +114,7 @@ fn symbol(unit: Unit) -> &'static str {
     }
 }
 
-/// Three decimals, as surveys have them, and more where they would be less than five digits.
+/// Three decimals, as usual in surveys; more if the number would otherwise have fewer than five digits.
 fn with_unit(value: f64, unit: Option<impl std::fmt::Display>) -> String {
     let magnitude = value.abs().log10().floor();
     let decimals = if magnitude.is_finite() { (4.0 - magnitude).clamp(3.0, 12.0) as usize } else { 3 };
@@ -124,7 +126,7 @@ fn with_unit(value: f64, unit: Option<impl std::fmt::Display>) -> String {
 mod tests {
     use super::*;
 
-    /// A place where `f32` holds half metres.
+    /// A place so far from the origin that the step of `f32` is half a metre.
     const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
     fn crs(unit: Option<Unit>, vertical_unit: Option<Unit>) -> Crs {
@@ -157,7 +159,7 @@ mod tests {
         for degrees in [0.0, 1e-3, 30.0, 90.0, 179.999, 180.0] {
             let (sin, cos) = f64::to_radians(degrees).sin_cos();
             let angle = ruler.angle(FAR + 2.0 * DVec3::X, FAR, FAR + 5.0 * dvec3(cos, sin, 0.0)).expect("an angle");
-            // A step of f64 at 5e6 seen over two metres.
+            // A step of f64 at 5e6, seen over two metres.
             assert!((angle - degrees).abs() < 1e-7, "{angle} is not {degrees}");
         }
         assert_eq!(ruler.angle(FAR, FAR, FAR + 1.0), None, "no way, no angle");

@@ -1,4 +1,4 @@
-//! What the user is told, in place: errors stay until they are closed, notes go by themselves.
+//! Messages to the user, over the picture. Errors stay until they are closed; notes disappear by themselves.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 
@@ -6,19 +6,19 @@ use eframe::egui;
 
 /// Seconds that a note is shown.
 const NOTE: f64 = 8.0;
-/// Messages kept; older ones go first.
+/// Number of messages kept; the oldest are dropped first.
 const KEPT: usize = 6;
 
-/// What is being told.
+/// The messages that are shown.
 pub(crate) struct Messages {
     list: Vec<Message>,
-    /// From threads.
+    /// Messages from threads.
     post: (Mail, Receiver<Result<String, String>>),
-    /// Why the last picture could not be made.
+    /// Why the last picture could not be rendered.
     failure: Option<String>,
 }
 
-/// Sends messages from a thread: notes, or what went wrong.
+/// Sends messages from a thread: a note, or an error.
 #[derive(Clone)]
 pub(crate) struct Mail {
     sender: Sender<Result<String, String>>,
@@ -26,7 +26,7 @@ pub(crate) struct Mail {
 }
 
 impl Mail {
-    /// Tells what came of some work.
+    /// Sends the result of some work.
     pub(crate) fn send(&self, message: Result<String, String>) {
         let _ = self.sender.send(message);
         self.context.request_repaint();
@@ -36,28 +36,28 @@ impl Mail {
 struct Message {
     text: String,
     error: bool,
-    /// When it was shown first, seconds.
+    /// Time when the message was first shown, seconds.
     since: Option<f64>,
 }
 
 impl Messages {
-    /// Nothing is told yet; `context` is asked to draw again when a thread has something to say.
+    /// No messages. `context` is asked for a repaint when a thread sends one.
     pub(crate) fn new(context: egui::Context) -> Self {
         let (sender, receiver) = channel();
         Self { list: Vec::new(), post: (Mail { sender, context }, receiver), failure: None }
     }
 
-    /// For a thread that will have something to say.
+    /// A sender for a thread.
     pub(crate) fn sender(&self) -> Mail {
         self.post.0.clone()
     }
 
-    /// Tells what is worth knowing.
+    /// Adds a note.
     pub(crate) fn note(&mut self, text: impl Into<String>) {
         self.push(text.into(), false);
     }
 
-    /// Tells what went wrong.
+    /// Adds an error.
     pub(crate) fn error(&mut self, text: impl Into<String>) {
         self.push(text.into(), true);
     }
@@ -69,12 +69,12 @@ impl Messages {
         self.list.drain(..surplus);
     }
 
-    /// Tells why there is no picture, until there is one.
+    /// Shows why there is no picture, until there is one.
     pub(crate) fn failure(&mut self, text: String) {
         self.failure = Some(text);
     }
 
-    /// There is a picture again.
+    /// Removes the failure, as there is a picture again.
     pub(crate) fn forget_failure(&mut self) {
         self.failure = None;
     }

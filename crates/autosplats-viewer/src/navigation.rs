@@ -1,69 +1,69 @@
-//! Where the eye is and how it gets elsewhere: orbit, pan, zoom, fly, fit.
+//! The camera and its movement: orbit, pan, zoom, fly, fit.
 //!
 //! # How it works
-//! Input moves a *goal*; what is shown follows it by a share of the way for each piece of time, so that movement is equally
-//! smooth and equally fast at any frame rate. A pose is a pivot, a distance and an orientation: the eye looks at the pivot.
-//! Nothing can turn the picture inside out, as distances stay above 0 and the eye tilts no further than to look straight
-//! down or up.
+//! Input moves a *goal*. The shown camera approaches the goal exponentially in time, so that movement looks the same at
+//! any frame rate. A pose is a pivot, a distance and an orientation: the camera looks at the pivot. Distances stay
+//! above 0 and the pitch within straight down and straight up, so that the picture never turns upside down.
 
 use autosplats::cloud::glam::{DMat3, DQuat, DVec2, DVec3};
 use autosplats::{Camera, Projection};
 
-/// Time in which the eye goes 63 % of its way, seconds.
+/// Time in which the camera covers 63 % of its way, seconds.
 const LAG: f64 = 0.06;
-/// Part of what is left to go below which the eye has arrived: a twentieth of a pixel.
+/// Fraction of the distance, or radians, below which the camera has arrived: a twentieth of a pixel.
 const ARRIVED: f64 = 5e-5;
-/// Field of view of the perspective camera unless it is told, degrees.
+/// Default vertical field of view of the perspective camera, degrees.
 const FOV_DEG: f64 = 40.0;
-/// Radians that a drag over the height of the picture turns.
+/// Radians turned by a drag over the picture's height.
 const TURN: f64 = std::f64::consts::PI;
-/// Radians a second that the arrow keys turn.
+/// Radians turned by the arrow keys per second.
 const KEY_TURN: f64 = 1.2;
-/// Distances from the pivot a second that keys fly.
+/// Distances to the pivot that keys fly per second.
 const FLY: f64 = 0.8;
-/// How much faster Shift flies.
+/// Factor by which Shift flies faster.
 const FAST: f64 = 5.0;
-/// Least and greatest distance from the pivot in sizes of the scene.
+/// Smallest and largest distance from the pivot, in radii of the scene.
 const DISTANCES: [f64; 2] = [1e-6, 1e3];
 
-/// Where the eye is.
+/// Place and direction of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pose {
-    /// What it looks at, and turns about.
+    /// The point that the camera looks at and turns about, world space.
     pivot: DVec3,
-    /// From the eye to the pivot. With an orthographic projection what a perspective one would have.
+    /// Distance from the eye to the pivot. An orthographic camera keeps that of the perspective one with the same
+    /// height at the pivot.
     distance: f64,
-    /// From view space (x right, y down, z forward) to world.
+    /// Rotation from view space (x right, y down, z forward) to world space.
     world_from_view: DQuat,
 }
 
-/// The camera under the user's hands.
+/// The camera that the user moves.
 #[derive(Clone, Debug)]
 pub(crate) struct Navigation {
     shown: Pose,
     goal: Pose,
     fov_deg: f64,
     orthographic: bool,
-    /// World direction that is up.
+    /// Unit vector upward, world space.
     up: DVec3,
-    /// Middle and radius of what is there.
+    /// Middle and radius of a ball around the scene.
     scene: (DVec3, f64),
 }
 
-/// Which keys fly, each -1, 0 or 1.
+/// Movement by keys, each component -1, 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Flight {
-    /// D less A.
+    /// D minus A.
     pub(crate) right: f64,
-    /// E less Q.
+    /// E minus Q.
     pub(crate) up: f64,
-    /// W less S.
+    /// W minus S.
     pub(crate) forward: f64,
-    /// Turning right, by arrow keys.
+    /// Turn to the right, by arrow keys.
     pub(crate) turn_right: f64,
-    /// Turning up, by arrow keys.
+    /// Turn upward, by arrow keys.
     pub(crate) turn_up: f64,
-    /// Shift.
+    /// Whether Shift is held.
     pub(crate) fast: bool,
 }
 
@@ -86,16 +86,16 @@ impl Pose {
         self.pivot - self.forward() * self.distance
     }
 
-    /// Whether nobody could tell the two apart.
+    /// Whether the two poses look the same.
     fn is_near(&self, other: &Self) -> bool {
-        // Far from the origin numbers are coarse.
+        // Rounding of coordinates far from the origin.
         let coarse = 4.0 * f64::EPSILON * other.pivot.abs().max_element();
         self.pivot.distance(other.pivot) < ARRIVED * other.distance + coarse
             && (self.distance / other.distance).ln().abs() < ARRIVED
             && self.world_from_view.angle_between(other.world_from_view) < ARRIVED
     }
 
-    /// A part of the way to another, 0 to 1.
+    /// The pose a fraction `part`, 0 to 1, of the way to `goal`.
     fn toward(&self, goal: &Self, part: f64) -> Self {
         Self {
             pivot: self.pivot.lerp(goal.pivot, part),
@@ -106,13 +106,13 @@ impl Pose {
 }
 
 impl Navigation {
-    /// Looks at the origin from 3 units away.
+    /// A camera that looks at the origin from 3 units away.
     pub(crate) fn new() -> Self {
         let pose = Pose { pivot: DVec3::ZERO, distance: 3.0, world_from_view: orientation(DVec3::Y, DVec3::Z) };
         Self { shown: pose, goal: pose, fov_deg: FOV_DEG, orthographic: false, up: DVec3::Z, scene: (DVec3::ZERO, 1.0) }
     }
 
-    /// Says what there is to be looked at, by the middle and the radius of a ball around it, and which way is up.
+    /// Sets the ball around the scene, by its middle and radius, and the up direction.
     pub(crate) fn set_scene(&mut self, middle: DVec3, radius: f64, up: DVec3) {
         if middle.is_finite() && radius.is_finite() {
             self.scene = (middle, radius.max(1e-9));
@@ -120,7 +120,7 @@ impl Navigation {
         self.up = up.try_normalize().unwrap_or(DVec3::Z);
     }
 
-    /// Goes where `camera` is, at once or smoothly.
+    /// Moves to `camera`, at once or smoothly.
     pub(crate) fn go_to(&mut self, camera: &Camera, at_once: bool) {
         let Ok([right, down, forward]) = camera.axes() else { return };
         let world_from_view = DQuat::from_mat3(&DMat3::from_cols(right, down, forward)).normalize();
@@ -141,12 +141,12 @@ impl Navigation {
         }
     }
 
-    /// The camera that is shown now.
+    /// The camera as shown.
     pub(crate) fn camera(&self) -> Camera {
         self.camera_at(&self.shown)
     }
 
-    /// The camera when the eye has arrived.
+    /// The camera that the shown one approaches.
     pub(crate) fn goal_camera(&self) -> Camera {
         self.camera_at(&self.goal)
     }
@@ -154,7 +154,7 @@ impl Navigation {
     fn camera_at(&self, pose: &Pose) -> Camera {
         let forward = pose.forward();
         let (distance, projection) = if self.orthographic {
-            // The eye of an orthographic camera is a plane to stand behind: before all there is.
+            // An orthographic camera has to stand in front of the whole scene, or its image plane cuts the scene.
             let (middle, radius) = self.scene;
             let before_all = forward.dot(pose.pivot - middle) + 1.5 * radius;
             let height = pose.distance * self.height_at_one();
@@ -165,27 +165,27 @@ impl Navigation {
         Camera { eye: pose.pivot - forward * distance, look_at: pose.pivot, up: pose.axis(DVec3::NEG_Y), projection }
     }
 
-    /// World units that the picture is high at a distance of 1.
+    /// Height of the picture at a distance of 1, world units.
     fn height_at_one(&self) -> f64 {
         2.0 * (0.5 * self.fov_deg).to_radians().tan()
     }
 
-    /// Whether the picture is an orthographic one.
+    /// Whether the projection is orthographic.
     pub(crate) fn is_orthographic(&self) -> bool {
         self.orthographic
     }
 
-    /// Changes between perspective and orthographic; what is at the pivot keeps its size.
+    /// Switches between perspective and orthographic. The size of the pivot's surroundings stays.
     pub(crate) fn toggle_projection(&mut self) {
         self.orthographic = !self.orthographic;
     }
 
-    /// Vertical field of view in degrees.
+    /// Vertical field of view, degrees.
     pub(crate) fn fov_deg(&self) -> f64 {
         self.fov_deg
     }
 
-    /// Changes the field of view; what is at the pivot keeps its size.
+    /// Sets the field of view, degrees. The size of the pivot's surroundings stays.
     pub(crate) fn set_fov_deg(&mut self, fov_deg: f64) {
         let before = self.height_at_one();
         self.fov_deg = fov_deg.clamp(1.0, 150.0);
@@ -196,7 +196,7 @@ impl Navigation {
         }
     }
 
-    /// Lets `seconds` go by. Whether the picture has changed.
+    /// Advances by `seconds`. Returns whether the camera has changed.
     pub(crate) fn advance(&mut self, seconds: f64, flight: Flight) -> bool {
         let seconds = seconds.clamp(0.0, 0.25);
         if !flight.still() {
@@ -215,21 +215,21 @@ impl Navigation {
         true
     }
 
-    /// Whether the eye is on its way.
+    /// Whether the camera is moving.
     #[cfg(test)]
     pub(crate) fn is_moving(&self) -> bool {
         self.shown != self.goal
     }
 
-    /// Turns about the pivot. `drag` is in heights of the picture, right and down.
+    /// Turns about the pivot. `drag` is in picture heights, right and down.
     pub(crate) fn orbit(&mut self, drag: DVec2) {
         self.turn(drag);
     }
 
-    /// Turns the head: the eye stays, the pivot moves. `drag` is in heights of the picture.
+    /// Turns the view direction: the eye stays and the pivot moves. `drag` is in picture heights.
     pub(crate) fn look(&mut self, drag: DVec2) {
         let eye = self.goal.eye();
-        // As if the world were pulled: the other way round than an orbit, and by the angle that the pixels cover.
+        // The drag pulls the world: opposite to an orbit, by the angle that the dragged pixels cover.
         let scale = self.fov_deg.to_radians() / TURN;
         self.turn(-drag * scale.min(1.0));
         self.goal.pivot = eye + self.goal.forward() * self.goal.distance;
@@ -240,9 +240,9 @@ impl Navigation {
             return;
         }
         let turn = drag * TURN;
-        // By both axes, so that a step too far over the top is seen as one and taken back.
+        // Both components, so that a step beyond the pole is detected and undone.
         let pitch = self.goal.forward().dot(self.up).atan2(self.goal.axis(DVec3::NEG_Y).dot(self.up));
-        // Down means that the eye rises, and looks further down.
+        // A drag down raises the eye, which then looks further down.
         let most = std::f64::consts::FRAC_PI_2;
         let tilt = (pitch - turn.y).clamp(-most, most) - pitch;
         let right = self.goal.axis(DVec3::X);
@@ -251,7 +251,7 @@ impl Navigation {
         self.goal.world_from_view = (about_up * about_right * self.goal.world_from_view).normalize();
     }
 
-    /// Moves the eye and the pivot so that what lies at `depth` follows a drag of so many heights of the picture.
+    /// Moves eye and pivot so that the point at `depth` follows the drag. `drag` is in picture heights.
     pub(crate) fn pan(&mut self, drag: DVec2, depth: Option<f64>) {
         let depth = if self.orthographic { self.goal.distance } else { depth.unwrap_or(self.goal.distance) };
         let step = drag * (depth * self.height_at_one());
@@ -260,7 +260,7 @@ impl Navigation {
         }
     }
 
-    /// Goes so many times as close to `target`, a point that stays where it is in the picture: above 1 is closer.
+    /// Divides the distance by `factor`: above 1 moves closer. `target` stays where it is in the picture.
     pub(crate) fn zoom(&mut self, factor: f64, target: Option<DVec3>) {
         let scale = 1.0 / factor;
         let [least, most] = DISTANCES.map(|part| part * self.scene.1);
@@ -276,7 +276,7 @@ impl Navigation {
         self.goal.pivot = if self.orthographic { moved } else { moved + self.goal.forward() * distance };
     }
 
-    /// Turns about `pivot` from now on; the eye goes sideways until it is in the middle.
+    /// Sets the pivot. The eye moves sideways until the pivot is in the middle of the picture.
     pub(crate) fn set_pivot(&mut self, pivot: DVec3) {
         if !pivot.is_finite() {
             return;
@@ -290,7 +290,7 @@ impl Navigation {
         self.goal.pivot = pivot;
     }
 
-    /// Stands the picture upright again after a camera with a tilted horizon, or when another way is up.
+    /// Makes the horizon level again, after a tilted camera or a change of the up axis.
     pub(crate) fn level(&mut self) {
         let forward = self.goal.forward();
         if forward.cross(self.up).length() > 1e-3 {
@@ -298,19 +298,19 @@ impl Navigation {
         }
     }
 
-    /// How the view stands to the world, for the little axes: the view-space directions of world x, y and z.
+    /// View-space directions of the world's x, y and z axis, for the axes in the corner.
     pub(crate) fn world_axes_in_view(&self) -> [DVec3; 3] {
         let view_from_world = self.shown.world_from_view.inverse();
         [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| view_from_world * axis)
     }
 
-    /// World units that a picture's height covers at the pivot.
+    /// Height of the picture at the pivot, world units.
     pub(crate) fn height_at_pivot(&self) -> f64 {
         self.shown.distance * self.height_at_one()
     }
 }
 
-/// Looks along `forward` with `up` upward.
+/// The orientation that looks along `forward` with `up` upward.
 fn orientation(forward: DVec3, up: DVec3) -> DQuat {
     let forward = forward.try_normalize().unwrap_or(DVec3::Y);
     let right = forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());

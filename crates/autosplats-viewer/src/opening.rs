@@ -12,16 +12,16 @@ use crate::glance::{FOV_DEG, Frame, Glance};
 use crate::kept::Kept;
 use crate::loading::{Appearance, Input, JobId, News};
 
-/// Files whose names are kept.
+/// Number of recent inputs kept.
 const RECENT: usize = 12;
 
 impl App {
-    /// Begins to read something.
+    /// Opens an input with the default appearance.
     pub(crate) fn open(&mut self, input: Input) {
         self.open_as(input, Appearance::default());
     }
 
-    /// Begins to read something that is shown in a certain way.
+    /// Opens an input with an appearance.
     pub(crate) fn open_as(&mut self, input: Input, appearance: Appearance) {
         if !matches!(input.source, Source::Scene(..) | Source::StandardInput) {
             let kept = Kept::of(&input, Appearance::default());
@@ -45,7 +45,7 @@ impl App {
         self.appearances.insert(job, appearance);
     }
 
-    /// Opens what was open once, as it was read and played then.
+    /// Opens a stored input, read and played as before.
     pub(crate) fn open_again(&mut self, kept: Kept) {
         match kept.open(Path::new("")) {
             Ok((input, appearance)) => self.open_as(input, appearance),
@@ -53,19 +53,19 @@ impl App {
         }
     }
 
-    /// Keeps the name of what could not be read, for a session.
+    /// Remembers an input that could not be read, for the session.
     pub(crate) fn fail(&mut self, input: Input, appearance: Appearance) {
         self.forget_failure_of(&input);
         self.failed.push((input, appearance));
     }
 
-    /// What is opened anew may be read this time, and is in a session once.
+    /// Removes an input from the failed ones, since it is opened again and a session stores each input once.
     fn forget_failure_of(&mut self, input: &Input) {
         let name = Self::source_name(input);
         self.failed.retain(|(failed, _)| Self::source_name(failed) != name);
     }
 
-    /// Takes in what has been read, and what has changed.
+    /// Receives what has been read and which files have changed.
     pub(crate) fn follow_files(&mut self) {
         for (input, job, news) in self.loader.news() {
             match news {
@@ -89,7 +89,7 @@ impl App {
                     self.messages.error(why);
                     let reloads = self.reloads.contains_key(&job);
                     let appearance = self.forget_job(job);
-                    // What is read again is still there as it was.
+                    // A failed reload keeps the old points.
                     if !reloads {
                         self.fail(input, appearance);
                     }
@@ -106,8 +106,8 @@ impl App {
         changed.iter().for_each(|path| self.reload(path));
     }
 
-    /// Gives the points that have arrived to the layer of a job, which is made with the first of them. Undo takes none of this
-    /// back. Says which layer it is, unless the user has removed it meanwhile.
+    /// Puts the points of a job into its layer, which the first points create. Undo does not revert this. Returns the
+    /// layer, or `None` if the user has removed it.
     fn fill_layer(&mut self, input: &Input, job: JobId, cloud: &Arc<PointCloud>, glance: Glance) -> Option<LayerId> {
         let id = match self.loading.get(&job).copied() {
             Some(id) if self.document().layer(id).is_none() => {
@@ -134,11 +134,11 @@ impl App {
         Some(id)
     }
 
-    /// Puts the first points of an input into the list, and stands where they are seen if they are the first of all.
+    /// Adds the layer of an input. The camera moves to show the points if they are the first ones.
     pub(crate) fn add_layer(&mut self, layer: Layer, input: &Input, glance: Glance) -> LayerId {
         let first = self.document().layers.is_empty();
         let id = layer.id;
-        // Those of layers that undo no longer brings back are not asked for any more.
+        // Forgets the inputs of layers that undo can no longer bring back.
         self.inputs.retain(|&known, _| self.history.holds(known));
         self.inputs.insert(id, input.clone());
         self.settle(|document| {
@@ -152,7 +152,8 @@ impl App {
         id
     }
 
-    /// After the points of a layer have changed: stands where all is seen, if that is asked for or nobody has moved.
+    /// Updates the view after the points of a layer have changed. The camera moves if `fitted`, or if the user has not
+    /// moved it yet.
     fn look_anew(&mut self, id: LayerId, glance: Glance, fitted: bool) {
         if self.document().layers.first().is_some_and(|layer| layer.id == id) {
             self.guessed_axes = Some(glance.axes);
@@ -171,7 +172,7 @@ impl App {
         }
     }
 
-    /// Takes the layer of a job away that will not be read to its end. Says how it was, or was to be, seen.
+    /// Removes the layer of a job that will not be finished. Returns the appearance of the layer, or the intended one.
     fn forget_job(&mut self, job: JobId) -> Appearance {
         self.reloads.remove(&job);
         let mut appearance = self.appearances.remove(&job).unwrap_or_default();
@@ -186,7 +187,7 @@ impl App {
         appearance
     }
 
-    /// Gives up a layer that is still being read or played.
+    /// Cancels a layer that is still being read or played.
     pub(crate) fn give_up(&mut self, id: LayerId) {
         if self.playing.stop(id) {
             self.settle(|document| {
@@ -200,7 +201,7 @@ impl App {
         }
     }
 
-    /// Shows what a file has now. Edits that were made while it was read are of the points before.
+    /// Shows the new points of a file. Edits made meanwhile apply to the old points, so that the new ones are dropped.
     fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: Glance) {
         if self.history.is_unsaved(id) {
             self.messages.note(format!("{} has changed; what was read is not shown, as it has edits here", input.name));
@@ -211,7 +212,7 @@ impl App {
         }
     }
 
-    /// Reads a file again that has changed.
+    /// Reads the layers of a changed file again.
     fn reload(&mut self, path: &Path) {
         let whole = |layer: &&Layer| !layer.incomplete || self.playing.shows(layer.id);
         let layers = self.document().layers.iter().filter(|layer| layer.path.as_deref() == Some(path)).filter(whole);
@@ -219,7 +220,8 @@ impl App {
         ids.into_iter().for_each(|id| self.reload_layer(id));
     }
 
-    /// Reads the file of an input again; one with edits is only told about, as they are of the points it had.
+    /// Reads the input of a layer again. A layer with unsaved edits is kept, with a note, since the edits apply to the
+    /// old points.
     pub(crate) fn reload_layer(&mut self, id: LayerId) {
         let Some(input) = self.inputs.get(&id).cloned() else { return };
         if self.history.is_unsaved(id) {
@@ -230,14 +232,14 @@ impl App {
             self.play_anew(id, input);
             return;
         }
-        // A file that keeps changing is read once more, not once for each change.
+        // A file that keeps changing cancels its earlier reload.
         let before: Vec<JobId> = self.reloads.iter().filter(|(_, layer)| **layer == id).map(|(&job, _)| job).collect();
         before.into_iter().for_each(|job| self.loader.cancel(job));
         let job = self.loader.read(input);
         self.reloads.insert(job, id);
     }
 
-    /// What an input was called when it was opened, as it could be typed.
+    /// Name of an input's source, as a user could type it.
     pub(crate) fn source_name(input: &Input) -> String {
         match &input.source {
             Source::File(path) | Source::Recording(path) => {
@@ -249,23 +251,23 @@ impl App {
         }
     }
 
-    /// Stands at a place whatever is opened.
+    /// Places the camera; the first input then does not move it.
     pub(crate) fn stand_at(&mut self, camera: &Camera) {
         self.navigation.go_to(camera, true);
         self.camera_given = true;
     }
 
-    /// What the first picture depends on besides points.
+    /// What the first view depends on besides the points.
     pub(crate) fn frame(&self) -> Frame {
         Frame { aspect: self.aspect, up: self.up_axis }
     }
 
-    /// What was seen at the first glance, if that is all there is and nothing has been done since.
+    /// The first look at the only input, if the document has not changed since.
     fn glance(&self) -> Option<&Glance> {
         self.glance.as_ref().filter(|(version, _)| *version == self.version).map(|(_, glance)| glance)
     }
 
-    /// Tells the navigation how large everything is.
+    /// Passes the extent of the document and the up axis to the navigation.
     pub(crate) fn measure_scene(&mut self) {
         let bounds = self.glance().map_or_else(|| self.document().shown_bounds(), |glance| glance.bounds);
         let up = self.up();
@@ -274,12 +276,12 @@ impl App {
         }
     }
 
-    /// Whether nobody has moved since the program chose where to stand.
+    /// Whether the user has not moved since the program chose the camera.
     pub(crate) fn stands_by_itself(&self) -> bool {
         self.first_camera.is_some_and(|(camera, _)| camera == self.navigation.goal_camera())
     }
 
-    /// Stands where a picture of the first input stands that names no camera.
+    /// Moves to the first view: that of the scene, or the one that a render without a camera uses.
     pub(crate) fn first_view(&mut self) {
         let scene = match self.document().layers.as_slice() {
             [only] => self.inputs.get(&only.id).and_then(|input| match &input.source {
@@ -325,7 +327,7 @@ impl App {
         }
     }
 
-    /// Stands where all points of a cloud are seen, looking the same way.
+    /// Moves the camera to show all points of a cloud, in the same direction.
     pub(crate) fn fit(&mut self, cloud: &PointCloud) {
         self.measure_scene();
         match self.navigation.goal_camera().showing(cloud, self.aspect) {

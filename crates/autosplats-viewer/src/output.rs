@@ -1,4 +1,4 @@
-//! What is written: pictures, one or many.
+//! Writes pictures and films.
 
 use std::path::PathBuf;
 
@@ -10,20 +10,20 @@ use crate::recording::Recording;
 use crate::render::Task;
 use crate::threads::spawn;
 
-/// What a picture of any size is made for.
+/// What a rendered picture is for.
 pub(crate) enum Goal {
     /// A file.
     File(PathBuf),
-    /// The film in the making, if it is still the one with this number.
+    /// A picture of the film with this number.
     Film(u64),
 }
 
-/// Does with a picture what it was made for.
+/// Hands a picture to its goal.
 pub(crate) fn photographed(app: &mut App, picture: Image, range: Option<[f64; 2]>, goal: Goal) {
     match goal {
         Goal::File(path) => save_picture(app, picture, path),
         Goal::Film(number) => {
-            // One that was stopped may have left a picture in work.
+            // A stopped film may have left a picture in work.
             if let Some(recording) = app.recording.as_mut().filter(|recording| recording.number == number) {
                 recording.arrived(picture, range);
             }
@@ -31,7 +31,7 @@ pub(crate) fn photographed(app: &mut App, picture: Image, range: Option<[f64; 2]
     }
 }
 
-/// Writes a picture beside the window, and says so.
+/// Writes a picture on a thread of its own and reports the result.
 pub(crate) fn save_picture(app: &mut App, picture: Image, path: PathBuf) {
     let messages = app.messages.sender();
     spawn("picture", move || {
@@ -43,7 +43,7 @@ pub(crate) fn save_picture(app: &mut App, picture: Image, path: PathBuf) {
     });
 }
 
-/// Goes on with the film in the making.
+/// Continues the film in progress.
 pub(crate) fn record(app: &mut App) {
     let Some(recording) = &mut app.recording else { return };
     if let Some(result) = recording.ended() {
@@ -65,7 +65,7 @@ pub(crate) fn record(app: &mut App) {
     }
 }
 
-/// Stops the film in the making.
+/// Stops the film in progress.
 pub(crate) fn stop(recording: &mut Option<Recording>) {
     if let Some(recording) = recording {
         recording.stop();

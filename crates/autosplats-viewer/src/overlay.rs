@@ -1,18 +1,18 @@
-//! What lies discreetly over the picture: a scale bar and the directions of the axes.
+//! The overlay of the picture: a scale bar and the directions of the axes.
 
 use eframe::egui::{self, Color32, Stroke};
 
 use crate::app::App;
 use crate::tools::ruler;
 
-/// Red, green and blue of the axes, that colour-blind people can tell apart by brightness.
+/// Red, green and blue of the axes, with brightnesses that differ for colour-blind users.
 const AXES: [(&str, Color32); 3] = [
     ("X", Color32::from_rgb(235, 95, 85)),
     ("Y", Color32::from_rgb(150, 205, 90)),
     ("Z", Color32::from_rgb(95, 150, 255)),
 ];
 
-/// Draws both.
+/// Draws the axes and the scale bar.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect) {
     if app.shot.is_none() {
         return;
@@ -25,7 +25,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect) {
 fn axes(app: &App, painter: &egui::Painter, rect: egui::Rect) {
     let middle = rect.right_bottom() + egui::vec2(-46.0, -46.0);
     let mut axes: Vec<_> = app.navigation.world_axes_in_view().into_iter().zip(AXES).collect();
-    // What points away is drawn first.
+    // Axes that point away are drawn first.
     axes.sort_by(|(a, _), (b, _)| b.z.total_cmp(&a.z));
     for (axis, (name, color)) in axes {
         let end = middle + egui::vec2(axis.x as f32, axis.y as f32) * 28.0;
@@ -61,7 +61,7 @@ fn scale_bar(app: &App, painter: &egui::Painter, rect: egui::Rect) {
     }
 }
 
-/// The next smaller number of the kind 1, 2, 5, 10, 20 …
+/// The largest number of the form 1, 2, 5, 10, 20 … that is at most `length`.
 pub(crate) fn round(length: f64) -> f64 {
     let power = 10f64.powf(length.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|step| step * power).find(|&step| step <= length * 1.000_001).unwrap_or(power)

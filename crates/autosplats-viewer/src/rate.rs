@@ -1,22 +1,22 @@
-//! How many pictures a second there are.
+//! The frame rate.
 
 use crate::render::Picture;
 
-/// Pictures a second, while they change.
+/// Measures pictures per second while the picture changes.
 #[derive(Default)]
 pub(crate) struct Rate {
     last: Option<f64>,
     /// Mean seconds between pictures; 0 while unknown.
     interval: f64,
-    /// The last pictures' times per stage, for the plot.
+    /// Times per stage of the last pictures, for the plot.
     pub(crate) timings: std::collections::VecDeque<autosplats::Timings>,
 }
 
 impl Rate {
-    /// Pictures kept for the plot.
+    /// Number of pictures in the plot.
     const KEPT: usize = 120;
 
-    /// There is another picture.
+    /// Counts a picture at time `now`, seconds.
     pub(crate) fn count(&mut self, now: f64, picture: &Picture) {
         if let Some(last) = self.last {
             let interval = now - last;
@@ -34,7 +34,7 @@ impl Rate {
         self.timings.push_back(picture.timings);
     }
 
-    /// Pictures a second, if they follow each other.
+    /// Pictures per second; `None` after a pause.
     pub(crate) fn per_second(&self) -> Option<f64> {
         (self.interval > 0.0).then(|| 1.0 / self.interval)
     }

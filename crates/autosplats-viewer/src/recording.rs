@@ -1,8 +1,9 @@
-//! Films in the making.
+//! Recording of films.
 //!
 //! # How it works
-//! The render thread is asked for one picture after the other, so that the window goes on in between; a thread of its own
-//! writes them, as PNG files or to ffmpeg, which makes a film. Everything is as it was when the film began but for the eye and,
+//! The render thread is asked for one picture at a time, so that the window stays usable. A thread of its own writes
+//! the pictures as PNG files, or sends them to ffmpeg for a film. Everything stays as at the start of the film, except
+//! the camera and, where time runs, the points that a [`Reel`] reads.
 //! where time runs, the points that a [`Reel`] reads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -17,36 +18,36 @@ use crate::playing::Reel;
 use crate::render::Wish;
 use crate::threads::spawn;
 
-/// Pictures that wait to be written.
+/// Pictures that may wait for the writer.
 const QUEUE: usize = 3;
 
-/// How many recordings there have been.
+/// Number of recordings started so far.
 static RECORDINGS: AtomicU64 = AtomicU64::new(0);
 
-/// A film in the making.
+/// A film in progress.
 pub(crate) struct Recording {
-    /// Which one it is: no other has the same number.
+    /// Unique number of the recording.
     pub(crate) number: u64,
-    /// What the last picture showed, and the next will but for what moves.
+    /// The request for the last picture; the next one differs by camera and moving points only.
     wish: Wish,
-    /// Of each picture.
+    /// One camera per picture.
     cameras: Vec<Camera>,
-    /// Where time runs.
+    /// Source of the moving points, where time runs.
     reel: Option<Reel>,
-    /// Picture that is asked for next.
+    /// Index of the next picture.
     next: usize,
-    /// To the thread that writes.
+    /// Channel to the writer.
     pictures: Option<SyncSender<Image>>,
-    /// One that the writer had no room for yet.
+    /// A picture that the writer had no room for.
     waiting: Option<Image>,
-    /// Whether a picture is being made.
+    /// Whether a picture is being rendered.
     asked: bool,
     result: Receiver<Result<String, String>>,
 }
 
 impl Recording {
-    /// Begins to write pictures of what `wish` shows, seen by `cameras`, so many a second, to `target`. With a `reel` time
-    /// runs.
+    /// Starts a film of the scene in `wish`, with one picture per camera, at `rate` pictures per second, into `target`.
+    /// With a `reel`, time runs.
     pub(crate) fn start(
         wish: Wish,
         cameras: Vec<Camera>,
@@ -74,15 +75,15 @@ impl Recording {
         Self { number, wish, cameras, reel, next: 0, pictures: Some(pictures), waiting: None, asked: false, result }
     }
 
-    /// Part that is done, 0 to 1.
+    /// Progress, 0 to 1.
     pub(crate) fn fraction(&self) -> f32 {
         self.next as f32 / self.cameras.len().max(1) as f32
     }
 
-    /// The picture to be made now, if it is time.
+    /// The request for the next picture; `None` while one is in work, or when all are done.
     ///
     /// # Errors
-    /// Why there will be no more pictures.
+    /// Why there are no more pictures.
     pub(crate) fn wanted(&mut self) -> Result<Option<Wish>, String> {
         if let Some(image) = self.waiting.take() {
             self.hand_over(image);
@@ -91,7 +92,7 @@ impl Recording {
             return Ok(None);
         }
         let Some(&camera) = self.cameras.get(self.next) else {
-            // The writer ends when nobody can send any more.
+            // The writer ends when the channel closes.
             self.stop();
             return Ok(None);
         };
@@ -105,11 +106,11 @@ impl Recording {
         Ok(Some(self.wish.clone()))
     }
 
-    /// Takes in the picture that was wanted, and the range of values that its colours are of.
+    /// Takes a finished picture and the value range of its colours.
     pub(crate) fn arrived(&mut self, image: Image, range: Option<[f64; 2]>) {
         self.asked = false;
         if self.next == 1 {
-            // The same colours mean the same in all pictures.
+            // All pictures keep the range of the first one.
             let range = range.map(|ends| ends.map(|end| end as f32)).filter(|[low, high]| low < high);
             let known = &mut self.wish.settings.shading.range;
             *known = known.or(range);
@@ -126,18 +127,18 @@ impl Recording {
         }
     }
 
-    /// Makes no more pictures.
+    /// Stops; no further pictures are rendered.
     pub(crate) fn stop(&mut self) {
         (self.pictures, self.reel) = (None, None);
     }
 
-    /// How it ended, once it has: what was written, or why not.
+    /// The result, once the film has ended: what was written, or why nothing was.
     pub(crate) fn ended(&self) -> Option<Result<String, String>> {
         self.result.try_recv().ok()
     }
 }
 
-/// Writes PNG files; those complete stay if the rest is not wanted any more.
+/// Writes PNG files. After a stop, the complete files stay.
 fn write_frames(
     queue: &Receiver<Image>,
     frames: &Frames,
@@ -160,7 +161,7 @@ fn write_frames(
     }
 }
 
-/// Makes a film, which appears complete or not at all.
+/// Writes a film, which appears complete or not at all.
 fn write_film(
     queue: &Receiver<Image>,
     mut film: Film,

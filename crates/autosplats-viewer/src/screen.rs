@@ -1,5 +1,5 @@
-//! Puts the picture into the window, by a pass of its own that reads one texture once a pixel: what egui draws its panels with
-//! takes several times as long for that, which counts where the window is drawn by the processor.
+//! Draws the picture into the window by a pass of its own, which reads one texture once per pixel. egui's own image
+//! drawing takes several times as long, which counts where the CPU draws the window.
 
 use std::sync::Arc;
 
@@ -7,12 +7,12 @@ use autosplats::Image;
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
 use eframe::{egui, wgpu};
 
-/// A picture to be shown.
+/// A picture to draw.
 pub(crate) struct OnScreen {
     pub(crate) image: Arc<Image>,
-    /// Enlarged without blending.
+    /// Whether to enlarge without blending.
     pub(crate) sharp: bool,
-    /// Of the window's pixels.
+    /// Pixel format of the window.
     pub(crate) format: wgpu::TextureFormat,
 }
 
@@ -75,7 +75,7 @@ impl OnScreen {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            // What the window converts on the way out is converted on the way in.
+            // An sRGB window converts linear values on output, so the texture converts on input.
             format: if self.format.is_srgb() {
                 wgpu::TextureFormat::Rgba8UnormSrgb
             } else {

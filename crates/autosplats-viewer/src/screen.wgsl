@@ -1,9 +1,9 @@
-// The picture, stretched over the viewport.
+// Draws the picture into the viewport. Reads the texture of the picture, writes the colour target of the window.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
 @group(0) @binding(1) var picture_sampler: sampler;
 
-/// What is seen through a picture that has no ground.
+/// Background colour where the picture is transparent.
 const GROUND: vec3f = vec3f(0.17, 0.19, 0.215);
 
 struct Corner {
@@ -11,7 +11,7 @@ struct Corner {
     @location(0) place: vec2f,
 }
 
-/// One triangle that covers all.
+/// One triangle that covers the whole viewport.
 @vertex
 fn corner(@builtin(vertex_index) index: u32) -> Corner {
     let place = vec2f(f32((index << 1u) & 2u), f32(index & 2u));

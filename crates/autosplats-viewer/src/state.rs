@@ -1,4 +1,4 @@
-//! A session in a file: what is open and how it is seen, to be had again.
+//! A session in a file: what is open and how it is shown.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::loading::Appearance;
 use crate::look::Look;
 use crate::playing::Clock;
 
-/// Everything but the points and what was done to them, which is exported.
+/// A session. Points and edits are not part of it; they are saved by exporting.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct State {
@@ -22,16 +22,16 @@ pub(crate) struct State {
     camera: Option<Camera>,
     up: Option<Up>,
     look: Look,
-    /// Cameras that a film goes through.
+    /// Key cameras of a film.
     keys: Vec<Camera>,
     #[serde(skip_serializing_if = "Option::is_none")]
     clip: Option<ClipBox>,
-    /// Where what moves stands, and how it goes on.
+    /// Time, speed and range of the playing inputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     clock: Option<Clock>,
 }
 
-/// Which way is up.
+/// The up axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Up {
     #[serde(rename = "z_up")]
@@ -43,7 +43,7 @@ enum Up {
 }
 
 impl State {
-    /// What is open in `app`, or was to be.
+    /// The session of `app`. It includes inputs that are still to be read.
     pub(crate) fn of(app: &App) -> Self {
         let layers = app.document().layers.iter().filter_map(|layer| {
             let appearance = Appearance { visible: layer.visible, tint: layer.tint };
@@ -51,14 +51,14 @@ impl State {
             kept.pose = layer.pose;
             Some(kept)
         });
-        // What could not be read this time, or is still being read, is no less a part of the session.
+        // Inputs that failed, or are still being read, belong to the session too.
         let started = |id| app.loading.contains_key(&id) || app.reloads.contains_key(&id);
         let read = app.loader.jobs().iter().filter(|job| !started(job.id));
         let read = read.map(|job| (&job.input, app.appearances.get(&job.id).copied().unwrap_or_default()));
         let waiting = app.playing.waiting().map(|waiting| (waiting.input, waiting.appearance));
         let failed = app.failed.iter().map(|(input, appearance)| (input, *appearance));
         let absent = read.chain(waiting).chain(failed).map(|(input, appearance)| Kept::of(input, appearance));
-        // What came through a pipe cannot be had again.
+        // Points from a pipe cannot be read again.
         let again = |kept: &Kept| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
         let inputs: Vec<Kept> = layers.chain(absent).filter(again).collect();
         let up = app.up_axis.map(|axes| match axes {
@@ -77,13 +77,13 @@ impl State {
         }
     }
 
-    /// Reads a state.
+    /// Reads a session.
     ///
     /// # Errors
-    /// What is wrong with the file, by its name and place.
+    /// A message with the file's name and what is wrong.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        // An empty list would pass for a state of which everything is missing.
+        // Only an object is accepted: an empty list would deserialize as a session of defaults.
         let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
             .and_then(|fields| serde_json::from_value::<Self>(fields.into()))
             .map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
@@ -103,10 +103,10 @@ impl State {
         Ok(state)
     }
 
-    /// Writes the state.
+    /// Writes the session.
     ///
     /// # Errors
-    /// Why it could not be written, with the file's name.
+    /// A message with the file's name and why writing failed.
     pub(crate) fn write(&self, path: &Path) -> Result<(), String> {
         files::write(path, |writer| {
             serde_json::to_writer_pretty(&mut *writer, self).map_err(std::io::Error::other)?;
@@ -115,7 +115,7 @@ impl State {
         .map_err(|error| format!("{}: {error}", path.display()))
     }
 
-    /// Opens what the state has; paths are from `folder`.
+    /// Opens what the session holds. Relative paths are resolved against `folder`.
     pub(crate) fn restore(self, app: &mut App, folder: &Path) {
         let Self { inputs, camera, up, look, keys, clip, clock } = self;
         app.look = look;
@@ -135,7 +135,7 @@ impl State {
         for kept in inputs {
             match kept.open(folder) {
                 Ok((input, appearance)) => {
-                    // Named when the program was started, too.
+                    // Inputs named on the command line may be in the session too.
                     let name = App::source_name(&input);
                     let named = app.loader.jobs().iter().any(|job| App::source_name(&job.input) == name);
                     if !named && !app.playing.has(&name) {
@@ -151,7 +151,7 @@ impl State {
     }
 }
 
-/// The folder that a state's paths are from.
+/// The folder that a session's relative paths start from.
 pub(crate) fn folder(path: &Path) -> PathBuf {
     path.parent().map_or_else(PathBuf::new, Path::to_path_buf)
 }
@@ -201,7 +201,7 @@ mod tests {
         kept.write(&path).expect("written");
         let mut second = app();
         State::read(&path).expect("read").restore(&mut second, folder.path());
-        // Turns are kept as another kind of number, which rounds.
+        // The navigation keeps orientations as quaternions, whose conversion rounds.
         let without = |state: State| State { camera: None, ..state };
         let kept = without(kept);
         assert_eq!(without(State::of(&second)), kept, "what was still to be read is no less a part of it");

@@ -9,22 +9,22 @@ use crate::look::Look;
 const LOOK: &str = "look";
 const RECENT: &str = "recent";
 
-/// Keeps the look, and what was opened last with how it is read and played.
+/// Stores the look and the recent inputs, with how these are read and played.
 pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
     let mut look = app.look.clone();
-    // The range of one file's values is not that of another's, nor is what its colours need.
+    // Value range and exposure belong to one file's values and colours.
     look.settings.shading.range = None;
     look.settings.shading.exposure = None;
     eframe::set_value(storage, LOOK, &look);
     eframe::set_value(storage, RECENT, &app.recent);
 }
 
-/// What was kept, as far as this version understands it.
+/// Loads what was stored. Values that this version does not understand become defaults.
 pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> (Look, Vec<Kept>) {
     let Some(storage) = storage else { return (Look::default(), Vec::new()) };
     let look: Look = eframe::get_value(storage, LOOK).unwrap_or_default();
     let look = if look.settings.check().is_ok() { look } else { Look::default() };
-    // Versions before kept the paths of files alone.
+    // Older versions stored paths only.
     let paths = || eframe::get_value::<Vec<PathBuf>>(storage, RECENT).unwrap_or_default();
     let recent = eframe::get_value(storage, RECENT)
         .unwrap_or_else(|| paths().iter().map(|path| Kept::named(path.display().to_string())).collect());

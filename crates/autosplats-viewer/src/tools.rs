@@ -1,4 +1,4 @@
-//! What the left button does besides turning the view: points are inspected, measured and selected.
+//! What the left button does besides turning the view: inspecting, measuring and selecting points.
 
 use eframe::egui::{self, Color32, Pos2, Stroke};
 
@@ -10,24 +10,24 @@ use crate::measure::{Ruler, angle_text};
 use crate::render::{Purpose, Seen, Task};
 use autosplats::cloud::glam::DVec3;
 
-/// Points a brush is wide at first, screen points.
+/// Initial radius of the brush, screen points.
 const BRUSH: f32 = 24.0;
 
-/// What the tools have in work.
+/// State of the tools.
 pub(crate) struct Tools {
-    /// The way of the pointer since the button went down, screen points.
+    /// Path of the pointer since the button went down, screen points.
     way: Vec<Pos2>,
-    /// Whether the drag was given up; the button may still be down.
+    /// Whether the drag was cancelled; the button may still be down.
     given_up: bool,
     /// Radius of the brush, screen points.
     pub(crate) brush: f32,
-    /// Selects what is behind the surface, too.
+    /// Whether to select points behind the surface too.
     pub(crate) through: bool,
-    /// The point that was asked about.
+    /// The inspected point.
     pub(crate) inspected: Option<PickedPoint>,
-    /// Corners of the measurement.
+    /// Corners of the measurement, world coordinates.
     pub(crate) measured: Vec<DVec3>,
-    /// Handles in the picture.
+    /// The handles in the picture.
     pub(crate) gizmo: Gizmo,
 }
 
@@ -46,13 +46,13 @@ impl Default for Tools {
 }
 
 impl Tools {
-    /// As if the pointer had gone this way.
+    /// Extends the pointer's path, for tests.
     #[cfg(test)]
     pub(crate) fn draw(&mut self, way: &[Pos2]) {
         self.way.extend_from_slice(way);
     }
 
-    /// Gives up what is being drawn, for as long as the button stays down; says whether there was anything.
+    /// Cancels the drawing until the button is released. Returns whether there was any.
     pub(crate) fn cancel_drag(&mut self) -> bool {
         let any = !self.way.is_empty();
         self.given_up |= any;
@@ -60,7 +60,7 @@ impl Tools {
         any
     }
 
-    /// Gives up what is being done; says whether there was anything.
+    /// Cancels what the tool is doing. Returns whether there was anything.
     pub(crate) fn cancel(&mut self) -> bool {
         let any = self.cancel_drag() || self.inspected.is_some() || !self.measured.is_empty();
         self.inspected = None;
@@ -69,14 +69,14 @@ impl Tools {
     }
 }
 
-/// Selection by a drag with the left button, or by a click of the brush.
+/// Selects by a drag with the left button, or by a click of the brush.
 pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
     let Some(place) = response.interact_pointer_pos() else { return };
     let modifiers = response.ctx.input(|input| input.modifiers);
     if response.drag_started_by(egui::PointerButton::Primary) {
         app.tools.given_up = false;
         app.tools.way.clear();
-        // The pointer has moved already when a drag is known to be one.
+        // The pointer has already moved when a drag is recognized.
         let start = response.ctx.input(|input| input.pointer.press_origin());
         app.tools.way.extend(start);
     }
@@ -113,7 +113,7 @@ pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
 }
 
 impl App {
-    /// A point was found where somebody clicked.
+    /// Receives the point under a click.
     pub(crate) fn picked(&mut self, purpose: Purpose, point: Option<Seen>) {
         let Some(seen) = point else {
             if purpose == Purpose::Inspect {
@@ -124,7 +124,7 @@ impl App {
         let described = self.document().describe(&seen.shown, seen.index);
         match (purpose, described) {
             (Purpose::Inspect, described) => self.tools.inspected = described,
-            // The second click of a double one meets the same point.
+            // The second click of a double click hits the same point.
             (Purpose::Measure, Some(described)) if self.tools.measured.last() != Some(&described.position) => {
                 self.tools.measured.push(described.position);
             }
@@ -133,7 +133,7 @@ impl App {
     }
 }
 
-/// Draws what the tools have in work over the picture.
+/// Draws the state of the tools over the picture.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
     let painter = ui.painter_at(rect);
     let accent = Color32::from_rgb(255, 160, 40);
@@ -204,7 +204,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
     }
 }
 
-/// Measures in the unit of what is open.
+/// A ruler in the units of the first layer.
 pub(crate) fn ruler(app: &App) -> Ruler {
     let layers = &app.document().layers;
     let crs = layers.first().map(|layer| layer.cloud.crs().clone()).unwrap_or_default();

@@ -1,32 +1,32 @@
-//! Windows that are drawn by a program on the processor, for want of a graphics card, and pictures that are made there too.
+//! For windows drawn by the CPU, for want of a graphics card, while the CPU renders the pictures too.
 //!
-//! Both at once take twice as long each, and a window is asked to draw itself for every twitch of the mouse. So while the view
-//! moves they take turns: a frame of the window waits for the picture that it has asked for, no longer than a picture may
-//! take, and shows that one.
+//! Window and picture slow each other down when drawn at once, and every mouse event asks for a new window frame. So
+//! they take turns while the view moves. A window frame waits for the picture that it has requested, up to a limit, and
+//! shows that picture.
 
 use std::time::{Duration, Instant};
 
-/// The window's turn and the picture's.
+/// Timing of the window's turn and the picture's turn.
 #[derive(Debug, Default)]
 pub(crate) struct Turns {
-    /// When the picture's turn ended.
+    /// Time when the picture's turn ended.
     ended: Option<Instant>,
     /// Mean milliseconds of the window's turn; 0 while unknown.
     window_ms: f64,
 }
 
 impl Turns {
-    /// A longer pause is not the window's work.
+    /// A turn longer than this is a pause, milliseconds.
     const PAUSE_MS: f64 = 200.0;
-    /// Share of the time that pictures are left at least.
+    /// Smallest share of the time that is left to pictures.
     const LEAST: f64 = 0.4;
 
-    /// What is left for a picture of the milliseconds that both may take together.
+    /// Milliseconds for a picture, given the time for window and picture together.
     pub(crate) fn budget_ms(&self, both_ms: f64) -> f64 {
         (both_ms - self.window_ms).max(Self::LEAST * both_ms)
     }
 
-    /// The window's turn is over.
+    /// Ends the window's turn and starts the picture's.
     pub(crate) fn begin(&mut self) {
         let spent = self.ended.map(|ended| ended.elapsed().as_secs_f64() * 1e3);
         if let Some(spent) = spent.filter(|&spent| spent < Self::PAUSE_MS) {
@@ -34,18 +34,18 @@ impl Turns {
         }
     }
 
-    /// How long the picture's turn may last: half as long again as it should, as no two pictures take the same time.
+    /// Time limit of the picture's turn: 1.5 times its budget, since render times vary.
     pub(crate) fn longest(&self, both_ms: f64) -> Duration {
         Duration::from_secs_f64(1.5e-3 * self.budget_ms(both_ms))
     }
 
-    /// The picture's turn is over.
+    /// Ends the picture's turn and starts the window's.
     pub(crate) fn end(&mut self) {
         self.ended = Some(Instant::now());
     }
 }
 
-/// Whether the device that draws the window is a program on the processor.
+/// Whether the device that draws the window is a software device on the CPU.
 pub(crate) fn are_taken(creation: &eframe::CreationContext<'_>) -> bool {
     let device = creation.wgpu_render_state.as_ref();
     device.is_some_and(|state| state.adapter.get_info().device_type == eframe::wgpu::DeviceType::Cpu)

@@ -1,4 +1,4 @@
-//! The picture in the window, and what the mouse does to it.
+//! The picture in the window, and what the mouse does there.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use crate::render::Purpose;
 use crate::screen::OnScreen;
 use crate::{gizmo, legend, overlay, tools};
 
-/// How much closer one line of a mouse wheel goes.
+/// Zoom per point scrolled: natural logarithm of the factor.
 const WHEEL: f64 = 0.0024;
 
-/// Shows the picture and lets it be moved.
+/// Shows the picture and handles the mouse.
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
         let rect = ui.available_rect_before_wrap();
@@ -54,7 +54,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     });
 }
 
-/// What an empty window says.
+/// Shows the welcome of an empty window.
 fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
     let mut chosen = None;
     let middle = egui::Rect::from_center_size(rect.center(), egui::vec2(360.0_f32.min(rect.width()), 320.0));
@@ -84,7 +84,7 @@ fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
     }
 }
 
-/// What the pointer does; says whether the view is in its hands.
+/// Handles the pointer. Returns whether the pointer moves the view.
 fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     if gizmo::handle(app, response, size) {
         return true;
@@ -92,7 +92,7 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     let rect = response.rect;
     let context = &response.ctx;
     let modifiers = context.input(|input| input.modifiers);
-    // What the pointer went before it was known to drag belongs to the drag.
+    // The way of the pointer before the drag was recognized belongs to the drag.
     let dragged = response.total_drag_delta().unwrap_or_default();
     let drag = if response.dragged() { dragged - app.panels.dragged } else { egui::Vec2::ZERO };
     app.panels.dragged = dragged;
@@ -101,7 +101,7 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     if response.drag_started() {
         let pressed = context.input(|input| input.pointer.press_origin()).or(response.interact_pointer_pos());
         app.panels.grabbed = pressed.and_then(|place| under(app, rect, place)).map(|(_, depth)| depth);
-        // Whatever had the keyboard lets go of it, so that keys fly.
+        // Takes the keyboard focus from any control, so that keys fly.
         response.request_focus();
         response.surrender_focus();
     }
@@ -169,21 +169,21 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     busy
 }
 
-/// Where a turn of the wheel began.
+/// The start of a turn of the wheel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Zoomed {
-    /// Of its last click, seconds.
+    /// Time of the last click of the wheel, seconds.
     time: f64,
     place: egui::Pos2,
     world: DVec3,
 }
 
-/// What a wheel goes to: as long as it turns and the pointer stays, to what was under that at first. Pictures made on the way
-/// lag behind, and a GPU hands out no depths with them.
+/// The point that a wheel zooms to: the one under the pointer when the turn began, while the wheel turns and the
+/// pointer stays. Pictures rendered meanwhile lag behind, and a GPU's moving pictures have no depths.
 fn zoom_target(app: &mut App, context: &egui::Context, rect: egui::Rect, place: egui::Pos2) -> Option<DVec3> {
     /// Longest pause between clicks of one turn, seconds.
     const PAUSE: f64 = 0.4;
-    /// Furthest that the pointer trembles, screen points.
+    /// Largest movement of the pointer that counts as staying, screen points.
     const TREMBLE: f32 = 3.0;
     let time = context.input(|input| input.time);
     let last = app.panels.zoomed.filter(|last| time - last.time < PAUSE && last.place.distance(place) < TREMBLE);
@@ -192,8 +192,8 @@ fn zoom_target(app: &mut App, context: &egui::Context, rect: egui::Rect, place: 
     world
 }
 
-/// Whether what scrolls is fingers on a touchpad, by the last event that tells. Where the system does not say, they are known
-/// by scrolling in pixels; X11 has lines for both.
+/// Whether fingers on a touchpad scroll, by the last event that tells. Where the system does not name the source,
+/// scrolling in pixels means fingers; X11 scrolls in lines for both.
 fn by_fingers(events: &[egui::Event]) -> Option<bool> {
     events.iter().rev().find_map(|event| match event {
         egui::Event::MouseWheel { source: MouseWheelSource::Trackpad | MouseWheelSource::Momentum, .. } => Some(true),
@@ -203,8 +203,8 @@ fn by_fingers(events: &[egui::Event]) -> Option<bool> {
     })
 }
 
-/// The place in the world under a place of the window and its depth: of the surface where there is one, else as far away
-/// as the pivot.
+/// World position and depth under a position in the window: on the surface where there is one, else at the depth of the
+/// pivot.
 fn under(app: &App, rect: egui::Rect, place: egui::Pos2) -> Option<(DVec3, f64)> {
     let share =
         DVec2::new(((place.x - rect.left()) / rect.width()).into(), ((place.y - rect.top()) / rect.height()).into());
