@@ -1,15 +1,15 @@
-//! How far away what is seen is, coarsely: for a wheel or a drag that cannot wait.
+//! Coarse depths of a picture, for a wheel or a drag that cannot wait for the renderer.
 
 use autosplats::cloud::glam::{DVec2, DVec3};
 use autosplats::{Camera, GBuffer};
 
-/// Every so many pixels one is kept, in both directions.
+/// Stride of the kept pixels, in both directions.
 const STEP: usize = 4;
 
-/// Depths of every fourth pixel of a picture.
+/// Depths of every fourth pixel of a picture, in both directions.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Depths {
-    /// Of the picture.
+    /// Size of the picture, pixels.
     size: [u32; 2],
     columns: usize,
     rows: usize,
@@ -17,7 +17,7 @@ pub(crate) struct Depths {
 }
 
 impl Depths {
-    /// Those of a picture; none if it does not have its layers.
+    /// The depths of a picture; empty if `layers` has none.
     pub(super) fn new(layers: &GBuffer) -> Self {
         let size = [layers.width, layers.height];
         if layers.depth.is_empty() {
@@ -29,8 +29,8 @@ impl Depths {
         Self { size, columns, rows, depths }
     }
 
-    /// The place in the world that is seen at a place of a picture taken by `camera`, each coordinate 0 to 1, or next to
-    /// it; `None` where nothing is.
+    /// World position of the surface at `place` in a picture taken by `camera`. `place` is in shares of the picture's
+    /// sides, 0 to 1. If the pixel is empty, its eight kept neighbours are tried; `None` if all are empty.
     pub(crate) fn world(&self, camera: &Camera, place: DVec2) -> Option<DVec3> {
         let pixel = place * DVec2::new(self.size[0].into(), self.size[1].into());
         let [column, row] = [pixel.x, pixel.y].map(|pixel| (pixel / STEP as f64).floor() as isize);

@@ -1,11 +1,13 @@
-//! The thread that makes pictures, so that the window never waits for one.
+//! The thread that renders pictures, so that the window never waits for one.
 //!
 //! # How it works
-//! The window posts what it wants to see; only the newest wish is kept, so a slow picture is followed by the one that is
-//! wanted then, never by a queue. [Tasks](Task) that have to be done, such as finding the point under the cursor, are done in
-//! their order before the next picture. Whatever comes of it arrives as [`Answer`]s, each with a request to draw the window
-//! again. While the eye moves, pictures are made smaller, of fewer points if need be, to come in time (`pace`), and a
-//! whole one in work is given up. Once nothing more is asked for, the picture at rest is made again, supersampled.
+//! The window posts what it wants to see. Only the newest wish is kept: a slow picture is followed by the latest wish,
+//! never by a queue. [Tasks](Task) that must be done, such as finding the point under the cursor, run in order before
+//! the next picture. Results arrive as [`Answer`]s, each with a request to repaint the window.
+//!
+//! While the view moves, pictures are rendered smaller, and of fewer points if need be, to meet their time limit
+//! (`pace`). A whole picture in work is given up when the view moves. Once nothing more is requested, the picture at
+//! rest is rendered again, supersampled.
 
 mod depths;
 mod pace;
@@ -25,65 +27,65 @@ pub(crate) use self::depths::Depths;
 pub(crate) use self::task::{Outcome, Purpose, Seen, Task};
 use crate::document::{Document, Shown};
 
-/// What the window wants to see.
+/// A request for a picture.
 #[derive(Clone)]
 pub(crate) struct Wish {
     pub(crate) document: Document,
     pub(crate) camera: Camera,
-    /// Pixels of the window's picture.
+    /// Size of the window's picture, pixels.
     pub(crate) size: [u32; 2],
     pub(crate) settings: Settings,
-    /// Dots so many pixels wide in place of splats.
+    /// Width of dots to draw instead of splats, pixels; `None` draws splats.
     pub(crate) dots: Option<u32>,
     pub(crate) backend: Backend,
-    /// Which way is up, for heights, if it is not to be guessed.
+    /// Up axis for heights; `None` guesses it from the points.
     pub(crate) axes: Option<Axes>,
-    /// Milliseconds that a picture may take, as the next one is waited for; `None` takes the time that it takes.
+    /// Time limit of the picture, milliseconds; `None` has no limit.
     pub(crate) budget_ms: Option<f64>,
 }
 
-/// A picture and what is known of it.
+/// A rendered picture and its data.
 pub(crate) struct Picture {
     pub(crate) image: Arc<Image>,
     pub(crate) camera: Camera,
-    /// Pixels of the window's picture, which this one may be smaller than.
+    /// Size of the window's picture, pixels; `image` may be smaller.
     pub(crate) size: [u32; 2],
-    /// Whether it is whole: in full size, of all points.
+    /// Whether the picture has full size and all points.
     pub(crate) whole: bool,
-    /// Dots are enlarged without blending.
+    /// Whether the picture shows dots, which are enlarged without blending.
     pub(crate) dots: bool,
     pub(crate) counts: Counts,
     pub(crate) timings: Timings,
-    /// What of the look these points or this device cannot have.
+    /// Which setting could not be applied to these points or on this device.
     pub(crate) remark: Option<String>,
-    /// Milliseconds from the wish to the finished picture.
+    /// Milliseconds from the request to the finished picture.
     pub(crate) milliseconds: f64,
-    /// How far away what is seen is; of a GPU's pictures only those at rest have it.
+    /// Coarse depths. A GPU's pictures have them only at rest.
     pub(crate) depths: Depths,
     pub(crate) shown: Arc<Shown>,
 }
 
-/// What comes back from the thread.
+/// A message from the thread.
 pub(crate) enum Answer {
     Picture(Box<Picture>),
-    /// The last picture once more, finer.
+    /// The last picture again, supersampled.
     Finer(Arc<Image>),
     /// There is nothing to show.
     Empty,
-    /// The device that pictures are made on, once it is known; `None` is the CPU.
+    /// The device that renders, once known; `None` is the CPU.
     Device(Option<AdapterSummary>),
-    /// Why the picture that was wanted could not be made.
+    /// Why the requested picture could not be rendered.
     Failed(String),
-    /// What came of a task.
+    /// Result of a task.
     Done(Outcome),
 }
 
-/// What the window and the thread share.
+/// State shared by the window and the thread.
 #[derive(Default)]
 struct Post {
     wish: Option<Wish>,
     tasks: VecDeque<Task>,
-    /// Whether the thread has something in work.
+    /// Whether the thread is working on something.
     working: bool,
     closed: bool,
 }
@@ -98,29 +100,30 @@ impl Shared {
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the picture in work, which is of `wish`, is not worth finishing: the window has closed, or what was at rest
-    /// moves again. A picture made on the way is finished, or there would be none as long as the view moves.
+    /// Whether the picture in work, requested by `wish`, should be given up: the window has closed, or a picture at
+    /// rest is in work and the view moves again. A picture with a time limit is always finished, or none would appear
+    /// while the view moves.
     fn is_in_haste(&self, wish: &Wish) -> bool {
         let post = self.lock();
         let moves = || post.wish.as_ref().is_some_and(|newer| newer.budget_ms.is_some());
         post.closed || wish.budget_ms.is_none() && moves()
     }
 
-    /// Whether anything is asked for: a picture that is there already is not worth making finer now.
+    /// Whether anything is requested, so that a supersampled picture has to wait.
     fn has_news(&self) -> bool {
         let post = self.lock();
         post.closed || post.wish.is_some() || !post.tasks.is_empty()
     }
 }
 
-/// The window's end.
+/// The window's side of the render thread.
 pub(crate) struct RenderThread {
     shared: Arc<Shared>,
     answers: Receiver<Answer>,
 }
 
 impl RenderThread {
-    /// Starts the thread; `context` is asked to draw again with each answer.
+    /// Starts the thread. `context` is asked for a repaint with each answer.
     pub(crate) fn start(context: egui::Context) -> Self {
         let shared = Arc::new(Shared { post: Mutex::default(), news: Condvar::new() });
         let (sender, answers) = channel();
@@ -130,31 +133,31 @@ impl RenderThread {
         Self { shared, answers }
     }
 
-    /// Wants to see something else than before.
+    /// Replaces the request for a picture.
     pub(crate) fn wish(&self, wish: Wish) {
         self.shared.lock().wish = Some(wish);
         self.shared.news.notify_one();
     }
 
-    /// Has something done.
+    /// Queues a task.
     pub(crate) fn task(&self, task: Task) {
         self.shared.lock().tasks.push_back(task);
         self.shared.news.notify_one();
     }
 
-    /// Whether everything asked for has been done, whose answers may still be on their way.
+    /// Whether everything requested is done. Its answers may still be on their way.
     #[cfg(test)]
     pub(crate) fn is_idle(&self) -> bool {
         let post = self.shared.lock();
         post.wish.is_none() && post.tasks.is_empty() && !post.working
     }
 
-    /// The next that comes, if it comes in time.
+    /// The next answer, if it arrives within `time`.
     pub(crate) fn answer_within(&self, time: Duration) -> Option<Answer> {
         self.answers.recv_timeout(time).ok()
     }
 
-    /// What has come since.
+    /// The answers since the last call.
     pub(crate) fn answers(&self) -> impl Iterator<Item = Answer> + '_ {
         self.answers.try_iter()
     }
@@ -162,13 +165,13 @@ impl RenderThread {
 
 impl Drop for RenderThread {
     fn drop(&mut self) {
-        // Nobody waits for the picture in work: closing the window is instant.
+        // The picture in work is not awaited, so that the window closes at once.
         self.shared.lock().closed = true;
         self.shared.news.notify_one();
     }
 }
 
-/// The thread's end.
+/// The thread's side of the channel.
 struct Outbox {
     sender: Sender<Answer>,
     context: egui::Context,
@@ -176,7 +179,7 @@ struct Outbox {
 
 impl Outbox {
     fn send(&self, answer: Answer) {
-        // Nobody listens any more once the window is closed.
+        // The receiver is gone once the window is closed.
         let _ = self.sender.send(answer);
         self.context.request_repaint();
     }

@@ -1,20 +1,20 @@
-//! How large a picture may be, and of how many points, to come in time.
+//! Chooses the size of a picture and the share of its points from its time limit.
 
-/// Least size of a picture on its way, by its sides.
+/// Smallest scale of a picture with a time limit, by its sides.
 const LEAST_SCALE: f64 = 0.25;
-/// Share of the time that projecting all points may take before some are left out.
+/// Share of the time limit that projecting all points may take before points are left out.
 const PROJECT: f64 = 0.4;
-/// Halvings to spare before more points are taken again.
+/// Margin, in halvings, before more points are used again.
 const EASE: f64 = 0.6;
-/// How much a scale has to differ from the last one to be taken, so that pictures do not breathe.
+/// Smallest change of the scale's logarithm that is applied, so that the picture's size does not flicker.
 const STEP: f64 = 0.08;
 
-/// What a picture is made of.
+/// Scale and share of points of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pace {
-    /// Sides by those of the window's picture, 0.25 to 1.
+    /// Sides relative to the window's picture, 0.25 to 1.
     pub(super) scale: f64,
-    /// Points are halved so many times.
+    /// Number of times the points are halved.
     pub(super) halvings: u32,
 }
 
@@ -22,7 +22,7 @@ impl Pace {
     pub(super) const WHOLE: Self = Self { scale: 1.0, halvings: 0 };
 }
 
-/// What pictures cost, by the last one.
+/// Cost estimates, averaged over the last pictures.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Costs {
     /// Milliseconds per million points; 0 while unknown.
@@ -33,14 +33,14 @@ pub(super) struct Costs {
 }
 
 impl Costs {
-    /// Learns from a picture of so many points and pixels: what its points took, and what its pixels.
+    /// Updates the estimates from a picture: numbers of points and pixels, and milliseconds spent on each.
     pub(super) fn learn(&mut self, points: usize, pixels: usize, point_ms: f64, pixel_ms: f64) {
         let blend = |old: f64, new: f64| if old > 0.0 { 0.6 * old + 0.4 * new } else { new };
         self.points = blend(self.points, point_ms / (points.max(1) as f64 * 1e-6));
         self.pixels = blend(self.pixels, pixel_ms / (pixels.max(1) as f64 * 1e-6));
     }
 
-    /// What a picture of so many points and pixels should be made of to take `budget_ms`.
+    /// The scale and share of points at which a picture of all `points` and `pixels` should take `budget_ms`.
     pub(super) fn pace(&mut self, points: usize, pixels: usize, budget_ms: f64) -> Pace {
         let all_points = self.points * points as f64 * 1e-6;
         let all_pixels = self.pixels * pixels as f64 * 1e-6;
@@ -50,7 +50,7 @@ impl Costs {
             && halvings < last.halvings
             && needed > f64::from(last.halvings) - 1.0 - EASE
         {
-            // Another part of the points has to be taken out of all of them, so it has to be worth it.
+            // A new subset has to be picked from all points, which must be worth its cost.
             halvings = last.halvings;
         }
         let left = budget_ms - all_points / f64::from(1 << halvings);

@@ -1,4 +1,4 @@
-//! What is done in order, besides pictures.
+//! Tasks: work that the render thread does in order, besides pictures.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use crate::document::{Region, SelectMode, Shown};
 use crate::output::Goal;
 
 impl Wish {
-    /// The same picture with what points are found by: a surface, which all points belong to where dots are shown, as all of
-    /// them are seen then.
+    /// The same request, for finding points: splats instead of dots. Where dots are shown, all points are visible; so
+    /// outlier removal and adaptation, which would leave points out, are switched off.
     pub(crate) fn of_points(mut self) -> Self {
         if self.dots.take().is_some() {
             self.settings.reconstruction.outlier_expansions = None;
@@ -20,19 +20,19 @@ impl Wish {
         self
     }
 
-    /// Pixels of a picture that is `scale` times as large as wished for; with dots, one pixel a dot, to be enlarged.
+    /// Size of a picture at `scale`, pixels. Dots take one pixel each, and the picture is enlarged later.
     pub(super) fn rendered_size(&self, scale: f64) -> [u32; 2] {
         let dots = f64::from(self.dots.unwrap_or(1).max(1));
         self.size.map(|side| ((f64::from(side) * scale / dots) as u32).max(1))
     }
 }
 
-/// Enlarges a picture by repeating its pixels, as the screen does.
+/// Enlarges a picture by repeating pixels, as the screen does.
 pub(super) fn enlarge(image: &Image, [width, height]: [u32; 2]) -> Image {
     if [image.width, image.height] == [width, height] {
         return image.clone();
     }
-    // The pixel under the middle of each new one.
+    // The old pixel under the middle of each new one.
     let places = |new: u32, old: u32| {
         let (new, old) = (u64::from(new), u64::from(old));
         (0..new).map(move |place| ((2 * place + 1) * old / (2 * new)) as usize)
@@ -43,44 +43,44 @@ pub(super) fn enlarge(image: &Image, [width, height]: [u32; 2]) -> Image {
     Image { width, height, pixels, linear: Vec::new() }
 }
 
-/// Something to be done as soon as the picture in work is finished.
+/// A task, done as soon as the picture in work is finished.
 pub(crate) enum Task {
-    /// Finds the point that is seen at a pixel of the picture wished for.
+    /// Finds the point seen at a pixel of the requested picture.
     Pick { wish: Box<Wish>, pixel: [f32; 2], purpose: Purpose },
-    /// Finds the points in a region of the picture wished for: those seen, or those behind them too.
+    /// Finds the points in a region of the requested picture: the visible ones, or with `through` all.
     Select { wish: Box<Wish>, region: Region, through: bool, mode: SelectMode },
-    /// Makes a picture of any size and hands it over.
+    /// Renders a picture of any size and hands it over.
     Photograph { wish: Box<Wish>, goal: Goal },
 }
 
 /// What a point is picked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// To turn about it.
+    /// To be the new pivot of the view.
     Pivot,
-    /// To say what is known of it.
+    /// To show its attributes.
     Inspect,
-    /// As the next corner of a measurement.
+    /// To be the next corner of a measurement.
     Measure,
 }
 
-/// What came of a task.
+/// Result of a task.
 pub(crate) enum Outcome {
     /// The point under the cursor, if there is one.
     Picked { purpose: Purpose, point: Option<Seen> },
-    /// Which of the points shown are in the region.
+    /// For each shown point, whether it is in the region.
     Selected { shown: Arc<Shown>, hits: Vec<bool>, mode: SelectMode },
-    /// A picture of the size that was asked for, and the range of values that its colours are of.
+    /// A picture of the requested size, and the value range of its colours.
     Photographed { image: Box<Image>, range: Option<[f64; 2]>, goal: Goal },
 }
 
-/// A point that is seen at a pixel.
+/// A point seen at a pixel.
 #[derive(Clone)]
 pub(crate) struct Seen {
-    /// Among the points shown.
+    /// Index among the shown points.
     pub(crate) index: usize,
     pub(crate) shown: Arc<Shown>,
-    /// Where the line of sight meets the surface; the point itself may lie beside it.
+    /// World position where the line of sight meets the surface; the point itself may lie beside it.
     pub(crate) surface: DVec3,
 }
 

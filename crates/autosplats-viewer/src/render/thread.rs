@@ -1,4 +1,4 @@
-//! What the thread does: wait for news, do what has to be done, make the picture that is wanted by then.
+//! The loop of the render thread: wait for requests, do the tasks, render the newest picture.
 
 use std::sync::{Arc, PoisonError};
 use std::time::Instant;
@@ -17,9 +17,9 @@ use super::{Answer, Depths, Outbox, Picture, Shared, Task, Wish};
 use crate::document::{Document, LayerId, Shown};
 use crate::output::Goal;
 
-/// What selected points are mixed with, sRGB.
+/// Colour that selected points are mixed with, sRGB.
 const SELECTED: [u16; 3] = [255, 140, 20];
-/// How far behind the surface, in splat radii, a point still counts as seen.
+/// Largest depth behind the surface at which a point still counts as seen, in splat radii.
 const SEEN: f32 = 2.0;
 
 pub(super) fn run(shared: &Shared, outbox: &Outbox) {
@@ -50,14 +50,14 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
             Work::Wish(wish) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)).map(Some),
             Work::Finer(finer) => studio.refine(&finer, &|| !shared.has_news()),
         });
-        // A bug in one picture must not end all pictures, with edits in the window that are not saved.
+        // A panic in one picture must not end all pictures, as the window may hold unsaved edits.
         let Ok(answer) = std::panic::catch_unwind(work) else {
             studio = Studio::default();
             outbox.send(Answer::Failed("this picture failed, which is a bug of this program".into()));
             continue;
         };
         match answer {
-            // What a task came before is made after it; another wish forgets it.
+            // A supersampled picture interrupted by a task is rendered after it; a new wish drops it.
             Err(Error::Cancelled) => studio.finer = studio.finer.take().or(finer),
             Ok(None) => {}
             Ok(Some(answer)) => outbox.send(answer),
@@ -71,24 +71,24 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
     }
 }
 
-/// What is to be done next.
+/// The next piece of work.
 enum Work {
     Task(Task),
     Wish(Wish),
     Finer(Finer),
 }
 
-/// A picture at rest that was made, and is to be made once more, supersampled.
+/// A request for the supersampled version of a finished picture at rest.
 #[derive(Clone)]
 struct Finer {
     wish: Wish,
     settings: Settings,
 }
 
-/// What is kept from picture to picture.
+/// State kept from picture to picture.
 #[derive(Default)]
 struct Studio {
-    /// What to do once nothing is asked for.
+    /// Work for when nothing is requested.
     finer: Option<Finer>,
     renderer: Option<(Backend, Renderer)>,
     costs: Costs,
@@ -97,19 +97,19 @@ struct Studio {
     exposure: Exposure,
 }
 
-/// How bright colours are shown if that is not said: as the first picture of some layers needs it, or it would change while they
-/// are edited, and while they play.
+/// The default brightness of colours. It is fixed by the first picture of a set of layers, so that edits and playing do
+/// not change the brightness.
 #[derive(Default)]
 struct Exposure {
     found: Option<f32>,
-    /// Of which layers, with their tints.
+    /// The layers that `found` belongs to, with their tints.
     layers: Vec<(LayerId, Option<[u8; 3]>)>,
 }
 
 impl Exposure {
     fn of(&mut self, document: &Document, cloud: &PointCloud) -> f32 {
         if document.layers.iter().any(|layer| layer.incomplete) {
-            // More points are to come, and with them perhaps colours.
+            // More points, and with them colours, may follow.
             self.layers.clear();
             return usual_exposure(cloud);
         }
@@ -121,18 +121,18 @@ impl Exposure {
     }
 }
 
-/// A part of the points, for pictures in haste.
+/// A random subset of the points, for pictures with a time limit.
 struct Sparse {
-    /// Of which cloud.
+    /// Identity of the full cloud.
     identity: u64,
     halvings: u32,
     cloud: PointCloud,
-    /// Of each point among all of them.
+    /// Index of each point in the full cloud.
     indices: Vec<u32>,
 }
 
 impl Sparse {
-    /// Points taken by chance, but the same ones each time.
+    /// Picks points by a hash of their index, so that the choice is always the same.
     fn new(cloud: &PointCloud, halvings: u32) -> Self {
         let kept = |index: usize| {
             let mixed = (index as u32).wrapping_mul(0x9E37_79B9).rotate_left(15).wrapping_mul(0x85EB_CA6B);
@@ -145,7 +145,7 @@ impl Sparse {
 }
 
 impl Studio {
-    /// The points that a wish is about, made again only if they have changed.
+    /// The points that a wish shows; cached until they change.
     fn shown(&mut self, wish: &Wish) -> Result<Arc<Shown>, Error> {
         if let Some((axes, shown)) = &self.shown
             && *axes == wish.axes
@@ -177,26 +177,26 @@ impl Studio {
         Ok(renderer)
     }
 
-    /// There is nothing to be drawn: gives back what a renderer keeps, which is as large as the largest picture and cloud that it
-    /// has seen. One on a GPU takes long to be made ready again, and stays.
+    /// Frees the renderer when there is nothing to draw, since its buffers are as large as the largest picture and
+    /// cloud so far. A renderer on a GPU stays, as it takes long to create.
     fn let_go(&mut self) {
         self.renderer.take_if(|(_, renderer)| renderer.adapter().is_none());
         self.sparse = None;
     }
 
-    /// What is asked of the renderer for a task.
+    /// Renderer settings for a task.
     fn settings(&mut self, wish: &Wish, shown: &Shown, outbox: &Outbox) -> Result<Settings, Error> {
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
         let mut settings = settings(wish, &shown.cloud, gpu).0;
         let exposure = self.exposure.of(&wish.document, &shown.cloud);
         settings.shading.exposure.get_or_insert(exposure);
-        // What is done once does not follow any other picture.
+        // A task's picture is independent of the pictures before it.
         settings.reconstruction.frames_averaged = 1;
         settings.reconstruction.steady = false;
         Ok(settings)
     }
 
-    /// Makes a picture, unless `go_on` says that another one is more urgent.
+    /// Renders a picture. `go_on` returns false once another one is more urgent.
     fn draw(&mut self, wish: &Wish, outbox: &Outbox, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
         let started = Instant::now();
         self.finer = None;
@@ -223,7 +223,7 @@ impl Studio {
         let selected = Some(shown.selected(&wish.document)).filter(|selected| !selected.is_empty());
         let (mut settings, remark) = settings(wish, cloud, gpu);
         settings.shading.exposure.get_or_insert(exposure);
-        // A GPU hands out layers only if it is asked, which takes time: at rest the pointer needs depths.
+        // A GPU reads layers back only on request, which takes time. At rest the pointer needs depths.
         settings.all_layers = selected.is_some() || gpu && wish.budget_ms.is_none();
         let Frame { image, layers, counts, timings, .. } =
             renderer.render_while(cloud, &wish.camera, size, &settings, go_on)?;
@@ -237,7 +237,7 @@ impl Studio {
         }
         if wish.budget_ms.is_none() && wish.dots.is_none() && still_supersample(wish.size) > 1 {
             settings.all_layers = selected.is_some();
-            // Colours are to mean what they mean in this picture.
+            // The supersampled picture keeps the value range of this one.
             settings.shading.range =
                 settings.shading.range.or(counts.value_range.map(|range| range.map(|end| end as f32)));
             *finer = Some(Finer { wish: wish.clone(), settings });
@@ -259,8 +259,8 @@ impl Studio {
         })))
     }
 
-    /// Makes a picture once more, supersampled, unless `go_on` says that something is asked for; `None` if it is too large for
-    /// the device: the picture that is there will do.
+    /// Renders a picture again, supersampled. `go_on` returns false once something is requested. `None` if the size is
+    /// too large for the device; the existing picture then stays.
     fn refine(&mut self, finer: &Finer, go_on: &dyn Fn() -> bool) -> Result<Option<Answer>, Error> {
         let Finer { wish, settings } = finer;
         let supersample = still_supersample(wish.size);
@@ -296,7 +296,7 @@ impl Studio {
                     .render(&shown.cloud, &wish.camera, wish.size, &settings)?
                     .layers;
                 let [x, y] = [0, 1].map(|i| (pixel[i].max(0.0) as usize).min(wish.size[i] as usize - 1));
-                // A click beside a thin thing means the thing.
+                // A click beside a thin object selects the object.
                 let reach = 4isize;
                 let near = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
                 let covered = near.filter_map(|(dx, dy)| {
@@ -346,7 +346,7 @@ impl Studio {
             Task::Photograph { wish, goal } => {
                 let shown = self.shown(&wish)?;
                 let mut settings = self.settings(&wish, &shown, outbox)?;
-                // But for those of a film, which follow each other.
+                // Pictures of a film follow each other, so that they are steadied.
                 let is_film = matches!(goal, Goal::Film(_));
                 settings.reconstruction.steady = is_film;
                 let size = wish.rendered_size(1.0);
@@ -371,7 +371,7 @@ impl Studio {
     }
 }
 
-/// Mixes the pixels of points that are selected with a colour.
+/// Mixes the pixels of selected points with the selection colour.
 fn tint(image: &mut Image, layers: &GBuffer, is_selected: impl Fn(u32) -> bool) {
     let width = image.width as usize;
     for (y, row) in image.pixels.chunks_mut(width).enumerate() {
@@ -385,8 +385,8 @@ fn tint(image: &mut Image, layers: &GBuffer, is_selected: impl Fn(u32) -> bool) 
     }
 }
 
-/// What is asked of the renderer: what is wished as far as these points and this device can have it, and what is done instead
-/// of the rest, as a look is kept from file to file.
+/// The renderer settings for a wish, and a remark on what was replaced. Settings that these points or this device do
+/// not support are replaced, since a look is kept from file to file.
 fn settings(wish: &Wish, cloud: &PointCloud, gpu: bool) -> (Settings, Option<String>) {
     let mut settings = wish.settings.clone();
     let mut remark = None;
@@ -407,7 +407,7 @@ fn settings(wish: &Wish, cloud: &PointCloud, gpu: bool) -> (Settings, Option<Str
     }
     let most = cloud.len().saturating_sub(1).clamp(1, 64) as u32;
     if wish.dots.is_some() {
-        // A search for one neighbour is all that dots cost.
+        // Dots cost only a search for one neighbour.
         settings.reconstruction = Reconstruction {
             k: 1,
             splat_scale: 0.01,
