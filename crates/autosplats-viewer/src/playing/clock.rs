@@ -1,28 +1,28 @@
-//! What time it is in what is played, without a clock of its own: the window tells how much has passed.
+//! The time in everything that is played. The window advances this clock by the time that has passed.
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Slowest and fastest, seconds played in a second.
+/// Slowest and fastest speed, seconds played per second.
 pub(crate) const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
-/// The place in everything that has a timeline. A session keeps it.
+/// The position in everything that has a timeline. A session stores it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct Clock {
     /// Seconds since the beginning.
     position: f64,
-    /// Seconds that everything takes.
+    /// Length of everything, seconds.
     #[serde(skip)]
     length: f64,
-    /// First and last second that is played; `None` is all.
+    /// First and last second that is played; `None` plays all.
     span: Option<[f64; 2]>,
     pub(crate) playing: bool,
     pub(crate) looped: bool,
-    /// Seconds played in a second.
+    /// Speed, seconds played per second.
     pub(crate) speed: f64,
-    /// Whether it waits for what is being opened, and keeps its place until then.
+    /// Whether the clock stands still until all inputs are open, so that it keeps its position.
     #[serde(skip)]
     held: bool,
 }
@@ -39,7 +39,7 @@ impl Clock {
         self.position
     }
 
-    /// Seconds that all takes.
+    /// Length of everything, seconds.
     pub(crate) fn length(&self) -> f64 {
         self.length
     }
@@ -54,46 +54,47 @@ impl Clock {
         self.span.is_some()
     }
 
-    /// Stands still at its place until everything is open, though it is not known yet how long that takes.
+    /// Stops at the present position until everything is open and the length is known.
     pub(crate) fn hold(&mut self) {
         self.held = true;
     }
 
-    /// Whether it waits for what is being opened.
+    /// Whether the clock waits for inputs that are being opened.
     pub(crate) fn is_held(&self) -> bool {
         self.held
     }
 
-    /// Whether frames follow each other: it is neither stopped nor held, and has not come to its end.
+    /// Whether time runs: the clock is neither stopped nor held, and has not reached its end.
     pub(crate) fn runs(&self) -> bool {
         self.playing && !self.held && self.length > 0.0 && (self.looped || self.position < self.span()[1])
     }
 
-    /// What is played takes so long now; `known` says whether that is all of it.
+    /// Sets the length of everything. `known` says whether all inputs are open, so that the length is final.
     pub(crate) fn set_length(&mut self, length: Duration, known: bool) {
         self.length = length.as_secs_f64();
         self.held &= !known;
         if !self.held {
-            // What is kept in a file may be rounded.
+            // A span stored in a file may be rounded.
             let span = self.span.filter(|&[begin, end]| begin < end && end <= self.length + 1e-6);
             self.span = span.map(|[begin, end]| [begin, end.min(self.length)]);
             self.seek(self.position);
         }
     }
 
-    /// Goes to a second.
+    /// Moves to a second.
     pub(crate) fn seek(&mut self, position: f64) {
         let end = if self.held { f64::MAX } else { self.length };
         self.position = if position.is_finite() { position.clamp(0.0, end) } else { 0.0 };
     }
 
-    /// Everything begins so many seconds later than before; how long it takes is to be [set](Self::set_length) next.
+    /// Moves position and span `seconds` later, when all inputs begin later. [`set_length`](Self::set_length) must
+    /// follow.
     pub(crate) fn shift(&mut self, seconds: f64) {
         self.position = (self.position + seconds).max(0.0);
         self.span = self.span.map(|span| span.map(|end| (end + seconds).max(0.0)));
     }
 
-    /// Begins or stops; from the end it begins anew.
+    /// Starts or stops. At the end, the clock starts again from the beginning.
     pub(crate) fn toggle(&mut self) {
         self.playing = !self.playing;
         let [begin, end] = self.span();
@@ -102,19 +103,19 @@ impl Clock {
         }
     }
 
-    /// Plays from here on, up to where it ended so far if that is later.
+    /// Starts the span here. Its end stays if it is later, else the span ends with everything.
     pub(crate) fn begin_here(&mut self) {
         let [_, end] = self.span();
         self.set_span(self.position, if end > self.position { end } else { self.length });
     }
 
-    /// Plays up to here, from where it began so far if that is earlier.
+    /// Ends the span here. Its beginning stays if it is earlier, else the span begins with everything.
     pub(crate) fn end_here(&mut self) {
         let [begin, _] = self.span();
         self.set_span(if begin < self.position { begin } else { 0.0 }, self.position);
     }
 
-    /// Plays all again.
+    /// Plays everything again.
     pub(crate) fn play_all(&mut self) {
         self.span = None;
     }
@@ -124,7 +125,7 @@ impl Clock {
         self.span = Some([begin, end]).filter(|_| !all && begin < end);
     }
 
-    /// Lets `seconds` pass. At the end it stops, unless something is live, which goes on.
+    /// Advances by `seconds` of the window. At the end the clock stops, unless some input is live.
     pub(crate) fn advance(&mut self, seconds: f64, live: bool) {
         if !self.playing || self.held || self.length <= 0.0 {
             return;
@@ -133,12 +134,12 @@ impl Clock {
         self.playing = live || self.looped || self.position < self.span()[1];
     }
 
-    /// Where it is `seconds` after it began to play all that is to be played.
+    /// Position `seconds` after playback of the span has begun.
     pub(crate) fn place_after(&self, seconds: f64) -> f64 {
         self.later(self.span()[0], seconds)
     }
 
-    /// Where it is `seconds` after it was at `from`.
+    /// Position `seconds` after it was `from`.
     fn later(&self, from: f64, seconds: f64) -> f64 {
         let [begin, end] = self.span();
         let position = from + seconds * self.speed;
@@ -151,7 +152,7 @@ impl Clock {
         }
     }
 
-    /// Whether this is a clock: what is read from a file may be anything.
+    /// Whether the values are valid; a file may hold any.
     pub(crate) fn is_clock(&self) -> bool {
         let Self { position, span, speed, .. } = self;
         let times = span.iter().flatten().chain([position]);

@@ -1,4 +1,4 @@
-//! What the window does with all that moves, each time that it is drawn.
+//! Playing inputs: what the window does with them in each frame.
 
 use std::sync::Arc;
 
@@ -13,13 +13,13 @@ use crate::glance::Glance;
 use crate::loading::{Appearance, Input};
 
 impl App {
-    /// Begins to play something.
+    /// Starts to play an input.
     pub(crate) fn play(&mut self, input: Input, appearance: Appearance, context: &egui::Context) {
         let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), context.clone());
         self.playing.streams.push(Moving::new(input, thread, appearance));
     }
 
-    /// Opens the source of a layer anew and plays it from where the clock stands.
+    /// Opens the source of a layer again and plays it from the clock's position.
     pub(crate) fn play_anew(&mut self, id: LayerId, input: Input) {
         if matches!(input.source, Source::StandardInput) {
             self.messages.note(format!("{}: what came through a pipe cannot be read again", input.name));
@@ -37,12 +37,12 @@ impl App {
         self.playing.clock.hold();
     }
 
-    /// Begins or stops to play.
+    /// Starts or stops playback.
     pub(crate) fn toggle_playing(&mut self) {
         self.playing.clock.toggle();
     }
 
-    /// Lets the time pass, asks for what is to be seen by then and takes in what has come.
+    /// Advances the clock, requests the frames of the new time and receives points.
     pub(crate) fn follow_streams(&mut self, context: &egui::Context) {
         self.follow_layers(context);
         if self.playing.is_empty() {
@@ -75,8 +75,8 @@ impl App {
         }
     }
 
-    /// Plays no longer what was removed, and again what undo has brought back: at the time of the clock, unless its points have
-    /// edits that are of another.
+    /// Stops the streams of removed layers, and restarts those of layers that undo has brought back. A restored layer
+    /// is at the clock's time; if it has unsaved edits, the clock returns to their time.
     fn follow_layers(&mut self, context: &egui::Context) {
         let open: Vec<LayerId> = self.document().layers.iter().map(|layer| layer.id).collect();
         let position = self.playing.clock.position();
@@ -98,7 +98,7 @@ impl App {
         self.playing.removed = gone;
         self.playing.removed.retain(|removed| self.history.holds(removed.layer));
         for Removed { input, layer, frame, position } in back {
-            // A pipe does not wait for anybody.
+            // A pipe cannot be read again.
             if matches!(input.source, Source::StandardInput) {
                 self.messages.note(format!("{} was closed; its last points are shown", input.name));
                 continue;
@@ -113,7 +113,7 @@ impl App {
         }
     }
 
-    /// Takes in what has come.
+    /// Receives news of the streams.
     fn take_news(&mut self) {
         let news: Vec<_> = self.playing.streams.iter().map(|moving| moving.thread.news()).collect();
         let mut ended = Vec::new();
@@ -134,14 +134,15 @@ impl App {
         for number in ended.into_iter().rev() {
             let moving = self.playing.streams.remove(number);
             match moving.layer {
-                // What came last stays, as any points do.
+                // The last points stay as an ordinary layer.
                 Some(id) => self.settle(|document| document.complete(id)),
                 None => self.fail(moving.input, moving.appearance),
             }
         }
     }
 
-    /// Points that stand still can be edited; what moves on would lose that, and stays at the time of the edits.
+    /// Keeps the clock at the time of unsaved edits, since another frame would replace the edited points. Points of a
+    /// stopped clock can be edited.
     fn keep_edits(&mut self) {
         let layers: Vec<LayerId> = self.playing.streams.iter().filter_map(|moving| moving.layer).collect();
         let unsaved = layers.iter().find(|id| self.history.is_unsaved(**id)).copied();
@@ -167,7 +168,7 @@ impl App {
     fn show_frame(&mut self, number: usize, frame: Option<usize>, cloud: &Arc<PointCloud>, glance: Option<Glance>) {
         let moving = &self.playing.streams[number];
         match moving.layer {
-            // What was asked for before the points were edited.
+            // These points were requested before the edit.
             Some(id) if self.history.is_unsaved(id) => return,
             Some(id) => self.fill(id, cloud),
             None if cloud.is_empty() => return,

@@ -1,4 +1,4 @@
-//! Inputs that move: each is read by a thread of its own, for the time that one clock of all says.
+//! Playing inputs: each is read by a thread of its own, at the time of one common clock.
 
 mod clock;
 mod follow;
@@ -19,53 +19,53 @@ use crate::app::App;
 use crate::document::LayerId;
 use crate::loading::{Appearance, Input};
 
-/// Milliseconds that a picture of something that moves may take at most, and of what is live before it is known how often that
-/// comes.
+/// Longest time limit of a picture while an input plays, milliseconds. Also the limit for a live input whose update
+/// rate is unknown.
 const LIVE_MS: f64 = 100.0;
-/// Share of the time from update to update that a picture of what is live may take: half a picture is waited for first, and both
-/// are to be over when the next update comes.
+/// Share of the time between two live updates that a picture may take. On average an update first waits for half a
+/// picture, and both must end before the next update.
 const LIVE_SHARE: f64 = 0.6;
 /// Seconds over which live updates are counted.
 const COUNTED: f64 = 1.0;
 
-/// All that moves.
+/// All playing inputs.
 #[derive(Default)]
 pub(crate) struct Playing {
     pub(crate) clock: Clock,
     streams: Vec<Moving>,
-    /// What was removed, and would come back by undo.
+    /// Removed inputs that undo would bring back.
     removed: Vec<Removed>,
-    /// When the clock was advanced last, seconds of the window.
+    /// Window time when the clock was last advanced, seconds.
     time: Option<f64>,
-    /// The time of points with edits that are not saved.
+    /// Clock position of the points with unsaved edits, seconds.
     edited_at: Option<f64>,
 }
 
-/// An input that moves.
+/// A playing input.
 struct Moving {
     input: Input,
     thread: StreamThread,
-    /// Where its points are shown, once there are some.
+    /// The layer that shows the points, once there are some.
     layer: Option<LayerId>,
     /// The frame that the layer shows.
     frame: Option<usize>,
-    /// When it begins on the clock, if its stamps say that; with the clock otherwise.
+    /// Start on the clock, if the stamps of several inputs share a clock; `None` starts at 0.
     begins: Option<Duration>,
     appearance: Appearance,
     heard: Heard,
 }
 
-/// How often something live comes.
+/// Measures how often a live input sends updates.
 #[derive(Default)]
 struct Heard {
-    /// Seconds of the window and the number of updates by then, when counting began.
+    /// Window time in seconds, and number of updates, when counting started.
     since: Option<(f64, u64)>,
-    /// Milliseconds from update to update, once that is known.
+    /// Milliseconds between updates, once known.
     period_ms: Option<f64>,
 }
 
 impl Heard {
-    /// So many updates have come by now.
+    /// Notes the number of updates so far.
     fn count(&mut self, now: f64, updates: u64) {
         let (since, before) = *self.since.get_or_insert((now, updates));
         if now - since >= COUNTED {
@@ -75,50 +75,50 @@ impl Heard {
         }
     }
 
-    /// Milliseconds that a picture may take to be there before the next update.
+    /// Time limit of a picture, so that it is finished before the next update, milliseconds.
     fn live_ms(&self) -> f64 {
         self.period_ms.map_or(LIVE_MS, |period_ms| (LIVE_SHARE * period_ms).min(LIVE_MS))
     }
 }
 
-/// An input that moved.
+/// A removed input.
 struct Removed {
     input: Input,
     layer: LayerId,
     frame: Option<usize>,
-    /// Seconds of the clock at which it was removed.
+    /// Clock position when the input was removed, seconds.
     position: f64,
 }
 
 /// An input that has no points yet.
 pub(crate) struct Waiting<'a> {
-    /// Among all that moves.
+    /// Index among the playing inputs.
     pub(crate) number: usize,
     pub(crate) input: &'a Input,
     pub(crate) appearance: Appearance,
-    /// What it waits for.
+    /// What the input waits for.
     pub(crate) why: String,
-    /// Part of that which is done, 0 to 1, as far as it is known.
+    /// Progress of reading, 0 to 1, as far as known.
     pub(crate) read: f32,
 }
 
 impl Moving {
-    /// Something that has no points yet.
+    /// An input without points.
     fn new(input: Input, thread: StreamThread, appearance: Appearance) -> Self {
         Self { input, thread, layer: None, frame: None, begins: None, appearance, heard: Heard::default() }
     }
 
-    /// When its frames happen, if it has a timeline and that is known.
+    /// The input's timeline, if it has one and is open.
     fn timeline(&self) -> Option<Arc<Timeline>> {
         self.thread.timeline().flatten()
     }
 
-    /// The frame of a timeline of its own that is shown at a place of the clock.
+    /// The frame of the input's timeline at a clock position.
     fn frame_at(&self, timeline: &Timeline, position: Duration) -> usize {
         timeline.frame_at(position.saturating_sub(self.begins.unwrap_or_default()))
     }
 
-    /// What it waits for, if it has no points yet.
+    /// What the input waits for, while it has no points.
     fn why(&self) -> String {
         match self.thread.timeline() {
             None => "being opened".into(),
@@ -129,41 +129,41 @@ impl Moving {
 }
 
 impl Playing {
-    /// Whether anything is played, or will be.
+    /// Whether no input is playing or waiting.
     pub(crate) fn is_empty(&self) -> bool {
         self.streams.is_empty()
     }
 
-    /// Plays what is shown as a layer no longer; says whether it was.
+    /// Stops the stream of a layer. Returns whether there was one.
     pub(crate) fn stop(&mut self, id: LayerId) -> bool {
         let before = self.streams.len();
         self.streams.retain(|moving| moving.layer != Some(id));
         self.streams.len() < before
     }
 
-    /// Gives up an input that [has no points yet](Self::waiting), by its number.
+    /// Stops an input that [has no points yet](Self::waiting), by its number.
     pub(crate) fn give_up(&mut self, number: usize) {
         if self.streams.get(number).is_some_and(|moving| moving.layer.is_none()) {
             self.streams.remove(number);
         }
     }
 
-    /// Gives up all that has no points yet.
+    /// Stops all inputs that have no points yet.
     pub(crate) fn give_up_waiting(&mut self) {
         self.streams.retain(|moving| moving.layer.is_some());
     }
 
-    /// Whether something of this name is played.
+    /// Whether an input of this name is playing.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.streams.iter().any(|moving| App::source_name(&moving.input) == name)
     }
 
-    /// Whether a layer is of something that is played.
+    /// Whether a layer belongs to a playing input.
     pub(crate) fn shows(&self, id: LayerId) -> bool {
         self.streams.iter().any(|moving| moving.layer == Some(id))
     }
 
-    /// What is open but has no points yet.
+    /// The inputs that are open but have no points yet.
     pub(crate) fn waiting(&self) -> impl Iterator<Item = Waiting<'_>> {
         let waiting = self.streams.iter().enumerate().filter(|(_, moving)| moving.layer.is_none());
         waiting.map(|(number, moving)| {
@@ -172,23 +172,24 @@ impl Playing {
         })
     }
 
-    /// The timelines of what has one, and when they begin on the clock.
+    /// The known timelines, and their starts on the clock.
     fn timelines(&self) -> impl Iterator<Item = (Arc<Timeline>, Duration)> + '_ {
         self.streams.iter().filter_map(|moving| Some((moving.timeline()?, moving.begins.unwrap_or_default())))
     }
 
-    /// Whether there is a time to go to.
+    /// Whether any input has a timeline.
     pub(crate) fn has_timeline(&self) -> bool {
         self.timelines().next().is_some()
     }
 
-    /// Whether a part of it is live.
+    /// Whether any input is live.
     pub(crate) fn is_live(&self) -> bool {
         self.streams.iter().any(|moving| matches!(moving.thread.timeline(), Some(None)))
     }
 
-    /// Milliseconds from frame to frame, while anything is played: of the input with the most frames a second, `least_ms` at least.
-    /// Of what is live, what a picture may take to be there before the next update.
+    /// Time limit of a picture while inputs play, milliseconds; `None` at rest. For timelines the limit is the shortest
+    /// frame period, at least `least_ms`; for live inputs, the time before the next update. No limit is above
+    /// `LIVE_MS`.
     pub(crate) fn frame_ms(&self, least_ms: f64) -> Option<f64> {
         let runs = self.clock.runs();
         let each = self
@@ -201,7 +202,7 @@ impl Playing {
         each.chain(live).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
     }
 
-    /// What became of all updates.
+    /// Statistics of all updates, summed over the inputs.
     pub(crate) fn statistics(&self) -> Statistics {
         self.streams.iter().map(|moving| moving.thread.statistics()).fold(Statistics::default(), |sum, next| {
             Statistics {
@@ -215,14 +216,14 @@ impl Playing {
         })
     }
 
-    /// The frame that is shown, of so many, where one input alone has a timeline.
+    /// The shown frame and the number of frames, if exactly one input has a timeline.
     pub(crate) fn frame(&self) -> Option<(usize, usize)> {
         let mut timelines = self.timelines();
         let (only, _) = timelines.next().filter(|_| timelines.next().is_none())?;
         Some((only.frame_at(self.position()), only.len()))
     }
 
-    /// When the input of a layer begins, where several have timelines, in words.
+    /// Text on when the input of a layer begins, if several inputs have timelines.
     pub(crate) fn alignment(&self, id: LayerId) -> Option<String> {
         let moving = self.streams.iter().find(|moving| moving.layer == Some(id) && moving.timeline().is_some())?;
         (self.timelines().count() > 1).then(|| match moving.begins {
@@ -231,11 +232,11 @@ impl Playing {
         })
     }
 
-    /// Goes to the next frame of any input, or to the one before.
+    /// Moves to the next frame of any input, or to the previous one.
     pub(crate) fn step(&mut self, forward: bool) {
         self.clock.playing = false;
         let position = self.position();
-        // Nanoseconds of the clock: of what is shown now, and those to choose from.
+        // Clock times in nanoseconds: of the shown frame, and of all frames.
         let mut now = 0;
         let mut times: Vec<u64> = Vec::new();
         for (timeline, begins) in self.timelines() {
@@ -253,12 +254,12 @@ impl Playing {
             times.into_iter().filter(|&time| time < now).max()
         };
         if let Some(next) = next {
-            // Half a nanosecond, lest rounding falls short of the frame.
+            // Half a nanosecond more, so that rounding does not fall short of the frame.
             self.clock.seek(next as f64 * 1e-9 + 0.5e-9);
         }
     }
 
-    /// The frames that are seen at each of some places of the clock, of all that has a timeline and points.
+    /// The frames at some clock positions, for each input that has a timeline and points.
     pub(crate) fn tracks(&self, places: &[f64]) -> Vec<Track> {
         let shown = self.streams.iter().filter_map(|moving| Some((moving, moving.layer?, moving.timeline()?)));
         let track = |(moving, layer, timeline): (&Moving, LayerId, Arc<Timeline>)| {
@@ -268,7 +269,7 @@ impl Playing {
         shown.map(track).collect()
     }
 
-    /// Listens how often live updates come, at a second of the window.
+    /// Counts live updates at window time `now`, seconds.
     fn count_updates(&mut self, now: f64) {
         for moving in &mut self.streams {
             let Statistics { taken, dropped, .. } = moving.thread.statistics();
@@ -276,8 +277,8 @@ impl Playing {
         }
     }
 
-    /// Finds out when each begins, by what is open now. What is shown stays as it is unless the clock is held; of several that
-    /// move against each other, what the first one shows.
+    /// Computes when each input begins, from the inputs that are open. Unless the clock is held, its position moves so
+    /// that the first shown input keeps its frame.
     fn align(&mut self) {
         let span = |moving: &Moving| moving.input.source.clock_span(&*moving.timeline()?);
         let spans: Vec<_> = self.streams.iter().map(span).collect();
@@ -299,7 +300,7 @@ impl Playing {
     }
 }
 
-/// A time of a clock.
+/// A clock position as a duration; 0 if invalid.
 fn duration(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or_default()
 }

@@ -1,7 +1,7 @@
-//! What a film shows of what moves.
+//! The moving points of a film.
 //!
-//! A thread opens everything once more, so that the same film is the same pictures whatever the window plays meanwhile, and reads
-//! ahead the frames of the next picture.
+//! A thread opens all inputs again, so that the film does not depend on what the window plays meanwhile. It reads the
+//! frames of the next picture ahead.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,17 +14,17 @@ use crate::document::LayerId;
 use crate::loading::Input;
 use crate::messages::Mail;
 
-/// Pictures whose points are read before they are asked for, beside the one in work.
+/// Pictures whose points are read ahead, besides the one in work.
 const AHEAD: usize = 1;
 
-/// An input of a film, and the frame of its timeline that each picture shows.
+/// An input of a film, and the frame of its timeline for each picture.
 pub(crate) struct Track {
     pub(crate) layer: LayerId,
     pub(crate) input: Input,
     pub(crate) frames: Vec<usize>,
 }
 
-/// Layers that change from one picture to the next, and their points.
+/// The layers that change from one picture to the next, and their new points.
 pub(crate) type Changes = Vec<(LayerId, Arc<PointCloud>)>;
 
 /// Reads the points of a film, picture by picture.
@@ -34,7 +34,7 @@ pub(crate) struct Reel {
 }
 
 impl Reel {
-    /// Begins to read; what is worth knowing is told by `mail`, and `context` asked to draw when there is something for a picture.
+    /// Starts to read. Notes go to `mail`; `context` is asked for a repaint when points are ready for a picture.
     pub(crate) fn start(tracks: Vec<Track>, mail: Mail, context: egui::Context) -> Self {
         let (sender, changes) = sync_channel(AHEAD);
         let cancelled = Arc::new(AtomicBool::new(false));
@@ -60,15 +60,15 @@ impl Reel {
         Self { changes, cancelled }
     }
 
-    /// What the next picture has other than the one before; `None` while that is being read.
+    /// The changes for the next picture; `None` while they are being read.
     ///
     /// # Errors
-    /// Why there will be none.
+    /// Why there are no more pictures.
     pub(crate) fn next(&self) -> Result<Option<Changes>, String> {
         match self.changes.try_recv() {
             Ok(changes) => changes.map(Some),
             Err(TryRecvError::Empty) => Ok(None),
-            // It has told all it had to tell.
+            // All results have been received.
             Err(TryRecvError::Disconnected) => Err("the film has no more pictures".into()),
         }
     }
@@ -80,7 +80,7 @@ impl Drop for Reel {
     }
 }
 
-/// Listens to the reading of an input.
+/// Receives progress and notes from a reader.
 struct Follower<'a> {
     input: &'a Input,
     mail: &'a Mail,
@@ -99,7 +99,7 @@ impl Progress for Follower<'_> {
     }
 }
 
-/// Reads all frames in order and hands them to `send`, which says whether more are wanted.
+/// Reads all frames in order and passes them to `send`, which returns whether more are wanted.
 fn read(tracks: &[Track], mail: &Mail, cancelled: &AtomicBool, send: &dyn Fn(Changes) -> bool) -> Result<(), Error> {
     let followers: Vec<_> = tracks.iter().map(|track| Follower { input: &track.input, mail, cancelled }).collect();
     let open = |follower: &Follower<'_>| {

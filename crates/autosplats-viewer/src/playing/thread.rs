@@ -1,4 +1,4 @@
-//! Reads what is played, beside the window.
+//! Reads a playing input on a thread of its own.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -9,37 +9,37 @@ use eframe::egui;
 use crate::glance::{Glance, Known};
 use crate::loading::Input;
 
-/// How long a live stream may keep silent before it is asked whether it is still wanted.
+/// Longest silence of a live stream before the thread checks whether the stream is still wanted.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Notes that wait to be told.
+/// Largest number of notes that may wait for the window.
 const MOST_NOTES: usize = 20;
 
-/// What has come since it was asked last.
+/// News since the last call.
 #[derive(Default)]
 pub(crate) struct News {
-    /// The newest points, and the frame that they are if there is a timeline; older ones that nobody took are gone.
+    /// The newest points, and their frame if there is a timeline. Older points that nobody took are dropped.
     pub(crate) cloud: Option<(Option<usize>, Arc<PointCloud>)>,
-    /// What is known of the first points at a glance.
+    /// The first look at the first points.
     pub(crate) glance: Option<Glance>,
-    /// What is to be told.
+    /// Notes for the user.
     pub(crate) notes: Vec<String>,
-    /// That there will be no more, and what went wrong if something did.
+    /// The end of the stream, with an error if it failed.
     pub(crate) ending: Option<Result<(), String>>,
 }
 
-/// What window and thread share.
+/// State shared by the window and the thread.
 #[derive(Default)]
 struct Post {
     news: News,
-    /// Once it is open: when its frames happen, or `None` if it is live.
+    /// `None` until the input is open; then its timeline, or `Some(None)` if it is live.
     timeline: Option<Option<Arc<Timeline>>>,
     statistics: Statistics,
-    /// Part of what has to be read first, 0 to 1.
+    /// Progress of reading before the first points, 0 to 1.
     read: f32,
     /// Whether there have been points.
     begun: bool,
-    /// Frame that the window wants, once it knows the timeline.
+    /// The frame that the window wants.
     wanted: Option<usize>,
     paused: bool,
     closed: bool,
@@ -56,19 +56,19 @@ impl Shared {
     }
 }
 
-/// The window's end of what is played.
+/// The window's side of a playing input.
 pub(crate) struct StreamThread {
     shared: Arc<Shared>,
 }
 
 impl StreamThread {
-    /// Begins to open an input; `context` is asked to draw again with each piece of news.
+    /// Starts to open an input. `context` is asked for a repaint with each piece of news.
     pub(crate) fn start(input: Input, view: Known, context: egui::Context) -> Self {
         Self::begin(input, None, view, Post::default(), context)
     }
 
-    /// The same where its points are shown already, as those of `frame` if it has a timeline: they stay until other ones are
-    /// wanted.
+    /// Starts to open an input whose points are shown already, as those of `frame` if there is a timeline. The points
+    /// stay until another frame is wanted.
     pub(crate) fn go_on(input: Input, frame: Option<usize>, view: Known, context: egui::Context) -> Self {
         Self::begin(input, frame, view, Post { begun: true, ..Post::default() }, context)
     }
@@ -90,7 +90,7 @@ impl StreamThread {
         Self { shared }
     }
 
-    /// Asks for a frame of the timeline.
+    /// Requests a frame of the timeline.
     pub(crate) fn want(&self, frame: usize) {
         let mut post = self.shared.lock();
         if post.wanted != Some(frame) {
@@ -100,27 +100,27 @@ impl StreamThread {
         }
     }
 
-    /// Whether live points that come are passed over for now, but for the first.
+    /// Sets whether live points are dropped. The first ones are always kept.
     pub(crate) fn pause(&self, paused: bool) {
         self.shared.lock().paused = paused;
     }
 
-    /// Once it is open: when its frames happen, or `None` if it is live.
+    /// `None` until the input is open; then its timeline, or `Some(None)` if it is live.
     pub(crate) fn timeline(&self) -> Option<Option<Arc<Timeline>>> {
         self.shared.lock().timeline.clone()
     }
 
-    /// Part of what has to be read before there are points, 0 to 1, as far as that is known.
+    /// Progress of reading before the first points, 0 to 1, as far as known.
     pub(crate) fn read(&self) -> f32 {
         self.shared.lock().read
     }
 
-    /// What became of the updates so far.
+    /// Statistics of the updates so far.
     pub(crate) fn statistics(&self) -> Statistics {
         self.shared.lock().statistics.clone()
     }
 
-    /// What has come since.
+    /// News since the last call.
     pub(crate) fn news(&self) -> News {
         std::mem::take(&mut self.shared.lock().news)
     }
@@ -133,7 +133,7 @@ impl Drop for StreamThread {
     }
 }
 
-/// Listens to a reader.
+/// Receives progress and notes from a reader.
 struct Follower<'a> {
     shared: &'a Shared,
     context: &'a egui::Context,
@@ -142,13 +142,13 @@ struct Follower<'a> {
 impl Progress for Follower<'_> {
     fn report(&self, fraction: f32) {
         let mut post = self.shared.lock();
-        // Later frames come soon enough.
+        // Progress is shown only until the first points.
         if post.begun {
             return;
         }
         let before = std::mem::replace(&mut post.read, fraction.clamp(0.0, 1.0));
         drop(post);
-        // A bar a hundred pixels long moves a hundred times.
+        // A progress bar 100 pixels long needs 100 repaints.
         if (100.0 * before) as u32 != (100.0 * fraction) as u32 {
             self.context.request_repaint();
         }
@@ -160,7 +160,7 @@ impl Progress for Follower<'_> {
 
     fn note(&self, note: &str) {
         let notes = &mut self.shared.lock().news.notes;
-        // A window that is not drawn takes none of them.
+        // The number of notes is limited, as a window that is not drawn takes none.
         if notes.len() < MOST_NOTES && notes.iter().all(|known| known != note) {
             notes.push(note.into());
         }
@@ -183,7 +183,7 @@ fn run(
         post.timeline = Some(timeline.clone());
         post.read = 0.0;
     }
-    // Which frame is wanted is known by the timeline.
+    // The window requests a frame once it knows the timeline.
     context.request_repaint();
     loop {
         let wanted = {

@@ -1,8 +1,8 @@
-//! What was played before is played again: after undo, and when it is read again.
+//! Inputs that are played again: after undo, and after a reload.
 
 use super::*;
 
-/// Takes the only layer off the list, as its menu does.
+/// Removes the only layer, as its menu does.
 fn remove(app: &mut App, context: &egui::Context) {
     let id = app.document().layers[0].id;
     app.edit("Remove an input", |document| {
@@ -12,7 +12,7 @@ fn remove(app: &mut App, context: &egui::Context) {
     assert!(app.playing.is_empty(), "it is not read any more");
 }
 
-/// An application that stands at the fourth of five frames, so that its points can be edited.
+/// An application stopped at the fourth of five frames, so that its points can be edited.
 fn at_the_fourth(folder: &Path, context: &egui::Context) -> App {
     let mut app = app(&sequence(folder, 5), context);
     app.toggle_playing();
@@ -46,7 +46,7 @@ fn undo_brings_edits_back_with_their_time() {
     let mut app = at_the_fourth(folder.path(), &context);
     delete(&mut app);
     remove(&mut app, &context);
-    // Something else goes on meanwhile.
+    // The clock moves on meanwhile.
     app.playing.clock.seek(0.1);
     app.undo();
     until(&mut app, &context, "its timeline", |app| app.playing.has_timeline());

@@ -1,4 +1,4 @@
-//! Films of what moves.
+//! Films of playing inputs.
 
 use autosplats::cloud::ReadOptions;
 use autosplats::{Camera, Image, Projection, Renderer};
@@ -9,7 +9,7 @@ use crate::playing::Reel;
 use crate::recording::Recording;
 use crate::render::{Answer, Outcome};
 
-/// Writes a film of some places of the clock; returns the folder's pictures in order, or why there are none.
+/// Writes a film of some clock positions. Returns its pictures in order, or why there are none.
 fn film(app: &mut App, context: &egui::Context, places: &[f64], folder: &Path) -> Result<Vec<Image>, String> {
     let target = Target::new(&folder.join("f.png")).expect("pictures");
     let wish = app.wish([48, 32], false);
@@ -48,7 +48,7 @@ fn each_picture_shows_the_frame_of_its_time() {
     let context = egui::Context::default();
     let name = sequence(folder.path(), 5);
     let mut app = app(&name, &context);
-    // Before all five frames, which are ten to the right of each other.
+    // In front of all five frames, whose points are 10 apart along x.
     let at = autosplats::cloud::glam::DVec3::new(24.0, 2.0, 0.0);
     let eye = at + autosplats::cloud::glam::DVec3::new(0.0, -60.0, 20.0);
     let up = autosplats::cloud::glam::DVec3::Z;
@@ -57,7 +57,7 @@ fn each_picture_shows_the_frame_of_its_time() {
     let places = [0.0, 0.1, 0.15, 0.3, 0.45, 0.2, 0.0];
     let pictures = film(&mut app, &context, &places, out.path()).expect("a film");
     assert_eq!(pictures.len(), places.len(), "one each");
-    // As render makes them, of the same player.
+    // The renders of the same player, for comparison.
     let source = Input::parse(&name).expect("a folder");
     let options = ReadOptions { exact: true, ..source.options.clone() };
     let mut player = source.source.play(&source.play, &options, &()).expect("it plays");

@@ -13,7 +13,7 @@ use crate::app::App;
 use crate::look::Look;
 use crate::{Input, Options};
 
-/// Frames of 40 points, each a step to the right of the one before.
+/// Frames of 40 points each. Each frame is shifted to the right of the one before.
 fn sequence(folder: &Path, frames: usize) -> String {
     for frame in 0..frames {
         let rows: String =
@@ -37,7 +37,7 @@ fn pictures_of_what_is_live_are_there_before_the_next_update() {
     assert_eq!(heard.live_ms(), LIVE_MS, "nor is a pause");
 }
 
-/// Lets the application take in what its threads have, until something is so.
+/// Runs the application until `done` returns true.
 fn until(app: &mut App, context: &egui::Context, what: &str, done: impl Fn(&App) -> bool) {
     let begun = Instant::now();
     while !done(app) {
@@ -47,7 +47,7 @@ fn until(app: &mut App, context: &egui::Context, what: &str, done: impl Fn(&App)
     }
 }
 
-/// Least x of what is shown.
+/// Smallest x of the shown points.
 fn left(app: &App) -> Option<f64> {
     let layer = app.document().layers.first()?;
     (0..layer.cloud.len()).map(|point| layer.cloud.world_position(point).x).reduce(f64::min)
@@ -57,11 +57,11 @@ fn app(name: &str, context: &egui::Context) -> App {
     app_of(Input::parse(name).expect("a folder"), context)
 }
 
-/// The application with the first frame of an input.
+/// An application that shows the first frame of an input.
 fn app_of(input: Input, context: &egui::Context) -> App {
     let options = Options { inputs: vec![input], backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), context);
-    // The context's clock stands still, and so does what is played.
+    // The context's clock stands still, so that the first frame stays.
     until(&mut app, context, "the first frame", |app| left(app) == Some(0.0));
     app
 }
@@ -103,7 +103,7 @@ fn edits_are_not_played_over() {
     assert!(app.playing.clock.playing, "nothing would be lost any more");
 }
 
-/// Deletes a few points.
+/// Deletes seven points.
 fn delete(app: &mut App) {
     app.edit_points("Delete", |document| {
         let shown = document.shown();
@@ -143,7 +143,7 @@ fn what_waits_for_its_first_points_says_so() {
     let mut app = App::new(options, Look::default(), Vec::new(), &context);
     let why = |app: &App| app.playing.waiting().next().map(|waiting| waiting.why);
     until(&mut app, &context, "a word", |app| why(app).is_some_and(|why| why.contains("points")));
-    // What was paused before there was anything to see shows what comes first.
+    // A stream that is paused before its first points still shows them.
     app.toggle_playing();
     std::fs::write(folder.path().join("frame_0.xyz"), "0 0 0\n1 0 0\n0 1 0\n").expect("a frame");
     until(&mut app, &context, "the first points", |app| left(app) == Some(0.0));

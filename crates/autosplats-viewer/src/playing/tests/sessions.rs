@@ -1,10 +1,10 @@
-//! A session plays the same as it did.
+//! A restored session plays as before.
 
 use super::*;
 use crate::loading::Appearance;
 use crate::state::State;
 
-/// What a session that was kept at `path` has.
+/// The application that restores the session at `path`.
 fn again(path: &Path, context: &egui::Context) -> App {
     let options = Options { backend: Some(Backend::Cpu), ..Options::default() };
     let mut app = App::new(options, Look::default(), Vec::new(), context);
@@ -12,7 +12,7 @@ fn again(path: &Path, context: &egui::Context) -> App {
     app
 }
 
-/// The inputs of a session.
+/// The inputs of a session, as JSON.
 fn inputs(app: &App) -> serde_json::Value {
     serde_json::to_value(State::of(app)).expect("a state")["inputs"].take()
 }
@@ -33,7 +33,7 @@ fn a_session_plays_the_same() {
     clock.end_here();
     clock.seek(1.75);
     (clock.speed, clock.looped) = (0.25, false);
-    // All four so far.
+    // All four frames so far, accumulated.
     until(&mut first, &context, "the fourth frame", |app| app.document().counts().points == 160);
     let id = first.document().layers[0].id;
     first.settle(|document| {
@@ -69,7 +69,7 @@ fn what_waits_or_failed_is_kept_as_it_is_to_look() {
     let waiting = State::of(&first);
     let path = folder.path().join("state.json");
     waiting.write(&path).expect("written");
-    // There is nothing in the folder that could be played.
+    // The folder holds nothing that can be played.
     until(&mut first, &context, "the failure", |app| app.playing.is_empty());
     assert_eq!(State::of(&first), waiting, "what failed is no less a part of it");
     let second = again(&path, &context);
