@@ -4,7 +4,6 @@
 //! The render thread is asked for one picture at a time, so that the window stays usable. A thread of its own writes
 //! the pictures as PNG files, or sends them to ffmpeg for a film. Everything stays as at the start of the film, except
 //! the camera and, where time runs, the points that a [`Reel`] reads.
-//! where time runs, the points that a [`Reel`] reads.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};

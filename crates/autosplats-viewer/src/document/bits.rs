@@ -1,10 +1,10 @@
-//! Sets of points, one bit a point, shared until changed.
+//! Sets of points, one bit per point. Clones share memory until changed.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-/// Words that one thread does at a time.
+/// Smallest number of words per parallel task.
 const LEAST: usize = 1 << 10;
 
 /// A set of points of one cloud, by index. Clones share their memory; the empty set has none.
@@ -12,7 +12,7 @@ const LEAST: usize = 1 << 10;
 pub(crate) struct Bits(Option<Arc<[u64]>>);
 
 impl Bits {
-    /// The points below `len` that `has` says yes to.
+    /// The points below `len` for which `has` returns true.
     pub(crate) fn from_fn(len: usize, has: impl Fn(usize) -> bool + Sync) -> Self {
         Self::from_words(len, |word| {
             let points = word * 64..len.min(word * 64 + 64);
@@ -20,23 +20,23 @@ impl Bits {
         })
     }
 
-    /// A set of points below `len` by its words, 64 points each, the first in the lowest bit.
+    /// A set of points below `len` by its words. A word holds 64 points, the first in the lowest bit.
     pub(super) fn from_words(len: usize, word: impl Fn(usize) -> u64 + Sync) -> Self {
         let words: Vec<u64> = (0..len.div_ceil(64)).into_par_iter().with_min_len(LEAST).map(&word).collect();
         if words.iter().all(|&word| word == 0) { Self(None) } else { Self(Some(words.into())) }
     }
 
-    /// The words, 64 points each; where they end no more points are in.
+    /// The words, 64 points each. Points beyond the last word are not in the set.
     pub(super) fn words(&self) -> &[u64] {
         self.0.as_deref().unwrap_or_default()
     }
 
-    /// Word `index`.
+    /// Word `index`, 0 beyond the last word.
     pub(super) fn word(&self, index: usize) -> u64 {
         self.words().get(index).copied().unwrap_or(0)
     }
 
-    /// Whether a point is in.
+    /// Whether a point is in the set.
     #[inline(always)]
     pub(crate) fn get(&self, point: usize) -> bool {
         self.words().get(point / 64).is_some_and(|word| word >> (point % 64) & 1 == 1)
@@ -47,12 +47,12 @@ impl Bits {
         self.words().par_iter().with_min_len(LEAST).map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Whether no point is in.
+    /// Whether the set has no points.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_none()
     }
 
-    /// Points of either set.
+    /// Points in either set.
     #[must_use]
     pub(crate) fn or(&self, other: &Self) -> Self {
         if other.is_empty() {
@@ -64,7 +64,7 @@ impl Bits {
         self.combine(other, |a, b| a | b)
     }
 
-    /// Points of this set that are not in the other.
+    /// Points of this set that are not in `other`.
     #[must_use]
     pub(crate) fn without(&self, other: &Self) -> Self {
         if self.is_empty() || other.is_empty() { self.clone() } else { self.combine(other, |a, b| a & !b) }
@@ -75,13 +75,14 @@ impl Bits {
         Self::from_words(words * 64, |index| rule(self.word(index), other.word(index)))
     }
 
-    /// Where the set lies in memory and how many bytes it takes, if any.
+    /// Address and size in bytes of the set's memory, if it has any.
     pub(super) fn memory(&self) -> Option<(usize, usize)> {
         self.0.as_ref().map(|words| (words.as_ptr().addr(), size_of_val(&**words)))
     }
 }
 
-/// Sets are compared by their points, fast where they share their memory. A longer run of empty words is no difference.
+/// Sets are equal if they have the same points; trailing empty words do not count. The comparison is fast if they share
+/// their memory.
 impl PartialEq for Bits {
     fn eq(&self, other: &Self) -> bool {
         let shared = match (&self.0, &other.0) {

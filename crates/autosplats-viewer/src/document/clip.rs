@@ -1,54 +1,54 @@
-//! The box outside of which nothing is shown.
+//! The clipping box, outside of which nothing is shown.
 
 use autosplats::cloud::glam::{DQuat, DVec3};
 
-/// Least side of a box by its longest: a face that is pushed through the opposite one stops before it.
+/// Smallest side of a box, as a share of its longest side. A face pushed through the opposite face stops there.
 const LEAST_SIDE: f64 = 1e-4;
 
-/// A box in world coordinates. Points outside are not shown, so that no edit reaches them; they are not changed.
+/// A box in world coordinates. Points outside are not shown, so that no edit reaches them; they stay unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ClipBox {
-    /// The lowest corner, before the box is turned.
+    /// The lowest corner, before rotation.
     pub(crate) min: DVec3,
-    /// The highest corner, before the box is turned.
+    /// The highest corner, before rotation.
     pub(crate) max: DVec3,
-    /// How it is turned about its centre.
+    /// Rotation about the centre of the box.
     pub(crate) rotation: DQuat,
-    /// Whether it clips.
+    /// Whether the box clips.
     pub(crate) enabled: bool,
 }
 
 impl ClipBox {
-    /// A box along the axes that clips.
+    /// An enabled box along the world axes.
     pub(crate) fn new(min: DVec3, max: DVec3) -> Self {
         Self { min, max, rotation: DQuat::IDENTITY, enabled: true }
     }
 
-    /// Whether it is one: what a file says may be anything.
+    /// Whether the values are a valid box; a file may hold any.
     pub(crate) fn is_box(&self) -> bool {
         let corners = self.min.is_finite() && self.max.is_finite() && self.min.cmple(self.max).all();
         corners && self.rotation.is_normalized()
     }
 
-    /// What it turns about.
+    /// Centre of the box and of its rotation.
     pub(crate) fn centre(&self) -> DVec3 {
         self.min.midpoint(self.max)
     }
 
-    /// The direction in the world that an axis of the box has.
+    /// World direction of an axis of the box.
     pub(crate) fn axis(&self, axis: usize) -> DVec3 {
         self.rotation * DVec3::AXES[axis]
     }
 
-    /// The middle of a face: that with the lowest or the highest coordinates of an axis of the box.
+    /// Middle of a face of the box: the one at the low or the high end of `axis`.
     pub(crate) fn face(&self, axis: usize, high: bool) -> DVec3 {
         let half = 0.5 * (self.max - self.min)[axis];
         self.centre() + self.axis(axis) * if high { half } else { -half }
     }
 
-    /// The box with a face moved along its axis; the others stay where they are in the world, and the box does not turn
-    /// inside out.
+    /// The box with one face moved by `way` along its axis. The other faces keep their places in the world, and the box
+    /// keeps its smallest side.
     #[must_use]
     pub(crate) fn with_face(&self, axis: usize, high: bool, way: f64) -> Self {
         if !way.is_finite() {
@@ -58,7 +58,7 @@ impl ClipBox {
         let least = LEAST_SIDE * size.max_element();
         let way = if high { way.max(least - size[axis]) } else { way.min(size[axis] - least) };
         if self.rotation == DQuat::IDENTITY {
-            // What does not move keeps all its digits.
+            // A direct change keeps all digits of the other faces.
             let mut moved = *self;
             let end = if high { &mut moved.max } else { &mut moved.min };
             end[axis] += way;
@@ -70,15 +70,15 @@ impl ClipBox {
         Self { min: centre - half, max: centre + half, ..*self }
     }
 
-    /// How far it is turned about a direction, in radians.
+    /// Angle of the rotation about `up`, radians, -π to π.
     pub(crate) fn angle_about(&self, up: DVec3) -> f64 {
         let DQuat { x, y, z, w } = self.rotation;
         let angle = 2.0 * DVec3::new(x, y, z).dot(up).atan2(w);
-        // From half a turn back to half a turn on.
+        // Normalizes to -π to π.
         angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
     }
 
-    /// Whether a place is in the box, its faces included. What is not finite is outside.
+    /// Whether a place is in the box or on a face. A place that is not finite is outside.
     #[inline]
     pub(crate) fn contains(&self, place: DVec3) -> bool {
         let place = if self.rotation == DQuat::IDENTITY {
@@ -90,7 +90,7 @@ impl ClipBox {
         place.cmpge(self.min).all() && place.cmple(self.max).all() && place.is_finite()
     }
 
-    /// The corners, the first axis changing fastest.
+    /// The corners, with the first axis changing fastest.
     pub(crate) fn corners(&self) -> [DVec3; 8] {
         let centre = self.centre();
         std::array::from_fn(|corner| {

@@ -1,4 +1,4 @@
-//! What is done to points. Each edit says how many points it reached; with none, the document is as it was.
+//! Edits of points. Each edit returns the number of points that it changed; with 0, the document is unchanged.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use autosplats::cloud::{
 
 use super::{Bits, Document, Layer, LayerId, layers::can_place, shown::bounds};
 
-/// Points that a drag holds, and what had moved them before.
+/// Points held by a drag, with the moves applied to them before the drag.
 #[derive(Clone, Debug)]
 pub(crate) struct Grip(Vec<Gripped>);
 
@@ -22,7 +22,7 @@ struct Gripped {
 }
 
 impl Document {
-    /// Hides the selected points, which are selected no longer.
+    /// Hides the selected points and deselects them.
     pub(crate) fn hide_selected(&mut self) -> usize {
         self.edit_reached(|layer, reached| {
             layer.edits.hidden = layer.edits.hidden.or(reached);
@@ -47,7 +47,7 @@ impl Document {
         })
     }
 
-    /// Deletes all that can be seen but is not selected; nothing if nothing is selected.
+    /// Deletes all visible points that are not selected; does nothing if nothing is selected.
     pub(crate) fn crop_to_selection(&mut self) -> usize {
         if self.layers.iter().all(|layer| self.reached(layer).is_empty()) {
             return 0;
@@ -59,7 +59,7 @@ impl Document {
         others.iter().map(Bits::count).sum()
     }
 
-    /// Moves the selected points by an affine map of world coordinates; one that flattens them is refused.
+    /// Moves the selected points by an affine map of world coordinates. A map without an inverse is refused.
     pub(crate) fn move_selected(&mut self, matrix: &DMat4) -> usize {
         if *matrix == DMat4::IDENTITY {
             return 0;
@@ -68,7 +68,7 @@ impl Document {
         self.move_gripped(&grip, matrix)
     }
 
-    /// The selected points as they lie now, to be moved from there as often as a drag wants.
+    /// The selected points at their present places, from where a drag can move them repeatedly.
     pub(crate) fn grip(&self) -> Grip {
         let gripped = self.layers.iter().map(|layer| Gripped {
             layer: layer.id,
@@ -79,15 +79,15 @@ impl Document {
         Grip(gripped.filter(|gripped| !gripped.points.is_empty()).collect())
     }
 
-    /// Moves points from where they lay when they were gripped, whatever has moved them since; by an affine map of world
-    /// coordinates, the identity to put them back. One that flattens them is refused.
+    /// Moves gripped points from the places where they were gripped, replacing later moves. `matrix` is an affine map
+    /// of world coordinates; the identity puts the points back. A map without an inverse is refused.
     pub(crate) fn move_gripped(&mut self, grip: &Grip, matrix: &DMat4) -> usize {
         if !can_place(matrix) {
             return 0;
         }
         let mut count = 0;
         for Gripped { layer, cloud, points, moves: before } in &grip.0 {
-            // A layer that was read again has other points.
+            // A layer that has been read again has other points.
             let there = |own: &&mut Layer| own.id == *layer && Arc::ptr_eq(&own.cloud, cloud);
             let Some(layer) = self.layers.iter_mut().find(there) else { continue };
             let own = if layer.pose == DMat4::IDENTITY { *matrix } else { layer.pose.inverse() * *matrix * layer.pose };
@@ -95,7 +95,7 @@ impl Document {
             moves.clone_from(before);
             match moves.last_mut() {
                 _ if *matrix == DMat4::IDENTITY => {}
-                // The same points once more: one move takes them all the way.
+                // The last move has the same points, so that both are combined into one.
                 Some((moved, before)) if moved == points => {
                     *before = own * *before;
                     if *before == DMat4::IDENTITY {
@@ -115,7 +115,7 @@ impl Document {
         self.move_selected(&about(low.midpoint(high), DMat4::from_axis_angle(axis, radians)))
     }
 
-    /// The least box along the axes that has all selected points in it.
+    /// Bounds of all selected points, world coordinates.
     pub(crate) fn selected_bounds(&self) -> Option<[DVec3; 2]> {
         let boxes = self.layers.iter().filter_map(|layer| {
             let reached = self.reached(layer);
@@ -124,7 +124,7 @@ impl Document {
         boxes.reduce(join)
     }
 
-    /// The least box along the axes that has all points in it that would be shown if no box clipped any.
+    /// Bounds of all points that would be shown without the clipping box, world coordinates.
     pub(crate) fn whole_bounds(&self) -> Option<[DVec3; 2]> {
         self.layers.iter().filter(|layer| layer.visible).filter_map(Layer::bounds).reduce(join)
     }
@@ -144,7 +144,7 @@ fn join([low, high]: [DVec3; 2], [min, max]: [DVec3; 2]) -> [DVec3; 2] {
     [low.min(min), high.max(max)]
 }
 
-/// A map that leaves `centre` where it is.
+/// A map that keeps `centre` in place.
 pub(crate) fn about(centre: DVec3, matrix: DMat4) -> DMat4 {
     DMat4::from_translation(centre) * matrix * DMat4::from_translation(-centre)
 }

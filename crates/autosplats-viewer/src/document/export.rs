@@ -1,4 +1,4 @@
-//! Writing points to a file, with what was done to them.
+//! Exports edited points to a file.
 
 use std::{
     borrow::Cow,
@@ -9,20 +9,20 @@ use autosplats::cloud::{Error, PointCloud, Progress, Scan, Unit, check_memory, c
 
 use super::{Document, Layer, LayerId, shown::points_where};
 
-/// Which points are written.
+/// Which points to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum What {
-    /// Those that can be seen.
+    /// The visible points.
     Shown,
-    /// Those selected that can be seen.
+    /// The selected points that are visible.
     Selected,
-    /// All of one layer that are not deleted, hidden ones too.
+    /// The points of one layer that are not deleted, including hidden ones.
     Layer(LayerId),
-    /// All that are not deleted, of all layers, hidden and invisible ones too.
+    /// The points of all layers that are not deleted, including hidden ones and those of invisible layers.
     All,
 }
 
-/// What may be replaced.
+/// Which files may be replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Replace {
     /// No file.
@@ -30,42 +30,42 @@ pub(crate) enum Replace {
     Nothing,
     /// A file that no layer was read from.
     Files,
-    /// Even a file that a layer was read from. The layer stays as it was read, so that what is told of its points is then
-    /// about the old file until it is opened again.
+    /// Even a file that a layer was read from. The layer keeps the points that it has, so that its point information
+    /// describes the old file until it is opened again.
     Inputs,
 }
 
-/// What was written.
+/// Result of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Exported {
-    /// Number of points.
+    /// Number of points written.
     pub(crate) points: usize,
 }
 
-/// Why nothing was written. All files are as they were.
+/// Why nothing was written. All files are unchanged.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ExportError {
-    /// There is no such point.
+    /// There are no points to write.
     #[error("there is no point to write")]
     Nothing,
-    /// The file is one of those open.
+    /// The file is the source of an open layer.
     #[error("{}: the layer '{layer}' was read from it; it is replaced only if you say so", path.display())]
     Input {
         /// The file.
         path: PathBuf,
-        /// The layer.
+        /// Name of the layer.
         layer: String,
     },
-    /// The file is there already.
+    /// The file exists already.
     #[error("{}: is already there", path.display())]
     Exists {
         /// The file.
         path: PathBuf,
     },
-    /// It was not to be finished.
+    /// The export was cancelled.
     #[error("cancelled")]
     Cancelled,
-    /// It could not be written.
+    /// The points could not be written.
     #[error(transparent)]
     Cloud(Error),
 }
@@ -79,15 +79,15 @@ impl From<Error> for ExportError {
     }
 }
 
-/// Writes points in the format that the extension of `path` names. Deleted points are left out, moves and poses applied;
-/// all else is as it was read: attributes, scans, coordinate system, steps. Colours are the points' own.
+/// Writes points in the format given by the extension of `path`. Deleted points are left out; moves and poses are
+/// applied. Attributes, scans, coordinate system and coordinate resolution stay as read. Colours are the points' own.
 ///
-/// Several layers become one cloud as [merging](PointCloud::merge) has it. Layers in degrees stay so unless others are not;
-/// then they are written in metres, as they are shown. What is lost is told to `progress`. The file appears complete or not
-/// at all.
+/// Several layers become one cloud by [merging](PointCloud::merge). Layers in degrees stay in degrees, unless other
+/// layers are not; then all are written in metres, as shown. Losses are reported to `progress`. The file appears
+/// complete or not at all.
 ///
 /// # Errors
-/// [`ExportError`] says why nothing was written.
+/// [`ExportError`]; nothing was written.
 pub(crate) fn export(
     document: &Document,
     what: What,
@@ -118,7 +118,7 @@ pub(crate) fn export(
         [only] => std::mem::take(only),
         [first, others @ ..] => {
             if others.iter().any(|other| other.origin() != first.origin()) {
-                // One part with residuals has merging keep all digits of all.
+                // With residuals in one part, merging keeps all digits of all parts.
                 with_digits(first.to_mut());
             }
             tell_losses(&clouds, progress);
@@ -129,7 +129,7 @@ pub(crate) fn export(
     Ok(Exported { points: cloud.len() })
 }
 
-/// The points of a layer that are to be written; nothing if all are.
+/// The points of a layer to write; `None` for all.
 fn chosen(document: &Document, layer: &Layer, what: What) -> Option<Vec<u32>> {
     let len = layer.cloud.len();
     match what {
@@ -147,11 +147,11 @@ impl Layer {
         !self.edits.moves.is_empty() || self.pose != DMat4::IDENTITY
     }
 
-    /// Bytes that [`exact`](Self::exact) takes at most.
+    /// Largest number of bytes that [`exact`](Self::exact) takes.
     fn exact_bytes(&self, points: Option<&[u32]>, degrees: bool) -> usize {
         let copies = match (points, self.is_moved(), self.local.filter(|_| !degrees)) {
             (None, false, None) => return 0,
-            // Placing makes another one.
+            // Placing by a pose makes a second copy.
             (_, true, _) if self.pose != DMat4::IDENTITY => 2,
             _ => 1,
         };
@@ -160,8 +160,8 @@ impl Layer {
         (part * (copies * (self.cloud.byte_len() + digits)) as f64) as usize
     }
 
-    /// Its points with the indices given, or all, moved and placed with all digits: in the file's degrees if `degrees`
-    /// says so, else in metres. A layer to which nothing was done is not copied.
+    /// The points with the given indices, or all, moved and placed with all digits. The result is in the file's degrees
+    /// if `degrees`, else in metres. An unchanged layer is not copied.
     pub(super) fn exact(&self, points: Option<&[u32]>, degrees: bool) -> Cow<'_, PointCloud> {
         let (moved, converted) = (self.is_moved(), self.local.filter(|_| !degrees));
         if points.is_none() && !moved && converted.is_none() {
@@ -197,7 +197,7 @@ fn with_place(mut matrix: DMat4, place: autosplats::cloud::glam::DVec3) -> DMat4
     matrix
 }
 
-/// Gives a cloud room for what `f32` cannot hold.
+/// Adds residuals to a cloud, for digits that `f32` cannot hold.
 fn with_digits(cloud: &mut PointCloud) {
     if cloud.residuals().is_none() {
         let zeros = vec![[0.0; 3]; cloud.len()];
@@ -206,7 +206,7 @@ fn with_digits(cloud: &mut PointCloud) {
     }
 }
 
-/// Tells what one cloud cannot have because not all of its parts do.
+/// Reports attributes and coordinate systems that merging drops, as not all parts have them.
 fn tell_losses(clouds: &[Cow<'_, PointCloud>], progress: &dyn Progress) {
     let [first, others @ ..] = clouds else { return };
     for cloud in clouds {
@@ -220,10 +220,10 @@ fn tell_losses(clouds: &[Cow<'_, PointCloud>], progress: &dyn Progress) {
     }
 }
 
-/// Refuses what must not be replaced; says what is to be written, which for a link is what it points to.
+/// Refuses files that must not be replaced. Returns the path to write, with links resolved.
 fn check_target(document: &Document, path: &Path, replace: Replace) -> Result<PathBuf, ExportError> {
     let Ok(target) = path.canonicalize() else {
-        // A link to nowhere is there, too.
+        // A dangling link also counts as an existing file.
         let there = path.symlink_metadata().is_ok() && replace < Replace::Files;
         return if there { Err(ExportError::Exists { path: path.into() }) } else { Ok(path.into()) };
     };

@@ -1,4 +1,4 @@
-//! Undoing and doing again, and what is not saved yet.
+//! Undo, redo, and which edits are unsaved.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::Arc;
@@ -7,32 +7,32 @@ use autosplats::cloud::PointCloud;
 
 use super::{Document, LayerId, layer::Changes};
 
-/// A document with those it was before, newest last, and those that were undone.
+/// A document with its past and its undone versions, the nearest last in each list.
 ///
-/// Old documents are forgotten, those furthest away first, when there are too many of them or when they take too much
-/// memory that the present one does not need.
+/// When there are too many old documents, or they take too much memory beyond that of the present one, the furthest are
+/// dropped first.
 #[derive(Clone, Debug)]
 pub(crate) struct History {
     current: Document,
     past: VecDeque<Step>,
     future: VecDeque<Step>,
-    /// What each layer's changes were when it was last written; as it was opened, if it never was.
+    /// Changes of each layer when it was last saved; a layer without an entry compares with how it was opened.
     saved: HashMap<LayerId, Changes>,
     most_steps: usize,
     most_bytes: usize,
 }
 
-/// What was done, and the document on the other side of it.
+/// An edit, and the document on the other side of it.
 #[derive(Clone, Debug)]
 struct Step {
     label: String,
     document: Document,
 }
 
-/// Documents kept.
+/// Number of old documents kept.
 const MOST_STEPS: usize = 200;
 
-/// Bytes that old documents may take beyond the present one.
+/// Memory of old documents beyond that of the present one, bytes.
 const MOST_BYTES: usize = 1 << 30;
 
 impl Default for History {
@@ -42,7 +42,7 @@ impl Default for History {
 }
 
 impl History {
-    /// An empty document that keeps so many old ones and so many bytes for them.
+    /// An empty document whose history has these limits.
     pub(crate) fn with_limits(most_steps: usize, most_bytes: usize) -> Self {
         Self {
             current: Document::default(),
@@ -54,12 +54,12 @@ impl History {
         }
     }
 
-    /// The document as it is.
+    /// The present document.
     pub(crate) fn current(&self) -> &Document {
         &self.current
     }
 
-    /// Puts a document in the place of the present one, which can be had back. `label` says what was done to it.
+    /// Replaces the document as an undo step. `label` says what was done.
     pub(crate) fn record(&mut self, label: impl Into<String>, document: Document) {
         let old = std::mem::replace(&mut self.current, document);
         self.past.push_back(Step { label: label.into(), document: old });
@@ -67,27 +67,27 @@ impl History {
         self.forget();
     }
 
-    /// Puts a document in the place of the present one without a step, for what nobody would undo.
+    /// Replaces the document without an undo step.
     pub(crate) fn replace(&mut self, document: Document) {
         self.current = document;
         self.forget();
     }
 
-    /// Changes the document and all it was and would be again: for what is no step, as a file that has been read, and has to
-    /// outlast undoing those that are.
+    /// Changes the document and all its past and undone versions, for changes that undo must not revert, as the reading
+    /// of a file.
     pub(crate) fn everywhere(&mut self, change: impl Fn(&mut Document)) {
         let steps = self.past.iter_mut().chain(&mut self.future).map(|step| &mut step.document);
         steps.chain([&mut self.current]).for_each(change);
     }
 
-    /// Gives a layer the points that its file has now; what was done to single points, ever, is forgotten, as they may be
-    /// others.
+    /// Replaces the points of a layer in all versions. Edits of single points are dropped everywhere, as the new points
+    /// may be different ones.
     pub(crate) fn reload(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
         self.everywhere(|document| document.reload(id, cloud));
         self.saved.remove(&id);
     }
 
-    /// Takes back the last step; says which.
+    /// Undoes the last step and returns its label.
     pub(crate) fn undo(&mut self) -> Option<String> {
         let Step { label, document } = self.past.pop_back()?;
         let undone = std::mem::replace(&mut self.current, document);
@@ -96,7 +96,7 @@ impl History {
         Some(label)
     }
 
-    /// Does again what was undone last; says what.
+    /// Redoes the step that was undone last and returns its label.
     pub(crate) fn redo(&mut self) -> Option<String> {
         let Step { label, document } = self.future.pop_back()?;
         let undone = std::mem::replace(&mut self.current, document);
@@ -105,31 +105,31 @@ impl History {
         Some(label)
     }
 
-    /// What undoing would take back.
+    /// Label of the step that undo would revert.
     pub(crate) fn undo_label(&self) -> Option<&str> {
         self.past.back().map(|step| &*step.label)
     }
 
-    /// What would be done again.
+    /// Label of the step that redo would repeat.
     pub(crate) fn redo_label(&self) -> Option<&str> {
         self.future.back().map(|step| &*step.label)
     }
 
-    /// Bytes that old documents take and the present one does not need.
+    /// Memory of old documents beyond that of the present one, bytes.
     pub(crate) fn old_bytes(&self) -> usize {
         let mut known: HashSet<usize> = self.current.memory().map(|(place, _)| place).collect();
         let old = self.past.iter().chain(&self.future).flat_map(|step| step.document.memory());
         old.filter(|(place, _)| known.insert(*place)).map(|(_, bytes)| bytes).sum()
     }
 
-    /// Whether a layer is in the document, or would be again by undoing or doing again.
+    /// Whether a layer is in the document, or in a version that undo or redo would restore.
     pub(crate) fn holds(&self, id: LayerId) -> bool {
         let steps = self.past.iter().chain(&self.future).map(|step| &step.document);
         steps.chain([&self.current]).any(|document| document.layer(id).is_some())
     }
 
     fn forget(&mut self) {
-        // The newest step is kept whatever it takes: it has just been done, and may have been a mistake.
+        // The newest step is always kept: it may be a mistake that has just been made.
         while self.past.len() + self.future.len() > 1
             && (self.past.len() + self.future.len() > self.most_steps || self.old_bytes() > self.most_bytes)
         {
@@ -140,7 +140,7 @@ impl History {
         }
     }
 
-    /// Whether points of a layer were deleted or moved, or the layer was, since it was opened or last saved.
+    /// Whether a layer was placed, or points of it deleted or moved, since it was opened or last saved.
     pub(crate) fn is_unsaved(&self, id: LayerId) -> bool {
         self.current.layer(id).is_some_and(|layer| {
             let changes = layer.changes();
@@ -148,18 +148,18 @@ impl History {
         })
     }
 
-    /// The layers that have edits which are in no file.
+    /// The layers with unsaved edits.
     pub(crate) fn unsaved(&self) -> impl Iterator<Item = LayerId> + '_ {
         self.current.layers.iter().map(|layer| layer.id).filter(|&id| self.is_unsaved(id))
     }
 
-    /// Whether anything would be lost by leaving. Selecting, hiding, colours and names are nothing that is lost; a layer
-    /// that was removed was to be asked about then.
+    /// Whether leaving would lose edits. Selection, visibility, colours and names do not count. Neither do removed
+    /// layers, as the user is asked before removal.
     pub(crate) fn is_changed_since_saved(&self) -> bool {
         self.unsaved().next().is_some()
     }
 
-    /// States that a file has a layer as it is in `document`, which was the present one when writing began.
+    /// Marks a layer as saved in its state in `document`, which was the present one when writing began.
     pub(crate) fn mark_saved(&mut self, document: &Document, id: LayerId) {
         if let Some(layer) = document.layer(id) {
             self.saved.insert(id, layer.changes());
@@ -168,7 +168,7 @@ impl History {
 }
 
 impl Document {
-    /// All that is shared with other documents: where it lies in memory, and how many bytes it takes.
+    /// Address and size in bytes of each part that documents may share.
     fn memory(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.layers.iter().flat_map(|layer| {
             let edits = &layer.edits;
@@ -179,7 +179,7 @@ impl Document {
     }
 }
 
-/// What was done to how many points, as a label: "Delete 1,234 points".
+/// A label with a number of points: "Delete 1,234 points".
 pub(crate) fn label(verb: &str, points: usize) -> String {
     format!("{verb} {} point{}", grouped(points), if points == 1 { "" } else { "s" })
 }

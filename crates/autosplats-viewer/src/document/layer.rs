@@ -1,4 +1,4 @@
-//! One input of a document and what was done to it.
+//! A layer: one input of a document and its edits.
 
 use std::{
     path::PathBuf,
@@ -15,52 +15,53 @@ use autosplats::cloud::{
 
 use super::{Bits, shown::bounds};
 
-/// Tells a layer from all others of this process; clones of a layer, as undo keeps them, have the same.
+/// Identifies a layer in this process. Clones of a layer, as undo keeps them, have the same id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct LayerId(u64);
 
-/// One input: a cloud as it was read, where it stands and what was done to its points.
+/// One input: a cloud as it was read, its pose and the edits of its points.
 #[derive(Clone, Debug)]
 pub(crate) struct Layer {
-    /// Which one it is.
+    /// Identifies the layer.
     pub(crate) id: LayerId,
-    /// Name for people.
+    /// Name shown to the user.
     pub(crate) name: String,
-    /// The file it was read from.
+    /// The file that the points were read from.
     pub(crate) path: Option<PathBuf>,
-    /// The points as read, with [all digits](autosplats::cloud::ReadOptions::exact); never changed.
+    /// The points as read, with [all digits](autosplats::cloud::ReadOptions::exact). They never change.
     pub(crate) cloud: Arc<PointCloud>,
-    /// Whether it is shown.
+    /// Whether the layer is shown.
     pub(crate) visible: bool,
-    /// Whether more points are still to come. Its points can be seen, but not selected or edited, as they are not the file's.
+    /// Whether points are still to come or to change. Incomplete points can be seen, but not selected or edited.
     pub(crate) incomplete: bool,
-    /// One colour for all its points instead of their own.
+    /// One colour for all points; `None` shows their own colours.
     pub(crate) tint: Option<[u8; 3]>,
-    /// Where it stands: maps its own coordinates, in metres where the file has degrees, to world coordinates, after the
-    /// [moves](Edits::moves).
+    /// Maps the layer's own coordinates to world coordinates, after the [moves](Edits::moves). The own coordinates of a
+    /// file in degrees are in metres.
     pub(crate) pose: DMat4,
-    /// What was done to single points.
+    /// Edits of single points.
     pub(crate) edits: Edits,
-    /// The pose it was opened with, which is no edit.
+    /// The pose when the layer was opened, which is no edit.
     pub(crate) opened_at: DMat4,
-    /// The map that makes metres of the file's degrees.
+    /// Converts a file's degrees to metres.
     pub(super) local: Option<LocalMetres>,
 }
 
-/// What was done to single points of a layer.
+/// Edits of single points of a layer.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Edits {
-    /// Points that the next edit is about.
+    /// Selected points.
     pub(crate) selected: Bits,
-    /// Points that are not shown but still there.
+    /// Points that exist but are not shown.
     pub(crate) hidden: Bits,
-    /// Points that are no longer there.
+    /// Points that no longer exist.
     pub(crate) deleted: Bits,
-    /// Points that were moved, in order: maps of the layer's own coordinates, in metres where the file has degrees.
+    /// Moved points and their maps, in order. The maps are in the layer's own coordinates, in metres for a file in
+    /// degrees.
     pub(crate) moves: Vec<(Bits, DMat4)>,
 }
 
-/// What was done to a layer that its file does not know.
+/// Changes to a layer that its file does not have.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Changes {
     pose: DMat4,
@@ -73,16 +74,16 @@ pub(super) struct Changes {
 pub(crate) struct Counts {
     /// All points of the file.
     pub(crate) points: usize,
-    /// Those that an edit would be about now.
+    /// Points that an edit would change.
     pub(crate) selected: usize,
-    /// Those hidden, but not deleted.
+    /// Points that are hidden, but not deleted.
     pub(crate) hidden: usize,
-    /// Those deleted.
+    /// Deleted points.
     pub(crate) deleted: usize,
 }
 
 impl Layer {
-    /// A layer that shows all of `cloud`. For one in degrees, the map to metres is found here, from all its points.
+    /// A layer that shows all of `cloud`. For a cloud in degrees, its conversion to metres is computed from all points.
     pub(crate) fn new(name: impl Into<String>, path: Option<PathBuf>, cloud: Arc<PointCloud>) -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         Self {
@@ -100,14 +101,14 @@ impl Layer {
         }
     }
 
-    /// States where it stands when it is opened, which does not count as an edit.
+    /// Sets the pose with which the layer is opened, which is no edit.
     #[must_use]
     pub(crate) fn opened_at(mut self, pose: DMat4) -> Self {
         (self.pose, self.opened_at) = (pose, pose);
         self
     }
 
-    /// What the file says a point's coordinates are.
+    /// Coordinates of a point in the file.
     ///
     /// # Panics
     /// If there is no such point.
@@ -115,7 +116,7 @@ impl Layer {
         self.cloud.world_position(point)
     }
 
-    /// World coordinates of a point, with all that was done to it.
+    /// World coordinates of a point, with all edits.
     ///
     /// # Panics
     /// If there is no such point.
@@ -127,11 +128,11 @@ impl Layer {
                 place = matrix.transform_point3(place);
             }
         }
-        // Infinities stay as they are where nothing is to be done.
+        // The identity is skipped, since it would turn infinities into NaN.
         if self.pose == DMat4::IDENTITY { place } else { self.pose.transform_point3(place) }
     }
 
-    /// The least box along the axes of the world that has all its points in it.
+    /// Bounds of the points that are neither hidden nor deleted, world coordinates.
     pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
         bounds(self.cloud.len(), |point| self.has(point).then(|| self.position(point)))
     }
@@ -141,18 +142,18 @@ impl Layer {
         !self.edits.hidden.get(point) && !self.edits.deleted.get(point)
     }
 
-    /// What was done to it that its file does not know.
+    /// Changes that the layer's file does not have.
     pub(super) fn changes(&self) -> Changes {
         let Edits { deleted, moves, .. } = &self.edits;
         Changes { pose: self.pose, deleted: deleted.clone(), moves: moves.clone() }
     }
 
-    /// The changes of a layer that is as it was opened.
+    /// The changes of a layer in the state in which it was opened.
     pub(super) fn no_changes(&self) -> Changes {
         Changes { pose: self.opened_at, deleted: Bits::default(), moves: Vec::new() }
     }
 
-    /// Whether the same points would be shown at the same places in the same colours.
+    /// Whether both layers show the same points at the same places in the same colours.
     pub(super) fn looks_like(&self, other: &Self) -> bool {
         let Self { id, cloud, tint, pose, edits, local, .. } = self;
         *id == other.id

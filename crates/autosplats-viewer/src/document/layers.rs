@@ -9,11 +9,11 @@ use autosplats::cloud::{
 
 use super::{Counts, Document, Layer, LayerId, layer::Edits};
 
-/// Points that are enough to see how large something is.
+/// Largest number of points of an overview: enough to find the size of a scene.
 const OVERVIEW: usize = 100_000;
 
 impl Document {
-    /// Puts a layer at the end of the list. One in degrees goes on the map of those that are there.
+    /// Appends a layer. A layer in degrees shares the metric map of the layers in degrees before it.
     pub(crate) fn add(&mut self, mut layer: Layer) -> LayerId {
         let beside = self.layers.iter().find_map(|other| other.local.as_ref());
         layer.local = layer.local.and_then(|own| layer.cloud.local_metres(Some(beside.unwrap_or(&own))));
@@ -22,7 +22,7 @@ impl Document {
         id
     }
 
-    /// The layer, if it is there.
+    /// The layer with this id, if there is one.
     pub(crate) fn layer(&self, id: LayerId) -> Option<&Layer> {
         self.layers.iter().find(|layer| layer.id == id)
     }
@@ -32,65 +32,64 @@ impl Document {
         layer.map(change).is_some()
     }
 
-    /// Takes a layer off the list; returns it. Ask first if it has [unsaved](super::History::is_unsaved) edits.
+    /// Removes a layer and returns it. Ask the user first if it has [unsaved](super::History::is_unsaved) edits.
     pub(crate) fn remove(&mut self, id: LayerId) -> Option<Layer> {
         let place = self.layers.iter().position(|layer| layer.id == id)?;
         Some(self.layers.remove(place))
     }
 
-    /// Moves a layer to a place of the list, the last one if there are fewer. Says whether there is such a layer, as do
-    /// the other changes.
+    /// Moves a layer to a place in the list, or to its end. Returns whether the layer exists.
     pub(crate) fn reorder(&mut self, id: LayerId, place: usize) -> bool {
         let Some(layer) = self.remove(id) else { return false };
         self.layers.insert(place.min(self.layers.len()), layer);
         true
     }
 
-    /// Gives a layer another name.
+    /// Renames a layer. Returns whether the layer exists.
     pub(crate) fn rename(&mut self, id: LayerId, name: impl Into<String>) -> bool {
         self.change(id, |layer| layer.name = name.into())
     }
 
-    /// Shows a layer or does not.
+    /// Shows or hides a layer. Returns whether the layer exists.
     pub(crate) fn set_visible(&mut self, id: LayerId, visible: bool) -> bool {
         self.change(id, |layer| layer.visible = visible)
     }
 
-    /// Shows a layer in one colour, or in its own.
+    /// Shows a layer in one colour, or with `None` in its own colours. Returns whether the layer exists.
     pub(crate) fn set_tint(&mut self, id: LayerId, tint: Option<[u8; 3]>) -> bool {
         self.change(id, |layer| layer.tint = tint)
     }
 
-    /// Places a layer in the world, by an affine map that does not flatten it; others are refused.
+    /// Places a layer in the world. A map that is not affine, or has no inverse, is refused.
     pub(crate) fn set_pose(&mut self, id: LayerId, pose: DMat4) -> bool {
         can_place(&pose) && self.change(id, |layer| layer.pose = pose)
     }
 
-    /// Gives a layer the points that its file has now; what was done to single points is forgotten, as they may be others.
+    /// Replaces the points of a layer. Edits of single points are dropped, as the new points may be different ones.
     pub(crate) fn reload(&mut self, id: LayerId, cloud: &Arc<PointCloud>) {
         self.change(id, |layer| {
-            // On the map as before, if it is in degrees still.
+            // A layer that is still in degrees keeps its map.
             layer.local = cloud.local_metres(layer.local.as_ref());
             (layer.cloud, layer.edits) = (Arc::clone(cloud), Edits::default());
         });
     }
 
-    /// Says whether more points of a layer are to come, or others: then it cannot be edited.
+    /// Sets whether points are still to come or to change, so that the layer cannot be edited.
     pub(crate) fn set_incomplete(&mut self, id: LayerId, incomplete: bool) {
         self.change(id, |layer| layer.incomplete = incomplete);
     }
 
-    /// Says that all points of a layer are there now: it can be edited.
+    /// Marks a layer as completely read, so that it can be edited.
     pub(crate) fn complete(&mut self, id: LayerId) {
         self.set_incomplete(id, false);
     }
 
-    /// A part of what is shown, for looking at it as a whole: points taken evenly from all of it.
+    /// A regular subset of the shown points, for views of the whole scene.
     pub(crate) fn overview(&self) -> PointCloud {
         self.part_of(|layer, point| layer.has(point))
     }
 
-    /// The like of the selected points.
+    /// A regular subset of the selected points.
     pub(crate) fn selected_overview(&self) -> PointCloud {
         self.part_of(|layer, point| layer.has(point) && layer.edits.selected.get(point))
     }
@@ -107,8 +106,8 @@ impl Document {
             places.extend(own.filter(|place| place.is_finite() && clip.is_none_or(|clip| clip.contains(*place))));
         }
         let origin = places.first().map_or(DVec3::ZERO, |place: &DVec3| place.round());
-        // Where sensors stood tells from where to look; which points they saw does not. Of points in a frame of their own that
-        // may be its origin.
+        // Places of sensors help to choose a view; their points do not matter. For points in a frame of their own the
+        // sensor may be at the origin.
         let at = |world_from_sensor| Scan { name: None, world_from_sensor, points: 0..0 };
         let sensors = |layer: &Layer| {
             let place = |scan: &Scan| layer.local.map_or(scan.position(), |local| local.metres(scan.position()));
@@ -131,13 +130,12 @@ impl Document {
             .with_crs(crs)
     }
 
-    /// The box around most of what is shown, by a part of the points.
+    /// Box around most of the shown points, by a subset of them.
     pub(crate) fn shown_bounds(&self) -> Option<[DVec3; 2]> {
         bounds_of(&self.overview())
     }
 
-    /// Numbers of points of a layer. With a clipping box all selected points are looked at: ask after edits, not in every
-    /// frame.
+    /// Point counts of a layer. With a clipping box all selected points are tested, so do not call this in every frame.
     pub(crate) fn counts_of(&self, layer: &Layer) -> Counts {
         Counts {
             points: layer.cloud.len(),
@@ -147,7 +145,7 @@ impl Document {
         }
     }
 
-    /// Numbers of points of all layers.
+    /// Point counts of all layers.
     pub(crate) fn counts(&self) -> Counts {
         self.layers.iter().map(|layer| self.counts_of(layer)).fold(Counts::default(), |all, own| Counts {
             points: all.points + own.points,
@@ -158,12 +156,12 @@ impl Document {
     }
 }
 
-/// The box around an [overview](Document::overview).
+/// Bounds of an [overview](Document::overview).
 pub(crate) fn bounds_of(overview: &PointCloud) -> Option<[DVec3; 2]> {
     super::shown::bounds(overview.len(), |index| Some(overview.world_position(index)))
 }
 
-/// Whether a matrix is an affine map that can be undone.
+/// Whether a matrix is an affine map with an inverse.
 pub(super) fn can_place(matrix: &DMat4) -> bool {
     let affine = matrix.is_finite() && matrix.row(3).to_array() == [0.0, 0.0, 0.0, 1.0];
     affine && matrix.determinant() != 0.0 && matrix.inverse().is_finite()

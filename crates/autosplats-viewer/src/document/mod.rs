@@ -1,20 +1,20 @@
-//! What is open in the viewer, and all that is done to it. There is nothing of a window or of graphics in here.
+//! The open document and its edits, independent of any window or graphics.
 //!
 //! # How it works
 //!
-//! A [`Document`] is a list of [`Layer`]s. A layer's cloud is never changed; what was done to its points is kept beside it,
-//! as sets of points and a list of moves. All big parts are shared, so that a clone of a document costs next to nothing:
-//! an edit is a new document, [`History`] keeps the old ones, and undoing takes one back.
+//! A [`Document`] is a list of [`Layer`]s. The cloud of a layer never changes; edits are kept beside it, as sets of
+//! points and a list of moves. All large parts are shared, so that a clone of a document costs next to nothing. An edit
+//! makes a new document; [`History`] keeps the old ones, and undo restores them.
 //!
-//! [`Document::shown`] makes the one cloud that is rendered. It has to be made anew only when [`Shown::shows`] says no; the
-//! selection is not part of it. Points of it are told by an index into it, as the renderer and the pointer know them, and
-//! [`Shown`] knows which point of which layer that is.
+//! [`Document::shown`] makes the one cloud that is rendered. The cloud has to be made again only when [`Shown::shows`]
+//! returns false; the selection is not part of it. Renderer and pointer identify points by their index in this cloud.
+//! [`Shown`] maps the index to a layer and its point.
 //!
-//! An edit reaches what can be seen and nothing else: points that are hidden, outside of the clipping box or in an
-//! invisible layer are safe from it even if they were selected before.
+//! An edit changes visible points only. Points that are hidden, outside the clipping box or in an invisible layer do
+//! not change, even if they are selected.
 //!
-//! Clouds in degrees are shown in metres on a [map](autosplats::cloud::LocalMetres) that all of a document's share; poses
-//! and moves are in these metres, and what is exported is in degrees again.
+//! Clouds in degrees are shown in metres, on one [map](autosplats::cloud::LocalMetres) per document. Poses and moves
+//! are in these metres; exported coordinates are in degrees again.
 
 mod bits;
 mod clip;
@@ -44,10 +44,10 @@ pub(crate) use self::{
     shown::Shown,
 };
 
-/// Everything that is open. Clones share all that is big.
+/// The open layers and the clipping box. Clones share all large parts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Document {
-    /// The inputs, in the order of the list.
+    /// The layers, in list order.
     pub(crate) layers: Vec<Layer>,
     /// The box outside of which nothing is shown.
     pub(crate) clip: Option<ClipBox>,

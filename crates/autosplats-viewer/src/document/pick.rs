@@ -1,4 +1,4 @@
-//! All there is to know about one point.
+//! Information on a picked point.
 
 use std::path::PathBuf;
 
@@ -6,33 +6,33 @@ use autosplats::cloud::{FieldValues, PointCloud, glam::DVec3};
 
 use super::{Document, LayerId, Shown};
 
-/// A point that was pointed at.
+/// A picked point.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PickedPoint {
-    /// Its layer.
+    /// The layer of the point.
     pub(crate) layer: LayerId,
-    /// The layer's name.
+    /// Name of the layer.
     pub(crate) name: String,
-    /// The file it was read from.
+    /// The file that the layer was read from.
     pub(crate) path: Option<PathBuf>,
-    /// Which point of the file it is, as far as points were kept in reading, from 0.
+    /// Index of the point among those kept in reading, from 0.
     pub(crate) point: usize,
-    /// World coordinates, with all that was done to it.
+    /// World coordinates, with all edits.
     pub(crate) position: DVec3,
-    /// The file's own coordinates.
+    /// Coordinates in the file.
     pub(crate) file_position: DVec3,
-    /// The file's own coordinates with the digits that the file has.
+    /// Coordinates in the file, with the file's digits.
     pub(crate) file_text: [String; 3],
-    /// Its own colour, sRGB.
+    /// The point's own colour, sRGB.
     pub(crate) color: Option<[u8; 3]>,
-    /// Name of the scan it belongs to.
+    /// Name of the scan that the point belongs to.
     pub(crate) scan: Option<String>,
-    /// Names and exact values of its attributes.
+    /// Names and exact values of the attributes.
     pub(crate) fields: Vec<(String, String)>,
 }
 
 impl Document {
-    /// Tells all about a shown point.
+    /// Information on the shown point `index`; `None` if the point no longer exists.
     pub(crate) fn describe(&self, shown: &Shown, index: usize) -> Option<PickedPoint> {
         let (id, point) = shown.point(index)?;
         let layer = self.layer(id).filter(|layer| point < layer.cloud.len())?;
@@ -53,7 +53,7 @@ impl Document {
     }
 }
 
-/// A value with all its digits and no more.
+/// A value with exactly the digits it has.
 fn value_text(values: &FieldValues, point: usize) -> String {
     macro_rules! each {
         ($($variant:ident),*) => { match values { $(FieldValues::$variant(values) => values[point].to_string(),)* } };
@@ -61,12 +61,12 @@ fn value_text(values: &FieldValues, point: usize) -> String {
     each!(U8, I8, U16, I16, U32, I32, U64, I64, F32, F64)
 }
 
-/// Points by which it is told how many digits a file has.
+/// Number of points tested to find out how many digits a file has.
 const SAMPLES: usize = 1000;
-/// Digits that somebody may have rounded a number to.
+/// Largest number of significant digits that a coordinate may have been rounded to.
 const DIGITS: usize = 13;
 
-/// Coordinates with the digits of the file: those of its steps, or as few as tell a number from its neighbours.
+/// Coordinates with the digits of the file: those of its resolution, or the fewest that identify the number.
 pub(super) fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
     let place = cloud.world_position(point);
     let single = is_single(cloud);
@@ -80,23 +80,24 @@ pub(super) fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
     })
 }
 
-/// Whether all coordinates could be those of a file of `f32`, by a part of them: a decimal that is not is no `f32` as a rule.
+/// Whether all coordinates fit into `f32`, judged by a sample of points. Most decimal numbers of a double-precision
+/// file do not fit.
 fn is_single(cloud: &PointCloud) -> bool {
     let step = cloud.len().div_ceil(SAMPLES).max(1);
     let same = |value: f64| f64::from(value as f32) == value || value.is_nan();
     (0..cloud.len()).step_by(step).all(|point| cloud.world_position(point).to_array().into_iter().all(same))
 }
 
-/// The digits of a coordinate, `lost` of which `f32` could not hold. That is an `f32`, too, and near zero it may not be all:
-/// what the file says is the shortest number near enough then.
+/// Text of a coordinate. `lost` is the part that `f32` could not hold; it is itself an `f32` and so not exact. Near
+/// zero its error may exceed the step of `f64`; then the shortest number within the error is taken.
 fn file_digits(value: f64, lost: f32) -> String {
     let error = 0.5 * f64::from(f32::EPSILON) * f64::from(lost.abs());
     let step = f64::EPSILON * value.abs();
     if error < 0.25 * step { value.to_string() } else { shortest(value, error + step) }
 }
 
-/// The shortest decimal that is no further than `error` from a number; all its digits where that would be no shorter than
-/// numbers that nobody has rounded.
+/// The shortest decimal within `error` of a number. If that takes more than `DIGITS` digits, nobody has rounded the
+/// number, and all digits are kept.
 pub(crate) fn shortest(value: f64, error: f64) -> String {
     let digits = (0..DIGITS).find_map(|digits| {
         let short: f64 = format!("{value:.digits$e}").parse().ok()?;
@@ -105,8 +106,8 @@ pub(crate) fn shortest(value: f64, error: f64) -> String {
     digits.unwrap_or(value).to_string()
 }
 
-/// A number with the decimals that all multiples of a step can be written with; nothing if that is not the number, as where
-/// a file counts its steps from an odd place.
+/// A number with the decimals that multiples of `step` need. `None` if the number is not such a multiple, as when a
+/// file counts its steps from an odd offset.
 fn in_steps(value: f64, step: f64) -> Option<String> {
     let decimals = (0..=12).find(|&decimals| {
         let steps = step * 10_f64.powi(decimals);

@@ -1,45 +1,45 @@
-//! Parts of a picture that points are selected in.
+//! Regions of a picture that select points.
 
-/// Bands that a region is cut into along y, so that only those of its lines are looked at that are as high as a place.
+/// Bands of a region along y, so that a test looks only at lines at the height of the place.
 const BANDS: usize = 256;
 
-/// A part of a picture, in pixels.
+/// A region of a picture, in pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Region {
     shape: Shape,
-    /// Nothing of the region is outside.
+    /// Bounds of the region, from `min` to `max`.
     min: [f32; 2],
     max: [f32; 2],
-    /// For each band the lines that touch it.
+    /// The lines that touch each band.
     bands: Vec<Vec<Line>>,
 }
 
-/// A straight line from one place to another.
+/// A line segment.
 type Line = [[f32; 2]; 2];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Rectangle,
-    /// Lines go all the way round.
+    /// The lines form a closed polygon.
     Lasso,
-    /// A round brush went along the lines; the square of its radius.
+    /// A round brush along the lines; the square of its radius.
     Brush(f32),
 }
 
 impl Region {
-    /// The rectangle between two corners, its edges included.
+    /// The rectangle between two corners, edges included.
     pub(crate) fn rectangle(from: [f32; 2], to: [f32; 2]) -> Self {
         Self::new(Shape::Rectangle, &[[from, to]], 0.0)
     }
 
-    /// What a line through some corners and back to the first goes round an odd number of times.
+    /// The places that a closed polygon winds around an odd number of times.
     pub(crate) fn lasso(corners: &[[f32; 2]]) -> Self {
         let next = corners.iter().cycle().skip(1);
         let lines: Vec<Line> = corners.iter().zip(next).map(|(&from, &to)| [from, to]).collect();
         Self::new(Shape::Lasso, &lines, 0.0)
     }
 
-    /// What a round brush touches on its way.
+    /// The places that a round brush touches on its way.
     pub(crate) fn brush(way: &[[f32; 2]], radius: f32) -> Self {
         let lines: Vec<Line> = match way {
             [only] => vec![[*only; 2]],
@@ -63,7 +63,7 @@ impl Region {
         region
     }
 
-    /// The band of a height; it never falls with the height.
+    /// The band of a height; monotonic in the height.
     fn band(&self, y: f32) -> usize {
         let [low, high] = [self.min[1], self.max[1]];
         (((y - low) / (high - low) * BANDS as f32) as usize).min(BANDS - 1)
@@ -83,18 +83,18 @@ impl Region {
     }
 }
 
-/// Whether a ray to the right of a place crosses a line.
+/// Whether a ray to the right of a place crosses a line segment.
 fn is_left_of([x, y]: [f32; 2], &[from, to]: &Line) -> bool {
-    // Each line has its upper end and not its lower one, so that a ray through a corner crosses one line of the two.
+    // Each segment contains one of its ends only, so that a ray through a corner crosses one of the two segments there.
     (from[1] > y) != (to[1] > y) && x < from[0] + (y - from[1]) / (to[1] - from[1]) * (to[0] - from[0])
 }
 
-/// Square of the distance of a place to a stretch of a line.
+/// Squared distance from a place to a line segment.
 fn distance_2(from: [f32; 2], to: [f32; 2], place: [f32; 2]) -> f32 {
     let [along, way] = [[to[0] - from[0], to[1] - from[1]], [place[0] - from[0], place[1] - from[1]]];
     let length_2 = along[0] * along[0] + along[1] * along[1];
     let part = (along[0] * way[0] + along[1] * way[1]) / length_2;
-    // A stretch without length is a point.
+    // A segment of length zero is a point.
     let part = if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 };
     let off = [way[0] - part * along[0], way[1] - part * along[1]];
     off[0] * off[0] + off[1] * off[1]
@@ -104,7 +104,7 @@ fn distance_2(from: [f32; 2], to: [f32; 2], place: [f32; 2]) -> f32 {
 mod tests {
     use super::*;
 
-    /// Places of a picture, between those of all corners.
+    /// Test places of a picture, off all corners.
     fn places() -> impl Iterator<Item = [f32; 2]> {
         (0..120 * 120).map(|i| [(i % 120) as f32 + 0.37, (i / 120) as f32 + 0.61])
     }
@@ -120,7 +120,7 @@ mod tests {
         assert!(!region.contains([f32::NAN, 40.0]), "no place is in no region");
     }
 
-    /// How many times the corners go round a place, by the angles they are seen in.
+    /// Winding number of the polygon around a place, by the sum of angles.
     fn turns(corners: &[[f32; 2]], place: [f32; 2]) -> i64 {
         let angle = |corner: [f32; 2]| f64::from(corner[1] - place[1]).atan2(f64::from(corner[0] - place[0]));
         let turned: f64 = (0..corners.len())
@@ -146,7 +146,7 @@ mod tests {
             (state >> 8) as f32 / (1 << 24) as f32 * 120.0
         };
         let scribble: Vec<[f32; 2]> = (0..40).map(|_| [random(), random()]).collect();
-        // Corners at the height of places, and an edge along them.
+        // A polygon with corners at the height of test places, and an edge along them.
         let house = vec![[10.37, 30.61], [60.0, 5.61], [100.0, 30.61], [100.0, 90.0], [10.37, 90.0]];
         for corners in [star, scribble, house] {
             let region = Region::lasso(&corners);
@@ -168,7 +168,7 @@ mod tests {
         let way = vec![[20.0, 20.0], [80.0, 30.0], [80.0, 30.0], [40.0, 90.0]];
         let region = Region::brush(&way, 7.0);
         for place in places() {
-            // The brush set down at many places of its way.
+            // The brush set down at many places of its path.
             let nearest = way
                 .windows(2)
                 .flat_map(|ends| {

@@ -1,23 +1,23 @@
-//! Which points the next edit is about.
+//! The selection: the points that the next edit changes.
 
 use super::{Bits, Document, Shown};
 
-/// How what is pointed at changes what was selected before.
+/// How new hits change the selection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum SelectMode {
-    /// Selects these and nothing else.
+    /// Selects exactly the hits.
     #[default]
     Replace,
-    /// Selects these, too.
+    /// Adds the hits.
     Add,
-    /// Selects these no longer.
+    /// Removes the hits.
     Subtract,
-    /// Selects of those selected before only these.
+    /// Keeps only the selected points that are hit.
     Intersect,
 }
 
 impl Document {
-    /// Selects the shown points that `hits` says yes to, by their index. What is not shown is not hit.
+    /// Changes the selection by the shown points whose index `hits` accepts. Points that are not shown are not hit.
     pub(crate) fn select(&mut self, shown: &Shown, hits: impl Fn(usize) -> bool + Sync, mode: SelectMode) {
         for layer in &mut self.layers {
             let part = shown.part(layer.id).filter(|_| !layer.incomplete);
@@ -32,19 +32,19 @@ impl Document {
         }
     }
 
-    /// Selects all shown points and nothing else.
+    /// Selects exactly the shown points.
     pub(crate) fn select_all(&mut self, shown: &Shown) {
         self.select(shown, |_| true, SelectMode::Replace);
     }
 
-    /// Selects nothing.
+    /// Deselects all points.
     pub(crate) fn select_none(&mut self) {
         for layer in &mut self.layers {
             layer.edits.selected = Bits::default();
         }
     }
 
-    /// Selects the shown points that are not selected, and nothing else.
+    /// Selects exactly the shown points that are not selected.
     pub(crate) fn select_inverse(&mut self, shown: &Shown) {
         let selected = shown.selected(self);
         self.select(shown, |index| !selected.get(index), SelectMode::Replace);

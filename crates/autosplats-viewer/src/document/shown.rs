@@ -1,4 +1,4 @@
-//! The one cloud that is rendered, and whose points its points are.
+//! The one cloud that is rendered, and the origin of its points.
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -10,36 +10,36 @@ use rayon::prelude::*;
 
 use super::{Bits, ClipBox, Document, Layer, LayerId};
 
-/// What is to be seen of a document: one cloud, and where each of its points comes from. Clones share all that is big.
+/// The visible points of a document as one cloud, with the layer of each point. Clones share all large parts.
 #[derive(Clone, Debug)]
 pub(crate) struct Shown {
-    /// The points, at their places in the world and in the colours they are shown in. Positions are as fine as `f32`
-    /// about its origin; [`Document::describe`] has all digits.
+    /// The points in world coordinates and in the colours shown. Positions have the precision of `f32` about the
+    /// cloud's origin; [`Document::describe`] has all digits.
     pub(crate) cloud: Arc<PointCloud>,
-    /// What it was made of.
+    /// The document that the cloud was made from.
     of: Document,
     parts: Vec<Part>,
 }
 
-/// The points of one layer, which are side by side.
+/// The points of one layer, which are contiguous in the cloud.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
     pub(super) layer: LayerId,
-    /// Where they begin in the shown cloud.
+    /// Index of the first point in the shown cloud.
     pub(super) start: usize,
     pub(super) len: usize,
-    /// Which of the layer's points they are, ascending; all of them if nothing is said.
+    /// Indices of the points in the layer, ascending; `None` for all points.
     points: Option<Arc<[u32]>>,
 }
 
 impl Part {
-    /// Which of the layer's points is the one at `index` of this part.
+    /// Index in the layer of the point at `index` of this part.
     fn point(&self, index: usize) -> usize {
         self.points.as_ref().map_or(index, |points| points[index] as usize)
     }
 
-    /// Those of the layer's `len` points that are shown and that `has`, asked for their indices in the shown cloud, says
-    /// yes to.
+    /// The layer's points that are shown and that `has` accepts, as a set below `len`. `has` takes the index in the
+    /// shown cloud.
     pub(super) fn bits(&self, len: usize, has: impl Fn(usize) -> bool + Sync) -> Bits {
         let Some(points) = &self.points else {
             return Bits::from_fn(len.min(self.len), |point| has(self.start + point));
@@ -53,7 +53,7 @@ impl Part {
 }
 
 impl Document {
-    /// The clipping box, if it clips.
+    /// The clipping box, if it is enabled.
     fn clips(&self) -> Option<&ClipBox> {
         self.clip.as_ref().filter(|clip| clip.enabled)
     }
@@ -62,7 +62,7 @@ impl Document {
         self.layers.iter().filter(|layer| layer.visible && !layer.cloud.is_empty())
     }
 
-    /// Those of a layer's points that can be seen, ascending; nothing if all can.
+    /// The layer's visible points, ascending; `None` if all are visible.
     pub(super) fn seen(&self, layer: &Layer) -> Option<Vec<u32>> {
         let clip = self.clips();
         if clip.is_none() && !layer.is_thinned() {
@@ -72,7 +72,7 @@ impl Document {
         points_where(layer.cloud.len(), seen)
     }
 
-    /// Those of a layer's points that an edit of the selection is about: selected, and to be seen.
+    /// The layer's points that are selected and visible, which an edit would change.
     pub(super) fn reached(&self, layer: &Layer) -> Bits {
         if !layer.visible || layer.incomplete {
             return Bits::default();
@@ -87,7 +87,7 @@ impl Document {
         }
     }
 
-    /// Those of a layer's points that can be seen and are not selected.
+    /// The layer's points that are visible and not selected.
     pub(super) fn others(&self, layer: &Layer) -> Bits {
         if !layer.visible || layer.incomplete {
             return Bits::default();
@@ -100,8 +100,8 @@ impl Document {
         })
     }
 
-    /// Bytes that [`shown`](Self::shown) will take at most, beyond what the document has. Systems promise memory they do not
-    /// have: [ask](autosplats::cloud::check_memory) before.
+    /// Largest number of bytes that [`shown`](Self::shown) takes beyond the document.
+    /// [Check](autosplats::cloud::check_memory) before the call, as systems promise memory they do not have.
     pub(crate) fn shown_bytes(&self) -> usize {
         let bytes = |layer: &Layer| {
             let sets = if self.clips().is_some() || layer.is_thinned() { 8 * layer.cloud.len() } else { 0 };
@@ -116,10 +116,10 @@ impl Document {
         }
     }
 
-    /// The one cloud to be rendered: visible layers at their places, without what is hidden, deleted or clipped.
+    /// The one cloud to render: visible layers at their places, without hidden, deleted or clipped points.
     ///
-    /// Fields, coordinate system and the like are kept as [merging](PointCloud::merge) keeps them; those in degrees become
-    /// metres. A single layer to which nothing was done is shared, not copied.
+    /// Attributes and coordinate system are kept as [merging](PointCloud::merge) keeps them; degrees become metres. A
+    /// single unedited layer is shared, not copied.
     pub(crate) fn shown(&self) -> Shown {
         let mut parts = Vec::new();
         let mut clouds: Vec<(&Layer, Cow<'_, PointCloud>)> = Vec::new();
@@ -148,17 +148,17 @@ impl Document {
 }
 
 impl Layer {
-    /// Whether some of its points are not there or not to be seen.
+    /// Whether some points are hidden or deleted.
     fn is_thinned(&self) -> bool {
         !self.edits.hidden.is_empty() || !self.edits.deleted.is_empty()
     }
 
-    /// Whether some of its points look or lie otherwise than in the file, but for its pose.
+    /// Whether some points differ in colour or place from the file, apart from the pose.
     fn is_changed(&self) -> bool {
         !self.edits.moves.is_empty() || self.tint.is_some() || self.local.is_some()
     }
 
-    /// Its points with the indices given, or all, moved and coloured as they are shown, but not placed in the world.
+    /// The points with the given indices, or all, moved and coloured as shown, but without the pose.
     fn look(&self, points: Option<&[u32]>) -> Cow<'_, PointCloud> {
         if points.is_none() && !self.is_changed() {
             return Cow::Borrowed(&self.cloud);
@@ -175,8 +175,8 @@ impl Layer {
         Cow::Owned(cloud)
     }
 
-    /// Applies the moves to a cloud of the layer's points with the indices given, or all; in the degrees of the file if
-    /// `degrees` says that these are its coordinates.
+    /// Applies the moves to a cloud of the layer's points with the given indices, or all. `degrees` says that the cloud
+    /// is in the file's degrees.
     pub(super) fn move_points(&self, cloud: &mut PointCloud, points: Option<&[u32]>, degrees: bool) {
         let local = self.local.as_ref().filter(|_| degrees);
         for (moved, matrix) in &self.edits.moves {
@@ -186,14 +186,14 @@ impl Layer {
     }
 }
 
-/// The points below `len` that `has` says yes to, ascending; nothing if all are.
+/// The points below `len` that `has` accepts, ascending; `None` if all are accepted.
 pub(super) fn points_where(len: usize, has: impl Fn(usize) -> bool + Sync) -> Option<Vec<u32>> {
     let points: Vec<u32> = (0..len).into_par_iter().filter(|&point| has(point)).map(|point| point as u32).collect();
     (points.len() < len).then_some(points)
 }
 
 impl Shown {
-    /// Whether this is what [`Document::shown`] would make of the document now. Names and the selection do not matter.
+    /// Whether [`Document::shown`] would make the same cloud of `document`. Names and the selection do not matter.
     pub(crate) fn shows(&self, document: &Document) -> bool {
         let layers = |document: &Document| document.visible().count();
         self.of.clips() == document.clips()
@@ -206,7 +206,7 @@ impl Shown {
         self.cloud.len()
     }
 
-    /// The layer of a shown point, and which of the layer's points it is.
+    /// Layer and index in the layer of a shown point.
     pub(crate) fn point(&self, index: usize) -> Option<(LayerId, usize)> {
         let part = &self.parts[self.parts.partition_point(|part| part.start <= index).checked_sub(1)?];
         let within = index - part.start;
@@ -217,7 +217,7 @@ impl Shown {
         self.parts.iter().find(|part| part.layer == layer)
     }
 
-    /// Which of the shown points are selected in the document.
+    /// The shown points that are selected in `document`.
     pub(crate) fn selected(&self, document: &Document) -> Bits {
         let parts: Vec<_> = self.parts.iter().map(|part| (part, document.layer(part.layer))).collect();
         if let [(Part { points: None, .. }, Some(layer))] = parts[..] {
@@ -233,7 +233,7 @@ impl Shown {
     }
 }
 
-/// The least box that has all places in it that are finite; nothing if there is none.
+/// Bounds of all finite places; `None` if there are none.
 pub(super) fn bounds(len: usize, place: impl Fn(usize) -> Option<DVec3> + Sync) -> Option<[DVec3; 2]> {
     let none = || [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let join = |[low, high]: [DVec3; 2], [min, max]: [DVec3; 2]| [low.min(min), high.max(max)];

@@ -1,4 +1,4 @@
-//! What a large document costs. Run by `cargo test --release -p autosplats-viewer costs -- --ignored --nocapture`.
+//! Cost of a large document. Run by `cargo test --release -p autosplats-viewer costs -- --ignored --nocapture`.
 
 use std::{hint::black_box, sync::Arc, time::Instant};
 
@@ -11,7 +11,7 @@ use autosplats::{Camera, Projection};
 use super::super::{ClipBox, Document, Layer, Region, SelectMode};
 use super::{FAR, edit, every};
 
-/// Ten million points as an aerial survey has them.
+/// A cloud of `len` points with the attributes of an aerial survey.
 fn survey(len: usize) -> Arc<PointCloud> {
     let position = |i: usize| [(i % 4000) as f32 * 0.25, (i / 4000) as f32 * 0.25, (i % 97) as f32 * 0.1];
     let cloud = PointCloud::new(FAR, (0..len).map(position).collect())

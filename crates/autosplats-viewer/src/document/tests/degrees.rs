@@ -1,4 +1,4 @@
-//! Longitude and latitude: shown, moved and placed in metres, written as they were read.
+//! Clouds in degrees: shown, moved and placed in metres, written as they were read.
 
 use std::sync::Arc;
 
@@ -108,7 +108,7 @@ fn edits_in_metres_are_written_in_degrees() {
         // One f64 step at 50 degrees is about a nanometre.
         assert!(off.length() < 1e-8, "point {index} is off by {off}");
     }
-    // PLY does not hold where sensors stood.
+    // PLY cannot hold places of sensors.
     let sensors = [0, 1].map(|layer| document.layers[layer].exact(None, true).scans()[0].position());
     assert!(sensors[0].abs_diff_eq(DVec3::new(10.0, 50.0, 100.0), 1e-9), "a sensor stays: {sensors:?}");
     assert!(

@@ -1,4 +1,4 @@
-//! Points written to files.
+//! Export of points.
 
 use std::{
     fs,
@@ -20,7 +20,7 @@ fn exact(path: &Path) -> PointCloud {
     read_with(path, &options, &()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Writes to a new file and reads it again.
+/// Exports to a new file and reads it again.
 fn round_trip(document: &Document, what: What) -> PointCloud {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("out.ply");
@@ -61,7 +61,7 @@ fn all_that_was_asked_for_is_written_with_all_digits() {
         }
         assert_eq!(written.len(), wanted.len(), "{what:?}: neither more nor less");
         let Some(FieldValues::U64(ids)) = written.field("Id").map(|field| &field.values) else {
-            // PLY has no 64-bit integers; the file names what it does instead.
+            // PLY has no 64-bit integers, so that only the places are compared.
             check_places(&written, &wanted.iter().map(|(place, ..)| *place).collect::<Vec<_>>());
             continue;
         };
@@ -107,7 +107,7 @@ fn sensors_go_with_their_layer() {
     assert!(sensor.position().abs_diff_eq(FAR + DVec3::Z, 1e-9), "moved with it: {}", sensor.position());
 }
 
-/// A layer of a file, and its folder.
+/// A layer read from a file, and its folder.
 fn opened() -> (tempfile::TempDir, PathBuf, Document) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("in.ply");
@@ -152,7 +152,7 @@ fn files_are_replaced_only_if_that_is_said() {
     assert!(inputs[2].symlink_metadata().expect("the link").is_symlink(), "a link stays a link");
 }
 
-/// Stops at once, or remembers what was noted.
+/// Cancels at once, or records notes.
 #[derive(Default)]
 struct Watcher {
     stop: bool,

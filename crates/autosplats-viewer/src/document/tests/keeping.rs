@@ -1,11 +1,11 @@
-//! Undo, its bounds, and what is not saved.
+//! Undo, its limits, and unsaved edits.
 
 use autosplats::cloud::glam::{DMat4, DVec3};
 
 use super::super::{Document, History, Layer, LayerId, label};
 use super::{FAR, cloud, contents, document, edit, every, select_every};
 
-/// A history of edits of all kinds, and what the document was before each and in the end.
+/// A history of edits of all kinds, and the contents of the document before each edit and at the end.
 fn edited() -> (History, Vec<String>) {
     let mut history = History::default();
     history.replace(document().0);

@@ -19,10 +19,10 @@ use autosplats::cloud::{
 
 use super::{Bits, Document, Layer, LayerId, SelectMode, Shown};
 
-/// A place where `f32` holds half metres.
+/// A place so far from the origin that the step of `f32` is half a metre.
 const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
-/// Points strewn over the unit cube about a place, with colours, digits and numbers that `f64` does not hold.
+/// Points scattered over the unit cube about a place, with colours, residuals and numbers that `f64` does not hold.
 fn cloud(len: usize, place: DVec3) -> Arc<PointCloud> {
     let position = |i: usize| [0, 1, 2].map(|axis| (i * [7, 13, 29][axis] % 101) as f32 / 100.0);
     let cloud = PointCloud::new(place, (0..len).map(position).collect())
@@ -57,7 +57,7 @@ fn every(len: usize, step: usize) -> Bits {
     Bits::from_fn(len, |point| point.is_multiple_of(step))
 }
 
-/// All there is of a document, its clouds told by where they are.
+/// The whole content of a document as text; clouds are identified by their address.
 fn contents(document: &Document) -> String {
     let layers = document.layers.iter().map(|layer| {
         let Layer { id, name, path, cloud, visible, tint, pose, edits, .. } = layer;

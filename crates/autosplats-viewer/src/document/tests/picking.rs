@@ -1,4 +1,4 @@
-//! All there is to know about a point.
+//! Information on a picked point.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -78,7 +78,7 @@ fn values_have_their_own_digits() {
     assert_eq!(describe((*super::cloud(2, FAR)).clone()).color, cloud_color(), "its colour");
 }
 
-/// What files say is told as they say it, whatever their numbers are kept as.
+/// Coordinates are shown with the file's digits, however they are stored.
 #[test]
 fn coordinates_are_told_as_the_file_has_them() {
     let folder = tempfile::tempdir().expect("a folder");

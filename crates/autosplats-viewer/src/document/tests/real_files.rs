@@ -1,7 +1,7 @@
-//! Files of scanners and of other programs, opened and written again.
+//! Files of scanners and other programs, opened and written again.
 //!
-//! They lie beside the repository, in `../shared/data`, or where `AUTOSPLATS_DATA` says. Without them these tests say that
-//! they check nothing, and where `CI` is set they fail.
+//! The files lie beside the repository, in `../shared/data`, or where `AUTOSPLATS_DATA` says. Without them these tests
+//! report that nothing is checked; if `CI` is set they fail.
 
 use std::{path::Path, sync::Arc};
 
@@ -16,8 +16,8 @@ fn exact(path: &Path) -> PointCloud {
     read_with(path, &options, &()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Files of integers in steps, of floats and of doubles; far away, with scans, with more than eight bits a colour, and in
-/// degrees.
+/// Files with integer steps, floats and doubles; far from the origin, with scans, with more than eight bits per colour,
+/// and in degrees.
 const FILES: [&str; 9] = [
     "scans/autzen_thin.las",
     "scans/autzen_trim.laz",
@@ -52,14 +52,14 @@ fn own_formats_keep_all_digits() {
             assert_eq!(written.len(), wanted.len(), "{file}: points");
             let digits = |cloud: &PointCloud| (0..kept.len()).map(|index| file_text(cloud, index)).collect::<Vec<_>>();
             let both = digits(&written).into_iter().zip(digits(&wanted));
-            // Without steps, what is shortest depends on how far from its origin a cloud holds a number; the next check is
-            // about that.
+            // Without steps, the shortest text depends on the origin of the cloud. The next check covers these
+            // coordinates.
             let steps = wanted.resolution().is_some();
             let unlike: Vec<_> = both.filter(|(written, wanted)| steps && written != wanted).collect();
             assert!(unlike.is_empty(), "{file}: to the last digit: {:?} of {}", unlike.first(), unlike.len());
             for index in 0..kept.len() {
                 let off = written.world_position(index) - wanted.world_position(index);
-                // A step or two of f64 about other origins.
+                // A step or two of f64, about different origins.
                 let room = 4.0 * f64::EPSILON * wanted.world_position(index).abs().max_element();
                 assert!(off.abs().max_element() <= room, "{file}: point {index} is off by {off}");
             }

@@ -1,14 +1,14 @@
-//! Which points the next edit is about.
+//! The selection.
 
 use super::super::{Bits, ClipBox, Document, SelectMode};
 use super::{FAR, document, edit, every, select_every};
 
-/// The selection, as shown points.
+/// The selection, as indices of shown points.
 fn selected(document: &Document) -> Bits {
     document.shown().selected(document)
 }
 
-/// Whether a point is selected that was so or not and is hit or not.
+/// Whether a point is selected afterwards, given whether it was selected and whether it is hit.
 type Rule = fn(bool, bool) -> bool;
 
 #[test]

@@ -7,7 +7,7 @@ use autosplats::cloud::glam::{DMat4, DQuat, DVec3};
 use super::super::{Bits, ClipBox, Document, Layer, LayerId, Shown};
 use super::{FAR, cloud, document, edit, every};
 
-/// The points that ought to be shown, one after the other.
+/// The points that should be shown, in order.
 fn expected(document: &Document) -> Vec<(LayerId, usize)> {
     let mut points = Vec::new();
     for layer in document.layers.iter().filter(|layer| layer.visible) {
@@ -115,7 +115,7 @@ fn bounds_are_those_of_what_is_shown() {
     assert_eq!(document.selected_bounds(), Some([place; 2]), "of one selected point, with all digits");
 }
 
-/// Something that is done to a document, and its layer.
+/// A change of a document's layer.
 type Change = fn(&mut Document, LayerId);
 
 #[test]
