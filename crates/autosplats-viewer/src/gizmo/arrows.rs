@@ -1,4 +1,5 @@
-//! What moves and turns the selection: an arrow along each axis, a ring about each, and a handle that goes with the pointer.
+//! The handles that move and turn the selection: an arrow along each axis, a ring about each axis, and a dot for free
+//! moves.
 
 use autosplats::cloud::glam::{DMat4, DVec3};
 use eframe::egui::{Color32, Painter, Pos2, Stroke};
@@ -10,28 +11,28 @@ use crate::document::{Grip, about};
 use crate::measure::angle_text;
 use crate::tools::ruler;
 
-/// Where an arrow begins and ends, screen points from the middle.
+/// Start and end of an arrow, screen points from the middle.
 const ARROW: [f64; 2] = [16.0, 78.0];
 /// Radius of the rings, screen points.
 const RING: f64 = 96.0;
-/// Corners of a ring.
+/// Corners of a ring's polygon.
 const CORNERS: usize = 72;
-/// Degrees of a step, when turning goes in steps.
+/// Step of a stepped rotation, degrees.
 const STEP_DEG: f64 = 15.0;
 const TAKEN: Color32 = Color32::from_rgb(255, 205, 60);
-/// Red, green and blue of the axes, as those in the corner of the picture.
+/// Red, green and blue of the axes, as in the corner of the picture.
 const COLORS: [Color32; 3] =
     [Color32::from_rgb(235, 95, 85), Color32::from_rgb(150, 205, 90), Color32::from_rgb(95, 150, 255)];
 
-/// Points that are being dragged.
+/// A drag of the selected points.
 pub(super) struct Drag {
     pub(super) handle: Handle,
     grip: Grip,
-    /// The middle of the selection when it was taken.
+    /// Middle of the selection when the drag began, world space.
     from: DVec3,
-    /// Where it was taken: along the axis, or the place in the plane.
+    /// The grabbed point: its offset along the axis, or its place in the plane.
     grabbed: Grabbed,
-    /// Radians so far, over more than one turn.
+    /// Angle so far, over more than one turn, radians.
     turned: f64,
     matrix: DMat4,
 }
@@ -57,7 +58,7 @@ impl Drag {
         Some(Self { handle, grip, from, grabbed, turned: 0.0, matrix: DMat4::IDENTITY })
     }
 
-    /// Moves the points to where the pointer is.
+    /// Moves the points to follow the pointer.
     pub(super) fn follow(&mut self, app: &mut App, view: &View, place: Pos2, stepped: bool) {
         let before = self.matrix;
         self.matrix = self.map(view, place, stepped).unwrap_or(before);
@@ -77,7 +78,7 @@ impl Drag {
                 let axis = DVec3::AXES[axis];
                 let now = on_plane(self.from, axis, ray)?;
                 let angle = angle(axis, start - self.from, now - self.from);
-                // As near as possible to what it was, so that it goes on after half a turn.
+                // Of the equivalent angles the one nearest to the last, so that the drag can pass half a turn.
                 let turn = std::f64::consts::TAU;
                 self.turned = angle + turn * ((self.turned - angle) / turn).round();
                 about(self.from, DMat4::from_axis_angle(axis, self.radians(stepped)))
@@ -92,12 +93,12 @@ impl Drag {
         if stepped { (self.turned / step).round() * step } else { self.turned }
     }
 
-    /// Puts the points back.
+    /// Moves the points back.
     pub(super) fn cancel(&self, app: &mut App) {
         app.change(|document| document.move_gripped(&self.grip, &DMat4::IDENTITY));
     }
 
-    /// Makes a step of it that can be undone.
+    /// Makes the drag an undo step.
     pub(super) fn finish(&self, app: &mut App) {
         self.cancel(app);
         if self.matrix != DMat4::IDENTITY {
@@ -106,12 +107,12 @@ impl Drag {
         }
     }
 
-    /// Where the middle of the selection is now.
+    /// The present middle of the selection, world space.
     pub(super) fn middle(&self) -> DVec3 {
         self.matrix.transform_point3(self.from)
     }
 
-    /// How far it has gone.
+    /// Distance or angle of the drag, as text.
     pub(super) fn text(&self, app: &App) -> String {
         match self.handle {
             Handle::Ring(axis) => {
@@ -134,7 +135,7 @@ impl Drag {
     }
 }
 
-/// The ends of an arrow, if it is seen from the side.
+/// Ends of an arrow; `None` if it is seen end on.
 fn arrow(middle: DVec3, axis: usize, view: &View) -> Option<[Pos2; 2]> {
     let unit = view.unit(middle)?;
     let axis = DVec3::AXES[axis];
@@ -143,7 +144,7 @@ fn arrow(middle: DVec3, axis: usize, view: &View) -> Option<[Pos2; 2]> {
     Some([from?, to?])
 }
 
-/// The places of a ring, if it is not seen edge on.
+/// Corners of a ring; `None` if it is seen edge on.
 fn ring(middle: DVec3, axis: usize, view: &View) -> Option<Vec<Pos2>> {
     let radius = RING * view.unit(middle)?;
     let [across, along] = [1, 2].map(|next| DVec3::AXES[(axis + next) % 3] * radius);
@@ -155,7 +156,7 @@ fn ring(middle: DVec3, axis: usize, view: &View) -> Option<Vec<Pos2>> {
     corners.collect()
 }
 
-/// What can be taken.
+/// The handles of the selection and their shapes.
 pub(super) fn handles(middle: DVec3, view: &View) -> Vec<(Handle, Shape)> {
     let mut handles = Vec::new();
     handles.extend(view.place(middle).map(|place| (Handle::Middle, Shape::Dot(place))));
@@ -167,10 +168,10 @@ pub(super) fn handles(middle: DVec3, view: &View) -> Vec<(Handle, Shape)> {
     handles
 }
 
-/// Draws the arrows and the rings.
+/// Draws the handles.
 pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<Handle>) {
     let mut handles = handles(middle, view);
-    // What is taken lies on top.
+    // The dragged or hovered handle is drawn on top.
     handles.sort_by_key(|(handle, _)| (taken == Some(*handle), !matches!(handle, Handle::Ring(_))));
     for (handle, shape) in handles {
         let is_taken = taken == Some(handle);
@@ -228,7 +229,7 @@ mod tests {
                 let map =
                     drag(&view, Handle::Arrow(axis), place).map(&view, view.place(taken + way).expect("seen"), false);
                 let moved = map.expect("seen from the side").transform_point3(FAR) - FAR;
-                // What is taken lies beside the arrow, where it follows the pointer less exactly.
+                // The grabbed point lies beside the arrow, so that it follows the pointer less exactly.
                 assert!(moved.distance(way) < 0.05, "along {axis} by {moved}, not {way}");
                 assert_eq!(moved.reject_from(way), DVec3::ZERO, "and along nothing else");
             }

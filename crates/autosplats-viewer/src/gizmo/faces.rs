@@ -1,4 +1,4 @@
-//! The clipping box in the picture: its edges, and a handle on each of its faces.
+//! The clipping box in the picture: its edges, and a handle on each face.
 
 use autosplats::cloud::glam::DVec3;
 use eframe::egui::{Color32, Painter, Pos2, Stroke};
@@ -9,22 +9,22 @@ use crate::app::App;
 use crate::document::ClipBox;
 use crate::tools::ruler;
 
-/// Pieces that an edge is cut into, to be fainter where it is behind something.
+/// Segments of an edge, each drawn faint where it is hidden.
 const PIECES: usize = 48;
 /// Radius of a handle, screen points.
 const RADIUS: f32 = 6.0;
 const EDGE: Color32 = Color32::from_rgb(120, 205, 255);
 const TAKEN: Color32 = Color32::from_rgb(255, 205, 60);
-/// How much there is to be seen of what is behind.
+/// Opacity of hidden edges.
 const FAINT: f32 = 0.28;
 
-/// A face that is being dragged.
+/// A drag of a face.
 pub(super) struct Drag {
     axis: usize,
     high: bool,
-    /// The box when it was taken.
+    /// The box when the drag began.
     before: ClipBox,
-    /// How far beyond the face's middle it was taken.
+    /// Offset of the grabbed point from the face's middle, along the axis, world units.
     grabbed: f64,
 }
 
@@ -38,21 +38,21 @@ impl Drag {
         Some(Self { axis, high, before, grabbed })
     }
 
-    /// The box with the face where the pointer is.
+    /// The box with the face under the pointer.
     fn dragged(&self, view: &View, place: Pos2) -> Option<ClipBox> {
         let Self { axis, high, before, grabbed } = self;
         let way = along(before.face(*axis, *high), before.axis(*axis), view.ray(place))?;
         Some(before.with_face(*axis, *high, way - grabbed))
     }
 
-    /// Moves the face to where the pointer is.
+    /// Moves the face to follow the pointer.
     pub(super) fn follow(&self, app: &mut App, view: &View, place: Pos2) {
         if let Some(clip) = self.dragged(view, place) {
             preview(app, Some(clip));
         }
     }
 
-    /// Puts the face back.
+    /// Moves the face back.
     pub(super) fn cancel(&self, app: &mut App) {
         preview(app, Some(self.before));
         settle(app);
@@ -62,7 +62,7 @@ impl Drag {
         Handle::Face { axis: self.axis, high: self.high }
     }
 
-    /// How wide the box is.
+    /// Width of the box along the dragged axis, as text.
     pub(super) fn text(&self, app: &App) -> Option<String> {
         let clip = app.document().clip?;
         let ruler = ruler(app);
@@ -71,7 +71,7 @@ impl Drag {
     }
 }
 
-/// Clips by another box, until [`settle`] says that this is how it stays.
+/// Sets the clipping box, until [`settle`] makes an undo step of it.
 pub(crate) fn preview(app: &mut App, clip: Option<ClipBox>) {
     let before = app.document().clip;
     if clip != before {
@@ -80,7 +80,7 @@ pub(crate) fn preview(app: &mut App, clip: Option<ClipBox>) {
     }
 }
 
-/// Makes one step of all changes to the clipping box since the last one.
+/// Combines all changes to the clipping box since the last call into one undo step.
 pub(crate) fn settle(app: &mut App) {
     let Some(before) = app.tools.gizmo.clip_before.take() else { return };
     let clip = app.document().clip;
@@ -91,7 +91,7 @@ pub(crate) fn settle(app: &mut App) {
     app.edit("Clipping box", |document| document.clip = clip);
 }
 
-/// Clips by the box or by it no longer; one is put around everything if there is none.
+/// Switches the clipping box on or off. Without one, a box around everything is created.
 pub(crate) fn switch(app: &mut App) {
     let clip = match app.document().clip {
         Some(clip) => Some(ClipBox { enabled: !clip.enabled, ..clip }),
@@ -106,7 +106,7 @@ pub(crate) fn switch(app: &mut App) {
     settle(app);
 }
 
-/// The faces that can be taken; not those that are seen from right before them, as nobody could tell where they go.
+/// Handles of the faces, without faces seen head on, for which a drag would be ambiguous.
 pub(super) fn handles(clip: &ClipBox, view: &View) -> Vec<(Handle, Shape)> {
     let faces = (0..6).filter_map(|face| {
         let (axis, high) = (face / 2, face % 2 == 1);
@@ -145,7 +145,7 @@ pub(super) fn show(app: &App, view: &View, painter: &Painter, taken: Option<Hand
     }
 }
 
-/// Which way a face goes.
+/// Draws the direction in which a face moves.
 fn arrow(clip: &ClipBox, view: &View, painter: &Painter, axis: usize, high: bool) {
     let middle = clip.face(axis, high);
     let Some(unit) = view.unit(middle) else { return };
@@ -162,7 +162,7 @@ fn faces_eye(clip: &ClipBox, view: &View, axis: usize, high: bool) -> bool {
     view.sight(middle).is_some_and(|sight| sight.dot(out) < 0.0)
 }
 
-/// Draws an edge in pieces: fainter where the box or the surface is before it.
+/// Draws an edge in segments, faint where the box or the surface hides them.
 fn edge(app: &App, clip: &ClipBox, view: &View, painter: &Painter, ends: [DVec3; 2], (corner, along): (usize, usize)) {
     let sides = (0..3).filter(|&axis| axis != along).map(|axis| (axis, corner >> axis & 1 == 1));
     let behind_box = sides.into_iter().all(|(axis, high)| !faces_eye(clip, view, axis, high));
@@ -199,7 +199,7 @@ mod tests {
             for (handle, shape) in handles {
                 let (Handle::Face { axis, high }, Shape::Dot(dot)) = (handle, shape) else { panic!("no face") };
                 let there = view.place(clip.face(axis, high) + clip.axis(axis) * 0.25).expect("before the eye");
-                // Taken beside its middle, it stays beside the pointer.
+                // Grabbed beside its middle, the face keeps its offset to the pointer.
                 let grip = eframe::egui::vec2(3.0, -2.0);
                 let drag = Drag::of(clip, &view, axis, high, dot + grip).expect("seen from the side");
                 assert_eq!(drag.dragged(&view, dot + grip), Some(clip), "{handle:?} has not gone anywhere yet");

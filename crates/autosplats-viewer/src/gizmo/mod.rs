@@ -1,9 +1,9 @@
-//! Handles in the picture that the mouse takes hold of: the faces of the clipping box, and what moves and turns the selection.
+//! Handles in the picture: the faces of the clipping box, and the arrows and rings of the selection.
 //!
 //! # How it works
-//! In each frame the handles that are there are laid out on the window ([`View`]), and the nearest one within reach of the
-//! pointer is the one that a drag would take. A drag changes the document as it goes, so that the picture follows, each time
-//! from how it was at the beginning; what undo takes back is the whole drag.
+//! In each frame the handles are projected onto the window ([`View`]). The nearest handle within reach of the pointer
+//! is the one that a drag would take. A drag changes the document continuously, so that the picture follows, each time
+//! starting from the state before the drag. Undo reverts the whole drag.
 
 mod arrows;
 mod faces;
@@ -20,51 +20,51 @@ use crate::app::App;
 use crate::commands::Tool;
 use crate::document::ClipBox;
 
-/// Something that can be dragged.
+/// A handle that can be dragged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Handle {
     /// A face of the clipping box.
     Face { axis: usize, high: bool },
-    /// Moves the selection along an axis of the world.
+    /// Moves the selection along a world axis.
     Arrow(usize),
-    /// Moves the selection as the pointer goes.
+    /// Moves the selection in the plane of the picture.
     Middle,
-    /// Turns the selection about an axis of the world.
+    /// Turns the selection about a world axis.
     Ring(usize),
 }
 
-/// What is being dragged.
+/// The drag in progress.
 enum Drag {
     Face(faces::Drag),
     Points(arrows::Drag),
-    /// It was given up; the button is still down.
+    /// A cancelled drag whose button is still down.
     Dropped,
 }
 
-/// What the handles have in work.
+/// State of the handles.
 #[derive(Default)]
 pub(crate) struct Gizmo {
     hovered: Option<Handle>,
     drag: Option<Drag>,
-    /// The middle of the selection, as of a version of the document.
+    /// Document version, and the middle of the selection in that version.
     middle: (u64, Option<DVec3>),
-    /// The clipping box before it was changed, as long as the change is not finished.
+    /// The clipping box before the unfinished change; the inner `None` is no box.
     clip_before: Option<Option<ClipBox>>,
 }
 
 impl Gizmo {
-    /// Whether something is being dragged.
+    /// Whether a drag is in progress, or cancelled with the button still down.
     pub(crate) fn is_dragging(&self) -> bool {
         self.drag.is_some()
     }
 
-    /// Whether the document is in the user's hands: dragged, or a number of the clipping box is.
+    /// Whether a change is unfinished: a drag, or a number of the clipping box.
     pub(crate) fn is_busy(&self) -> bool {
         self.is_dragging() || self.clip_before.is_some()
     }
 }
 
-/// What the pointer does to handles; says whether it is taken up by one.
+/// Handles the pointer. Returns whether a handle uses it.
 pub(crate) fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
     let left = egui::PointerButton::Primary;
     if app.tools.gizmo.drag.is_some() && !response.dragged_by(left) {
@@ -83,7 +83,7 @@ pub(crate) fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -
     let (pressed, hover, alt) =
         response.ctx.input(|input| (input.pointer.press_origin(), input.pointer.hover_pos(), input.modifiers.alt));
     let begins = response.drag_started_by(left);
-    // The pointer has moved already when a drag is known to be one.
+    // The pointer has already moved when a drag is recognized.
     let place = if begins { pressed.or(hover) } else { hover.filter(|_| response.hovered()) };
     let place = place.filter(|_| begins || !response.dragged());
     let handles = handles(app, &view);
@@ -99,7 +99,7 @@ pub(crate) fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -
     begins
 }
 
-/// Gives up what is being dragged; says whether there was anything.
+/// Cancels the drag. Returns whether there was one.
 pub(crate) fn cancel(app: &mut App) -> bool {
     match app.tools.gizmo.drag.replace(Drag::Dropped) {
         Some(Drag::Face(drag)) => drag.cancel(app),
@@ -121,7 +121,7 @@ fn finish(app: &mut App) {
     }
 }
 
-/// Takes what is dragged to where the pointer is; in steps if `stepped`.
+/// Moves the dragged handle to follow the pointer; in steps if `stepped`.
 fn follow(app: &mut App, view: &View, place: Pos2, stepped: bool) {
     match app.tools.gizmo.drag.take() {
         Some(Drag::Face(drag)) => {
@@ -136,7 +136,7 @@ fn follow(app: &mut App, view: &View, place: Pos2, stepped: bool) {
     }
 }
 
-/// Looks where the selection is, if it may have changed.
+/// Computes the middle of the selection, if it may have changed.
 fn find_middle(app: &mut App) {
     let version = app.version();
     if app.tool == Tool::Move && app.tools.gizmo.middle.0 != version {
@@ -145,7 +145,7 @@ fn find_middle(app: &mut App) {
     }
 }
 
-/// Where the arrows are, if there are any.
+/// Middle of the arrows and rings, if they are shown.
 fn middle(app: &App) -> Option<DVec3> {
     match &app.tools.gizmo.drag {
         Some(Drag::Points(drag)) => Some(drag.middle()),
@@ -153,7 +153,7 @@ fn middle(app: &App) -> Option<DVec3> {
     }
 }
 
-/// The clipping box, if it has handles.
+/// The clipping box, if its handles are shown.
 fn clip(app: &App) -> Option<ClipBox> {
     app.document().clip.filter(|clip| clip.enabled && app.panels.clip)
 }
@@ -194,7 +194,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: egui::Rect, size: [u32; 2]) {
     }
 }
 
-/// A line that is seen on any ground.
+/// A line with a dark outline, visible on any background.
 fn line(painter: &egui::Painter, ends: [Pos2; 2], width: f32, color: Color32) {
     let shade = Color32::from_black_alpha((f32::from(color.a()) * 0.5) as u8);
     painter.line_segment(ends, Stroke::new(width + 2.0, shade));

@@ -1,4 +1,4 @@
-//! Drags of a whole application that has no window.
+//! Drags in an application without a window.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::Options;
 use crate::document::{Layer, SelectMode};
 use crate::look::Look;
 
-/// An application with 1,000 points in the unit cube, a clipping box and everything selected; and its picture.
+/// An application with 1,000 points in the unit cube, all selected, with a clipping box; and its view.
 fn app() -> (App, View) {
     let context = egui::Context::default();
     let mut app = App::new(Options::default(), Look::default(), Vec::new(), &context);
@@ -32,7 +32,7 @@ fn app() -> (App, View) {
     (app, view)
 }
 
-/// What undoing takes back, newest first.
+/// Undoes all steps and returns their labels, newest first.
 fn steps(app: &mut App) -> Vec<String> {
     std::iter::from_fn(|| app.undo()).collect()
 }

@@ -1,34 +1,34 @@
-//! Between the window and the world: lines of sight, what the pointer is on, and how far something goes that is dragged.
+//! Geometry between window and world: lines of sight, the handle under the pointer, and the distance of a drag.
 
 use autosplats::cloud::glam::{DVec2, DVec3};
 use autosplats::{Camera, Lens};
 use eframe::egui::{Pos2, Rect, vec2};
 
-/// How far from a handle the pointer may be to take it, screen points.
+/// Largest distance from the pointer to a handle that takes it, screen points.
 const REACH: f32 = 9.0;
-/// By how much a dot may be further away than a line and is taken nevertheless, screen points.
+/// Advantage of a dot over a line in the choice of the nearest handle, screen points.
 const DOTS_FIRST: f32 = 4.0;
-/// Square of the sine of the angle between a line of sight and an axis below which it cannot be told how far a drag along
-/// the axis goes: 4 degrees.
+/// Squared sine of the angle between a line of sight and an axis, below which a drag along the axis is ambiguous: 4
+/// degrees.
 const END_ON: f64 = 5e-3;
-/// Sine of the angle between a line of sight and a plane below which the plane is seen edge on: 4 degrees.
+/// Sine of the angle between a line of sight and a plane, below which the plane is seen edge on: 4 degrees.
 const EDGE_ON: f64 = 0.07;
 
-/// A line of sight: where it begins and its direction, of length 1.
+/// A line of sight: origin and unit direction, world space.
 pub(super) type Ray = (DVec3, DVec3);
 
-/// The window's picture as a map of the world.
+/// Projection between world and window.
 pub(super) struct View {
     lens: Lens,
     rect: Rect,
-    /// Pixels of the picture by screen points.
+    /// Pixels per screen point.
     scale: f64,
-    /// Where the eye looks.
+    /// Unit vector of the view direction, world space.
     pub(super) forward: DVec3,
 }
 
 impl View {
-    /// The picture of so many pixels that `camera` takes, shown in `rect`.
+    /// The view of `camera` in a picture of `size` pixels, shown in `rect`.
     pub(super) fn new(camera: &Camera, rect: Rect, size: [u32; 2]) -> Option<Self> {
         let lens = camera.lens(size).ok()?;
         let [_, _, forward] = camera.axes().ok()?;
@@ -36,19 +36,19 @@ impl View {
         Some(Self { lens, rect, scale, forward })
     }
 
-    /// Where a place is seen, and how far away.
+    /// Window position and depth of a world position.
     pub(super) fn seen(&self, world: DVec3) -> Option<(Pos2, f64)> {
         let (pixel, depth) = self.lens.to_pixel(world)?;
         let pixel = pixel / self.scale;
         Some((self.rect.min + vec2(pixel.x as f32, pixel.y as f32), depth))
     }
 
-    /// Where a place is seen.
+    /// Window position of a world position.
     pub(super) fn place(&self, world: DVec3) -> Option<Pos2> {
         self.seen(world).map(|(place, _)| place)
     }
 
-    /// A place of the window by the picture's sides, 0 to 1.
+    /// A window position in shares of the picture's sides, 0 to 1.
     pub(super) fn share(&self, place: Pos2) -> DVec2 {
         let at = (place - self.rect.min) / self.rect.size();
         DVec2::new(at.x.into(), at.y.into())
@@ -59,17 +59,17 @@ impl View {
         DVec2::new(at.x.into(), at.y.into()) * self.scale
     }
 
-    /// The line of sight through a place of the window.
+    /// The line of sight through a window position.
     pub(super) fn ray(&self, place: Pos2) -> Ray {
         self.lens.ray(self.pixel(place))
     }
 
-    /// The direction in which a place is seen, of length 1.
+    /// Unit vector of the line of sight to a world position.
     pub(super) fn sight(&self, world: DVec3) -> Option<DVec3> {
         self.place(world).map(|place| self.ray(place).1)
     }
 
-    /// How long a screen point is where `world` is.
+    /// Length of a screen point at the depth of `world`, world units.
     pub(super) fn unit(&self, world: DVec3) -> Option<f64> {
         let (pixel, depth) = self.lens.to_pixel(world)?;
         let aside = self.lens.unproject(pixel + DVec2::new(self.scale, 0.0), depth);
@@ -77,11 +77,11 @@ impl View {
     }
 }
 
-/// What a handle looks like to the pointer.
+/// Shape of a handle in the window.
 pub(super) enum Shape {
     Dot(Pos2),
     Line(Pos2, Pos2),
-    /// A line that goes round.
+    /// A closed polyline.
     Loop(Vec<Pos2>),
 }
 
@@ -98,24 +98,24 @@ impl Shape {
     }
 }
 
-/// The distance of a place to a stretch of a line.
+/// Distance from a place to a line segment.
 fn distance(from: Pos2, to: Pos2, place: Pos2) -> f32 {
     let (along, way) = (to - from, place - from);
     let part = along.dot(way) / along.length_sq();
-    // A stretch without length is a point.
+    // A segment of length zero is a point.
     let part = if part.is_finite() { part.clamp(0.0, 1.0) } else { 0.0 };
     (from + along * part).distance(place)
 }
 
-/// The handle that the pointer is on: the nearest one within reach.
+/// The handle under the pointer: the nearest one within reach.
 pub(super) fn nearest<T: Copy>(handles: &[(T, Shape)], place: Pos2) -> Option<T> {
     let distances = handles.iter().map(|(handle, shape)| (*handle, shape.distance(place)));
     let near = distances.filter(|(_, distance)| *distance < REACH);
     near.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(handle, _)| handle)
 }
 
-/// Where on a line the pointer is: how far beyond `origin`, in the direction `axis` of length 1, the line is nearest to a
-/// line of sight. Nothing if it is seen end on.
+/// Offset from `origin` along the unit vector `axis` of the point of the line that is nearest to a line of sight.
+/// `None` if the line is seen end on.
 pub(super) fn along(origin: DVec3, axis: DVec3, (eye, sight): Ray) -> Option<f64> {
     let between = origin - eye;
     let cosine = axis.dot(sight);
@@ -124,14 +124,14 @@ pub(super) fn along(origin: DVec3, axis: DVec3, (eye, sight): Ray) -> Option<f64
     (sine_2 > END_ON && way.is_finite()).then_some(way)
 }
 
-/// Where a line of sight meets a plane. Nothing if it is seen edge on.
+/// Intersection of a line of sight with a plane. `None` if the plane is seen edge on.
 pub(super) fn on_plane(origin: DVec3, normal: DVec3, (eye, sight): Ray) -> Option<DVec3> {
     let sine = normal.dot(sight);
     let place = eye + sight * (normal.dot(origin - eye) / sine);
     (sine.abs() > EDGE_ON && place.is_finite()).then_some(place)
 }
 
-/// The angle about an axis that takes one direction to another, in radians, from half a turn back to half a turn on.
+/// Angle about an axis from one direction to another, radians, -π to π.
 pub(super) fn angle(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
     let [from, to] = [from, to].map(|way| way.reject_from_normalized(axis));
     axis.dot(from.cross(to)).atan2(from.dot(to))
@@ -143,10 +143,10 @@ pub(super) mod tests {
     use autosplats::Projection;
     use eframe::egui::pos2;
 
-    /// A place where `f32` holds half metres.
+    /// A place so far from the origin that the step of `f32` is half a metre.
     pub(in crate::gizmo) const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
 
-    /// A perspective and an orthographic picture of [`FAR`].
+    /// A perspective and an orthographic view of [`FAR`].
     pub(in crate::gizmo) fn views() -> impl Iterator<Item = View> {
         let rect = Rect::from_min_size(pos2(200.0, 30.0), vec2(600.0, 400.0));
         [Projection::PerspectiveFovDeg(40.0), Projection::OrthographicHeight(8.0)].into_iter().map(move |projection| {
@@ -161,7 +161,7 @@ pub(super) mod tests {
             let world = FAR + DVec3::new(1.0, 2.0, -0.5);
             let place = view.place(world).expect("before the eye");
             let (eye, sight) = view.ray(place);
-            // A tenth of a pixel, as places of the window are f32.
+            // A tenth of a pixel, as window positions are f32.
             assert!((world - eye).cross(sight).length() < 2e-3, "{world} is not on its line of sight");
             let unit = view.unit(world).expect("before the eye");
             let right = view.forward.cross(DVec3::Z).normalize();
@@ -179,7 +179,7 @@ pub(super) mod tests {
                     let place = view.place(FAR + axis * way).expect("before the eye");
                     let found = along(FAR, axis, view.ray(place)).expect("seen from the side");
                     assert!((found - way).abs() < 2e-3, "{found} is not {way} along {axis}");
-                    // Beside the line it is the nearest place of it.
+                    // Beside the line, the nearest point of the line counts.
                     let up = view.ray(place).1.cross(axis).normalize();
                     let beside = view.place(FAR + axis * way + up * 0.2).expect("before the eye");
                     let found = along(FAR, axis, view.ray(beside)).expect("seen from the side");

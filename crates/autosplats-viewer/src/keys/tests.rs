@@ -29,7 +29,7 @@ fn the_opposite_view_is_upright() {
     assert_eq!(opposite(&above, DVec3::Z).eye, DVec3::NEG_Z, "from above is from below");
 }
 
-/// An application with points that are selected.
+/// An application whose points are all selected.
 fn app(context: &egui::Context) -> App {
     let mut app = App::new(Options::default(), Look::default(), Vec::new(), context);
     app.change(|document| {
@@ -40,7 +40,7 @@ fn app(context: &egui::Context) -> App {
     app
 }
 
-/// Presses a key in a frame of the window in which a question is asked or not.
+/// Presses a key in a window frame; with `question`, the frame shows a modal question.
 fn press(app: &mut App, context: &egui::Context, key: Key, question: bool) {
     let mut input = egui::RawInput::default();
     let event = |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::NONE };

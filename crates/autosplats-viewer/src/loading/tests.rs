@@ -76,7 +76,7 @@ fn changes_of_a_file_are_noticed_once() {
     std::fs::write(&path, rows(10)).expect("written");
     let loader = Loader::start(egui::Context::default());
     let watch = loader.watch(path.clone());
-    // The first look is what changes are held against.
+    // The first check records the state that changes are compared with.
     std::thread::sleep(WATCH * 2);
     std::fs::write(&path, rows(20)).expect("written again");
     assert_eq!(wait(|| loader.changed().next()), path, "it has changed");

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Looks north from the south of a scene of radius 10.
+/// A camera that looks north from the south of a scene of radius 10.
 fn south() -> Navigation {
     let mut navigation = Navigation::new();
     navigation.set_scene(DVec3::ZERO, 10.0, DVec3::Z);
@@ -14,7 +14,7 @@ fn south() -> Navigation {
     navigation
 }
 
-/// Where `point` is in the picture, in heights of it from the middle, right and down.
+/// Position of `point` in the picture, in picture heights from its middle, right and down.
 fn on_screen(camera: &Camera, point: DVec3) -> DVec2 {
     let [right, down, forward] = camera.axes().expect("a camera that sees");
     let offset = point - camera.eye;

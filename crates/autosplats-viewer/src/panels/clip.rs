@@ -1,4 +1,4 @@
-//! The clipping box in numbers.
+//! The clipping box as numbers.
 
 use autosplats::cloud::glam::{DQuat, DVec3};
 use eframe::egui;
@@ -7,7 +7,7 @@ use crate::app::App;
 use crate::document::ClipBox;
 use crate::gizmo;
 
-/// Part of the box's longest side that a number goes by while the pointer goes one point.
+/// Change of a number per screen point dragged, as a share of the box's longest side.
 const SPEED: f64 = 0.002;
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
@@ -32,15 +32,15 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     });
     app.panels.clip = open;
     gizmo::preview(app, clip);
-    // A number that is dragged or typed makes one step, when it is let go.
+    // Changes by dragging or typing a number become one undo step when the number is released.
     if !busy && app.tools.gizmo.is_busy() && !app.tools.gizmo.is_dragging() {
         gizmo::settle(app);
-        // The figures beside the picture waited for it.
+        // Points are counted again only after the change; the repaint shows the counts.
         context.request_repaint();
     }
 }
 
-/// Says whether one of the numbers is in the user's hands.
+/// Shows the numbers. Returns whether one of them is being dragged or typed.
 fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
     let mut busy = false;
     ui.checkbox(&mut clip.enabled, "Clips").on_hover_text("Without, all points are shown and the box is kept");

@@ -1,8 +1,8 @@
-//! A colour and how it is changed: egui's own button has a sign in its window that egui's font lacks.
+//! A colour button. egui's own button needs a glyph that egui's font lacks.
 
 use eframe::egui::{self, Color32, DragValue, Popup, PopupCloseBehavior, Slider};
 
-/// A button of a colour that opens what changes it; says whether it was changed.
+/// A button in a colour, with a popup to change it. Returns whether the colour was changed.
 pub(super) fn button(ui: &mut egui::Ui, color: &mut [u8; 3], what: &str) -> bool {
     let size = egui::vec2(ui.spacing().interact_size.x, ui.spacing().interact_size.y);
     let (rect, response) = ui.allocate_exact_size(size, egui::Sense::click());
@@ -36,7 +36,7 @@ fn code(ui: &mut egui::Ui, color: &mut [u8; 3]) {
     }
 }
 
-/// A colour of six hexadecimal digits as one number.
+/// Parses a colour of six hexadecimal digits.
 fn parse(text: &str) -> Option<u32> {
     let digits = text.trim().trim_start_matches('#');
     let right = digits.len() == 6 && digits.bytes().all(|digit| digit.is_ascii_hexdigit());

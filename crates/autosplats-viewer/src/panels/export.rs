@@ -1,4 +1,4 @@
-//! Writing points, beside the window.
+//! The dialog to export points, and the export on a thread of its own.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -13,12 +13,12 @@ use crate::app::App;
 use crate::document::{Document, ExportError, Exported, LayerId, Replace, What, export, grouped};
 use crate::threads::spawn;
 
-/// What is being asked and what is being written.
+/// State of the dialog and of the export.
 pub(crate) struct Export {
     pub(crate) open: bool,
     what: What,
     target: TargetFile,
-    /// What writing the file that was refused would replace.
+    /// What the last refused export would replace.
     replace: Replace,
     work: Option<Work>,
 }
@@ -31,21 +31,21 @@ impl Default for Export {
 }
 
 impl Export {
-    /// Whether a file is being written, which leaving would stop.
+    /// Whether a file is being written; leaving would stop the export.
     pub(crate) fn is_writing(&self) -> bool {
         self.work.is_some()
     }
 }
 
-/// Asks where points go.
+/// Opens the dialog.
 pub(crate) fn open(app: &mut App) {
     app.panels.export.target.open();
     app.panels.export.open = true;
 }
 
-/// A file that is being written.
+/// An export in progress.
 struct Work {
-    /// As it was when writing began.
+    /// The document when the export began.
     document: Document,
     what: What,
     path: PathBuf,
@@ -53,7 +53,7 @@ struct Work {
     result: Receiver<Result<Exported, ExportError>>,
 }
 
-/// What writer and window share.
+/// State shared by the writer and the window.
 struct Listener {
     done: AtomicU32,
     cancelled: AtomicBool,
@@ -122,7 +122,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// What can be written: what it is called, what it is, and whether there is any of it.
+/// What can be exported: label, choice, and whether it holds any points.
 fn choices(app: &mut App) -> Vec<(String, What, bool)> {
     let counts = app.counts().all;
     let document = app.document();
@@ -157,7 +157,7 @@ fn start(app: &mut App, context: &egui::Context, path: PathBuf, replace: Replace
     app.panels.export.work = Some(Work { document, what, path, listener, result });
 }
 
-/// Takes in how writing ended.
+/// Receives the result of the export.
 fn finish(app: &mut App) {
     let Some(result) = app.panels.export.work.as_ref().and_then(|work| work.result.try_recv().ok()) else { return };
     let Some(Work { document, what, path, listener, .. }) = app.panels.export.work.take() else { return };
@@ -177,7 +177,7 @@ fn finish(app: &mut App) {
                 ExportError::Input { .. } => Replace::Inputs,
                 _ => Replace::Nothing,
             };
-            // What may be replaced is by what was to be written.
+            // The permission to replace holds only for the points that were refused.
             let question = export.replace != Replace::Nothing && export.what == what;
             export.target.refuse(&path, error.to_string(), question);
             export.open = true;
@@ -185,7 +185,7 @@ fn finish(app: &mut App) {
     }
 }
 
-/// The layers of which nothing would be lost now: all their points that are left are in the file.
+/// The layers that are saved by an export, as all their remaining points are in the file.
 fn saved_layers(document: &Document, what: What) -> Vec<LayerId> {
     let complete = |layer: &&crate::document::Layer| match what {
         What::All => true,
@@ -198,7 +198,7 @@ fn saved_layers(document: &Document, what: What) -> Vec<LayerId> {
     document.layers.iter().filter(complete).map(|layer| layer.id).collect()
 }
 
-/// Whether a path names a picture.
+/// Whether a path has an extension, in any case.
 pub(super) fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }

@@ -1,4 +1,4 @@
-//! Turntables and ways of the camera, played and written.
+//! The dialog for films: turntables and camera paths, played and recorded.
 
 use std::sync::{Arc, OnceLock};
 
@@ -14,50 +14,50 @@ use crate::playing::{Clock, Reel};
 use crate::recording::Recording;
 use crate::threads::spawn;
 
-/// Most pictures of a film.
+/// Largest number of pictures of a film.
 const MOST: f64 = 1e6;
 
-/// What is being asked and what is being played.
+/// State of the dialog and of the preview.
 pub(crate) struct Film {
     pub(crate) open: bool,
     keyed: bool,
     time: Time,
-    /// How long it takes, unless what is played says so.
+    /// Length of the film, seconds, unless the timeline sets it.
     seconds: f64,
     degrees: f64,
     rate: u32,
     size: [u32; 2],
     target: TargetFile,
-    /// How many pictures were not written because they would replace something.
+    /// Number of pictures of the refused film, which would have replaced a file.
     refused: Option<usize>,
-    /// Whether films can be made, once it is known, and once somebody looks.
+    /// Whether ffmpeg is installed; `None` until somebody asks, unset until the answer is known.
     ffmpeg: Option<Arc<OnceLock<bool>>>,
-    /// What is being played, and when that began.
+    /// Moments of the preview, and the window time when it began, seconds.
     played: Option<(Vec<Moment>, f64)>,
 }
 
-/// What moves meanwhile.
+/// How time runs in a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Time {
-    /// It goes on from where it begins to be played, as long as the film lasts.
+    /// Time runs from the beginning of the span, for the length of the film.
     #[default]
     Runs,
-    /// The same, and the film lasts as long as it does.
+    /// Time runs once through the span, which sets the length of the film.
     Once,
-    /// It stands still.
+    /// Time stands still.
     Stands,
 }
 
-/// What a picture shows.
+/// Camera and time of one picture.
 #[derive(Clone, Copy, Debug)]
 struct Moment {
     camera: Camera,
-    /// Place of the clock, where time runs.
+    /// Clock position, where time runs.
     place: Option<f64>,
 }
 
 impl Film {
-    /// Seconds that it takes.
+    /// Length of the film, seconds.
     fn seconds(&self, clock: Option<&Clock>) -> f64 {
         match clock {
             Some(clock) if self.time == Time::Once => {
@@ -68,24 +68,24 @@ impl Film {
         }
     }
 
-    /// Number of pictures; `clock` is that of what moves.
+    /// Number of pictures; `clock` is that of the playing inputs.
     fn pictures(&self, clock: Option<&Clock>) -> usize {
         (self.seconds(clock) * f64::from(self.rate)).round().clamp(1.0, MOST) as usize
     }
 
-    /// Plays no longer.
+    /// Stops the preview.
     #[cfg(test)]
     pub(crate) fn stop(&mut self) {
         self.played = None;
     }
 
-    /// Half a second, ten small pictures a second, of a camera that stays where it is.
+    /// Sets half a second of ten small pictures per second, with a still camera.
     #[cfg(test)]
     pub(crate) fn still_for_tests(&mut self) {
         (self.seconds, self.rate, self.degrees, self.size) = (0.5, 10, 0.0, [64, 48]);
     }
 
-    /// Whether films can be made; nobody has to wait for it, as it is found out beside the window.
+    /// Whether ffmpeg is installed; `None` until known. A thread of its own finds out, so that nothing waits.
     fn has_ffmpeg(&mut self, context: &egui::Context) -> Option<bool> {
         let found = self.ffmpeg.get_or_insert_with(|| {
             let found = Arc::new(OnceLock::new());
@@ -118,7 +118,7 @@ impl Default for Film {
     }
 }
 
-/// Opens the window, or closes it.
+/// Opens or closes the dialog.
 pub(crate) fn toggle(app: &mut App) {
     app.panels.film.target.forget();
     app.panels.film.open = !app.panels.film.open;
@@ -170,7 +170,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     app.panels.film.open = open;
 }
 
-/// Which way the camera goes.
+/// The choice of the camera path.
 fn way(app: &mut App, ui: &mut egui::Ui) {
     ui.horizontal(|ui| {
         ui.radio_value(&mut app.panels.film.keyed, false, "Turntable");
@@ -213,7 +213,7 @@ fn way(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
-/// Whether time runs in the film, where there is something that it runs for.
+/// The choice of how time runs, if an input has a timeline.
 fn time(app: &mut App, ui: &mut egui::Ui) {
     if !app.playing.has_timeline() {
         return;
@@ -241,7 +241,7 @@ fn time(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
-/// The clock of what moves in the film, if something does.
+/// The clock, if time runs in the film.
 fn clock(app: &App) -> Option<&Clock> {
     let runs = app.panels.film.time != Time::Stands && app.playing.has_timeline();
     runs.then_some(&app.playing.clock)
@@ -252,7 +252,7 @@ fn has_way(app: &App) -> bool {
     !app.document().layers.is_empty() && (!app.panels.film.keyed || !app.keys.is_empty())
 }
 
-/// Why time cannot run now, if it is to.
+/// Why the film cannot be made, if time is to run; `None` if it can.
 fn problem(app: &App) -> Option<String> {
     let clock = clock(app)?;
     let pictures = app.panels.film.seconds(Some(clock)) * f64::from(app.panels.film.rate);
@@ -266,7 +266,7 @@ fn problem(app: &App) -> Option<String> {
     Some(format!("{} has edits of one moment; export or undo them, or let time stand still", unsaved.name))
 }
 
-/// The cameras of the film and the times that they see, up to a million.
+/// The cameras of the film and their times, a million at most.
 fn moments(app: &App) -> Vec<Moment> {
     let (film, clock) = (&app.panels.film, clock(app));
     let pictures = film.pictures(clock);
@@ -281,7 +281,7 @@ fn moments(app: &App) -> Vec<Moment> {
     cameras.into_iter().enumerate().map(|(picture, camera)| Moment { camera, place: place(picture) }).collect()
 }
 
-/// Where it goes, if it is `ready` to go anywhere.
+/// The output file. `ready` says whether the film has cameras.
 fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     let context = ui.ctx().clone();
     let film = &mut app.panels.film;
@@ -309,7 +309,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     let words = Words { title: "Save film", name: "film.mp4", verb: "Write" };
     let Some(write) = film.target.show(ui, &words, &mut app.panels.entered, problem) else { return };
     let Ok(target) = Target::new(&write.path) else { return };
-    // Of pictures the system's dialog knows one name only.
+    // The system's dialog has asked about one name only, but a film of pictures has many.
     let there = target.existing(pictures).filter(|there| !(write.answered || write.replace && *there == write.path));
     if let Some(there) = there {
         film.target.refuse(&write.path, format!("{} is there already", there.display()), true);
@@ -328,7 +328,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     app.recording = Some(Recording::start(wish, cameras, reel, rate, target, &context));
 }
 
-/// Goes on with what is being played.
+/// Continues the preview.
 fn play(app: &mut App, context: &egui::Context) {
     let Some((moments, began)) = &app.panels.film.played else { return };
     let picture = (context.input(|input| input.time) - began) * f64::from(app.panels.film.rate);

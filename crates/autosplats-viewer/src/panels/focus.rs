@@ -1,34 +1,34 @@
-//! Which part of the window has the keyboard: F6 goes from part to part, Tab from control to control.
+//! The keyboard focus: F6 moves it from part to part of the window, Tab from control to control.
 //!
 //! # How it works
-//! Panels say where they are in each frame, windows are layers of egui's. A part is entered at its first control, as the last
-//! frame had them. The picture has the keyboard when nothing else has it, so that its keys need no modifiers.
+//! Panels report their place in each frame; windows are layers of egui. A part is entered at its first control in the
+//! last frame. The picture has the keyboard when no control has it, so that its keys need no modifiers.
 
 use eframe::egui::{self, Context, Id, LayerId, Rect};
 
 use crate::app::App;
 
-/// Where the panels are, and whether the keyboard is what goes from control to control.
+/// Places of the panels, and whether the keyboard moves the focus.
 #[derive(Default)]
 pub(crate) struct Focus {
     panels: Vec<Rect>,
-    /// Whether keys have chosen what has the focus, so that it is to be seen.
+    /// Whether keys have set the focus, which is then shown by a ring.
     pub(crate) by_keys: bool,
 }
 
 impl Focus {
-    /// A frame begins.
+    /// Starts a frame.
     pub(super) fn begin(&mut self) {
         self.panels.clear();
     }
 
-    /// There is a panel.
+    /// Reports a panel.
     pub(super) fn part(&mut self, rect: Rect) {
         self.panels.push(rect);
     }
 }
 
-/// A part of the window besides the picture.
+/// A part of the window, other than the picture.
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Panel(Rect),
@@ -44,12 +44,12 @@ impl Part {
     }
 }
 
-/// The controls that can have the focus, in the order of Tab.
+/// The controls that can have the focus, in Tab order.
 fn controls(context: &Context) -> Vec<(Id, LayerId, Rect)> {
     let order: Vec<LayerId> = context.memory(|memory| memory.layer_ids().collect());
     context.viewport(|viewport| {
         let mut layers: Vec<_> = viewport.prev_pass.widgets.layers().collect();
-        // Panels, then windows from the lowest to the topmost.
+        // Panels first, then windows from the lowest to the topmost.
         layers.sort_by_key(|(layer, _)| (layer.order, order.iter().position(|own| own == *layer)));
         let all = layers.into_iter().flat_map(|(layer, widgets)| widgets.iter().map(move |widget| (*layer, widget)));
         let usable = all.filter(|(_, widget)| widget.enabled && widget.sense.is_focusable());
@@ -57,7 +57,7 @@ fn controls(context: &Context) -> Vec<(Id, LayerId, Rect)> {
     })
 }
 
-/// Gives the focus to the next part of the window, or to the one before.
+/// Moves the focus to the next part of the window, or to the previous one.
 pub(crate) fn go_on(app: &mut App, context: &Context, back: bool) {
     let controls = controls(context);
     let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
@@ -74,7 +74,7 @@ pub(crate) fn go_on(app: &mut App, context: &Context, back: bool) {
         let (_, layer, rect) = controls.iter().find(|(id, ..)| *id == focused)?;
         stops.iter().position(|(part, _)| part.holds(*layer, *rect))
     });
-    // One place more than there are stops is the picture's.
+    // One stop more than there are parts: the picture.
     let count = stops.len() + 1;
     let place = here.unwrap_or(stops.len());
     let next = if back { place + count - 1 } else { place + 1 } % count;
@@ -86,7 +86,7 @@ pub(crate) fn go_on(app: &mut App, context: &Context, back: bool) {
     app.panels.focus.by_keys = true;
 }
 
-/// Draws a ring around what has the focus, if keys have given it.
+/// Draws a ring around the focused control, if keys have set the focus.
 pub(super) fn ring(app: &mut App, context: &Context) {
     if context.input(|input| input.pointer.any_pressed()) {
         app.panels.focus.by_keys = false;

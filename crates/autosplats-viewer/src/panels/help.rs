@@ -1,4 +1,4 @@
-//! What keys and mouse do.
+//! The help window: what keys and mouse do.
 
 use eframe::egui;
 

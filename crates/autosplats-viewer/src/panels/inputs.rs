@@ -1,4 +1,4 @@
-//! The list of what is open, and what is known of a point.
+//! The list of inputs, and the window with information on a point.
 
 use autosplats::cloud::glam::DVec3;
 use eframe::egui;
@@ -36,7 +36,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     app.panels.focus.part(shown.response.rect);
 }
 
-/// What is being read.
+/// The inputs that are being read.
 fn loading(app: &App, ui: &mut egui::Ui) {
     for job in app.loader.jobs() {
         ui.horizontal(|ui| {
@@ -49,7 +49,7 @@ fn loading(app: &App, ui: &mut egui::Ui) {
     }
 }
 
-/// What is played but has no points yet, and why.
+/// The playing inputs that have no points yet, and why.
 fn waiting(app: &mut App, ui: &mut egui::Ui) {
     let mut given_up = None;
     for Waiting { number, input, why, read, .. } in app.playing.waiting() {
@@ -61,7 +61,7 @@ fn waiting(app: &mut App, ui: &mut egui::Ui) {
         });
         ui.horizontal_wrapped(|ui| {
             ui.add_space(22.0);
-            // Nothing that turns: it would draw the window all the while.
+            // A spinner would repaint the window continuously.
             ui.small(if read > 0.0 { format!("{why}, {:.0} %", 100.0 * read) } else { why });
         });
         ui.add_space(4.0);
@@ -151,7 +151,7 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     }
 }
 
-/// Takes everything off the list.
+/// Removes all inputs.
 pub(crate) fn close_all(app: &mut App) {
     app.loader.cancel_all();
     app.playing.give_up_waiting();
@@ -159,7 +159,7 @@ pub(crate) fn close_all(app: &mut App) {
     remove(app, ids);
 }
 
-/// Takes layers off the list, which undo brings back; asks first if edits could be lost.
+/// Removes layers as an undo step. Asks first if edits would be lost.
 fn remove(app: &mut App, ids: Vec<LayerId>) {
     if ids.iter().any(|&id| app.history.is_unsaved(id)) {
         app.panels.removal = ids;
@@ -183,7 +183,7 @@ fn remove_now(app: &mut App, ids: &[LayerId]) {
     });
 }
 
-/// Asks before edits go with their layer.
+/// Asks before layers with unsaved edits are removed.
 pub(super) fn removal(app: &mut App, context: &egui::Context) {
     if app.panels.removal.is_empty() {
         return;
@@ -218,13 +218,13 @@ pub(super) fn removal(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// A place with the digits that moving and turning leave exact.
+/// Text of a place, with the digits that remain exact after moving and turning.
 fn place_text(place: DVec3) -> String {
     let error = 1e-13 * place.abs().max_element();
     place.to_array().map(|value| shortest(value, error)).join(" ")
 }
 
-/// What is known of the point that was asked about.
+/// The window with information on the inspected point.
 pub(super) fn inspected(app: &mut App, context: &egui::Context) {
     let Some(point) = app.tools.inspected.clone() else { return };
     let mut open = true;

@@ -1,4 +1,4 @@
-//! What can be done with an input besides looking at it: its name, its place in the list and in the world.
+//! The menu of an input: its name, its place in the list and in the world.
 
 use autosplats::cloud::Source;
 use eframe::egui;
@@ -10,17 +10,17 @@ use crate::document::LayerId;
 pub(crate) struct Naming {
     layer: LayerId,
     text: String,
-    /// Whether the field has the keyboard yet.
+    /// Whether the field has received the keyboard focus.
     focused: bool,
 }
 
-/// Begins to rename an input.
+/// Starts to rename an input.
 pub(super) fn rename(app: &mut App, id: LayerId) {
     let Some(text) = app.document().layer(id).map(|layer| layer.name.clone()) else { return };
     app.panels.naming = Some(Naming { layer: id, text, focused: false });
 }
 
-/// The field in place of the name of an input that is being renamed; says whether it is.
+/// Shows a text field instead of the name of an input that is being renamed. Returns whether it is.
 pub(super) fn naming(app: &mut App, ui: &mut egui::Ui, id: LayerId) -> bool {
     let Some(mut naming) = app.panels.naming.take_if(|naming| naming.layer == id) else { return false };
     let field = egui::TextEdit::singleline(&mut naming.text).desired_width(ui.available_width());

@@ -1,4 +1,4 @@
-//! How the points are shown.
+//! The look panel: how the points are shown.
 
 use autosplats::{Backend, Background, Backs, ColorMap, ColorMode, SearchEngine, Settings, usual_exposure};
 use eframe::egui::{self, ComboBox, DragValue, Slider};
@@ -6,7 +6,7 @@ use eframe::egui::{self, ComboBox, DragValue, Slider};
 use crate::app::App;
 use crate::look::{Look, TwoFingers};
 
-/// Colour modes that every cloud has, or that an error explains if it does not.
+/// Colour modes that every cloud has, or whose absence is reported.
 const MODES: [(&str, ColorMode); 9] = [
     ("auto", ColorMode::Auto),
     ("colours", ColorMode::Rgb),
@@ -30,7 +30,7 @@ const MAPS: [(&str, Option<ColorMap>); 6] = [
 
 const BACKENDS: [(&str, Backend); 3] = [("auto", Backend::Auto), ("CPU", Backend::Cpu), ("GPU", Backend::Gpu)];
 
-/// What two fingers on a touchpad do.
+/// What a two-finger drag on a touchpad does.
 const FINGERS: [(&str, TwoFingers); 3] =
     [("zoom", TwoFingers::Zoom), ("orbit", TwoFingers::Orbit), ("pan", TwoFingers::Pan)];
 
@@ -103,7 +103,7 @@ fn color(app: &mut App, ui: &mut egui::Ui) {
     let before = shading.color.clone();
     choose(ui, "by", &mut shading.color, &options);
     if shading.color != before {
-        // Values of another kind have another range.
+        // Another colour mode has another range of values.
         shading.range = None;
     }
     choose(ui, "map", &mut shading.color_map, &MAPS);
@@ -217,7 +217,7 @@ fn search(app: &mut App, ui: &mut egui::Ui) {
     ui.checkbox(&mut reconstruction.trim, "Trim").on_hover_text("End silhouettes where points do");
 }
 
-/// A radius that holds some ten points of a cloud, were they a sphere.
+/// A radius that holds about ten points, as if the points covered a surface as wide as the cloud's diagonal.
 fn first_radius(cloud: &autosplats::cloud::PointCloud) -> f32 {
     let step = (cloud.len() / 10_000).max(1);
     let finite = cloud.positions().iter().step_by(step).filter(|place| place.iter().all(|c| c.is_finite()));

@@ -1,4 +1,4 @@
-//! What was measured, in numbers.
+//! The window with the measured values.
 
 use std::fmt::Write as _;
 
@@ -54,10 +54,10 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// A name and what belongs to it.
+/// A name and its value.
 type Row = (String, String);
 
-/// All that can be said of a line through some corners.
+/// All values of a polyline.
 #[derive(Debug, Default)]
 struct Report {
     whole: Vec<Row>,
@@ -103,18 +103,18 @@ impl Report {
         [&self.whole, &self.steps, &self.angles, &self.corners]
     }
 
-    /// One line for each, name and value with a tab between them.
+    /// One line per value, with a tab between name and value.
     fn text(&self) -> String {
         let mut text = String::new();
         for (name, value) in self.parts().into_iter().flatten() {
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = writeln!(text, "{name}\t{value}");
         }
         text
     }
 }
 
-/// Decimals that tell corners apart to a hundred-thousandth of how far they are from each other, and three at least.
+/// Decimals that resolve a hundred-thousandth of the distance between corners; three at least.
 fn decimals(corners: &[DVec3]) -> usize {
     let low = corners.iter().copied().reduce(DVec3::min).unwrap_or_default();
     let high = corners.iter().copied().reduce(DVec3::max).unwrap_or_default();

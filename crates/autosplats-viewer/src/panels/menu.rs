@@ -1,4 +1,4 @@
-//! The menus and the tools.
+//! The menus and the tool bar.
 
 use autosplats::ViewDirection;
 use eframe::egui;

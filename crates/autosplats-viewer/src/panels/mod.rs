@@ -1,4 +1,4 @@
-//! Everything around the picture.
+//! Panels, windows and dialogs around the picture.
 
 mod clip;
 mod color;
@@ -33,13 +33,13 @@ use crate::app::App;
 use crate::commands::Command;
 use crate::document::LayerId;
 
-/// What is open around the picture.
+/// State of the panels, windows and dialogs.
 pub(crate) struct Panels {
     pub(crate) inputs: bool,
     pub(crate) look: bool,
     pub(crate) statistics: bool,
     pub(crate) help: bool,
-    /// The numbers of the clipping box, and its handles.
+    /// Whether the numbers and the handles of the clipping box are shown.
     pub(crate) clip: bool,
     pub(crate) moving: moving::Numbers,
     pub(crate) pose: Option<pose::Pose>,
@@ -50,24 +50,24 @@ pub(crate) struct Panels {
     pub(crate) film: film::Film,
     pub(crate) session: session::Session,
     pub(crate) focus: focus::Focus,
-    /// Whether Enter was pressed where nothing takes it: the dialog on top does what it is for.
+    /// Whether Enter was pressed where no control takes it; the dialog on top then performs its action.
     pub(crate) entered: bool,
-    /// Whether Escape has just given the focus back, which is all that it does then.
+    /// Whether Escape has just returned the focus to the picture; that Escape then does nothing else.
     pub(crate) left: bool,
     /// Commands whose keys were taken from egui.
     pub(crate) claimed: Vec<Command>,
     memory: status::Memory,
-    /// Whether fingers on a touchpad scroll, and not a wheel.
+    /// Whether the last scrolling came from fingers on a touchpad rather than a wheel.
     pub(crate) fingers: bool,
-    /// How far the drag has gone that the view has followed, screen points.
+    /// The part of the drag that the view has followed, screen points.
     pub(crate) dragged: egui::Vec2,
-    /// Depth of what a drag took hold of.
+    /// Depth of the point grabbed by the drag, world units.
     pub(crate) grabbed: Option<f64>,
-    /// What the wheel goes to.
+    /// The target of the wheel.
     pub(crate) zoomed: Option<crate::viewport::Zoomed>,
-    /// Whether the user wants to leave though something is not saved.
+    /// Whether to ask about leaving with unsaved edits.
     leave: bool,
-    /// Layers with edits that are in no file, which the user wants to remove.
+    /// Layers with unsaved edits that the user wants to remove.
     removal: Vec<LayerId>,
 }
 
@@ -103,7 +103,7 @@ impl Default for Panels {
 }
 
 impl Panels {
-    /// Closes a window that lies over the picture; says whether there was one.
+    /// Closes one of the windows over the picture. Returns whether there was one.
     pub(crate) fn close_window(&mut self) -> bool {
         self.windows().into_iter().find(|open| **open).map(|open| *open = false).is_some()
     }
@@ -119,7 +119,7 @@ impl Panels {
     }
 }
 
-/// Shows the panels that lie beside the picture.
+/// Shows the panels beside the picture.
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     app.panels.focus.begin();
     menu::show(app, ui);
@@ -133,7 +133,7 @@ pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
     }
 }
 
-/// Shows the windows that lie over the picture.
+/// Shows the windows over the picture.
 pub(crate) fn over(app: &mut App, context: &egui::Context) {
     open::show(app, context);
     statistics::show(app, context);
@@ -153,7 +153,7 @@ pub(crate) fn over(app: &mut App, context: &egui::Context) {
     focus::ring(app, context);
 }
 
-/// Asks before edits are lost.
+/// Asks before leaving would lose edits.
 fn leave(app: &mut App, context: &egui::Context) {
     let asked = context.input(|input| input.viewport().close_requested());
     let writing = app.panels.export.is_writing();
@@ -195,7 +195,8 @@ fn leave(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// The button of a question that Enter presses, as it does no harm: it has the keyboard until another one is chosen.
+/// The harmless button of a question. It has the keyboard focus, so that Enter presses it, until another button is
+/// chosen.
 fn main_button(ui: &mut egui::Ui, label: &str) -> egui::Response {
     let button = ui.button(label);
     if ui.memory(|memory| memory.focused().is_none()) {

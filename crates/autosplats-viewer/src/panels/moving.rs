@@ -11,7 +11,7 @@ use crate::commands::Tool;
 pub(crate) struct Numbers {
     way: DVec3,
     degrees: f64,
-    /// The axis that is turned about; upward if none is said.
+    /// World axis of the rotation; `None` is the up axis.
     axis: Option<usize>,
 }
 
@@ -75,7 +75,7 @@ enum Act {
     Turn,
 }
 
-/// How much a number goes by while the pointer goes one point: as much as can be seen.
+/// Change of a number per screen point dragged, world units: a thousandth of the picture's height at the pivot.
 fn speed(app: &App) -> f64 {
     let speed = app.navigation.height_at_pivot() * 1e-3;
     if speed > 0.0 && speed.is_finite() { speed } else { 0.01 }

@@ -1,4 +1,4 @@
-//! Opening files: the system's dialog, and a line to type a path or a scene where there is none.
+//! Opening files: the system's dialog, or a text field for a path or a scene where there is none.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError};
@@ -9,16 +9,16 @@ use crate::app::App;
 use crate::files::ask_for_inputs;
 use crate::loading::Input;
 
-/// What is being asked.
+/// State of the dialogs.
 #[derive(Default)]
 pub(crate) struct Dialogs {
     chosen: Option<Receiver<Option<Vec<PathBuf>>>>,
-    /// What is typed, while it can be.
+    /// The text, while the field is shown.
     typed: Option<String>,
 }
 
 impl Dialogs {
-    /// Asks for files.
+    /// Opens the system's dialog.
     pub(crate) fn open(&mut self, context: &egui::Context) {
         if self.chosen.is_none() {
             self.chosen = Some(ask_for_inputs(context));
@@ -28,7 +28,7 @@ impl Dialogs {
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     match app.panels.dialogs.chosen.as_ref().map(Receiver::try_recv) {
-        // Without a system dialog a path can be typed.
+        // Without a system dialog, the text field is shown.
         Some(Ok(None)) => {
             app.panels.dialogs.chosen = None;
             app.panels.dialogs.typed.get_or_insert_default();

@@ -1,4 +1,4 @@
-//! Writing pictures.
+//! The dialog to save pictures.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,14 +14,14 @@ use crate::app::App;
 use crate::output::Goal;
 use crate::render::{Task, Wish};
 
-/// What is being asked.
+/// State of the dialog.
 pub(crate) struct PictureDialog {
     pub(crate) open: bool,
     target: TargetFile,
     size: [u32; 2],
-    /// The window as it is, menus and all.
+    /// Whether to save the whole window, menus included.
     window: bool,
-    /// The picture of the window, when it arrives, and where it goes.
+    /// The expected screenshot of the window, and its file.
     expected: Option<(Receiver<Arc<egui::ColorImage>>, PathBuf)>,
 }
 
@@ -31,7 +31,7 @@ impl Default for PictureDialog {
     }
 }
 
-/// Asks where a picture goes.
+/// Opens the dialog.
 pub(crate) fn open(app: &mut App) {
     app.panels.picture.target.open();
     app.panels.picture.open = true;
@@ -94,7 +94,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// Writes the picture of the window that was asked for.
+/// Writes the screenshot of the window once it arrives.
 fn arrived(app: &mut App) {
     let Some(image) = app.panels.picture.expected.as_ref().and_then(|(receiver, _)| receiver.try_recv().ok()) else {
         return;

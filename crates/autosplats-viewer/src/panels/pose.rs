@@ -1,4 +1,4 @@
-//! Where an input stands, in numbers.
+//! The pose of an input as numbers.
 
 use autosplats::cloud::glam::{DMat3, DMat4, DQuat, DVec3, EulerRot};
 use eframe::egui;
@@ -9,40 +9,40 @@ use crate::document::LayerId;
 /// The pose that is being edited.
 pub(crate) struct Pose {
     layer: LayerId,
-    /// What the input turns about, in its own coordinates.
+    /// The centre of rotation, in the input's own coordinates.
     middle: DVec3,
     parts: Parts,
-    /// What the parts make; another pose in the document means that it came by undo.
+    /// The pose made of `parts`. If the document has another one, undo has changed it.
     made: DMat4,
-    /// The pose before it was changed, as long as the change is not finished.
+    /// The pose before the unfinished change.
     before: Option<DMat4>,
 }
 
-/// A pose as people say it: `place = turn · scale · rest · (own - middle) + middle + way`.
+/// The parts of a pose: `place = turn · scale · rest · (own - middle) + middle + way`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Parts {
     way: DVec3,
-    /// About x, then y, then z, degrees.
+    /// Angles about x, then y, then z, degrees.
     turn_deg: DVec3,
     scale: f64,
-    /// What a turn and a scale leave of the matrix: identity but for mirrored, stretched or sheared inputs.
+    /// The remainder of the matrix: the identity, except for mirrored, stretched or sheared inputs.
     rest: DMat3,
 }
 
 impl Parts {
     fn new(pose: &DMat4, middle: DVec3) -> Self {
         let linear = DMat3::from_mat4(*pose);
-        // The turn that keeps x and the plane of x and y where they are, so that there is one for sheared inputs, too.
+        // The rotation that keeps the x axis and the xy plane of the matrix, which also exists for sheared inputs.
         let x = linear.x_axis.normalize();
         let y = linear.y_axis.reject_from_normalized(x).normalize();
         let turn = DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y)));
         let (z, y, x) = turn.to_euler(EulerRot::ZYX);
-        // Nothing is added, so that -0 becomes 0.
+        // Adding zero turns -0 into 0.
         let turn_deg = DVec3::new(x, y, z).map(f64::to_degrees) + 0.0;
         let stretch = DMat3::from_euler(EulerRot::ZYX, z, y, x).transpose() * linear;
         let scale = stretch.determinant().abs().cbrt();
         let rest = stretch * (1.0 / scale);
-        // What is nothing but rounding is nothing.
+        // A remainder within rounding is the identity.
         let rest = if rest.abs_diff_eq(DMat3::IDENTITY, 1e-9) { DMat3::IDENTITY } else { rest };
         Self { way: pose.transform_point3(middle) - middle, turn_deg, scale, rest }
     }
@@ -57,7 +57,7 @@ impl Parts {
     }
 }
 
-/// Opens the numbers of an input's pose.
+/// Opens the window for an input's pose.
 pub(super) fn open(app: &mut App, id: LayerId) {
     let Some(layer) = app.document().layer(id) else { return };
     let middle = layer.bounds().map_or(DVec3::ZERO, |[low, high]| low.midpoint(high));
@@ -112,7 +112,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     app.panels.pose = open.then_some(pose);
 }
 
-/// Says whether one of the numbers is in the user's hands.
+/// Shows the numbers. Returns whether one of them is being dragged or typed.
 fn numbers(ui: &mut egui::Ui, parts: &mut Parts, speed: f64) -> bool {
     let mut busy = false;
     egui::Grid::new("pose").num_columns(4).show(ui, |ui| {
@@ -143,7 +143,7 @@ fn numbers(ui: &mut egui::Ui, parts: &mut Parts, speed: f64) -> bool {
     busy
 }
 
-/// Makes one step of all changes since the last one.
+/// Combines all changes since the last call into one undo step.
 fn settle(app: &mut App, pose: &mut Pose) {
     let Some(before) = pose.before.take().filter(|before| *before != pose.made) else { return };
     let (id, made) = (pose.layer, pose.made);

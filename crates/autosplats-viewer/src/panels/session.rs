@@ -1,4 +1,4 @@
-//! Keeping the session in a file.
+//! The dialog to save the session.
 
 use eframe::egui;
 
@@ -6,7 +6,7 @@ use super::target_file::{TargetFile, Words};
 use crate::app::App;
 use crate::state::State;
 
-/// Where the session is to be kept.
+/// State of the dialog.
 pub(crate) struct Session {
     pub(crate) open: bool,
     target: TargetFile,
@@ -18,7 +18,7 @@ impl Default for Session {
     }
 }
 
-/// Asks where to keep it, which is where it is kept so far if that was told.
+/// Opens the dialog. The proposed file is the present session file, if there is one.
 pub(crate) fn open(app: &mut App) {
     if let Some(path) = &app.state {
         app.panels.session.target = TargetFile::new(path.display().to_string());

@@ -1,4 +1,4 @@
-//! What a picture costs, live.
+//! The statistics window: render times and counts.
 
 use autosplats::Timings;
 use eframe::egui;
@@ -7,10 +7,10 @@ use egui_plot::{Bar, BarChart, Plot};
 use crate::app::App;
 use crate::document::grouped;
 
-/// What a stage is called, its milliseconds and its colour.
+/// Name, milliseconds and colour of a stage.
 type Stage = (&'static str, fn(&Timings) -> f64, egui::Color32);
 
-/// The stages, with colours that colour-blind people can tell apart (Okabe and Ito 2008).
+/// The stages. Colour-blind people can tell the colours apart (Okabe and Ito 2008).
 const STAGES: [Stage; 6] = [
     ("project", |t| t.project, egui::Color32::from_rgb(0, 114, 178)),
     ("search", |t| t.search, egui::Color32::from_rgb(230, 159, 0)),

@@ -1,4 +1,4 @@
-//! The line below the picture.
+//! The status line below the picture.
 
 use eframe::egui;
 
@@ -44,13 +44,13 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         });
     });
     let rect = shown.response.rect;
-    // Nothing in it can be used, but people who do not see it can have it read.
+    // The line has no controls, but screen readers can reach it.
     let line = ui.interact(rect, egui::Id::unique("status line"), egui::Sense::focusable_noninteractive());
     line.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, "Status"));
     app.panels.focus.part(rect);
 }
 
-/// Memory that the program takes, asked for once a second.
+/// Memory of the program, queried once a second.
 #[derive(Default)]
 pub(super) struct Memory {
     asked: Option<f64>,
@@ -58,7 +58,7 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Bytes in memory `now`, seconds; `None` where the system does not tell.
+    /// Resident memory in bytes at time `now`, seconds; `None` where the system does not report it.
     fn bytes(&mut self, now: f64) -> Option<usize> {
         if self.asked.is_none_or(|asked| now - asked >= 1.0) {
             self.asked = Some(now);

@@ -1,4 +1,4 @@
-//! Where something is written: a line for the path, the system's dialog, and the question before anything is replaced.
+//! The choice of an output file: a text field, the system's dialog, and the question before a file is replaced.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
@@ -7,78 +7,78 @@ use eframe::egui;
 
 use crate::files::ask_for_output;
 
-/// A file that is to be written.
+/// An output file.
 ///
-/// The system's dialog does not tell whether it was cancelled or is not there, so that it is only a way to fill the line in.
+/// The system's dialog does not tell whether it was cancelled or is missing, so that it only fills in the text field.
 pub(crate) struct TargetFile {
-    /// As it is typed.
+    /// The text as typed.
     text: String,
     chosen: Option<Receiver<Option<PathBuf>>>,
-    /// What may be replaced if it is there: this very file, as the system's dialog has asked.
+    /// The file that may be replaced, as the system's dialog has asked about it.
     agreed: Option<PathBuf>,
-    /// Why it was not written, for this path.
+    /// Why the file with this path was not written.
     refused: Option<(PathBuf, Refusal)>,
-    /// Whether the line is to have the keyboard.
+    /// Whether the text field should receive the focus.
     fresh: bool,
 }
 
-/// Why something was not written.
+/// Why a file was not written.
 struct Refusal {
     why: String,
-    /// Whether the user may have it all the same.
+    /// Whether the user may decide to replace the file.
     question: bool,
 }
 
-/// What a dialog for a file says.
+/// The texts of a file dialog.
 pub(super) struct Words<'a> {
     /// Title of the system's dialog.
     pub(super) title: &'a str,
-    /// A name as an example.
+    /// Example of a file name.
     pub(super) name: &'a str,
-    /// What the button says that writes it.
+    /// Label of the button that writes the file.
     pub(super) verb: &'a str,
 }
 
-/// What is to be written.
+/// A decision to write a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Write {
     pub(super) path: PathBuf,
-    /// Whether the user wants it to replace what is there.
+    /// Whether an existing file may be replaced.
     pub(super) replace: bool,
-    /// Whether that was said to the last question.
+    /// Whether the user has just allowed that in answer to the question.
     pub(super) answered: bool,
 }
 
 impl TargetFile {
-    /// A file of this name, where nobody says another one.
+    /// A choice with a proposed name.
     pub(super) fn new(text: impl Into<String>) -> Self {
         Self { text: text.into(), chosen: None, agreed: None, refused: None, fresh: false }
     }
 
-    /// The dialog is opened: nothing is agreed yet, and a name can be typed.
+    /// Prepares the opened dialog: the text field receives the focus, and no file may be replaced.
     pub(super) fn open(&mut self) {
         self.forget();
         self.fresh = true;
     }
 
-    /// Something else is to be written: what was agreed was about another thing.
+    /// Forgets the permission to replace, as something else is to be written.
     pub(super) fn forget(&mut self) {
         self.agreed = None;
         self.refused = None;
     }
 
-    /// Tells why `path` was not written; as a question if it may be all the same. Another name can be typed.
+    /// Shows why `path` was not written. With `question`, the user may replace the file; another name can be typed.
     pub(super) fn refuse(&mut self, path: &Path, why: impl Into<String>, question: bool) {
         self.fresh = true;
         self.refused = Some((path.into(), Refusal { why: why.into(), question }));
     }
 
-    /// The path, without blanks around it.
+    /// The path, without surrounding blanks.
     pub(super) fn path(&self) -> PathBuf {
         self.text.trim().into()
     }
 
-    /// Takes in what was chosen in the system's dialog, and forgets what was said of another file.
+    /// Receives the choice in the system's dialog, and forgets what concerns another file.
     fn receive(&mut self) {
         if let Some(Ok(chosen)) = self.chosen.as_ref().map(Receiver::try_recv) {
             self.chosen = None;
@@ -92,8 +92,9 @@ impl TargetFile {
         self.refused.take_if(|(refused, _)| *refused != path);
     }
 
-    /// The line and its buttons; gives what is to be written now. Enter does what the button does, but replaces nothing.
-    /// `entered` says that Enter was pressed where nothing takes it; `problem` is why it cannot be written as it is.
+    /// Shows the text field and its buttons. Returns what to write now. Enter presses the button, but never replaces a
+    /// file. `entered` says that Enter was pressed where no control takes it. `problem` says why the file cannot be
+    /// written.
     pub(super) fn show(
         &mut self,
         ui: &mut egui::Ui,
@@ -131,7 +132,7 @@ impl TargetFile {
         let named = !self.text.trim().is_empty() && problem.is_none();
         let write = |replace, answered| Some(Write { path: path.clone(), replace, answered });
         let question = refused.is_some_and(|refusal| refusal.question);
-        // What is typed next is no command while the dialog is open.
+        // The text field keeps the focus, so that typing does not trigger commands.
         self.fresh |= enter && (question || !named);
         if question {
             let replace = ui.add_enabled(named, egui::Button::new("Replace it"));

@@ -1,4 +1,4 @@
-//! What moves: play, pause, and where in time.
+//! The timeline: play, pause, and the time.
 
 use eframe::egui;
 
@@ -22,7 +22,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             if timeline {
                 button(app, ui, Command::StepForward, Sign::Forward);
             }
-            // From the right what is small, then the time with all that is left.
+            // From the right: the small controls, then the time slider in the remaining space.
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 statistics(app, ui);
                 if timeline {
@@ -36,7 +36,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     app.panels.focus.part(shown.response.rect);
 }
 
-/// What is drawn on a button: the fonts have no such signs.
+/// A symbol drawn on a button, since the fonts have no such glyphs.
 #[derive(Clone, Copy)]
 enum Sign {
     Play,
@@ -46,13 +46,13 @@ enum Sign {
 }
 
 impl Sign {
-    /// Draws it about the middle of a button.
+    /// Draws the symbol about the middle of a button.
     fn draw(self, painter: &egui::Painter, middle: egui::Pos2, color: egui::Color32) {
         let bar = |x: f32| {
             let rect = egui::Rect::from_center_size(middle + egui::vec2(x, 0.0), egui::vec2(2.5, 10.0));
             painter.rect_filled(rect, 0.0, color);
         };
-        // Towards the right, or the left.
+        // A triangle that points to the right, or to the left for negative `to`.
         let arrow = |x: f32, to: f32| {
             let corners = [[x - to, -5.0], [x + to, 0.0], [x - to, 5.0]].map(|[x, y]| middle + egui::vec2(x, y));
             painter.add(egui::Shape::convex_polygon(corners.to_vec(), color, egui::Stroke::NONE));
@@ -83,7 +83,7 @@ fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: Sign) {
     }
 }
 
-/// What became of updates.
+/// Counts of live updates.
 fn statistics(app: &App, ui: &mut egui::Ui) {
     let statistics = app.playing.statistics();
     if statistics.refused > 0 {

@@ -1,4 +1,4 @@
-//! Everything has a name and a place in a small window.
+//! Everything has a name and fits into a small window.
 
 use super::*;
 use crate::commands::{Command, Tool};
@@ -52,7 +52,7 @@ fn a_widget_without_a_name_is_found() {
     assert_eq!(harness.unnamed_widgets().len(), 1, "one of the two has no name");
 }
 
-/// Part of the picture that lies under panels and windows; widgets that end outside the window.
+/// Share of the window that the picture has left, and the widgets that end outside the window.
 fn crowding(window: &Window) -> (f32, Vec<String>) {
     let screen = Rect::from_min_size(Pos2::ZERO, SMALL).expand(1.0);
     let picture = window.picture();
@@ -66,7 +66,7 @@ fn crowding(window: &Window) -> (f32, Vec<String>) {
             egui::pos2(bounds.x0 as f32, bounds.y0 as f32),
             egui::pos2(bounds.x1 as f32, bounds.y1 as f32),
         );
-        // What a list has scrolled away may be below or above, never beside.
+        // Widgets scrolled out of a list may lie below or above the window, never beside it.
         let beside = rect.left() < screen.left() || rect.right() > screen.right();
         let lost = access.role() == Role::Window && !screen.contains_rect(rect);
         if beside || lost {
@@ -98,7 +98,7 @@ fn a_small_window_has_room_for_everything() {
         (panels.export.open, panels.picture.open, panels.help, panels.film.open) = (false, false, false, false);
         window.steps(2);
     }
-    // The comparison can fail: what is put outside is found.
+    // The check can fail: it finds widgets outside the small window.
     window.harness.set_size(SMALL + egui::vec2(300.0, 200.0));
     window.steps(3);
     assert!(!crowding(&window).1.is_empty(), "a larger window reaches beyond the small one");

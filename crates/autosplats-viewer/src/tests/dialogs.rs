@@ -1,19 +1,20 @@
-//! Dialogs by keys alone: Enter does what they are for, Escape closes them, and nothing is replaced unasked.
+//! Dialogs by keyboard alone: Enter performs their action, Escape closes them, and no file is replaced without a
+//! question.
 
 use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::commands::Command;
 
-/// Opens a dialog and types where it is to write.
+/// Opens a dialog and types the output file.
 fn ask(window: &mut Window, command: Command, path: &Path) {
     let context = window.harness.ctx.clone();
     crate::keys::run(window.harness.state_mut(), &context, command);
     window.steps(3);
     if command == Command::Film {
-        // Two hundred large pictures would test nothing more.
+        // A full film of two hundred large pictures would test nothing more.
         window.harness.state_mut().panels.film.still_for_tests();
-        // It stays open beside the picture, which keeps its keys.
+        // The film dialog leaves the keyboard to the picture, so the field has to be focused.
         let line = window.harness.get_by_role(Role::TextInput);
         line.focus();
         window.steps(2);
@@ -23,7 +24,7 @@ fn ask(window: &mut Window, command: Command, path: &Path) {
     window.step();
 }
 
-/// The four dialogs, and the name that each takes.
+/// The four dialogs, and a file name for each.
 const DIALOGS: [(Command, &str); 4] = [
     (Command::Export, "points.ply"),
     (Command::Screenshot, "picture.png"),
@@ -41,7 +42,7 @@ fn is_open(window: &Window, command: Command) -> bool {
     }
 }
 
-/// What a dialog writes first: of a film a picture.
+/// The first file that a dialog writes: for a film its first picture.
 fn written(folder: &Path, name: &str) -> PathBuf {
     folder.join(if name == "film.png" { "film_00000.png" } else { name })
 }

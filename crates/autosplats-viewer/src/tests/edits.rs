@@ -1,4 +1,4 @@
-//! Selecting, deleting, taking back, and leaving.
+//! Selecting, deleting, undoing, and leaving.
 
 use super::*;
 use crate::document::Counts;
@@ -7,7 +7,7 @@ fn counts(window: &Window) -> Counts {
     window.app().document().counts()
 }
 
-/// Has a rectangle in the middle of the picture selected.
+/// Selects by a rectangle in the middle of the picture.
 fn select(window: &mut Window) {
     window.press(Key::B);
     let (from, to) = (window.place(0.42, 0.35), window.place(0.58, 0.6));
@@ -65,7 +65,7 @@ fn leaving_with_edits_asks() {
         viewports.entry(ViewportId::ROOT).or_default().events.push(egui::ViewportEvent::Close);
         window.commands.clear();
         window.steps(2);
-        // A window that is not told otherwise closes.
+        // A window closes unless the close is cancelled.
         !window.commands.contains(&ViewportCommand::CancelClose)
     };
     assert!(close(&mut window), "nothing is lost, so nothing is asked");

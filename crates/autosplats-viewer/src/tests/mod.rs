@@ -1,4 +1,4 @@
-//! The whole viewer without a window: events go in, the tree of accessible widgets and the state come out.
+//! The whole viewer without a window. Events go in; the accessibility tree and the state are checked.
 
 mod access;
 mod dialogs;
@@ -25,18 +25,18 @@ use crate::app::App;
 use crate::look::Look;
 use crate::{Input, Options};
 
-/// The smallest window that everything has to work in.
+/// The smallest window in which everything has to work.
 const SMALL: Vec2 = egui::vec2(1024.0, 640.0);
-/// What threads get to answer, on machines that do much else.
+/// Time limit for threads, on busy machines.
 const WAIT: Duration = Duration::from_secs(90);
-/// Ctrl, as events have it.
+/// Ctrl, as in events.
 const CTRL: Modifiers = Modifiers { ctrl: true, command: true, ..Modifiers::NONE };
 const CTRL_SHIFT: Modifiers = Modifiers { shift: true, ..CTRL };
 const SHIFT: Modifiers = Modifiers { shift: true, ..Modifiers::NONE };
-/// A scene of few points, which the processor draws quickly.
+/// A scene of few points, which the CPU renders quickly.
 const STATUE: &str = "scene:statue:20K";
 
-/// The viewer, and what it asked of the system since.
+/// The viewer, and its requests to the system.
 struct Window {
     harness: Harness<'static, App>,
     commands: Vec<ViewportCommand>,
@@ -44,12 +44,12 @@ struct Window {
 }
 
 impl Window {
-    /// A window that begins to open what is named.
+    /// A window that opens the inputs of these names.
     fn new(names: &[&str]) -> Self {
         Self::on(Backend::Cpu, names)
     }
 
-    /// A window with pictures made by a backend.
+    /// A window that renders on a backend.
     fn on(backend: Backend, names: &[&str]) -> Self {
         let parse = |name: &&str| Input::parse(name).unwrap_or_else(|error| panic!("{name}: {error}"));
         let options =
@@ -84,7 +84,7 @@ impl Window {
         (0..count).for_each(|_| self.step());
     }
 
-    /// Draws the window until something is so.
+    /// Draws the window until `done` returns true.
     fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
         let start = Instant::now();
         loop {
@@ -97,7 +97,7 @@ impl Window {
         }
     }
 
-    /// Draws the window until everything is read and the picture is what is wanted.
+    /// Draws the window until everything is read and the requested picture is complete.
     fn settle(&mut self) {
         self.steps(2);
         self.until("the picture is whole", |window| {
@@ -118,7 +118,7 @@ impl Window {
         });
     }
 
-    /// One thing happens, and the window is drawn. The first look goes to the application, as in a real window.
+    /// Sends an event and draws the window. The application sees the event first, as in a real window.
     fn event(&mut self, event: Event) {
         let mut input = egui::RawInput { events: vec![event], ..egui::RawInput::default() };
         let context = self.harness.ctx.clone();
@@ -165,18 +165,18 @@ impl Window {
         self.steps(2);
     }
 
-    /// Everything that is written in the window.
+    /// All texts in the window.
     fn words(&self) -> Vec<String> {
         let nodes = self.harness.root().children_recursive().map(|node| node.accesskit_node());
         nodes.filter(|node| !node.is_hidden()).flat_map(|node| [node.label(), node.value()]).flatten().collect()
     }
 
-    /// Whether some text can be read in the window.
+    /// Whether the window shows a text.
     fn says(&self, text: &str) -> bool {
         self.words().iter().any(|word| word.contains(text))
     }
 
-    /// Where the picture is.
+    /// Rectangle of the picture.
     fn picture(&self) -> Rect {
         self.harness.get_by_role_and_label(Role::Image, "Surface of the points").rect()
     }
@@ -188,7 +188,7 @@ impl Window {
     }
 }
 
-/// The folder of files that tests share.
+/// The folder of the shared test files.
 pub(crate) fn data() -> Option<std::path::PathBuf> {
     let beside = || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let folder = std::env::var_os("AUTOSPLATS_DATA").map_or_else(beside, std::path::PathBuf::from);
@@ -196,7 +196,7 @@ pub(crate) fn data() -> Option<std::path::PathBuf> {
         return Some(folder);
     }
     assert!(std::env::var_os("CI").is_none(), "the shared files are not at {}", folder.display());
-    // Past the test harness, which would swallow what a passing test prints.
+    // The test harness hides what a passing test prints, so the message goes to stderr directly.
     let message = format!("SKIPPED: the shared files are not at {}; nothing is checked\n", folder.display());
     use std::io::Write as _;
     std::io::stderr().write_all(message.as_bytes()).expect("somewhere to say it");

@@ -6,14 +6,14 @@ use autosplats::cloud::glam::{DVec2, DVec3};
 use super::*;
 use crate::commands::Tool;
 
-/// Where a place of the world is in the picture, by shares of its sides.
+/// Position of a world position in the picture, by shares of its sides.
 fn share(window: &Window, camera: &Camera, world: DVec3) -> DVec2 {
     let size = window.app().shot.as_ref().expect("there is a picture").size;
     let (pixel, _) = camera.lens(size).expect("the camera sees").to_pixel(world).expect("it is before the eye");
     DVec2::new(pixel.x, pixel.y) / DVec2::new(size[0].into(), size[1].into())
 }
 
-/// The surface at a place of the picture.
+/// World position of the surface at a place of the picture.
 fn surface(window: &Window, place: DVec2) -> DVec3 {
     let picture = window.app().shot.as_ref().expect("there is a picture");
     picture.depths.world(&picture.camera, place).unwrap_or_else(|| panic!("there is a surface at {place}"))
@@ -27,7 +27,7 @@ fn forward(camera: &Camera) -> DVec3 {
     (camera.look_at - camera.eye).normalize()
 }
 
-/// Depths are known at every fourth pixel, some two hundredths of the picture's height with the slope of the surface.
+/// Tolerance by shares of the picture: depths are kept at every fourth pixel, and the surface is sloped.
 const NEAR: f64 = 0.02;
 
 #[test]
@@ -63,7 +63,7 @@ fn wheel_zooms(mut window: Window) {
     assert!(near < 0.8 * far, "the eye comes from {far} to {near}");
     let moved = share(&window, &after, world).distance(at);
     assert!(moved < NEAR, "what is under the cursor stays there: {moved}");
-    // Zooming to the middle would not pass.
+    // The check can fail: a zoom to the middle moves the point.
     let toward = (before.look_at - before.eye) * (1.0 - near / far);
     let middle = Camera { eye: before.eye + toward, ..before };
     assert!(share(&window, &middle, world).distance(at) > NEAR, "the comparison can tell");
@@ -95,7 +95,7 @@ fn left_drag_turns_and_right_drag_moves() {
         assert!(angle < 1e-3, "{button:?} {modifiers:?}: the direction stays: {angle}°");
         let way = share(&window, &moved, world) - held;
         let wanted = DVec2::new(0.1, -0.1);
-        // The second drag takes hold of another place, which may be nearer or farther.
+        // The second drag grabs another place, which may be nearer or farther.
         assert!(way.distance(wanted) < 0.05, "{button:?} {modifiers:?}: what was held came along: {way}");
         window.drag(button, modifiers, window.place(0.6, 0.4), from);
         window.settle();
@@ -149,7 +149,7 @@ fn points_are_inspected_and_measured_where_they_are_clicked() {
     assert!(window.app().tools.measured.is_empty(), "Escape gives the measurement up");
 }
 
-/// Fingers or a wheel go over the middle of the picture.
+/// Scrolls by fingers or wheel over the middle of the picture.
 fn scroll(window: &mut Window, unit: egui::MouseWheelUnit, source: egui::MouseWheelSource, delta: Vec2) {
     let place = window.place(0.5, 0.45);
     window.event(Event::PointerMoved(place));

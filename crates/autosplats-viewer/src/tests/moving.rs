@@ -1,4 +1,4 @@
-//! What moves, in the whole window.
+//! Playing inputs, in the whole window.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use autosplats::cloud::Source;
 use super::*;
 use crate::commands::Command;
 
-/// Frames of a few points, each a step to the right of the one before.
+/// Frames of 400 points each. Each frame is shifted to the right of the one before.
 fn frames(folder: &Path, count: usize) -> Input {
     for frame in 0..count {
         let rows: String = (0..400).map(|i| format!("{} {} {}\n", frame * 3 + i % 20, i / 20, i % 3)).collect();
@@ -16,7 +16,7 @@ fn frames(folder: &Path, count: usize) -> Input {
     Input::parse(&folder.display().to_string()).expect("a folder")
 }
 
-/// A window that shows some inputs, and stands.
+/// A window that shows the first points of some inputs.
 fn playing(inputs: Vec<Input>) -> Window {
     let mut window = Window::new(&[]);
     let count = inputs.len();
@@ -80,7 +80,7 @@ fn the_inspector_says_how_recordings_are_aligned() {
         words.iter().all(|words| words.as_ref().is_some_and(|words| words.contains("by the clock")))
     };
     window.until("both are open", |window| by_clock(&words(window)));
-    // Points of both lie at the same places.
+    // Points of both inputs lie at the same places.
     window.harness.state_mut().tools.inspected = {
         let document = window.app().document();
         document.describe(&document.shown(), 0)
@@ -96,7 +96,7 @@ fn the_inspector_says_how_recordings_are_aligned() {
     assert!(!by_clock(&words(&window)), "files have no clock: {:?}", words(&window));
 }
 
-/// Pictures of a film that was written, with the time choices of the dialog.
+/// Records a film with a time choice of the dialog, and returns its pictures.
 fn film(window: &mut Window, choice: &str, path: &Path) -> Vec<Vec<u8>> {
     window.click_on(choice);
     window.harness.get_by_role(Role::TextInput).focus();
@@ -106,7 +106,7 @@ fn film(window: &mut Window, choice: &str, path: &Path) -> Vec<Vec<u8>> {
     window.press(Key::Enter);
     window.until("the film", |window| window.app().recording.is_some());
     window.until("its end", |window| window.app().recording.is_none());
-    // The dialog is back.
+    // The dialog is open again.
     window.steps(2);
     let stem = path.file_stem().expect("a name").to_string_lossy().into_owned();
     let file = |number: usize| path.with_file_name(format!("{stem}_{number:05}.png"));

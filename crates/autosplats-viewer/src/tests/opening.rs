@@ -1,4 +1,4 @@
-//! From a name to a picture, or to a word about why not.
+//! From a name to a picture, or to an explanation why there is none.
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ fn a_scene_is_shown_and_listed() {
     assert!(window.says(&format!("{} points", crate::document::grouped(points))), "and its number of points");
     let [width, height] = shot.size;
     let share = shot.counts.covered as f64 / f64::from(width * height);
-    // The statue's first view fills about half of the picture.
+    // The first view of the statue fills about half of the picture.
     assert!((0.1..0.9).contains(&share), "the surface covers {share} of the picture");
 }
 
@@ -40,7 +40,7 @@ fn what_cannot_be_read_says_why_in_place() {
     window.steps(700);
     assert!(window.says("broken.ply"), "errors do not go by themselves");
     let closers = |window: &Window| window.harness.query_all_by_label_contains("Close this message").count();
-    // A button without words of its own is named by its tooltip or its sign.
+    // Without a label, the button is named by its tooltip or by its text.
     if closers(&window) == 0 {
         window.harness.get_all_by_label("×").next().expect("a message can be closed").click();
     } else {
@@ -57,14 +57,14 @@ fn the_first_view_is_the_same_whoever_finds_it() {
     let path = folder.path().join("slope.xyz");
     let rows: String = (0..500).map(|i| format!("{} {} {}\n", i % 25, i / 25, i % 7)).collect();
     std::fs::write(&path, rows).expect("it can be written");
-    // Threads know the window's shape once it is drawn.
+    // The reading thread knows the picture's shape once the window has been drawn.
     let mut window = Window::new(&[]);
     window.settle();
     window.harness.state_mut().open(Input::file(path));
     window.until("it is read", |window| !window.app().document().layers.is_empty());
     window.settle();
     let camera = window.app().navigation.goal_camera();
-    // Turns are kept as another kind of number, which rounds.
+    // The navigation keeps orientations as quaternions, whose conversion rounds.
     let same = |other: Camera| camera.eye.distance(other.eye) < 1e-6 && camera.look_at.distance(other.look_at) < 1e-6;
     let (_, glance) = window.app().glance.clone().expect("the thread that read it has looked at it");
     assert!(glance.camera.is_some_and(same), "where it says: {glance:?} is not {camera:?}");
@@ -111,7 +111,7 @@ impl eframe::Storage for Memory {
     fn flush(&mut self) {}
 }
 
-/// A recording of which it was told how to play it.
+/// A recording with play options.
 fn played() -> Input {
     let mut input = Input::parse("/some/drive.mcap").expect("a recording");
     (input.play.topics, input.play.fps) = (vec!["/front".into()], Some(5.0));
@@ -138,7 +138,7 @@ fn settings_are_kept_between_starts() {
     eframe::set_value(&mut memory, "recent", &paths);
     assert_eq!(storage::load(Some(&memory)).1, [Kept::named("/some/where.ply".into())], "an older version's paths");
     assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
-    // Values that no renderer takes are left behind, too.
+    // Values that the renderer rejects become defaults too.
     window.harness.state_mut().look.settings.reconstruction.k = 100_000;
     storage::save(window.app(), &mut memory);
     assert_eq!(storage::load(Some(&memory)).0, Look::default(), "k of 100,000 is out of range");

@@ -1,10 +1,10 @@
-//! Pictures while nothing moves.
+//! Pictures at rest.
 
 use autosplats::{Image, Renderer, usual_exposure};
 
 use super::*;
 
-/// What the window shows once nothing is left to do.
+/// The picture in the window once no work is left.
 fn at_rest(window: &mut Window) -> Image {
     window.settle();
     window.until("all is done", |window| window.app().render.is_idle());
@@ -12,7 +12,7 @@ fn at_rest(window: &mut Window) -> Image {
     Image::clone(&window.app().shot.as_ref().expect("there is a picture").image)
 }
 
-/// The same picture by the library, so many times as wide and high and averaged.
+/// The same picture rendered by the library, supersampled and averaged.
 fn rendered(window: &Window, supersample: u32) -> Image {
     let app = window.app();
     let shot = app.shot.as_ref().expect("there is a picture");
@@ -46,6 +46,6 @@ fn what_is_selected_is_tinted_in_the_finer_picture() {
     let selected = at_rest(&mut window);
     let differ = plain.pixels.iter().zip(&selected.pixels).filter(|(one, other)| one != other).count();
     let covered = window.app().shot.as_ref().expect("a picture").counts.covered;
-    // Where the outermost splats end, a pixel may be covered in one of the two sizes alone.
+    // At the rim of the outermost splats, a pixel may be covered in one of the two sizes only.
     assert!(differ + covered / 50 > covered, "{differ} of {covered} pixels have another colour");
 }

@@ -1,4 +1,4 @@
-//! Every command by its key.
+//! Every command by its shortcut.
 
 use autosplats::cloud::Axes;
 use autosplats::cloud::glam::DVec3;
@@ -7,7 +7,7 @@ use autosplats::{Camera, ViewDirection};
 use super::*;
 use crate::commands::Command;
 
-/// Presses the key of a command, as a keyboard does; the clipboard's keys arrive as what they mean.
+/// Presses the shortcut of a command. The clipboard's keys arrive as events of their own.
 fn give(window: &mut Window, command: Command) {
     window.commands.clear();
     window.outputs.clear();
@@ -24,7 +24,7 @@ fn give(window: &mut Window, command: Command) {
     window.step();
 }
 
-/// The camera one step aside.
+/// The present camera, moved to the side.
 fn elsewhere(window: &Window) -> Camera {
     let camera = window.app().navigation.goal_camera();
     let aside = DVec3::new(0.25, 0.5, 0.0);
@@ -36,7 +36,7 @@ fn forward(window: &Window) -> DVec3 {
     (camera.look_at - camera.eye).normalize()
 }
 
-/// Where a view looks with Z upward; nothing for those that depend on the points.
+/// View direction of a named view with Z upward; `None` for views that depend on the points.
 fn wanted(direction: ViewDirection) -> Option<DVec3> {
     Some(match direction {
         ViewDirection::Front => DVec3::Y,
@@ -49,7 +49,7 @@ fn wanted(direction: ViewDirection) -> Option<DVec3> {
     })
 }
 
-/// Whether a key did what its command is for; `before` is what was so before.
+/// Presses the shortcut of a command and checks its effect.
 fn check(window: &mut Window, command: Command) {
     let counts = |window: &Window| window.app().document().counts();
     let before = counts(window);
@@ -59,7 +59,7 @@ fn check(window: &mut Window, command: Command) {
     let orthographic = window.app().navigation.is_orthographic();
     match command {
         Command::InvertSelection | Command::HideSelected | Command::DeleteSelected | Command::CropToSelected => {
-            // Half of the points, without waiting for a picture.
+            // Half of the points, selected without waiting for a picture.
             window.harness.state_mut().change(|document| {
                 let shown = document.shown();
                 document.select(&shown, |index| index % 2 == 0, crate::document::SelectMode::Replace);
@@ -73,7 +73,7 @@ fn check(window: &mut Window, command: Command) {
     let now = window.app().navigation.goal_camera();
     let app = window.app();
     match command {
-        // No system dialog opens here: a path can be typed.
+        // Tests open no system dialog, so that the text field appears.
         Command::Open => {
             window.until("a path can be typed", |window| window.says("Path of a file"));
             window.steps(2);
@@ -144,7 +144,7 @@ fn check(window: &mut Window, command: Command) {
         Command::View(direction) => {
             if let Some(wanted) = wanted(direction) {
                 let angle = forward(window).angle_between(wanted).to_degrees();
-                // Straight down has no horizon: the eye stays a little aside.
+                // A view straight down has no horizon, so the camera is slightly tilted.
                 assert!(angle < 1.0, "{direction:?} looks along {:?}", forward(window));
             } else {
                 assert_ne!(now, view, "{direction:?} stands elsewhere");
@@ -190,7 +190,7 @@ fn check(window: &mut Window, command: Command) {
             assert_ne!(window.app().playing.clock.playing, playing, "it goes on, or stops");
             give(window, command);
         }
-        // What nothing moves for; what they do is tried in `playing`.
+        // Nothing plays here; tests of these commands are in `playing`.
         Command::StepBack | Command::StepForward | Command::PlayFromHere | Command::PlayToHere => {
             assert_eq!(app.playing.clock.position(), 0.0, "there is no other time");
         }
@@ -227,12 +227,12 @@ fn check(window: &mut Window, command: Command) {
     }
 }
 
-/// What has the keyboard besides the picture.
+/// The focused control, if any.
 fn focused(window: &Window) -> Option<egui::Id> {
     window.harness.ctx.memory(|memory| memory.focused())
 }
 
-/// Where what has the keyboard is in the window.
+/// Place of the focused control in the window.
 fn place(window: &Window) -> Pos2 {
     let response = window.harness.ctx.read_response(focused(window).expect("something has the keyboard"));
     response.expect("it is seen").rect.center()
@@ -253,7 +253,7 @@ fn f6_goes_round_the_window_and_tab_through_a_panel() {
         }
         places.push(place(&window));
     }
-    // The menu, the status line, the list, the look and the statistics.
+    // The menu, the status line, the list of inputs, the look panel and the statistics.
     assert_eq!(places.len(), 5, "each part once, then the picture: {places:?}");
     let picture = window.picture();
     assert!(places[0].y < picture.top() && places[1].y > picture.bottom(), "above and below: {places:?}");
@@ -297,12 +297,12 @@ fn every_key_does_what_its_command_says() {
         window.press(Key::Escape);
         window.press(Key::Escape);
         window.press(Key::Escape);
-        // A place that no view stands at.
+        // A camera that no view has.
         let mut camera = elsewhere(&window);
         camera.projection = autosplats::Projection::PerspectiveFovDeg(40.0);
         window.harness.state_mut().navigation.go_to(&camera, true);
         if command == Command::View(ViewDirection::Front) {
-            // These are told for Z upward.
+            // The expected directions are for Z upward.
             window.harness.state_mut().up_axis = Some(Axes::ZUp);
         } else if command == Command::UpAxis {
             window.harness.state_mut().up_axis = None;

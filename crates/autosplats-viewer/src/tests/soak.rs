@@ -1,9 +1,9 @@
-//! Anything in any order: nothing may panic, and memory may not grow.
+//! Random input in random order: nothing may panic, and memory may not grow.
 
 use super::*;
 use crate::commands::Command;
 
-/// A sequence of numbers that is the same each time (xorshift64*, Vigna 2016).
+/// A reproducible sequence of random numbers (xorshift64*, Vigna 2016).
 struct Chance(u64);
 
 impl Chance {
@@ -23,11 +23,11 @@ impl Chance {
     }
 }
 
-/// Tells what is allocated and not freed: what a system has given a program says more of its allocator.
+/// Counts memory that is allocated and not freed. The memory of the process depends on the allocator.
 #[global_allocator]
 static ALLOCATED: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;
 
-/// What is opened and closed.
+/// Inputs that are opened and closed.
 const SCENES: [&str; 4] = [STATUE, "scene:figure:5K", "scene:herd:3K", "/nowhere/absent.ply"];
 
 fn anything(window: &mut Window, chance: &mut Chance) {
@@ -52,7 +52,7 @@ fn anything(window: &mut Window, chance: &mut Chance) {
         }
         4 | 5 => {
             let place = place(chance);
-            // Dialogs that write would write.
+            // A click in a dialog could write a file.
             if !window.says("Browse…") {
                 window.click(place);
             }
@@ -75,7 +75,7 @@ fn anything(window: &mut Window, chance: &mut Chance) {
         }
         8 => {
             if let Ok(input) = Input::parse(SCENES[chance.below(SCENES.len())]) {
-                // More than a few make pictures slow and test nothing more.
+                // More layers make pictures slow and test nothing more.
                 if window.app().document().layers.len() < 3 {
                     window.harness.state_mut().open(input);
                 }
@@ -92,7 +92,7 @@ fn anything(window: &mut Window, chance: &mut Chance) {
             let keys =
                 [Key::W, Key::A, Key::S, Key::D, Key::ArrowLeft, Key::Tab, Key::Enter, Key::Escape, Key::Backspace];
             let key = keys[chance.below(keys.len())];
-            // Enter in a dialog that writes would write.
+            // Enter in a dialog could write a file.
             if key == Key::Enter && window.says("Browse…") {
                 return;
             }
@@ -110,23 +110,23 @@ fn anything(window: &mut Window, chance: &mut Chance) {
     window.steps(1 + chance.below(3));
 }
 
-/// Brings the program to where it was in the beginning: everything is closed, what could be undone, which is kept on purpose, is
-/// forgotten, and the window has its first size. Gives the megabytes that are left.
+/// Resets the program: everything is closed, the undo history is dropped, and the window has its first size. Returns
+/// the megabytes still allocated.
 fn rest(window: &mut Window) -> f64 {
     window.harness.set_size(SMALL);
-    // What the window asked of the system is kept by the test, not by the program.
+    // The window's requests to the system are kept by the test, not by the program.
     (window.commands, window.outputs) = (Vec::new(), Vec::new());
     let app = window.harness.state_mut();
     app.loader.cancel_all();
     app.history = crate::document::History::default();
     app.version += 1;
-    // Cameras that are being played may be tens of thousands.
+    // A film preview may hold tens of thousands of cameras.
     app.panels.film.stop();
     window.until("everything is closed", |window| {
         let app = window.app();
         app.loader.jobs().is_empty() && app.document().layers.is_empty() && app.render.is_idle()
     });
-    // What has been done meanwhile is taken in, and what threads that write have in work is let go of.
+    // Pending results are received, and writing threads release their data.
     for _ in 0..10 {
         std::thread::sleep(Duration::from_millis(5));
         window.step();
@@ -134,11 +134,11 @@ fn rest(window: &mut Window) -> f64 {
     f64::from(ALLOCATED.current_usage_as_mb())
 }
 
-/// Does anything for so long; what is left when everything is closed may grow by so many megabytes.
+/// Sends random input for `seconds`. Memory that remains after everything is closed may grow by `allowed_mb`.
 ///
-/// While things are open memory goes up and down by hundreds of megabytes, in which a leak would not be seen. So everything is
-/// closed every now and then, as in the beginning, and what is still allocated counts. Caches are as large as they get after a
-/// third of the time; what is more in the last third than in the middle one, each at its least, is lost.
+/// While inputs are open, memory varies by hundreds of megabytes, which would hide a leak. So everything is closed from
+/// time to time, and the memory still allocated is sampled. Caches are full after a third of the time. The growth is
+/// the minimum of the last third minus that of the middle third.
 fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     let mut window = Window::with_statue();
     let mut chance = Chance(seed);
@@ -146,7 +146,7 @@ fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     let (mut events, mut samples, mut next) = (0_u64, Vec::new(), 0.0);
     while start.elapsed().as_secs_f64() < seconds {
         anything(&mut window, &mut chance);
-        // Another backend would begin with buffers of its own, and what is left could not be compared.
+        // Another backend has buffers of its own, so that samples could not be compared.
         window.harness.state_mut().look.backend = Backend::Cpu;
         events += 1;
         if start.elapsed().as_secs_f64() >= next {
@@ -164,14 +164,14 @@ fn soak(seconds: f64, seed: u64, allowed_mb: f64) {
     window.until("it can still be used", |window| !window.app().navigation.is_moving());
 }
 
-/// The least of each of some equal parts.
+/// The minima of `parts` equal parts.
 fn least(samples: &[f64], parts: usize) -> Vec<f64> {
     let len = samples.len() / parts;
     let least = |part: usize| samples[part * len..][..len].iter().copied().fold(f64::INFINITY, f64::min);
     (0..parts).map(least).collect()
 }
 
-/// Megabytes that the last third has more than the middle one, each at its least.
+/// Minimum of the last third minus that of the middle third, megabytes.
 fn grown(samples: &[f64]) -> f64 {
     let least = least(samples, 3);
     least[2] - least[1]
@@ -180,7 +180,7 @@ fn grown(samples: &[f64]) -> f64 {
 #[test]
 fn growth_is_told_from_chance() {
     let mut chance = Chance(7);
-    // Between 300 and 400 MB, as things come and go.
+    // Between 300 and 400 MB, as inputs come and go.
     let steady: Vec<f64> = (0..900).map(|_| 300.0 + f64::from(100.0 * chance.share())).collect();
     assert!(grown(&steady).abs() < 2.0, "as things go: {}", grown(&steady));
     let leaking: Vec<f64> = steady.iter().zip(0..).map(|(own, second)| own + 0.1 * f64::from(second)).collect();
@@ -189,13 +189,14 @@ fn growth_is_told_from_chance() {
     assert!(grown(&filling).abs() < 2.0, "what fills at first is kept on purpose: {}", grown(&filling));
 }
 
-/// Other tests of this program run at the same time and have memory, too; this is for panics, and for what grows fast.
+/// Other tests of this process run at the same time and allocate memory too. This test finds panics and fast growth
+/// only.
 #[test]
 fn twenty_seconds_of_anything() {
     soak(20.0, 0x5EED_0001, 300.0);
 }
 
-/// The long form, to be run alone: `AUTOSPLATS_SOAK_SECONDS` tells how long.
+/// The long test, to be run alone. `AUTOSPLATS_SOAK_SECONDS` sets its length.
 #[test]
 #[ignore = "takes ten minutes"]
 fn ten_minutes_of_anything() {

@@ -11,7 +11,7 @@ use crate::look::Look;
 use crate::output::Goal;
 use crate::render::{Answer, Outcome};
 
-/// An application in a window 200 by 200 whose middle one of 2 points is in.
+/// An application in a window of 200 by 200 points. Its cloud has two points, one of them in the middle of the window.
 fn app(context: &egui::Context, tool: Tool) -> App {
     let mut app = App::new(Options::default(), Look::default(), Vec::new(), context);
     let cloud = PointCloud::new(DVec3::ZERO, vec![[0.0; 3], [0.5, 0.0, 0.0]]);
@@ -24,7 +24,7 @@ fn app(context: &egui::Context, tool: Tool) -> App {
     };
     app.stand_at(&camera);
     app.tool = tool;
-    // What is seen would need a picture.
+    // Selecting visible points only would need a picture.
     app.tools.through = true;
     frame(&mut app, context, Event::PointerMoved(pos2(100.0, 100.0)));
     app
@@ -49,9 +49,9 @@ fn button(pressed: bool, place: Pos2) -> Event {
     Event::PointerButton { pos: place, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }
 }
 
-/// How many points are hit by the selection that was asked for, if one was.
+/// Number of points hit by the requested selection, if there was one.
 fn hits(app: &App) -> Option<usize> {
-    // Tasks are done in their order: with the answer to this one all are in.
+    // Tasks run in order: when this one is answered, so are all before it.
     let (wish, region) = (Box::new(app.wish([200, 200], false)), Region::brush(&[], 1.0));
     app.render.task(Task::Select { wish, region, through: true, mode: SelectMode::Intersect });
     let mut hits = None;
