@@ -92,9 +92,9 @@ impl TargetFile {
         self.refused.take_if(|(refused, _)| *refused != path);
     }
 
-    /// Shows the text field and its buttons. Returns what to write now. Enter presses the button, but never replaces a
-    /// file. `entered` says that Enter was pressed where no control takes it. `problem` says why the file cannot be
-    /// written.
+    /// Shows the text field and its buttons. Returns what to write now. Enter presses the button, but never answers the
+    /// question to replace. `entered` says that Enter was pressed where no control takes it. `problem` says why the
+    /// file cannot be written.
     pub(super) fn show(
         &mut self,
         ui: &mut egui::Ui,
