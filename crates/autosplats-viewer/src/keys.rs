@@ -103,7 +103,7 @@ fn dropped(app: &mut App, context: &egui::Context) {
     for file in files {
         match crate::files::dropped(&*file) {
             Some(path) => app.open(Input::file(path)),
-            None => app.messages.error(format!("{}: this cannot be read from here", file.path().display())),
+            None => app.messages.error(format!("{}: a dropped file needs a path", file.path().display())),
         }
     }
 }
@@ -131,8 +131,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             None => app.messages.note("There is nothing to undo"),
         },
         Command::Redo => match app.redo() {
-            Some(label) => app.messages.note(format!("Done again: {label}")),
-            None => app.messages.note("There is nothing to do again"),
+            Some(label) => app.messages.note(format!("Redone: {label}")),
+            None => app.messages.note("There is nothing to redo"),
         },
         Command::SelectAll | Command::InvertSelection => {
             if let Some(shown) = app.shown() {
@@ -192,7 +192,7 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
             match serde_json::to_string_pretty(&camera) {
                 Ok(text) => {
                     context.copy_text(text);
-                    app.messages.note("The view was copied; 'autosplats render --camera' takes it, too");
+                    app.messages.note("The view was copied; 'autosplats render --camera' accepts it too");
                 }
                 Err(error) => app.messages.error(error.to_string()),
             }
@@ -235,9 +235,9 @@ fn paste_view(app: &mut App, text: &str) {
     match serde_json::from_str::<Camera>(text).map_err(|error| error.to_string()) {
         Ok(camera) => match camera.check() {
             Ok(()) => app.navigation.go_to(&camera, false),
-            Err(error) => app.messages.error(format!("The copied view cannot see: {error}")),
+            Err(error) => app.messages.error(format!("The copied view is invalid: {error}")),
         },
-        Err(_) => app.messages.note("What is on the clipboard is no view; Copy view puts one there"),
+        Err(_) => app.messages.note("The clipboard holds no view; Copy view puts one there"),
     }
 }
 

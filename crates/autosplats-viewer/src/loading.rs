@@ -154,7 +154,7 @@ impl Loader {
                 let read = std::panic::catch_unwind(work);
                 // A panic in one file must not stop the following files.
                 let news = read.unwrap_or_else(|_| {
-                    News::Failed(format!("{}: reading it failed, which is a bug of this program", order.input.name))
+                    News::Failed(format!("{}: reading failed, which is a bug in this program", order.input.name))
                 });
                 let _ = sender.send((order.id, news));
                 asked.request_repaint();
@@ -260,7 +260,7 @@ fn read(order: &Order, frame: &Known, sender: &Sender<(JobId, News)>, context: &
     let follower = Follower { order, frame, sender, context, notes: Mutex::default(), preview: Mutex::default() };
     let options = ReadOptions { exact: true, ..order.input.options.clone() };
     match order.input.source.read(&options, &follower) {
-        Ok(cloud) if cloud.is_empty() => News::Failed(format!("{}: there is no point in it", order.input.name)),
+        Ok(cloud) if cloud.is_empty() => News::Failed(format!("{}: there are no points in it", order.input.name)),
         Ok(cloud) => {
             let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
             let cloud = Arc::new(cloud);

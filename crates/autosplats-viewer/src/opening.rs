@@ -96,7 +96,7 @@ impl App {
                 }
                 News::Cancelled => {
                     if !self.reloads.contains_key(&job) {
-                        self.messages.note(format!("{}: not read to its end", input.name));
+                        self.messages.note(format!("{}: reading was cancelled", input.name));
                     }
                     self.forget_job(job);
                 }
@@ -204,7 +204,10 @@ impl App {
     /// Shows the new points of a file. Edits made meanwhile apply to the old points, so that the new ones are dropped.
     fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: Glance) {
         if self.history.is_unsaved(id) {
-            self.messages.note(format!("{} has changed; what was read is not shown, as it has edits here", input.name));
+            self.messages.note(format!(
+                "{} has changed; its new points are not shown, because it has unsaved edits",
+                input.name
+            ));
         } else if self.document().layer(id).is_some() {
             self.fill(id, cloud);
             self.messages.note(format!("{} was read again", input.name));
@@ -225,7 +228,8 @@ impl App {
     pub(crate) fn reload_layer(&mut self, id: LayerId) {
         let Some(input) = self.inputs.get(&id).cloned() else { return };
         if self.history.is_unsaved(id) {
-            self.messages.note(format!("{} has changed; it was not read again, as it has edits here", input.name));
+            self.messages
+                .note(format!("{} has changed; it was not read again, because it has unsaved edits", input.name));
             return;
         }
         if input.moves() {

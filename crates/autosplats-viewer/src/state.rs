@@ -86,19 +86,19 @@ impl State {
         // Only an object is accepted: an empty list would deserialize as a session of defaults.
         let state = serde_json::from_str::<serde_json::Map<_, _>>(&text)
             .and_then(|fields| serde_json::from_value::<Self>(fields.into()))
-            .map_err(|error| format!("{}: no saved state: {error}", path.display()))?;
+            .map_err(|error| format!("{}: not a session file: {error}", path.display()))?;
         state.look.settings.check().map_err(|error| format!("{}: {error}", path.display()))?;
         for camera in state.camera.iter().chain(&state.keys) {
             camera.check().map_err(|error| format!("{}: {error}", path.display()))?;
         }
         if state.clip.as_ref().is_some_and(|clip| !clip.is_box()) {
-            return Err(format!("{}: the clipping box is no box", path.display()));
+            return Err(format!("{}: the clipping box is invalid", path.display()));
         }
         if let Some(problem) = state.inputs.iter().find_map(Kept::problem) {
             return Err(format!("{}: {problem}", path.display()));
         }
         if state.clock.as_ref().is_some_and(|clock| !clock.is_clock()) {
-            return Err(format!("{}: the clock's times or speed are none", path.display()));
+            return Err(format!("{}: the times or the speed of the clock are invalid", path.display()));
         }
         Ok(state)
     }

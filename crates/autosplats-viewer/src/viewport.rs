@@ -61,14 +61,14 @@ fn welcome(app: &mut App, ui: &mut egui::Ui, rect: egui::Rect) {
     ui.scope_builder(egui::UiBuilder::new().max_rect(middle), |ui| {
         ui.vertical_centered(|ui| {
             ui.heading("Drop point clouds here");
-            ui.label("or open them with Ctrl+O. H shows what keys and mouse do.");
+            ui.label("or open them with Ctrl+O. H shows all keys and mouse actions.");
             ui.add_space(12.0);
             if ui.button("Open…").clicked() {
                 chosen = Some(None);
             }
             if !app.recent.is_empty() {
                 ui.add_space(12.0);
-                ui.weak("Opened lately");
+                ui.weak("Recently opened");
             }
             for kept in app.recent.iter().take(8) {
                 if ui.link(kept.short_name()).on_hover_text(&kept.source).clicked() {

@@ -46,10 +46,10 @@ pub(crate) struct Exported {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ExportError {
     /// There are no points to write.
-    #[error("there is no point to write")]
+    #[error("there are no points to write")]
     Nothing,
     /// The file is the source of an open layer.
-    #[error("{}: the layer '{layer}' was read from it; it is replaced only if you say so", path.display())]
+    #[error("{}: the layer '{layer}' was read from this file; replacing it needs your consent", path.display())]
     Input {
         /// The file.
         path: PathBuf,
@@ -57,7 +57,7 @@ pub(crate) enum ExportError {
         layer: String,
     },
     /// The file exists already.
-    #[error("{}: is already there", path.display())]
+    #[error("{}: the file exists already", path.display())]
     Exists {
         /// The file.
         path: PathBuf,

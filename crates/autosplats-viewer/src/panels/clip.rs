@@ -43,7 +43,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 /// Shows the numbers. Returns whether one of them is being dragged or typed.
 fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
     let mut busy = false;
-    ui.checkbox(&mut clip.enabled, "Clips").on_hover_text("Without, all points are shown and the box is kept");
+    ui.checkbox(&mut clip.enabled, "Clips").on_hover_text("If off, all points are shown and the box is kept");
     let speed = SPEED * (clip.max - clip.min).max_element().max(1e-9);
     egui::Grid::new("clip").num_columns(3).show(ui, |ui| {
         ui.label("");
@@ -84,13 +84,13 @@ fn buttons(app: &mut App, ui: &mut egui::Ui, clip: &mut Option<ClipBox>) {
     let selected = app.counts().all.selected > 0;
     ui.horizontal(|ui| {
         let button = ui.add_enabled(selected, egui::Button::new("Around selected"));
-        if button.on_hover_text("Show the selected points and what is beside them").clicked() {
+        if button.on_hover_text("Put the box around the selected points").clicked() {
             *clip = around(app.document().selected_bounds()).or(*clip);
         }
-        if ui.button("Reset").on_hover_text("Around everything, along the axes").clicked() {
+        if ui.button("Reset").on_hover_text("Put the box around everything, along the axes").clicked() {
             *clip = around(app.document().whole_bounds()).or(*clip);
         }
-        if ui.add_enabled(clip.is_some(), egui::Button::new("Remove")).on_hover_text("Clip no longer").clicked() {
+        if ui.add_enabled(clip.is_some(), egui::Button::new("Remove")).on_hover_text("Remove the box").clicked() {
             *clip = None;
         }
     });

@@ -107,7 +107,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         }
         ui.add_space(6.0);
         let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
-        ui.small(format!("The name tells the format: .{}", formats.join(" .")));
+        ui.small(format!("The extension of the name sets the format: .{}", formats.join(" .")));
         let words = Words { title: "Export points", name: "points.ply", verb: "Export" };
         write = export.target.show(ui, &words, &mut app.panels.entered, None);
     });
@@ -127,9 +127,9 @@ fn choices(app: &mut App) -> Vec<(String, What, bool)> {
     let counts = app.counts().all;
     let document = app.document();
     let mut choices = vec![
-        ("What is shown".into(), What::Shown, counts.points > 0),
-        (format!("What is selected ({})", grouped(counts.selected)), What::Selected, counts.selected > 0),
-        ("All, hidden points too".into(), What::All, counts.points > 0),
+        ("Visible points".into(), What::Shown, counts.points > 0),
+        (format!("Selected points ({})", grouped(counts.selected)), What::Selected, counts.selected > 0),
+        ("All points, including hidden ones".into(), What::All, counts.points > 0),
     ];
     if document.layers.len() > 1 {
         let layer = |layer: &crate::document::Layer| (format!("All of {}", layer.name), What::Layer(layer.id), true);

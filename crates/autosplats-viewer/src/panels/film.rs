@@ -150,7 +150,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
             match given.filter(|_| film.time == Time::Once) {
                 Some(mut seconds) => {
                     let number = egui::DragValue::new(&mut seconds).max_decimals(1).suffix(" s");
-                    ui.add_enabled(false, number).on_disabled_hover_text("As long as what moves is played");
+                    ui.add_enabled(false, number).on_disabled_hover_text("As long as the played span");
                 }
                 None => {
                     ui.add(egui::DragValue::new(&mut film.seconds).range(0.1..=600.0).speed(0.1).suffix(" s"));
@@ -224,12 +224,12 @@ fn time(app: &mut App, ui: &mut egui::Ui) {
     ui.horizontal(|ui| {
         ui.label("Time");
         let time = &mut app.panels.film.time;
-        ui.radio_value(time, Time::Runs, "runs").on_hover_text("What moves goes on as long as the film lasts");
-        ui.radio_value(time, Time::Once, "runs once").on_hover_text("The film lasts as long as what moves is played");
-        ui.radio_value(time, Time::Stands, "stands still").on_hover_text("The film shows what is seen now");
+        ui.radio_value(time, Time::Runs, "runs").on_hover_text("Playback continues for the length of the film");
+        ui.radio_value(time, Time::Once, "runs once").on_hover_text("The film is as long as the played span");
+        ui.radio_value(time, Time::Stands, "stands still").on_hover_text("All pictures show the present frame");
     });
     let film = &app.panels.film;
-    let around = if looped { ", over and over" } else { ", and stays there" };
+    let around = if looped { ", repeatedly" } else { ", then standing still" };
     let around = if film.time == Time::Runs && film.seconds * speed > end - begin { around } else { "" };
     let words = match film.time {
         Time::Stands => format!("{:.2} s in all pictures", app.playing.clock.position()),
@@ -237,7 +237,7 @@ fn time(app: &mut App, ui: &mut egui::Ui) {
     };
     ui.weak(words).on_hover_text("Begin, end, speed and loop are those of the timeline");
     if app.playing.is_live() {
-        ui.weak("What is live stands still.");
+        ui.weak("Live inputs stand still.");
     }
 }
 
@@ -257,13 +257,13 @@ fn problem(app: &App) -> Option<String> {
     let clock = clock(app)?;
     let pictures = app.panels.film.seconds(Some(clock)) * f64::from(app.panels.film.rate);
     if pictures > MOST {
-        return Some(format!("These are {pictures:.0} pictures, more than {MOST:.0}; play a part, or faster"));
+        return Some(format!("The film has {pictures:.0} pictures, more than {MOST:.0}; play a part, or faster"));
     }
     if let Some(waiting) = app.playing.waiting().next() {
         return Some(format!("{} has no points yet: {}", waiting.input.name, waiting.why));
     }
     let unsaved = app.history.unsaved().find(|&id| app.playing.shows(id)).and_then(|id| app.document().layer(id))?;
-    Some(format!("{} has edits of one moment; export or undo them, or let time stand still", unsaved.name))
+    Some(format!("{} has unsaved edits of one frame; export or undo them, or let time stand still", unsaved.name))
 }
 
 /// The cameras of the film and their times, a million at most.
@@ -303,7 +303,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
         Ok(Target::Film(_)) if ffmpeg == Some(false) => {
             Some("ffmpeg is not installed; a name that ends in .png writes the pictures".into())
         }
-        Ok(_) if !ready => Some("There is no way to go yet".into()),
+        Ok(_) if !ready => Some("There is no camera path yet".into()),
         Ok(_) => unready,
     };
     let words = Words { title: "Save film", name: "film.mp4", verb: "Write" };
@@ -312,7 +312,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
     // The system's dialog has asked about one name only, but a film of pictures has many.
     let there = target.existing(pictures).filter(|there| !(write.answered || write.replace && *there == write.path));
     if let Some(there) = there {
-        film.target.refuse(&write.path, format!("{} is there already", there.display()), true);
+        film.target.refuse(&write.path, format!("{} exists already", there.display()), true);
         film.refused = Some(pictures);
         return;
     }

@@ -9,16 +9,16 @@ const MOUSE: [(&str, &str); 13] = [
     ("Left drag", "Turn about the pivot"),
     ("Right drag, Shift + left drag", "Move sideways"),
     ("Wheel, pinch", "Zoom to the cursor"),
-    ("Two fingers on a touchpad", "Zoom, turn or move sideways, as Look, Movement says"),
+    ("Two fingers on a touchpad", "Zoom, turn or move sideways, as set in Look, Movement"),
     ("Ctrl + left drag", "Look around"),
-    ("Double click", "Turn about this place from now on"),
+    ("Double click", "Make this place the pivot"),
     ("W A S D, Q E", "Fly forward, left, back, right, down and up"),
     ("Shift", "Fly faster"),
-    ("Arrow keys", "Turn the head"),
+    ("Arrow keys", "Look around"),
     ("Alt + left drag", "Turn the view while selecting"),
-    ("Tab, after F6", "From control to control; Escape goes back to the picture"),
-    ("Enter in a dialog", "What it is for; Escape closes it"),
-    ("Drag dots, arrows, rings", "Move the faces of the clipping box, or the selection; Escape gives it up"),
+    ("Tab, after F6", "Next control; Escape returns to the picture"),
+    ("Enter in a dialog", "Perform its action; Escape closes it"),
+    ("Drag dots, arrows, rings", "Move the faces of the clipping box, or the selection; Escape cancels"),
 ];
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {

@@ -113,21 +113,21 @@ fn layer(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
                 }
             }
             ui.small(figures);
-            ui.menu_button("…", |ui| menu(app, ui, id)).response.on_hover_text("What can be done with it");
+            ui.menu_button("…", |ui| menu(app, ui, id)).response.on_hover_text("Actions for this input");
         });
     });
     ui.add_space(4.0);
 }
 
 fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
-    if ui.button("Fit").on_hover_text("Stand where all of it is seen").clicked() {
+    if ui.button("Fit").on_hover_text("Move the camera to show all of it").clicked() {
         let mut alone = Document::default();
         alone.layers.extend(app.document().layer(id).cloned());
         let cloud = alone.overview();
         app.fit(&cloud);
         ui.close();
     }
-    if ui.button("Show it alone").clicked() {
+    if ui.button("Show only this").clicked() {
         app.settle(|document| {
             let ids: Vec<_> = document.layers.iter().map(|layer| layer.id).collect();
             for other in ids {
@@ -145,7 +145,7 @@ fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     ui.separator();
     super::layer::menu(app, ui, id);
     ui.separator();
-    if ui.button("Remove").on_hover_text("Take it off the list; its file stays as it is").clicked() {
+    if ui.button("Remove").on_hover_text("Remove it from the list; its file stays unchanged").clicked() {
         remove(app, vec![id]);
         ui.close();
     }
@@ -194,7 +194,7 @@ pub(super) fn removal(app: &mut App, context: &egui::Context) {
     let mut answer = None;
     let modal = egui::Modal::new(egui::Id::unique("removal")).show(context, |ui| {
         ui.heading("Edits are not saved");
-        ui.label(format!("Those of {} are in no file yet.", names.join(", ")));
+        ui.label(format!("The edits of {} are in no file yet.", names.join(", ")));
         ui.add_space(8.0);
         ui.horizontal(|ui| {
             if super::main_button(ui, "Export…").clicked() {

@@ -68,9 +68,9 @@ pub(super) fn menu(app: &mut App, ui: &mut egui::Ui, id: LayerId) {
     let unsaved = app.history.is_unsaved(id);
     let reload = ui.add_enabled(again && !unsaved, egui::Button::new("Reload"));
     let reload = reload.on_hover_text("Read it again, from where it was read").on_disabled_hover_text(if unsaved {
-        "It has edits that are not saved, which would be of other points"
+        "It has unsaved edits, which would not fit the new points"
     } else {
-        "It was made, or came through a pipe"
+        "Scenes and pipes cannot be read again"
     });
     if reload.clicked() {
         app.reload_layer(id);

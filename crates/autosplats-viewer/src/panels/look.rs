@@ -41,7 +41,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         ui.horizontal(|ui| {
             ui.strong("Look");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.small_button("Reset").on_hover_text("As in the beginning").clicked() {
+                if ui.small_button("Reset").on_hover_text("Restore the defaults").clicked() {
                     app.look = Look::default();
                 }
             });
@@ -51,7 +51,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             section(ui, "Colour", |ui| color(app, ui));
             section(ui, "Light", |ui| light(app, ui));
             section(ui, "Points", |ui| {
-                ui.checkbox(&mut app.look.dots, "Raw points").on_hover_text("Dots in place of the surface (Tab)");
+                ui.checkbox(&mut app.look.dots, "Raw points").on_hover_text("Dots instead of the surface (Tab)");
                 ui.add(Slider::new(&mut app.look.dot_size, 1..=8).text("dot size").suffix(" px"));
             });
             section(ui, "Surface", |ui| surface(&mut app.look.settings, ui));
@@ -59,7 +59,8 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             section(ui, "Movement", |ui| {
                 let mut rate = 1000.0 / app.look.moving_ms;
                 let slider = Slider::new(&mut rate, 5.0..=60.0).text("pictures a second").fixed_decimals(0);
-                if ui.add(slider).on_hover_text("More are smoother and coarser while the view moves").changed() {
+                if ui.add(slider).on_hover_text("Higher rates are smoother, but coarser while the view moves").changed()
+                {
                     app.look.moving_ms = 1000.0 / rate;
                 }
                 choose(ui, "two fingers", &mut app.look.two_fingers, &FINGERS);
@@ -109,7 +110,7 @@ fn color(app: &mut App, ui: &mut egui::Ui) {
     choose(ui, "map", &mut shading.color_map, &MAPS);
     let mut given = shading.range.is_some();
     ui.horizontal(|ui| {
-        if ui.checkbox(&mut given, "range").on_hover_text("Otherwise what is in the picture").changed() {
+        if ui.checkbox(&mut given, "range").on_hover_text("Otherwise the range of values in the picture").changed() {
             shading.range = given.then_some([0.0, 1.0]);
         }
         if let Some([low, high]) = &mut shading.range {
@@ -126,10 +127,10 @@ fn color(app: &mut App, ui: &mut egui::Ui) {
 
 fn light(app: &mut App, ui: &mut egui::Ui) {
     let shading = &mut app.look.settings.shading;
-    ui.checkbox(&mut shading.lighting, "Light").on_hover_text("Otherwise colours as they are");
+    ui.checkbox(&mut shading.lighting, "Light").on_hover_text("Otherwise colours are shown unchanged");
     ui.horizontal(|ui| {
         let mut given = shading.exposure.is_some();
-        let hint = "How bright the points' own colours are lit; otherwise brighter only where all are dark";
+        let hint = "Brightness of the points' own colours; by default only dark clouds are brightened";
         if ui.checkbox(&mut given, "exposure").on_hover_text(hint).changed() {
             let usual = app.shot.as_ref().map_or(1.0, |shot| usual_exposure(&shot.shown.cloud));
             shading.exposure = given.then_some(usual);
@@ -139,10 +140,10 @@ fn light(app: &mut App, ui: &mut egui::Ui) {
         }
     });
     ui.add(Slider::new(&mut shading.occlusion, 0.0..=4.0).text("occlusion"))
-        .on_hover_text("Darkens creases and what lies behind something; eye-dome lighting");
+        .on_hover_text("Darkens creases and whatever lies behind an edge (eye-dome lighting)");
     let mut toned = shading.backs == Backs::Toned;
     let tone = ui.checkbox(&mut toned, "Darker backs");
-    if tone.on_hover_text("The side of a surface that its sensor did not see, where that is known").changed() {
+    if tone.on_hover_text("Darkens the side of a surface that its sensor did not see, where that is known").changed() {
         shading.backs = if toned { Backs::Toned } else { Backs::Same };
     }
     ui.horizontal(|ui| {
@@ -164,24 +165,23 @@ fn surface(settings: &mut Settings, ui: &mut egui::Ui) {
     let given = Settings::default().reconstruction;
     let reconstruction = &mut settings.reconstruction;
     ui.checkbox(&mut reconstruction.adaptive, "k auto")
-        .on_hover_text("More neighbours where points scatter; rows and strays are told apart");
-    ui.add(Slider::new(&mut reconstruction.k, 1..=64).text("k")).on_hover_text("Neighbours that a splat is made from");
+        .on_hover_text("More neighbours where points are noisy; detects scan lines and outliers");
+    ui.add(Slider::new(&mut reconstruction.k, 1..=64).text("k"))
+        .on_hover_text("Number of neighbours that a splat is fitted to");
     ui.add(Slider::new(&mut reconstruction.splat_scale, 0.1..=4.0).logarithmic(true).text("splat size"));
     ui.add(Slider::new(&mut reconstruction.frames_averaged, 1..=32).text("frames averaged"))
-        .on_hover_text("Steadies live points that are noisy anew in each frame; what moves slowly lags behind");
+        .on_hover_text("Averages live points that are noisy in each frame; slow motion lags behind");
     let mut two = reconstruction.points_per_pixel == 2;
-    if ui.checkbox(&mut two, "Two points a pixel").on_hover_text("Truer outlines and thin parts").changed() {
+    if ui.checkbox(&mut two, "Two points a pixel").on_hover_text("Better outlines and thin parts").changed() {
         reconstruction.points_per_pixel = if two { 2 } else { 1 };
     }
     let mut removed = reconstruction.outlier_expansions.is_some();
-    if ui.checkbox(&mut removed, "Remove outliers").on_hover_text("Points that are no part of a surface").changed() {
+    if ui.checkbox(&mut removed, "Remove outliers").on_hover_text("Removes points that belong to no surface").changed()
+    {
         reconstruction.outlier_expansions = removed.then(|| given.outlier_expansions.unwrap_or(1));
     }
     let mut open = reconstruction.gap_factor.is_some();
-    if ui
-        .checkbox(&mut open, "Gaps stay open")
-        .on_hover_text("Otherwise all neighbours are taken across any gap")
-        .changed()
+    if ui.checkbox(&mut open, "Gaps stay open").on_hover_text("Otherwise neighbours are taken across any gap").changed()
     {
         reconstruction.gap_factor = open.then(|| given.gap_factor.unwrap_or(4.0));
     }
@@ -211,10 +211,11 @@ fn search(app: &mut App, ui: &mut egui::Ui) {
         let speed = f64::from(*first_radius) * 0.01;
         ui.add(DragValue::new(first_radius).range(1e-9..=1e9).speed(speed).prefix("first radius "));
     }
-    ui.checkbox(&mut reconstruction.grid_culling, "Grid culling").on_hover_text("Skip what is hidden for sure");
+    ui.checkbox(&mut reconstruction.grid_culling, "Grid culling")
+        .on_hover_text("Skips points that are certainly hidden");
     ui.checkbox(&mut reconstruction.depth_refinement, "Depth refinement")
-        .on_hover_text("Keep splats of hidden points out of the surface");
-    ui.checkbox(&mut reconstruction.trim, "Trim").on_hover_text("End silhouettes where points do");
+        .on_hover_text("Keeps splats of hidden points out of the surface");
+    ui.checkbox(&mut reconstruction.trim, "Trim").on_hover_text("Ends silhouettes where the points end");
 }
 
 /// A radius that holds about ten points, as if the points covered a surface as wide as the cloud's diagonal.

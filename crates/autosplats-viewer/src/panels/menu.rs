@@ -25,7 +25,7 @@ fn file(app: &mut App, ui: &mut egui::Ui) {
     command_button(app, ui, Command::Open, true);
     let recent = app.recent.clone();
     ui.add_enabled_ui(!recent.is_empty(), |ui| {
-        ui.menu_button("Open lately", |ui| {
+        ui.menu_button("Open recent", |ui| {
             for kept in recent {
                 if ui.button(kept.short_name()).on_hover_text(&kept.source).clicked() {
                     app.open_again(kept);
@@ -88,7 +88,10 @@ fn view(app: &mut App, ui: &mut egui::Ui) {
     ui.horizontal(|ui| {
         let mut fov = app.navigation.fov_deg();
         let number = egui::DragValue::new(&mut fov).range(5.0..=120.0).max_decimals(1).suffix("°");
-        if ui.add(number).on_hover_text("From the upper to the lower edge; what is looked at keeps its size").changed()
+        if ui
+            .add(number)
+            .on_hover_text("Vertical field of view; the surroundings of the pivot keep their size")
+            .changed()
         {
             app.navigation.set_fov_deg(fov);
         }
@@ -124,7 +127,7 @@ fn window(app: &mut App, ui: &mut egui::Ui) {
     let themes = [
         (egui::ThemePreference::Dark, "Dark"),
         (egui::ThemePreference::Light, "Light"),
-        (egui::ThemePreference::System, "As the system"),
+        (egui::ThemePreference::System, "Like the system"),
     ];
     for (preference, label) in themes {
         if ui.radio_value(&mut theme, preference, label).changed() {
@@ -144,7 +147,7 @@ fn tools(app: &mut App, ui: &mut egui::Ui) {
     }
     if app.tool.selects() {
         ui.separator();
-        ui.checkbox(&mut app.tools.through, "Through").on_hover_text("Select what is behind the surface, too");
+        ui.checkbox(&mut app.tools.through, "Through").on_hover_text("Also select points behind the surface");
     }
     if app.tool == Tool::Brush {
         let radius = egui::DragValue::new(&mut app.tools.brush).range(2.0..=300.0).suffix(" px");

@@ -169,11 +169,11 @@ fn leave(app: &mut App, context: &egui::Context) {
     let modal = egui::Modal::new(egui::Id::unique("leave")).show(context, |ui| {
         if writing {
             ui.heading("A file is being written");
-            ui.label("It would stay as it was.");
+            ui.label("Leaving now cancels the export; the old file stays unchanged.");
         }
         if !names.is_empty() {
             ui.heading("Edits are not saved");
-            ui.label(format!("Those of {} would be lost.", names.join(", ")));
+            ui.label(format!("The edits of {} would be lost.", names.join(", ")));
         }
         ui.add_space(8.0);
         ui.horizontal(|ui| {

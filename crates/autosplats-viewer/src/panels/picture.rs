@@ -49,7 +49,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     window.default_pos(app.view_rect.center() - egui::vec2(220.0, 110.0)).show(context, |ui| {
         ui.set_width(420.0);
         let dialog = &mut app.panels.picture;
-        ui.checkbox(&mut dialog.window, "The window as it is, menus and all");
+        ui.checkbox(&mut dialog.window, "The whole window, with menus");
         ui.add_enabled_ui(!dialog.window, |ui| {
             ui.horizontal(|ui| {
                 ui.add(egui::DragValue::new(&mut dialog.size[0]).range(1..=MAX_SIDE).suffix(" px"));
@@ -77,7 +77,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let Some(Write { path, replace, .. }) = write else { return };
     let dialog = &mut app.panels.picture;
     if !replace && path.exists() {
-        dialog.target.refuse(&path, "This file is there already", true);
+        dialog.target.refuse(&path, "This file exists already", true);
         return;
     }
     dialog.open = false;

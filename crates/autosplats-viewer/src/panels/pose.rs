@@ -94,7 +94,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
                 context.copy_text(text);
             }
             let reset = ui.add_enabled(pose.made != opened_at, egui::Button::new("Reset"));
-            if reset.on_hover_text("Where it stood when it was opened").clicked() {
+            if reset.on_hover_text("The pose with which it was opened").clicked() {
                 pose.parts = Parts::new(&opened_at, pose.middle);
                 wanted = Some(opened_at);
             }
@@ -139,7 +139,7 @@ fn numbers(ui: &mut egui::Ui, parts: &mut Parts, speed: f64) -> bool {
         busy |= response.dragged() || response.has_focus();
         ui.end_row();
     });
-    ui.small("Turned about x, then y, then z, and about its middle.");
+    ui.small("Turned about its middle: about x, then y, then z.");
     busy
 }
 

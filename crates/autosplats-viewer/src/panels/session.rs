@@ -41,12 +41,12 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     app.panels.session.open = open;
     let Some(write) = write else { return };
     if !write.replace && write.path.exists() {
-        app.panels.session.target.refuse(&write.path, "This file is there already", true);
+        app.panels.session.target.refuse(&write.path, "This file exists already", true);
         return;
     }
     match State::of(app).write(&write.path) {
         Ok(()) => {
-            app.messages.note(format!("{} was written; 'autosplats --state' has it again", write.path.display()));
+            app.messages.note(format!("{} was written; 'autosplats --state' restores it", write.path.display()));
             app.panels.session.open = false;
         }
         Err(error) => app.panels.session.target.refuse(&write.path, error, false),

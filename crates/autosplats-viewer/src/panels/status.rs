@@ -22,7 +22,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
                     .on_hover_text("Points that own a pixel or half of one");
                 ui.separator();
                 ui.label(format!("{:.0} ms", picture.milliseconds))
-                    .on_hover_text("What the last picture took (P tells more)");
+                    .on_hover_text("Render time of the last picture (P shows more)");
                 if let Some(rate) = app.rate.per_second() {
                     ui.label(format!("{rate:.0} fps"));
                 }
@@ -35,7 +35,7 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let device = app.device.as_ref().map_or("CPU", |device| &*device.name);
-                ui.weak(device).on_hover_text("Where pictures are made");
+                ui.weak(device).on_hover_text("Device that renders the pictures");
                 let [points, undo] = [bytes, old_bytes].map(|bytes| bytes as f64 * 1e-6);
                 let all = app.panels.memory.bytes(ui.input(|input| input.time)).map(|bytes| bytes as f64 * 1e-6);
                 ui.weak(format!("{:.0} MB", all.unwrap_or(points + undo)))

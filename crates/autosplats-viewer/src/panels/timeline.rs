@@ -94,7 +94,7 @@ fn statistics(app: &App, ui: &mut egui::Ui) {
     if app.playing.is_live() {
         if statistics.dropped > 0 {
             ui.weak(format!("{} dropped", statistics.dropped))
-                .on_hover_text("Newer points came before they were shown");
+                .on_hover_text("Replaced by newer points before they were shown");
         }
         match statistics.waiting {
             Some(why) => ui.weak(why),
@@ -106,9 +106,9 @@ fn statistics(app: &App, ui: &mut egui::Ui) {
 
 fn speed(app: &mut App, ui: &mut egui::Ui) {
     let clock = &mut app.playing.clock;
-    ui.checkbox(&mut clock.looped, "Loop").on_hover_text("Begin anew at the end");
+    ui.checkbox(&mut clock.looped, "Loop").on_hover_text("Start again at the end");
     let number = egui::DragValue::new(&mut clock.speed).range(SPEEDS).speed(0.01).max_decimals(2).suffix("×");
-    let response = ui.add(number).on_hover_text("Seconds played in a second");
+    let response = ui.add(number).on_hover_text("Seconds played per second");
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, "Speed"));
     if clock.has_span() {
         let [begin, end] = clock.span();

@@ -22,10 +22,10 @@ impl App {
     /// Opens the source of a layer again and plays it from the clock's position.
     pub(crate) fn play_anew(&mut self, id: LayerId, input: Input) {
         if matches!(input.source, Source::StandardInput) {
-            self.messages.note(format!("{}: what came through a pipe cannot be read again", input.name));
+            self.messages.note(format!("{}: an input from a pipe cannot be read again", input.name));
             return;
         }
-        self.messages.note(format!("{} is opened anew", input.name));
+        self.messages.note(format!("{} is opened again", input.name));
         let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), self.loader.context().clone());
         match self.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
             Some(moving) => (moving.thread, moving.frame) = (thread, None),
@@ -155,7 +155,7 @@ impl App {
             self.playing.clock.seek(at);
             self.playing.edited_at = Some(self.playing.clock.position());
             let name = self.document().layer(id).map(|layer| layer.name.clone()).unwrap_or_default();
-            self.messages.note(format!("{name} has edits that are not saved; export or undo them to play on"));
+            self.messages.note(format!("{name} has edits that are not saved; export or undo them to continue playing"));
         }
         let still = !self.playing.clock.playing;
         let changed = |id: &LayerId| self.document().layer(*id).is_some_and(|layer| layer.incomplete == still);

@@ -227,8 +227,8 @@ impl Playing {
     pub(crate) fn alignment(&self, id: LayerId) -> Option<String> {
         let moving = self.streams.iter().find(|moving| moving.layer == Some(id) && moving.timeline().is_some())?;
         (self.timelines().count() > 1).then(|| match moving.begins {
-            Some(begins) => format!("by the clock of its stamps, {:.3} s after the first", begins.as_secs_f64()),
-            None => "at once with the others, whatever their stamps say".into(),
+            Some(begins) => format!("{:.3} s after the first input, by its time stamps", begins.as_secs_f64()),
+            None => "together with the other inputs, regardless of time stamps".into(),
         })
     }
 

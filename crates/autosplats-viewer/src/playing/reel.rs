@@ -53,7 +53,7 @@ impl Reel {
                     send(Err(error.to_string()));
                 }
                 Err(_) => {
-                    send(Err("reading the film's points failed, which is a bug of this program".into()));
+                    send(Err("reading the film's points failed, which is a bug in this program".into()));
                 }
             }
         });

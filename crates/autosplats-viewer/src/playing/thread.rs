@@ -82,7 +82,7 @@ impl StreamThread {
                 Ok(Ok(())) => Ok(()),
                 Ok(Err(Error::Cancelled)) => return,
                 Ok(Err(error)) => Err(error.to_string()),
-                Err(_) => Err(format!("{}: playing it failed, which is a bug of this program", input.name)),
+                Err(_) => Err(format!("{}: playing failed, which is a bug in this program", input.name)),
             };
             theirs.lock().news.ending = Some(ending);
             context.request_repaint();

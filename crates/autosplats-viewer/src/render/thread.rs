@@ -53,7 +53,7 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
         // A panic in one picture must not end all pictures, as the window may hold unsaved edits.
         let Ok(answer) = std::panic::catch_unwind(work) else {
             studio = Studio::default();
-            outbox.send(Answer::Failed("this picture failed, which is a bug of this program".into()));
+            outbox.send(Answer::Failed("this picture failed, which is a bug in this program".into()));
             continue;
         };
         match answer {

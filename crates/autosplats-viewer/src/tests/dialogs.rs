@@ -92,7 +92,7 @@ fn what_may_be_replaced_is_what_was_asked_about() {
     };
     ask(&mut window, Command::Export, &file);
     question(&mut window);
-    window.click_on("All, hidden points too");
+    window.click_on("All points, including hidden ones");
     assert!(!window.says("Replace it"), "other points are another question");
     question(&mut window);
     ask(&mut window, Command::Export, &file);

@@ -77,7 +77,7 @@ fn the_inspector_says_how_recordings_are_aligned() {
         ids.into_iter().map(|id| window.app().playing.alignment(id)).collect::<Vec<_>>()
     };
     let by_clock = |words: &[Option<String>]| {
-        words.iter().all(|words| words.as_ref().is_some_and(|words| words.contains("by the clock")))
+        words.iter().all(|words| words.as_ref().is_some_and(|words| words.contains("by its time stamps")))
     };
     window.until("both are open", |window| by_clock(&words(window)));
     // Points of both inputs lie at the same places.
@@ -86,7 +86,7 @@ fn the_inspector_says_how_recordings_are_aligned() {
         document.describe(&document.shown(), 0)
     };
     window.steps(3);
-    assert!(window.says("Begins") && window.says("by the clock of its stamps, 0.000 s after the first"), "it is told");
+    assert!(window.says("Begins") && window.says("0.000 s after the first input, by its time stamps"), "it is told");
     let folder = tempfile::tempdir().expect("a folder");
     let first = window.app().document().layers[0].id;
     window.harness.state_mut().give_up(first);
