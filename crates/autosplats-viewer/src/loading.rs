@@ -125,7 +125,7 @@ impl Job {
 /// Reads inputs one after the other, since each is read by all cores.
 pub(crate) struct Loader {
     context: egui::Context,
-    /// Frame of the window's picture.
+    /// The shape and the up axis of the window's picture.
     pub(crate) frame: Known,
     orders: Sender<Order>,
     receiver: Receiver<(JobId, News)>,
@@ -193,7 +193,7 @@ impl Loader {
         self.jobs.iter().for_each(Job::cancel);
     }
 
-    /// News since the last call. Jobs that have ended are dropped, so each one's last news is returned once.
+    /// The news since the last call. Jobs that have ended are dropped, so each one's last news is returned once.
     pub(crate) fn news(&mut self) -> Vec<(Input, JobId, News)> {
         let news: Vec<_> = self.receiver.try_iter().collect();
         let mut told = Vec::new();

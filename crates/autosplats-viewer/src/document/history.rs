@@ -16,7 +16,7 @@ pub(crate) struct History {
     current: Document,
     past: VecDeque<Step>,
     future: VecDeque<Step>,
-    /// Changes of each layer when it was last saved; a layer without an entry compares with how it was opened.
+    /// The changes of each layer when it was last saved. A layer without an entry compares with how it was opened.
     saved: HashMap<LayerId, Changes>,
     most_steps: usize,
     most_bytes: usize,
@@ -73,8 +73,8 @@ impl History {
         self.forget();
     }
 
-    /// Changes the document and all its past and undone versions, for changes that undo must not revert, as the reading
-    /// of a file.
+    /// Applies `change` to the document and all its past and undone versions. It is for changes that undo must not
+    /// revert, as the reading of a file.
     pub(crate) fn everywhere(&mut self, change: impl Fn(&mut Document)) {
         let steps = self.past.iter_mut().chain(&mut self.future).map(|step| &mut step.document);
         steps.chain([&mut self.current]).for_each(change);

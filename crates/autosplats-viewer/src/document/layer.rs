@@ -61,7 +61,7 @@ pub(crate) struct Edits {
     pub(crate) moves: Vec<(Bits, DMat4)>,
 }
 
-/// Changes to a layer that its file does not have.
+/// The changes to a layer that its file does not have.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Changes {
     pose: DMat4,
@@ -142,7 +142,7 @@ impl Layer {
         !self.edits.hidden.get(point) && !self.edits.deleted.get(point)
     }
 
-    /// Changes that the layer's file does not have.
+    /// The changes that the layer's file does not have.
     pub(super) fn changes(&self) -> Changes {
         let Edits { deleted, moves, .. } = &self.edits;
         Changes { pose: self.pose, deleted: deleted.clone(), moves: moves.clone() }

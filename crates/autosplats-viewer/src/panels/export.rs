@@ -18,7 +18,7 @@ pub(crate) struct Export {
     pub(crate) open: bool,
     what: What,
     target: TargetFile,
-    /// What the last refused export would replace.
+    /// The files that the last refused export would replace.
     replace: Replace,
     work: Option<Work>,
 }
@@ -122,7 +122,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     }
 }
 
-/// What can be exported: label, choice, and whether it holds any points.
+/// The choices of an export: label, scope, and whether it holds any points.
 fn choices(app: &mut App) -> Vec<(String, What, bool)> {
     let counts = app.counts().all;
     let document = app.document();

@@ -33,7 +33,7 @@ const COUNTED: f64 = 1.0;
 pub(crate) struct Playing {
     pub(crate) clock: Clock,
     streams: Vec<Moving>,
-    /// Removed inputs that undo would bring back.
+    /// The removed inputs that undo would bring back.
     removed: Vec<Removed>,
     /// Window time when the clock was last advanced, seconds.
     time: Option<f64>,

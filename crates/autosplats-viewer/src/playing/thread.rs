@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// Largest number of notes that may wait for the window.
 const MOST_NOTES: usize = 20;
 
-/// News since the last call.
+/// The news since the last call.
 #[derive(Default)]
 pub(crate) struct News {
     /// The newest points, and their frame if there is a timeline. Older points that nobody took are dropped.
@@ -120,7 +120,7 @@ impl StreamThread {
         self.shared.lock().statistics.clone()
     }
 
-    /// News since the last call.
+    /// The news since the last call.
     pub(crate) fn news(&self) -> News {
         std::mem::take(&mut self.shared.lock().news)
     }

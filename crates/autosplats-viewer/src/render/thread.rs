@@ -88,7 +88,7 @@ struct Finer {
 /// State kept from picture to picture.
 #[derive(Default)]
 struct Studio {
-    /// Work for when nothing is requested.
+    /// The job for when nothing is requested.
     finer: Option<Finer>,
     renderer: Option<(Backend, Renderer)>,
     costs: Costs,
