@@ -3,7 +3,6 @@
 use autosplats::ViewDirection;
 use eframe::egui::{Key, KeyboardShortcut, Modifiers};
 
-/// A command of the user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Command {
     Open,
@@ -205,7 +204,6 @@ impl Command {
         }
     }
 
-    /// Keyboard shortcut.
     pub(crate) fn shortcut(self) -> Option<KeyboardShortcut> {
         let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
         let command = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
@@ -267,7 +265,6 @@ impl Command {
         }
     }
 
-    /// Text of the tooltip.
     pub(crate) fn tooltip(self) -> &'static str {
         match self {
             Self::Open => "Open point clouds, meshes or depth images, in addition to the open ones",

@@ -23,7 +23,6 @@ pub(crate) struct Counted {
 }
 
 impl App {
-    /// The open document.
     pub(crate) fn document(&self) -> &Document {
         self.history.current()
     }

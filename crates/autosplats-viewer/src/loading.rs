@@ -163,7 +163,6 @@ impl Loader {
         Self { context, frame, orders, receiver, changes: channel(), jobs: Vec::new(), next: 0 }
     }
 
-    /// The window's context.
     pub(crate) fn context(&self) -> &egui::Context {
         &self.context
     }
@@ -183,12 +182,10 @@ impl Loader {
         &self.jobs
     }
 
-    /// Cancels a job.
     pub(crate) fn cancel(&self, id: JobId) {
         self.jobs.iter().filter(|job| job.id == id).for_each(Job::cancel);
     }
 
-    /// Cancels all jobs.
     pub(crate) fn cancel_all(&self) {
         self.jobs.iter().for_each(Job::cancel);
     }

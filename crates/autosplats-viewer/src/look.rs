@@ -10,13 +10,11 @@ const MOVING_MS: f64 = 1000.0 / 30.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Look {
-    /// Settings of the renderer.
     pub(crate) settings: Settings,
     /// Whether to draw points as dots instead of the surface.
     pub(crate) dots: bool,
     /// Width of a dot, pixels.
     pub(crate) dot_size: u32,
-    /// Backend for rendering.
     pub(crate) backend: Backend,
     /// Time limit of a picture while the view moves, milliseconds. A larger limit is sharper and less smooth.
     pub(crate) moving_ms: f64,

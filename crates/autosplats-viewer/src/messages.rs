@@ -52,12 +52,10 @@ impl Messages {
         self.post.0.clone()
     }
 
-    /// Adds a note.
     pub(crate) fn note(&mut self, text: impl Into<String>) {
         self.push(text.into(), false);
     }
 
-    /// Adds an error.
     pub(crate) fn error(&mut self, text: impl Into<String>) {
         self.push(text.into(), true);
     }

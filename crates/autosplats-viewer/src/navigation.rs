@@ -170,7 +170,6 @@ impl Navigation {
         2.0 * (0.5 * self.fov_deg).to_radians().tan()
     }
 
-    /// Whether the projection is orthographic.
     pub(crate) fn is_orthographic(&self) -> bool {
         self.orthographic
     }

@@ -36,18 +36,15 @@ impl Bits {
         self.words().get(index).copied().unwrap_or(0)
     }
 
-    /// Whether a point is in the set.
     #[inline(always)]
     pub(crate) fn get(&self, point: usize) -> bool {
         self.words().get(point / 64).is_some_and(|word| word >> (point % 64) & 1 == 1)
     }
 
-    /// Number of points in the set.
     pub(crate) fn count(&self) -> usize {
         self.words().par_iter().with_min_len(LEAST).map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Whether the set has no points.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_none()
     }

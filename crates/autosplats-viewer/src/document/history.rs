@@ -54,7 +54,6 @@ impl History {
         }
     }
 
-    /// The present document.
     pub(crate) fn current(&self) -> &Document {
         &self.current
     }

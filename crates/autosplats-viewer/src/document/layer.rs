@@ -22,7 +22,6 @@ pub(crate) struct LayerId(u64);
 /// One input: a cloud as it was read, its pose and the edits of its points.
 #[derive(Clone, Debug)]
 pub(crate) struct Layer {
-    /// Identifies the layer.
     pub(crate) id: LayerId,
     /// Name shown to the user.
     pub(crate) name: String,
@@ -30,7 +29,6 @@ pub(crate) struct Layer {
     pub(crate) path: Option<PathBuf>,
     /// The points as read, with [all digits](autosplats::cloud::ReadOptions::exact). They never change.
     pub(crate) cloud: Arc<PointCloud>,
-    /// Whether the layer is shown.
     pub(crate) visible: bool,
     /// Whether points are still to come or to change. Incomplete points can be seen, but not selected or edited.
     pub(crate) incomplete: bool,
@@ -50,7 +48,6 @@ pub(crate) struct Layer {
 /// Edits of single points of a layer.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Edits {
-    /// Selected points.
     pub(crate) selected: Bits,
     /// Points that exist but are not shown.
     pub(crate) hidden: Bits,
@@ -78,7 +75,6 @@ pub(crate) struct Counts {
     pub(crate) selected: usize,
     /// Points that are hidden, but not deleted.
     pub(crate) hidden: usize,
-    /// Deleted points.
     pub(crate) deleted: usize,
 }
 

@@ -9,9 +9,7 @@ use super::{Document, LayerId, Shown};
 /// A picked point.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PickedPoint {
-    /// The layer of the point.
     pub(crate) layer: LayerId,
-    /// Name of the layer.
     pub(crate) name: String,
     /// The file that the layer was read from.
     pub(crate) path: Option<PathBuf>,

@@ -37,7 +37,6 @@ impl Document {
         self.select(shown, |_| true, SelectMode::Replace);
     }
 
-    /// Deselects all points.
     pub(crate) fn select_none(&mut self) {
         for layer in &mut self.layers {
             layer.edits.selected = Bits::default();

@@ -201,7 +201,6 @@ impl Shown {
             && self.of.visible().zip(document.visible()).all(|(own, other)| own.looks_like(other))
     }
 
-    /// Number of points.
     pub(crate) fn len(&self) -> usize {
         self.cloud.len()
     }

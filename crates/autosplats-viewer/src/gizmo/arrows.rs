@@ -168,7 +168,6 @@ pub(super) fn handles(middle: DVec3, view: &View) -> Vec<(Handle, Shape)> {
     handles
 }
 
-/// Draws the handles.
 pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<Handle>) {
     let mut handles = handles(middle, view);
     // The dragged or hovered handle is drawn on top.

@@ -37,7 +37,6 @@ impl Export {
     }
 }
 
-/// Opens the dialog.
 pub(crate) fn open(app: &mut App) {
     app.panels.export.target.open();
     app.panels.export.open = true;

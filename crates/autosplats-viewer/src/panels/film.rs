@@ -118,7 +118,6 @@ impl Default for Film {
     }
 }
 
-/// Opens or closes the dialog.
 pub(crate) fn toggle(app: &mut App) {
     app.panels.film.target.forget();
     app.panels.film.open = !app.panels.film.open;

@@ -9,7 +9,6 @@ use crate::app::App;
 use crate::files::ask_for_inputs;
 use crate::loading::Input;
 
-/// State of the dialogs.
 #[derive(Default)]
 pub(crate) struct Dialogs {
     chosen: Option<Receiver<Option<Vec<PathBuf>>>>,
@@ -18,7 +17,6 @@ pub(crate) struct Dialogs {
 }
 
 impl Dialogs {
-    /// Opens the system's dialog.
     pub(crate) fn open(&mut self, context: &egui::Context) {
         if self.chosen.is_none() {
             self.chosen = Some(ask_for_inputs(context));

@@ -14,7 +14,6 @@ use crate::app::App;
 use crate::output::Goal;
 use crate::render::{Task, Wish};
 
-/// State of the dialog.
 pub(crate) struct PictureDialog {
     pub(crate) open: bool,
     target: TargetFile,
@@ -31,7 +30,6 @@ impl Default for PictureDialog {
     }
 }
 
-/// Opens the dialog.
 pub(crate) fn open(app: &mut App) {
     app.panels.picture.target.open();
     app.panels.picture.open = true;
