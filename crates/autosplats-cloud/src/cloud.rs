@@ -1,4 +1,4 @@
-//! The point cloud: what every reader makes and every renderer takes.
+//! The point cloud, which every reader makes and every renderer takes.
 
 use std::{ops::Range, path::Path};
 
@@ -6,11 +6,12 @@ use glam::{DMat4, DVec3};
 
 use crate::{Crs, Error, Progress, identity::Identity};
 
-/// Points of one frame: positions, and whatever else the scanner recorded.
+/// Points of one frame: positions and the attributes that the scanner recorded.
 ///
-/// A position is stored as three `f32` about an `f64` [`origin`](Self::origin): survey coordinates reach 5e6, where one
-/// `f32` step is half a metre. World coordinates are `origin + position`, plus a [residual](Self::residuals) where a file
-/// was read [exactly](crate::ReadOptions::exact). All attributes have one entry per point.
+/// A position is stored as three `f32` relative to an `f64` [`origin`](Self::origin). Survey coordinates reach 5e6,
+/// where one `f32` step is half a metre. World coordinates are `origin + position`. A file read
+/// [exactly](crate::ReadOptions::exact) adds a [residual](Self::residuals) to that sum. Every attribute has one entry
+/// per point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
     pub(crate) origin: DVec3,
@@ -25,47 +26,47 @@ pub struct PointCloud {
     pub(crate) identity: Identity,
 }
 
-/// A run of points that one sensor saw from one place.
+/// A contiguous range of points that one sensor saw from one place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
-    /// What the file calls it.
+    /// Name in the file.
     pub name: Option<String>,
-    /// Where the sensor stood, and how it was turned: maps its own frame to world coordinates, lengths kept. The points
-    /// are in world coordinates already.
+    /// Pose of the sensor: maps the sensor's frame to world coordinates and keeps lengths. The cloud's points are
+    /// already in world coordinates.
     pub world_from_sensor: DMat4,
-    /// The points it saw, by index.
+    /// Indices of the points that the sensor saw.
     pub points: Range<usize>,
 }
 
 impl Scan {
-    /// World coordinates of the sensor.
+    /// Position of the sensor in world coordinates.
     pub fn position(&self) -> DVec3 {
         self.world_from_sensor.w_axis.truncate()
     }
 }
 
-/// Which way is up, and where a viewer would stand first.
+/// Which axis points up, and from where a viewer looks first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axes {
-    /// Z up, seen first from -Y: surveys, robots.
+    /// Z up, seen first from -Y. Usual for surveys and robots.
     ZUp,
-    /// Y up, seen first from +Z: models.
+    /// Y up, seen first from +Z. Usual for models.
     YUp,
-    /// A camera's own frame: x right, y down, z forward. Such points were seen from the origin only, so that is where
-    /// they look right.
+    /// A camera's own frame: x right, y down, z forward. The points were seen from the origin, so they look right only
+    /// from there.
     Camera,
 }
 
-/// A named scalar attribute, one value per point. Names are PDAL's where PDAL has one (`Intensity`, `Classification`).
+/// A named scalar attribute with one value per point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
-    /// Name, as PDAL spells it where PDAL knows the attribute, else as the file does.
+    /// PDAL's name of the attribute, such as `Intensity` or `Classification`; the file's name if PDAL has none.
     pub name: String,
-    /// The values, in the width the file has them.
+    /// Values in the file's number type.
     pub values: FieldValues,
 }
 
-/// Values of a [`Field`], kept in their own width so that a byte per point costs a byte per point.
+/// Values of a [`Field`], stored in the file's number type to save memory.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs, reason = "the variants say it")]
 pub enum FieldValues {
@@ -81,7 +82,7 @@ pub enum FieldValues {
     F64(Vec<f64>),
 }
 
-/// Calls `$body` with `$v` bound to the typed vector inside `$values`.
+/// Evaluates `$body` with `$v` bound to the typed vector inside `$values`.
 macro_rules! each_type {
     ($values:expr, $v:ident => $body:expr) => {
         match $values {
@@ -106,12 +107,12 @@ impl FieldValues {
         each_type!(self, v => v.len())
     }
 
-    /// Whether there is no value.
+    /// Whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The value of point `index` as `f64`; 64-bit integers beyond 2⁵³ are rounded.
+    /// The value of point `index` as `f64`. Integers beyond 2⁵³ are rounded.
     ///
     /// # Panics
     /// If `index` is not below [`len`](Self::len).
@@ -122,21 +123,21 @@ impl FieldValues {
         }
     }
 
-    /// Bytes the values take in memory.
+    /// Size of the values in memory, in bytes.
     pub fn byte_len(&self) -> usize {
         each_type!(self, v => size_of_val(v.as_slice()))
     }
 }
 
 impl PointCloud {
-    /// A cloud of bare positions, each `origin + position` in world coordinates.
+    /// Makes a cloud of positions without attributes. World coordinates are `origin + position`.
     ///
-    /// Non-finite positions are allowed, as scanners record them; the renderer drops and counts them.
+    /// Non-finite positions are allowed, because scanners record them. The renderer drops and counts them.
     pub fn new(origin: DVec3, positions: Vec<[f32; 3]>) -> Self {
         Self { origin, positions, ..Self::default() }
     }
 
-    /// Reads a file of any format known; see [`read`](crate::read).
+    /// Reads a file in any known format; see [`read`](crate::read).
     ///
     /// # Errors
     /// Those of [`read`](crate::read).
@@ -144,10 +145,10 @@ impl PointCloud {
         crate::read(path.as_ref(), progress)
     }
 
-    /// Adds colours, sRGB, 8 bits a channel, replacing any.
+    /// Sets the colours: sRGB, 8 bits per channel.
     ///
     /// # Errors
-    /// [`Error::AttributeLength`] if there is not exactly one per point.
+    /// [`Error::AttributeLength`] if there is not exactly one colour per point.
     pub fn with_colors(mut self, colors: Vec<[u8; 3]>) -> Result<Self, Error> {
         self.check_length("colours", colors.len())?;
         self.identity = Identity::default();
@@ -155,7 +156,7 @@ impl PointCloud {
         Ok(self)
     }
 
-    /// Adds a scalar field, replacing one of the same name.
+    /// Adds a scalar field, or replaces the field of the same name.
     ///
     /// # Errors
     /// [`Error::AttributeLength`] if there is not exactly one value per point.
@@ -168,28 +169,28 @@ impl PointCloud {
         Ok(self)
     }
 
-    /// States which way is up, where the file or its format says so.
+    /// Sets which axis points up.
     #[must_use]
     pub fn with_axes(mut self, axes: Axes) -> Self {
         self.axes = Some(axes);
         self
     }
 
-    /// Adds to each position what `f32` has lost of it, replacing any residuals.
+    /// Sets the residuals: what rounding each position to `f32` lost.
     ///
     /// # Errors
-    /// [`Error::AttributeLength`] if there is not exactly one per point.
+    /// [`Error::AttributeLength`] if there is not exactly one residual per point.
     pub fn with_residuals(mut self, residuals: Vec<[f32; 3]>) -> Result<Self, Error> {
         self.check_length("residuals", residuals.len())?;
         self.residuals = Some(residuals);
         Ok(self)
     }
 
-    /// States which points were seen from where, replacing what was known. Points of no scan were seen from nobody knows
-    /// where; one that several claim belongs to the first of them, by the places where they begin.
+    /// Sets the scans: which points were seen from where. The sensor of points in no scan is unknown. A point in
+    /// several scans belongs to the one that starts first.
     ///
     /// # Panics
-    /// If a scan's points are not among the cloud's.
+    /// If a scan's range reaches beyond the cloud's points.
     #[must_use]
     pub fn with_scans(mut self, scans: Vec<Scan>) -> Self {
         let len = self.len();
@@ -201,14 +202,14 @@ impl PointCloud {
         self
     }
 
-    /// States the coordinate system and its units.
+    /// Sets the coordinate system and its units.
     #[must_use]
     pub fn with_crs(mut self, crs: Crs) -> Self {
         self.crs = crs;
         self
     }
 
-    /// States that coordinates are multiples of a step, in each of x, y and z, as files that store integers have it.
+    /// Sets the step of which coordinates are multiples, per axis. Files that store integers have such a step.
     #[must_use]
     pub fn with_resolution(mut self, step: DVec3) -> Self {
         self.resolution = Some(step);
@@ -225,7 +226,7 @@ impl PointCloud {
         self.positions.len()
     }
 
-    /// Whether its points, in metres, lie so close together that nobody could stand among them.
+    /// Whether the finite points span less than 1 m along each axis, assuming metres: nobody could stand among them.
     pub(crate) fn is_small(&self) -> bool {
         const SMALL: f32 = 1.0;
         let none = [f32::INFINITY, f32::NEG_INFINITY];
@@ -236,23 +237,24 @@ impl PointCloud {
         })
     }
 
-    /// Whether there is no point.
+    /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// A number that tells this cloud's points and attributes from all others' in this process: clones have the same, and
-    /// whatever changes a cloud changes it. So whoever keeps a copy, as on a graphics card, knows when it is out of date.
+    /// A number that identifies the cloud's points and attributes within this process. Clones share the number; changed
+    /// points, colours, fields or scans get another. A cached copy, as on a graphics card, is outdated if the number
+    /// differs.
     pub fn identity(&self) -> u64 {
         self.identity.0
     }
 
-    /// What has to be added to a position to get world coordinates.
+    /// Origin of the positions, in world coordinates.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// Positions about the [`origin`](Self::origin), in the file's unit.
+    /// Positions relative to the [`origin`](Self::origin), in the file's unit.
     pub fn positions(&self) -> &[[f32; 3]] {
         &self.positions
     }
@@ -269,47 +271,47 @@ impl PointCloud {
         }
     }
 
-    /// What is to be added to each position to get all digits of the file, where `f32` cannot hold them.
+    /// What rounding each position to `f32` lost; present only if the cloud keeps all digits of the file.
     pub fn residuals(&self) -> Option<&[[f32; 3]]> {
         self.residuals.as_deref()
     }
 
-    /// Colours, sRGB, 8 bits a channel, if the points have any.
+    /// Colours, sRGB, 8 bits per channel.
     pub fn colors(&self) -> Option<&[[u8; 3]]> {
         self.colors.as_deref()
     }
 
-    /// The scalar fields, in the file's order.
+    /// Scalar fields, in the file's order.
     pub fn fields(&self) -> &[Field] {
         &self.fields
     }
 
-    /// The field called `name`, letter case ignored.
+    /// The field called `name`; letter case is ignored.
     pub fn field(&self, name: &str) -> Option<&Field> {
         self.fields.iter().find(|field| field.name.eq_ignore_ascii_case(name))
     }
 
-    /// Which way is up, where the file or its format says so.
+    /// Which axis points up, if the file or its format states it.
     pub fn axes(&self) -> Option<Axes> {
         self.axes
     }
 
-    /// Which points were seen from where, as far as the file says.
+    /// Which points were seen from where, as far as the file states it.
     pub fn scans(&self) -> &[Scan] {
         &self.scans
     }
 
-    /// The coordinate system and its units, as far as the file says.
+    /// The coordinate system and its units, as far as the file states them.
     pub fn crs(&self) -> &Crs {
         &self.crs
     }
 
-    /// The step of which coordinates are multiples, where the file stores them as integers.
+    /// The step of which coordinates are multiples, per axis, if the file stores integers.
     pub fn resolution(&self) -> Option<DVec3> {
         self.resolution
     }
 
-    /// Bytes the cloud takes in memory.
+    /// Size of the cloud in memory, in bytes.
     pub fn byte_len(&self) -> usize {
         size_of_val(self.positions.as_slice())
             + self.residuals.as_ref().map_or(0, |residuals| size_of_val(residuals.as_slice()))

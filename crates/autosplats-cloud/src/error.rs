@@ -1,121 +1,121 @@
-//! What can go wrong between a disk and a [`PointCloud`](crate::PointCloud).
+//! Errors of reading, writing and generating clouds.
 
 use std::path::PathBuf;
 
-/// Everything that reading, writing or generating a cloud can fail with. Each message is one line.
+/// Errors of reading, writing or generating a cloud. Each message is one line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An attribute has not exactly one value per point.
+    /// An attribute does not have exactly one value per point.
     #[error("{name}: {len} values for {points} points")]
     AttributeLength {
-        /// Attribute name.
+        /// Name of the attribute.
         name: String,
-        /// Values given.
+        /// Number of values given.
         len: usize,
-        /// Points in the cloud.
+        /// Number of points in the cloud.
         points: usize,
     },
-    /// The operating system refused to open, read or write.
+    /// The operating system refused to open, read or write a file.
     #[error("{}: {source}", path.display())]
     Io {
-        /// File concerned.
+        /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// Neither the content nor the name of the file tells a format that is read.
+    /// Neither the content nor the name of a file identifies a format that can be read.
     #[error("{}: unknown format; {} can be read", path.display(), crate::read::format_names())]
     UnknownFormat {
-        /// File concerned.
+        /// The file.
         path: PathBuf,
     },
-    /// The name of a file to write has no extension of a format that is written.
+    /// The extension of an output file names no format that can be written.
     #[error("{}: its name tells no format that is written; {} can be", path.display(), crate::write::format_names())]
     UnknownOutput {
-        /// File concerned.
+        /// The file.
         path: PathBuf,
     },
-    /// The file breaks the rules of its format.
+    /// A file breaks the rules of its format.
     #[error("{}: {place}: {what}", path.display())]
     Malformed {
-        /// File concerned.
+        /// The file.
         path: PathBuf,
-        /// Line, byte or point at which it was noticed.
+        /// Line, byte or point where the fault was noticed.
         place: String,
-        /// What is wrong, and the remedy where one exists.
+        /// The fault, and the remedy if there is one.
         what: String,
     },
-    /// The file is in order but uses a part of its format that is not read.
+    /// A valid file uses a part of its format that cannot be read.
     #[error("{}: {what}", path.display())]
     Unsupported {
-        /// File concerned.
+        /// The file.
         path: PathBuf,
-        /// What is not read, and the remedy where one exists.
+        /// The unsupported part, and the remedy if there is one.
         what: String,
     },
-    /// The memory for a cloud could not be had.
+    /// Not enough memory is free.
     #[error("out of memory: {bytes} bytes for {what} are not free; thin the cloud or split it")]
     OutOfMemory {
-        /// What the memory was for.
+        /// Purpose of the memory.
         what: String,
         /// Size of the request in bytes.
         bytes: usize,
     },
-    /// A number that was given is out of its range.
+    /// A number is out of its range.
     #[error("{name} {value}: it must be {rule}")]
     BadValue {
-        /// What the number is.
+        /// Name of the number.
         name: &'static str,
         /// The number.
         value: f64,
-        /// What it should be.
+        /// The allowed range.
         rule: &'static str,
     },
-    /// A mesh has nothing that points could be strewn over.
+    /// A mesh has no triangle with an area, so there is no surface to sample.
     #[error("there is no surface to strew points over: no triangle has an area; take the points as they are")]
     NoSurface,
-    /// No made-up scene has this name.
+    /// No generated scene has this name.
     #[error("no scene is called {given:?}; there are:{known}")]
     UnknownScene {
         /// Name asked for.
         given: String,
-        /// The names there are, a line each.
+        /// Known names, one per line.
         known: String,
     },
-    /// A made-up scene cannot be had like this.
+    /// A generated scene was asked for with wrong parameters.
     #[error("scene {given:?}: {why}")]
     BadScene {
-        /// What was asked for.
+        /// Text of the request.
         given: String,
-        /// What is wrong with it.
+        /// Fault of the request.
         why: String,
     },
-    /// Nothing that could be played.
+    /// A source has no frames to play.
     #[error("{name}: {why}")]
     NoFrames {
-        /// What was to be played.
+        /// Name of the source.
         name: String,
-        /// Why it cannot be.
+        /// Why there are no frames.
         why: String,
     },
-    /// An address of live points makes no sense, or nobody is there.
+    /// The address of a live source is invalid, or nobody answers there.
     #[error("{address}: {what}")]
     Remote {
-        /// The address that was given.
+        /// The address.
         address: String,
-        /// What is wrong with it, and the remedy.
+        /// The fault, and the remedy.
         what: String,
     },
-    /// [`Progress::cancelled`](crate::Progress::cancelled) asked to stop.
+    /// [`Progress::cancelled`](crate::Progress::cancelled) returned true.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// Letters of a message, which may have pieces of a file in it.
+/// Longest error message, in characters; messages may quote parts of a file.
 const MAX_MESSAGE: usize = 600;
 
-/// A message that is no longer than a few lines and does nothing to a terminal.
+/// Cuts a message to a few lines and replaces control characters, which could act on a terminal.
 pub(crate) fn message(text: &str) -> String {
     if text.len() <= MAX_MESSAGE && !text.contains(char::is_control) {
         return text.to_owned();

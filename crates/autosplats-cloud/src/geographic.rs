@@ -1,31 +1,33 @@
-//! Degrees and feet to metres: for pictures, which need equal units along all axes, and for files that mean metres.
+//! Conversion of degrees and feet to metres, for pictures, which need equal units along all axes, and for files in
+//! metres.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{Crs, PointCloud, Unit, identity::Identity, merge::residual, read::middle};
 
-/// Half the longer axis of the WGS 84 ellipsoid in metres, and the square of its eccentricity.
+/// Semi-major axis of the WGS 84 ellipsoid, in metres.
 const SEMI_MAJOR: f64 = 6_378_137.0;
+/// Squared eccentricity of the WGS 84 ellipsoid.
 const ECCENTRICITY_2: f64 = 6.694_379_990_141_316e-3;
 
-/// Steps of a degree to which the middle is rounded: about 11 cm.
+/// Steps per degree to which the map's centre is rounded; a step is about 11 cm.
 const STEPS: f64 = 1e6;
 
 impl PointCloud {
-    /// Puts metres in the place of longitude and latitude, if that is what x and y [are](Unit::Degree): x to the east and
-    /// y to the north of the cloud's middle, z up from where it was, in metres. Says whether it did; other clouds stay as
-    /// they are.
+    /// Converts longitude and latitude to metres if x and y are in [degrees](Unit::Degree), and returns whether they
+    /// were. x then points east and y north from the cloud's middle; z is converted to metres and keeps its zero. Other
+    /// clouds stay unchanged.
     ///
-    /// Lengths are right at the middle of the cloud. A hundred kilometres to the north or south of it, those to the east
-    /// are wrong by one or two parts in a hundred, as on any flat map. Residuals are taken up by the new positions,
-    /// scanner places are moved but not turned.
+    /// Lengths are right at the cloud's middle. As on any flat map they are wrong elsewhere: 100 km north or south,
+    /// east-west lengths are off by one or two percent. Residuals are added to the new positions. Sensors are moved but
+    /// not rotated.
     pub fn to_local_metres(&mut self) -> bool {
         self.local_metres(None).is_some_and(|local| self.to_metres_on(&local))
     }
 
-    /// The flat map about the cloud's middle, if its x and y are longitude and latitude; or the one about the place that
-    /// `beside` is about, so that clouds of one map keep their places to each other.
+    /// The flat map about the cloud's middle, if x and y are longitude and latitude. With `beside`, the new map has the
+    /// same centre, so that clouds on both maps keep their relative places.
     pub fn local_metres(&self, beside: Option<&LocalMetres>) -> Option<LocalMetres> {
         if self.crs.unit != Some(Unit::Degree) {
             return None;
@@ -37,7 +39,7 @@ impl PointCloud {
         Some(LocalMetres::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0)))
     }
 
-    /// As [`to_local_metres`](Self::to_local_metres), on a map that is known.
+    /// Like [`to_local_metres`](Self::to_local_metres), on the given map.
     pub fn to_metres_on(&mut self, local: &LocalMetres) -> bool {
         if self.crs.unit != Some(Unit::Degree) {
             return false;
@@ -62,15 +64,15 @@ impl PointCloud {
         true
     }
 
-    /// Metres per unit of x, y and z, where they are lengths.
+    /// Metres per unit of x, y and z, if they are lengths.
     pub(crate) fn metres_per_unit(&self) -> Option<DVec3> {
         let Crs { unit, vertical_unit, .. } = &self.crs;
         let across = (*unit)?.metres()?;
         Some(DVec3::new(across, across, vertical_unit.map_or(Some(across), Unit::metres)?))
     }
 
-    /// Multiplies coordinates by what makes them metres, and forgets the coordinate system, which has another unit. Scanner
-    /// places are moved but not turned.
+    /// Multiplies world coordinates by `scale`, in metres per unit. The coordinate system is dropped, because it has
+    /// another unit. Sensors are moved but not rotated.
     pub(crate) fn scale_to_metres(&mut self, scale: DVec3) {
         let world = |i: usize| self.world_position(i) * scale;
         let origin = (self.origin * scale).round();
@@ -86,17 +88,17 @@ impl PointCloud {
     }
 }
 
-/// A flat map that touches the ellipsoid at one place: longitude and latitude to metres east and north of there, heights to
-/// metres.
+/// A flat map that touches the ellipsoid at one place. It maps longitude and latitude to metres east and north of that
+/// place, and heights to metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalMetres {
     middle: DVec3,
-    /// Metres per unit.
+    /// Metres per unit of x, y and z.
     scale: DVec3,
 }
 
 impl LocalMetres {
-    /// `height` is the length of z's unit in metres.
+    /// The map about `middle`; `height` is the unit of z in metres.
     fn at(middle: DVec3, height: f64) -> Self {
         let (sin, cos) = middle.y.clamp(-90.0, 90.0).to_radians().sin_cos();
         let root = 1.0 - ECCENTRICITY_2 * sin * sin;
@@ -105,14 +107,14 @@ impl LocalMetres {
         Self { middle, scale: DVec3::new(parallel.to_radians(), meridian.to_radians(), height) }
     }
 
-    /// Metres on the map of a place in degrees.
+    /// Converts a place in degrees to metres on the map.
     pub fn metres(&self, degrees: DVec3) -> DVec3 {
-        // The short way round, across the 180th meridian too.
+        // The short way round, also across the 180th meridian.
         let east = (degrees.x - self.middle.x + 180.0).rem_euclid(360.0) - 180.0;
         DVec3::new(east, degrees.y - self.middle.y, degrees.z) * self.scale
     }
 
-    /// The place in degrees that is at some metres on the map. Longitudes go on beyond the 180th meridian.
+    /// Converts metres on the map to a place in degrees. Longitudes may exceed 180 degrees.
     pub fn degrees(&self, metres: DVec3) -> DVec3 {
         metres / self.scale + self.middle.with_z(0.0)
     }
@@ -122,7 +124,7 @@ impl LocalMetres {
 mod tests {
     use super::*;
 
-    /// Length of a degree of longitude and of latitude, from published tables of WGS 84.
+    /// Latitude, length of a degree of longitude and of latitude in metres, from published tables of WGS 84.
     const TABLE: [(f64, f64, f64); 4] = [
         (0.0, 111_320.0, 110_574.0),
         (30.0, 96_486.0, 110_852.0),
@@ -158,7 +160,7 @@ mod tests {
         for index in 0..2 {
             let place = first.world_position(index);
             let back = local.degrees(local.metres(place));
-            // A few steps of f64 at 180.
+            // A few steps of `f64` at 180.
             assert!(back.abs_diff_eq(place, 1e-13), "{place} comes back as {back}");
         }
         assert_eq!(second.local_metres(Some(&local)), Some(local), "a neighbour on the same map");
@@ -177,7 +179,7 @@ mod tests {
         let mut date_line = cloud(&[[179.999, 0.0, 0.0], [-179.999, 0.0, 0.0]]);
         date_line.to_local_metres();
         let way = date_line.world_position(1) - date_line.world_position(0);
-        // One f32 step of 360 degrees is 3 m.
+        // One `f32` step at 360 degrees is 3 m.
         assert!((way.x - 222.6).abs() < 3.5, "across the 180th meridian: {way}");
         let mut metres = cloud(&[[1.0, 2.0, 3.0]]).with_crs(Crs::default());
         let before = metres.clone();

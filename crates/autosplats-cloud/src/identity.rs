@@ -1,10 +1,10 @@
-//! Telling contents of clouds apart without looking at them.
+//! Telling the contents of clouds apart without comparing them.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A number that no other content has had in this process; clones keep it.
 ///
-/// All are equal: contents are compared, not their numbers.
+/// All identities compare equal, so that clouds are compared by content alone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Identity(pub(crate) u64);
 

@@ -1,19 +1,20 @@
-//! The layout of LAS files: what reading and writing share.
+//! Layout of LAS files, shared by reading and writing.
 
-/// Bytes of a record, by point format.
+/// Bytes of a point record, by point format.
 pub(crate) const RECORD_LEN: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
-/// Bytes before the data of a variable length record, and of an extended one.
+/// Bytes before the data of a variable length record (VLR).
 pub(crate) const VLR_HEADER: usize = 54;
+/// Bytes before the data of an extended variable length record (EVLR).
 pub(crate) const EVLR_HEADER: usize = 60;
 
-/// Bytes that describe one extra value of a record.
+/// Bytes that describe one extra value of a point record.
 pub(crate) const EXTRA_DESCRIPTOR: usize = 192;
 
-/// Degrees of one step of the wide formats' scan angle.
+/// Degrees of one step of the scan angle in point formats 6 and above.
 pub(crate) const ANGLE_STEP: f32 = 0.006;
 
-/// Who records are from, and their numbers.
+/// User ids and record ids of the variable length records that are read or written.
 pub(crate) const SPEC: &str = "LASF_Spec";
 pub(crate) const EXTRA_BYTES: u16 = 4;
 pub(crate) const PROJECTION: &str = "LASF_Projection";
@@ -22,23 +23,23 @@ pub(crate) const GEO_KEYS: u16 = 34735;
 pub(crate) const GEO_DOUBLES: u16 = 34736;
 pub(crate) const GEO_ASCII: u16 = 34737;
 
-/// Where one value lies in a record, and how.
+/// Byte offset and storage type of one value in a point record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// Some bits of a byte.
+    /// Bits of the byte at `at`.
     Bits { at: usize, shift: u8, mask: u8 },
     /// A signed byte.
     I8(usize),
-    /// An unsigned 16-bit number.
+    /// An unsigned 16-bit integer.
     U16(usize),
-    /// An angle in steps of [`ANGLE_STEP`], 16 bits, signed.
+    /// A signed 16-bit angle in steps of [`ANGLE_STEP`].
     Angle(usize),
-    /// A double.
+    /// A 64-bit float.
     F64(usize),
 }
 
 impl Place {
-    /// How it is stored, for people.
+    /// Description of the storage type for people.
     pub(crate) fn stored(self) -> String {
         match self {
             Self::Bits { mask: 255, .. } => "uint8".into(),
@@ -52,12 +53,12 @@ impl Place {
     }
 }
 
-/// Whether records are of the kind that LAS 1.4 brought, with wider bit fields.
+/// Whether a point format is one of those added by LAS 1.4, which have wider bit fields.
 pub(crate) fn is_wide(format: usize) -> bool {
     format >= 6
 }
 
-/// Where the time of a point lies.
+/// Byte offset of the GPS time.
 fn time(format: usize) -> Option<usize> {
     match format {
         0 | 2 => None,
@@ -66,7 +67,7 @@ fn time(format: usize) -> Option<usize> {
     }
 }
 
-/// Where red, green and blue lie, 16 bits each.
+/// Byte offset of red, followed by green and blue, 16 bits each.
 pub(crate) fn colors(format: usize) -> Option<usize> {
     match format {
         2 => Some(20),
@@ -76,12 +77,12 @@ pub(crate) fn colors(format: usize) -> Option<usize> {
     }
 }
 
-/// Whether records point to waveforms.
+/// Whether point records refer to waveforms.
 pub(crate) fn has_waveforms(format: usize) -> bool {
     matches!(format, 4 | 5 | 9 | 10)
 }
 
-/// Name and place of the values of a point format, coordinates, colours and waveforms left out.
+/// Names and places of the values of a point format, except coordinates, colours and waveforms.
 pub(crate) fn places(format: usize) -> Vec<(&'static str, Place)> {
     let bits = |at, shift, mask| Place::Bits { at, shift, mask };
     let mut places = vec![("Intensity", Place::U16(12))];

@@ -1,6 +1,6 @@
-//! Point clouds, the files they come from and the sources that make them.
+//! Point clouds: the files they are read from and written to, and the sources that make them.
 //!
-//! This crate never sees a GPU and never draws: it turns bytes into a [`PointCloud`].
+//! This crate turns bytes into a [`PointCloud`]. It draws nothing and uses no GPU.
 //!
 //! ```
 //! use autosplats_cloud::{PointCloud, write};
@@ -38,7 +38,7 @@ pub use cloud::{Axes, Field, FieldValues, PointCloud, Scan};
 pub use crs::{Crs, GeoKeys, Unit};
 pub use error::Error;
 pub use geographic::LocalMetres;
-/// The vector library of the public interface.
+/// Vector library of the public interface.
 pub use glam;
 pub use memory::{available_memory, check_memory};
 pub use progress::Progress;

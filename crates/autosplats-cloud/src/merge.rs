@@ -1,4 +1,4 @@
-//! Several clouds to one.
+//! Joining several clouds.
 
 use std::ops::Range;
 
@@ -9,22 +9,23 @@ use crate::{
     Crs, Field, FieldValues, PointCloud, Scan, cloud::each_type, identity::Identity, read::SMALL, read::middle,
 };
 
-/// Colour of the points of a part that has none, beside parts that have.
+/// Colour of the points of a part without colours, if another part has colours.
 const GREY: [u8; 3] = [200; 3];
 
 impl PointCloud {
-    /// Puts clouds together, each moved by its pose: an affine map of world coordinates, applied in `f64`.
+    /// Joins clouds, each moved by its pose: an affine map of world coordinates, applied in `f64`.
     ///
-    /// * The origin of the result is zero if all parts are near it, else that of the first part that is not; parts with
-    ///   one common origin and no pose keep it, and their bits.
-    /// * If any part has colours, the points of the others become mid grey.
-    /// * A field is kept if every part has one of that name, letter case included; as `f64` where its widths differ.
-    ///   Normals of floats are turned with their points, their lengths kept; other fields stay as they are.
-    /// * Axes are kept if all parts that state some agree on them, coordinate system and resolution if all parts do; scans stay
-    ///   known, each moved with its part.
-    /// * Residuals are kept if any part has some, and made anew for parts that a pose moves.
+    /// * The origin of the result is zero if all parts lie near zero, otherwise that of the first part that does not.
+    ///   Parts without poses that share one origin keep that origin and their exact positions.
+    /// * If any part has colours, the points of the others become grey.
+    /// * A field is kept if every part has one of the same name; case matters. Fields of different types become `f64`.
+    ///   Normals of floats are rotated with their points and keep their lengths; other fields stay unchanged.
+    /// * Axes are kept if all parts that state axes agree. Coordinate system and resolution are kept if all parts
+    ///   agree.
+    /// * Scans are kept, each moved with its part.
+    /// * Residuals are kept if any part has some, and computed anew for parts that are moved.
     ///
-    /// A single part without pose is returned as it is. Parts without points count for nothing.
+    /// A single part without a pose is returned unchanged. Parts without points are ignored.
     #[must_use]
     pub fn merge(parts: Vec<(Self, DMat4)>) -> Self {
         let (mut parts, empty): (Vec<_>, Vec<_>) = parts.into_iter().partition(|(cloud, _)| !cloud.is_empty());
@@ -37,7 +38,7 @@ impl PointCloud {
         Self::merged(&parts.iter().map(|(cloud, pose)| (cloud, *pose)).collect::<Vec<_>>())
     }
 
-    /// As [`merge`](Self::merge), of clouds that others still need; a single part is copied.
+    /// Like [`merge`](Self::merge), for borrowed clouds. A single part without a pose is copied.
     #[must_use]
     pub fn merged(parts: &[(&Self, DMat4)]) -> Self {
         let filled: Vec<_> = parts.iter().filter(|(cloud, _)| !cloud.is_empty()).copied().collect();
@@ -110,15 +111,15 @@ impl PointCloud {
     }
 }
 
-/// What normals are multiplied by where positions are by `matrix`: its inverse transposed, but for a positive factor, so
-/// that it is there for flat ones too.
+/// The matrix that transforms normals if `matrix` transforms positions: the inverse transpose times the positive |det|.
+/// This cofactor form exists for singular matrices too.
 pub(crate) fn normal_matrix(matrix: DMat3) -> DMat3 {
     let DMat3 { x_axis: x, y_axis: y, z_axis: z } = matrix;
     let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign
 }
 
-/// Has normals follow the poses of their parts.
+/// Rotates the normals of each part by the part's pose.
 fn turn_normals(fields: &mut [Field], parts: &[(&PointCloud, DMat4)]) {
     let mut start = 0;
     for (cloud, pose) in parts {
@@ -130,7 +131,8 @@ fn turn_normals(fields: &mut [Field], parts: &[(&PointCloud, DMat4)]) {
     }
 }
 
-/// Turns the normals of those of `points` that `which` says yes to, if there are any of floats.
+/// Rotates the normals of those `points` for which `which` is true, if all three normal fields are floats. Lengths are
+/// kept.
 pub(crate) fn turn(fields: &mut [Field], points: Range<usize>, pose: &DMat4, which: impl Fn(usize) -> bool + Sync) {
     let find = |name: &str| {
         fields.iter().position(|Field { name: own, values }| {
@@ -157,10 +159,10 @@ pub(crate) fn turn(fields: &mut [Field], points: Range<usize>, pose: &DMat4, whi
     }
 }
 
-/// What `f32` loses of a position.
+/// What rounding a position to `f32` loses.
 pub(crate) fn residual(position: DVec3) -> [f32; 3] {
     let lost = (position - position.as_vec3().as_dvec3()).as_vec3();
-    // Nothing is to be added to what is infinite or no number.
+    // Infinite and NaN positions have no residual.
     if lost.is_finite() { lost.to_array() } else { [0.0; 3] }
 }
 
@@ -177,7 +179,7 @@ fn common_origin(parts: &[(&PointCloud, DMat4)]) -> DVec3 {
     far.unwrap_or(DVec3::ZERO)
 }
 
-/// The field `name` of all parts one after the other, if all have it.
+/// The concatenated field `name` of all parts, if every part has one.
 fn common_field(parts: &[(&PointCloud, DMat4)], name: &str) -> Option<Field> {
     let own = |cloud: &PointCloud| cloud.fields().iter().position(|field| field.name == name);
     let all = parts.iter().map(|(cloud, _)| Some(&cloud.fields()[own(cloud)?].values)).collect::<Option<Vec<_>>>()?;

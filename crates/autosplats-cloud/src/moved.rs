@@ -1,4 +1,4 @@
-//! Some points of a cloud: taken out as a cloud of their own, or moved within it.
+//! Some points of a cloud: copied to a cloud of their own, or moved within the cloud.
 
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
@@ -10,7 +10,7 @@ use crate::{
 };
 
 impl PointCloud {
-    /// A cloud of the points with the indices given, which have to ascend, with all attributes.
+    /// Copies the points with the given indices, in ascending order, with all attributes to a new cloud.
     ///
     /// # Panics
     /// If an index is not below [`len`](Self::len).
@@ -37,11 +37,12 @@ impl PointCloud {
         }
     }
 
-    /// Moves the points that `which` says yes to, by an affine map of world coordinates, in `f64`; the others keep their
-    /// bits. Normals of floats are turned with their points, scans stay where they were.
+    /// Moves the points for which `which` is true by an affine map of world coordinates, in `f64`. All other points
+    /// keep their exact positions. Normals of floats are rotated with their points; scans stay where they are.
     ///
-    /// What `f32` loses goes to the residuals if the cloud has some; give it [zeros](Self::with_residuals) before, where
-    /// all digits matter. With a map, for a cloud in degrees, `matrix` is one of metres on it.
+    /// Rounding errors go to the residuals if the cloud has some. To keep all digits, set [zero
+    /// residuals](Self::with_residuals) first. For a cloud in degrees pass the map `local`; `matrix` then applies to
+    /// metres on that map.
     pub fn move_points(&mut self, which: impl Fn(usize) -> bool + Sync, matrix: &DMat4, local: Option<&LocalMetres>) {
         let moved = |place: DVec3| match local {
             None => matrix.transform_point3(place),
@@ -68,7 +69,7 @@ impl PointCloud {
 }
 
 impl FieldValues {
-    /// The values with the indices given.
+    /// The values with the given indices.
     fn pick(&self, points: &[u32]) -> Self {
         macro_rules! each {
             ($($variant:ident),*) => {
@@ -88,7 +89,7 @@ mod tests {
     use super::*;
     use crate::{Crs, Unit};
 
-    /// Points on a line, far from zero, each with its index and a normal, seen by two sensors.
+    /// Points on a line far from zero, each with its index and a normal, seen by two sensors.
     fn cloud() -> PointCloud {
         let scan = |points| Scan { name: None, world_from_sensor: DMat4::IDENTITY, points };
         let line = (0..100).map(|i| [i as f32, 0.5, 0.25]).collect();
@@ -124,7 +125,7 @@ mod tests {
         for i in 0..100 {
             let expected =
                 if i % 2 == 1 { quarter.transform_point3(before.world_position(i)) } else { before.world_position(i) };
-            // Two f32 have 48 bits, of the three million from the origin here.
+            // Two `f32` have 48 bits; the points lie three million units from the origin.
             assert!(after.world_position(i).abs_diff_eq(expected, 1e-8), "point {i}");
             let [x, y] = ["NormalX", "NormalY"].map(|name| after.field(name).map(|field| field.values.get(i)));
             let (sin, cos) = if i % 2 == 1 { 0.5_f64.sin_cos() } else { (0.0, 1.0) };
@@ -151,7 +152,7 @@ mod tests {
         let before = local.metres(cloud.world_position(1));
         cloud.move_points(|i| i == 1, &DMat4::from_translation(DVec3::new(3.0, 4.0, 5.0)), Some(&local));
         let way = local.metres(cloud.world_position(1)) - before;
-        // One step of f64 at 50 degrees is less than a nanometre.
+        // One step of `f64` at 50 degrees is less than a nanometre.
         assert!(way.abs_diff_eq(DVec3::new(3.0, 4.0, 5.0), 1e-8), "{way}");
         assert_eq!(cloud.world_position(0), DVec3::new(10.0, 50.0, 100.0), "the other stays");
         assert_eq!(cloud.crs().unit, Some(Unit::Degree), "in degrees still");

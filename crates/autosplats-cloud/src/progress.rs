@@ -1,35 +1,33 @@
-//! How a caller follows and stops long work.
+//! How a caller follows and cancels long work.
 
 use crate::{Error, PointCloud};
 
-/// Told how far reading or writing has come and what was noticed, and asked whether to go on.
+/// Receives the progress and the notes of reading or writing, and may cancel the work.
 ///
-/// `()` implements it: nothing is reported and nothing is cancelled.
+/// `()` implements the trait: it reports nothing and never cancels.
 pub trait Progress: Sync {
-    /// Called now and then with the part of the work that is done, 0 to 1, never falling.
+    /// Called now and then with the finished fraction of the work, 0 to 1, which never falls.
     fn report(&self, fraction: f32);
 
-    /// Whether to stop; asked many times a second. The work then ends with [`Error::Cancelled`].
+    /// Whether to stop; asked many times a second. Cancelled work ends with [`Error::Cancelled`].
     fn cancelled(&self) -> bool {
         false
     }
 
-    /// Called with what the user should know though it is no error: what was dropped, guessed or cannot be kept. One
+    /// Called with a note for the user that is no error: what was dropped, guessed or cannot be kept. A note is one
     /// line, without the file's name.
     fn note(&self, _note: &str) {}
 
-    /// Whether [`chunk`](Self::chunk) is to be called.
+    /// Whether [`chunk`](Self::chunk) shall be called.
     fn wants_chunks(&self) -> bool {
         false
     }
 
-    /// Called with points as they are read, in the file's order, about a million at a time, so that they can be shown
-    /// before the file ends.
+    /// Called with points while the file is read, in the file's order, about a million at a time.
     ///
-    /// Chunks are a preview: each has its own origin, colours are scaled by the chunk alone, and points without a return
-    /// are still there. The vertices of OBJ, STL and glTF come without their attributes and when all of them are known;
-    /// depth images, each of which is one picture, come only whole. The cloud that reading returns in the end is the
-    /// result.
+    /// Chunks are a preview. Each has its own origin, colours scaled by that chunk alone, and still contains points
+    /// without a return. The vertices of OBJ, STL and glTF come without attributes, once all of them are known. Depth
+    /// images have no chunks. The cloud that reading returns is the result.
     fn chunk(&self, _points: PointCloud) {}
 }
 
@@ -37,7 +35,7 @@ impl Progress for () {
     fn report(&self, _fraction: f32) {}
 }
 
-/// Reports `fraction` and stops if the caller wants that.
+/// Reports `fraction`, or fails with [`Error::Cancelled`] if the caller cancels.
 pub(crate) fn tick(progress: &dyn Progress, fraction: f32) -> Result<(), Error> {
     if progress.cancelled() {
         return Err(Error::Cancelled);
@@ -46,7 +44,7 @@ pub(crate) fn tick(progress: &dyn Progress, fraction: f32) -> Result<(), Error> 
     Ok(())
 }
 
-/// A part of some work, which reports for itself from 0 to 1.
+/// Progress of one step of the work: maps the step's 0 to 1 to a range of the whole.
 pub(crate) struct Part<'a> {
     pub(crate) whole: &'a dyn Progress,
     pub(crate) start: f32,

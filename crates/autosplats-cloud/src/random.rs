@@ -1,21 +1,22 @@
-//! Counter-based randomness: the same numbers for the same thing, whichever thread asks.
+//! Counter-based random numbers: the same for the same index, whichever thread asks.
 
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-/// Random numbers (splitmix) of one thing, a point or a ray.
+/// Random numbers (splitmix64) of one item, such as a point or a ray.
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// Of the thing with this number; another seed makes other numbers of all.
+    /// The numbers of item `number`. Another seed changes the numbers of all items.
     pub(crate) fn new(seed: u64, number: u64) -> Self {
         let mut random = Self(seed ^ number.wrapping_mul(0xD134_2543_DE82_EF95));
         random.bits();
         random
     }
 
-    /// Of the thing with this number, as generated scenes have them: other numbers would be other points.
+    /// The numbers of item `number` in generated scenes. This seeding is fixed: other numbers would change the scenes'
+    /// points.
     pub(crate) fn of_scene(number: u64) -> Self {
         let mut seed = Self(number ^ 0x5EED_A570_5B1A_7500);
         Self(seed.bits())
@@ -29,23 +30,23 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in 0..1.
+    /// A uniform number in 0..1.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
-    /// Uniform in 0..n.
+    /// A uniform integer in 0..n.
     pub(crate) fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n - 1)
     }
 
-    /// Of the normal distribution, by Box and Muller.
+    /// A normally distributed number, by the Box-Muller method.
     pub(crate) fn normal(&mut self) -> f64 {
         let (length, turn) = (1.0 - self.unit(), self.unit());
         (-2.0 * length.ln()).sqrt() * (TAU * turn).cos()
     }
 
-    /// Of length one.
+    /// A uniformly distributed unit vector.
     pub(crate) fn direction(&mut self) -> DVec3 {
         let (height, turn) = (2.0 * self.unit() - 1.0, TAU * self.unit());
         let width = (1.0 - height * height).sqrt();

@@ -1,11 +1,11 @@
-//! Points taken out of a cloud.
+//! Removing points from a cloud.
 
 use rayon::prelude::*;
 
 use crate::{PointCloud, cloud::each_type, identity::Identity};
 
 impl PointCloud {
-    /// Keeps the points that `keep` says yes to, by their index, with all attributes and in the same order.
+    /// Keeps the points for which `keep`, called with their index, is true. Order and attributes are kept.
     pub fn retain(&mut self, keep: impl Fn(usize) -> bool + Sync + Send) {
         let keep: Vec<bool> = (0..self.len()).into_par_iter().map(keep).collect();
         if keep.iter().all(|&keep| keep) {
@@ -25,8 +25,8 @@ impl PointCloud {
         }
     }
 
-    /// Has the scans follow their points. There may be as many scans as points, so that all their ends are found on one
-    /// way through the points.
+    /// Updates the ranges of the scans. There may be as many scans as points, so one pass over the points finds all
+    /// range ends.
     fn move_scans(&mut self, keep: &[bool]) {
         let mut ends: Vec<usize> = self.scans.iter().flat_map(|scan| [scan.points.start, scan.points.end]).collect();
         ends.sort_unstable();

@@ -1,15 +1,16 @@
-//! Fewer points, and noisier ones.
+//! Fewer points, and noisier points.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::{Error, PointCloud, Progress, identity::Identity, merge::residual, progress::tick};
 
-/// Blocks of points between two looks at the caller's wish to stop.
+/// Points processed between two checks for cancellation.
 const BLOCK: usize = 1 << 20;
 
 impl PointCloud {
-    /// Keeps the points within a box of world coordinates, its faces included. Points without a finite position go.
+    /// Keeps the points inside a box of world coordinates, faces included. Points without a finite position are
+    /// removed.
     pub fn crop(&mut self, min: DVec3, max: DVec3) {
         let inside: Vec<bool> = (0..self.len())
             .into_par_iter()
@@ -30,13 +31,13 @@ impl PointCloud {
         self.retain(|i| i.is_multiple_of(step));
     }
 
-    /// Keeps one point for each cube of edge length `size` that has any: the one nearest to the mean of the cube's
-    /// points, with its own position and attributes. Cubes are counted from world coordinate zero, so that clouds of one
-    /// place are thinned alike. Points without a finite position go.
+    /// Keeps one point per occupied cube of edge length `size`, in the file's unit: the point nearest to the mean of
+    /// the cube's points. Position and attributes of that point stay unchanged. Cubes are aligned with world coordinate
+    /// zero, so clouds of the same place are thinned alike. Points without a finite position are removed.
     ///
     /// # Errors
-    /// [`Error::BadValue`] if `size` is not above zero, or so small that cubes cannot be counted;
-    /// [`Error::Cancelled`] if `progress` says so.
+    /// [`Error::BadValue`] if `size` is not above zero, or so small that cube indices overflow; [`Error::Cancelled`] if
+    /// `progress` says so.
     pub fn thin_by_voxel(&mut self, size: f64, progress: &dyn Progress) -> Result<(), Error> {
         if !(size > 0.0 && size.is_finite()) {
             return Err(Error::BadValue { name: "voxel size", value: size, rule: "above 0" });
@@ -53,7 +54,7 @@ impl PointCloud {
             return Err(Error::BadValue { name: "voxel size", value: size, rule: "larger for these coordinates" });
         }
         tick(progress, 0.2)?;
-        // Points of a cube side by side, in the file's order.
+        // Sorting puts the points of a cube side by side, in the file's order.
         cells.par_sort_unstable();
         tick(progress, 0.8)?;
         let mut keep = vec![false; self.len()];
@@ -71,8 +72,8 @@ impl PointCloud {
         tick(progress, 1.0)
     }
 
-    /// Moves every point by normally distributed noise of standard deviation `sigma` along each axis, in the unit of the
-    /// positions; the same for the same `seed`.
+    /// Adds normally distributed noise of standard deviation `sigma` to every point, along each axis, in the file's
+    /// unit. The same `seed` gives the same noise.
     ///
     /// # Errors
     /// [`Error::BadValue`] if `sigma` is not zero or above; [`Error::Cancelled`] if `progress` says so.
@@ -98,11 +99,11 @@ impl PointCloud {
     }
 }
 
-/// Three numbers of the normal distribution, by Box and Muller's method.
+/// Three normally distributed numbers, by the Box-Muller method.
 fn normal(seed: u64, index: u64) -> DVec3 {
     let mut state = seed ^ index.wrapping_mul(0xd134_2543_de82_ef95);
     let mut unit = || {
-        // Splitmix; the result is above 0 and at most 1.
+        // Splitmix64; the result is above 0 and at most 1.
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,16 +1,17 @@
-//! The keys of GeoTIFF headers, which LAS 1.0 to 1.3 use for coordinate systems.
+//! Keys of GeoTIFF headers, which LAS 1.0 to 1.3 use for coordinate systems.
 
 use super::{Crs, Found, Unit};
 
-/// Keys of a GeoTIFF header with their parameters, as the three tags have them.
+/// Keys of a GeoTIFF header with their parameters, as stored in its three tags.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GeoKeys {
-    /// The directory: version, revision, minor revision, number of keys; then for each key its number, the tag where its
-    /// value is (0 for here), the count of values, and the value or the index of the first.
+    /// The key directory: version, revision, minor revision, number of keys; then four numbers per key. These are the
+    /// key's number, the tag of its value (0: in the directory), the count of values, and the value or the index of the
+    /// first.
     pub directory: Vec<u16>,
-    /// The doubles that keys point to.
+    /// The floating-point values that keys refer to.
     pub doubles: Vec<f64>,
-    /// The texts that keys point to, each ending with `|`.
+    /// The texts that keys refer to, each ending with `|`.
     pub ascii: String,
 }
 
@@ -25,15 +26,15 @@ const LINEAR_UNIT: u16 = 3076;
 const LINEAR_UNIT_SIZE: u16 = 3077;
 const VERTICAL_UNIT: u16 = 4099;
 
-/// Tags that values are in.
+/// Tag numbers of floating-point values and of texts.
 const DOUBLES_TAG: u16 = 34736;
 const ASCII_TAG: u16 = 34737;
 
-/// The code that stands for a definition of one's own.
+/// Code of a user-defined system.
 const USER_DEFINED: u16 = 32767;
 
 impl GeoKeys {
-    /// Takes the three tags as they lie in a file.
+    /// Decodes the contents of the three tags.
     pub(crate) fn from_bytes(directory: &[u8], doubles: &[u8], ascii: &[u8]) -> Self {
         Self {
             directory: directory.as_chunks().0.iter().map(|raw| u16::from_le_bytes(*raw)).collect(),
@@ -47,7 +48,7 @@ impl GeoKeys {
         self.directory.as_chunks().0.iter().skip(1).take(count.into()).copied()
     }
 
-    /// The value of a key that is a number here.
+    /// The value of a key that is stored in the directory itself.
     fn number(&self, key: u16) -> Option<u16> {
         self.keys().find(|[id, tag, ..]| (*id, *tag) == (key, 0)).map(|[.., value]| value)
     }
@@ -67,7 +68,7 @@ impl GeoKeys {
         (!text.is_empty()).then_some(text)
     }
 
-    /// What the keys say.
+    /// Decodes the coordinate system.
     pub(crate) fn read(&self) -> Found {
         let code = |key| self.number(key).filter(|&code| code != 0 && code != USER_DEFINED).map(u32::from);
         let model = self.number(MODEL);
@@ -79,7 +80,7 @@ impl GeoKeys {
             code(LINEAR_UNIT).and_then(Unit::of_epsg).or_else(own).or_else(|| projected.and_then(unit_of_utm))
         };
         let unit = if geographic {
-            // Degrees are what is meant when nothing is said.
+            // The default angular unit is the degree.
             match code(ANGULAR_UNIT) {
                 None => Some(Unit::Degree),
                 Some(unit) => Unit::of_epsg(unit),
@@ -104,7 +105,7 @@ impl GeoKeys {
         Found { crs, geocentric: model == Some(3), heights: vertical }
     }
 
-    /// Keys that say what is known of a system.
+    /// Keys that state what is known of a coordinate system.
     pub(crate) fn describe(crs: &Crs) -> Self {
         let degrees = crs.unit == Some(Unit::Degree);
         let code = crs.epsg.and_then(|code| u16::try_from(code).ok()).unwrap_or(USER_DEFINED);
@@ -128,7 +129,7 @@ impl GeoKeys {
     }
 }
 
-/// The metre, for the codes of the common UTM zones: on WGS 84, ETRS89, NAD83.
+/// Metre, if the code is that of a UTM zone on WGS 84, ETRS89 or NAD83.
 fn unit_of_utm(epsg: u32) -> Option<Unit> {
     let utm = matches!(epsg, 32601..=32660 | 32701..=32760 | 25828..=25838 | 26901..=26923);
     utm.then_some(Unit::Metre)

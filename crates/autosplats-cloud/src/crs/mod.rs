@@ -1,52 +1,52 @@
-//! Coordinate systems: what the numbers of a file mean.
+//! Coordinate systems.
 
 pub(crate) mod geotiff;
 mod wkt;
 
-/// What a file says of its coordinate system. Nothing is converted by it; it tells people and other programs.
+/// The coordinate system that a file states. Readers do not convert coordinates.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Crs {
     /// Name for people.
     pub name: Option<String>,
-    /// Code in the EPSG registry, of the horizontal or compound system.
+    /// EPSG code of the horizontal or compound system.
     pub epsg: Option<u32>,
-    /// The whole definition as OGC well-known text.
+    /// Complete definition as OGC well-known text (WKT).
     pub wkt: Option<String>,
     /// Unit of x and y.
     pub unit: Option<Unit>,
-    /// Unit of z, where it is not that of x and y.
+    /// Unit of z, if it differs from the unit of x and y.
     pub vertical_unit: Option<Unit>,
-    /// The keys of a GeoTIFF header, where the file has the definition as such; they are written again.
+    /// Keys of a GeoTIFF header, if the file has one; they are written again.
     pub geotiff: Option<GeoKeys>,
 }
 
 pub use self::geotiff::GeoKeys;
 
-/// What is found out about a coordinate system.
+/// What a definition of a coordinate system states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Found {
     pub(crate) crs: Crs,
-    /// Whether coordinates are from the middle of the earth.
+    /// Whether coordinates are geocentric: measured from the centre of the earth.
     pub(crate) geocentric: bool,
-    /// Unit of z where it is said, even if it is that of x and y.
+    /// Unit of z, if stated, even if it is the unit of x and y.
     pub(crate) heights: Option<Unit>,
 }
 
 impl Crs {
-    /// What well-known text, of version 1 or 2, says. Text that cannot be understood is kept as it is.
+    /// Parses well-known text of version 1 or 2. Text that cannot be parsed is kept in `wkt`.
     pub fn from_wkt(text: &str) -> Self {
         Found::from_wkt(text).crs
     }
 }
 
 impl Found {
-    /// What well-known text says.
+    /// Parses well-known text.
     pub(crate) fn from_wkt(text: &str) -> Self {
         wkt::read(text)
     }
 }
 
-/// What a coordinate of 1 is.
+/// Unit of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Metre.
@@ -62,14 +62,14 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// The unit of so many metres, if it is one of these.
+    /// The unit of this length, if it is known.
     pub(crate) fn of_metres(metres: f64) -> Option<Self> {
         // The two feet differ in the sixth digit.
         let same = |unit: &Self| unit.metres().is_some_and(|own| (own / metres - 1.0).abs() < 1e-7);
         [Self::Metre, Self::Millimetre, Self::Foot, Self::UsSurveyFoot].into_iter().find(same)
     }
 
-    /// The unit with a code in the EPSG registry.
+    /// The unit with this EPSG code.
     pub(crate) fn of_epsg(code: u32) -> Option<Self> {
         match code {
             9001 => Some(Self::Metre),
@@ -81,7 +81,7 @@ impl Unit {
         }
     }
 
-    /// Its code in the EPSG registry.
+    /// EPSG code.
     pub(crate) fn epsg(self) -> u16 {
         match self {
             Self::Metre => 9001,
@@ -92,7 +92,7 @@ impl Unit {
         }
     }
 
-    /// Length in metres; nothing for degrees.
+    /// Length in metres; `None` for degrees.
     pub fn metres(self) -> Option<f64> {
         match self {
             Self::Metre => Some(1.0),
@@ -103,7 +103,7 @@ impl Unit {
         }
     }
 
-    /// The name for people.
+    /// Name for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Metre => "metre",

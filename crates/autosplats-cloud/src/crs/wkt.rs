@@ -1,11 +1,12 @@
-//! Well-known text of coordinate systems, versions 1 and 2: as much as names, codes and units need.
+//! Well-known text of coordinate systems, versions 1 and 2, as far as names, codes and units need it.
 //!
-//! The text is a tree: a keyword with values in brackets, some of which are keywords with values themselves.
+//! The text is a tree: a keyword with values in brackets, some of which are keywords with values again.
 
 use super::{Crs, Found, Unit};
 
-/// Depth of brackets and length of text beyond which it is rather broken than rich.
+/// Largest depth of brackets; deeper text is not parsed.
 const MAX_DEPTH: usize = 32;
+/// Largest length of parsed text, in bytes.
 const MAX_LEN: usize = 1 << 20;
 
 /// A keyword with its values.
@@ -15,7 +16,7 @@ struct Node<'a> {
 }
 
 enum Value<'a> {
-    /// In quotes, or bare as numbers are.
+    /// Quoted text, or a bare word such as a number.
     Text(&'a str),
     Node(Node<'a>),
 }
@@ -55,7 +56,7 @@ impl Node<'_> {
         epsg.next()?.text(1)?.trim().parse().ok()
     }
 
-    /// The unit among the values of a system or an axis.
+    /// The unit stated by a system or an axis.
     fn unit(&self) -> Option<Unit> {
         let unit = self.child(&["UNIT", "LENGTHUNIT", "ANGLEUNIT"])?;
         let factor: f64 = unit.text(1)?.trim().parse().ok()?;
@@ -63,14 +64,14 @@ impl Node<'_> {
         if (factor / degree - 1.0).abs() < 1e-6 { Some(Unit::Degree) } else { Unit::of_metres(factor) }
     }
 
-    /// The unit of an axis, which may have its own.
+    /// The unit of axis `index`: its own, or that of the system.
     fn axis_unit(&self, index: usize) -> Option<Unit> {
         let own = self.children().filter(|child| child.is(&["AXIS"])).nth(index).and_then(Node::unit);
         own.or_else(|| self.unit())
     }
 }
 
-/// What the text says.
+/// Parses a definition; `text` is kept even if it cannot be parsed.
 pub(super) fn read(text: &str) -> Found {
     let text = text.trim_end_matches('\0').trim();
     let mut found = Found { crs: Crs { wkt: Some(text.to_owned()), ..Crs::default() }, ..Found::default() };
@@ -89,7 +90,7 @@ pub(super) fn read(text: &str) -> Found {
     found
 }
 
-/// Takes name, code and units of a system; of compound ones those of the parts, for what the whole does not say.
+/// Stores name, code and units of a system. Parts of a compound system add only what is still unknown.
 fn system(node: &Node<'_>, found: &mut Found) {
     let crs = &mut found.crs;
     if node.is(&["BOUNDCRS", "SOURCECRS", "COORDINATEOPERATION"]) {
@@ -110,21 +111,21 @@ fn system(node: &Node<'_>, found: &mut Found) {
         crs.unit = node.axis_unit(0);
     } else if !node.is(&["AUTHORITY", "ID"]) && crs.unit.is_none() {
         crs.unit = node.axis_unit(0);
-        // The third axis of a system of three.
+        // The third axis of a three-dimensional system.
         if node.children().filter(|child| child.is(&["AXIS"])).count() > 2 {
             crs.vertical_unit = node.axis_unit(2).filter(|unit| *unit != Unit::Degree);
         }
     }
 }
 
-/// Whether a geodetic system of version 2 has axes from the middle of the earth.
+/// Whether a geodetic system of version 2 is geocentric.
 fn is_cartesian_3d(node: &Node<'_>) -> bool {
     let geodetic = node.is(&["GEODCRS", "GEODETICCRS", "GEOGCRS"]);
     let cartesian = |cs: &Node<'_>| cs.text(0).is_some_and(|kind| kind.trim().eq_ignore_ascii_case("cartesian"));
     geodetic && node.child(&["CS"]).is_some_and(cartesian)
 }
 
-/// The tree, if the text begins as one; what follows it is left alone, brackets that are missing at the end are forgiven.
+/// The tree at the start of the text. Text after the tree is ignored; brackets missing at the end are added.
 fn parse(text: &str) -> Option<Node<'_>> {
     let mut open: Vec<Node<'_>> = Vec::new();
     let mut rest = text;

@@ -1,16 +1,16 @@
-//! Points strewn evenly over the triangles of a mesh.
+//! Evenly distributed points on the triangles of a mesh.
 //!
 //! # How it works
 //!
-//! A curve is laid through the whole surface: from triangle to triangle in an order that keeps neighbours together, and
-//! within each as a Sierpiński curve, which halves it again and again. The way along the curve is measured in area. Cut
-//! into as many equal pieces as points are wanted, it makes patches of equal area that hang together, and each patch
-//! gets one point, near its middle. So the density is exactly even, and there are neither clumps nor holes, as random
-//! points have them. Choosing among many more random points (dart throwing, sample elimination) covers yet more evenly,
-//! but takes a search among neighbours, in an order that threads would have to keep; here every point is on its own.
+//! A curve runs through the whole surface. It visits the triangles in an order that keeps neighbours together. Within a
+//! triangle the curve is a Sierpiński curve, which halves the triangle again and again. Position along the curve is
+//! measured in area. Cut into `count` equal pieces, the curve yields connected patches of equal area, and each patch
+//! gets one point near its middle. The density is exactly even, without the clumps and holes of random points. Dart
+//! throwing and sample elimination cover more evenly still. But they search neighbours in a fixed order, while here
+//! each point is computed on its own.
 //!
-//! The middle of a part of a triangle is had in closed form: halves that lie before a place on the curve add their
-//! centres, weighted by area, and only the half that the place is in is looked into.
+//! The centroid of a part of a triangle has a closed form. Halves before a position on the curve add their centroids,
+//! weighted by area. Only the half that contains the position is subdivided.
 
 mod strewn;
 
@@ -21,29 +21,32 @@ use self::strewn::Place;
 pub(crate) use self::strewn::Strewn;
 use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress, random::Random};
 
-/// Points made between two looks at the caller's wish to stop.
+/// Points computed between two checks for cancellation.
 const BLOCK: usize = 1 << 18;
 
-/// Points that one thread makes at a time.
+/// Points that one thread computes at a time.
 const PIECE: usize = 1 << 12;
 
-/// How far a point is drawn from the middle of its patch to a random place in it, so that no pattern is seen.
+/// How far a point moves from the middle of its patch towards a random place in the patch, so that no pattern shows.
 const JITTER: f64 = 0.3;
 
-/// Part of a patch that is large enough to have the point in its own middle. The nearest place to the middle of all parts
-/// would be on an edge, where the points of other patches come to lie too.
+/// Share of a patch's area from which a triangle's part of the patch gets the point in its own middle. With smaller
+/// parts the place nearest to the patch's middle is used. That place lies on an edge, where points of other patches may
+/// lie too.
 const LARGE: f64 = 0.3;
 
 /// Halvings beyond those that make a piece as small as a patch.
 const FINER: i32 = 6;
 
-/// Strews exactly `count` points over the triangles of `mesh`, evenly by area: each has a patch of the same area for its
-/// own. Colours and fields of floats are interpolated, other fields are those of the nearest corner; normals get length
-/// one. Origin, axes and coordinate system are the mesh's. Triangles without area, or with corners that are not finite
-/// or do not exist, get no points. The same `seed` gives the same points, however many threads there are.
+/// Samples exactly `count` points on the triangles of `mesh`, evenly by area. Every point has a patch of the same area.
+///
+/// Colours and float fields are interpolated; other fields take the value of the nearest corner; normals get unit
+/// length. Origin, axes and coordinate system are the mesh's. Triangles without area, or with missing or non-finite
+/// corners, get no points. The same `seed` gives the same points on any number of threads.
 ///
 /// # Errors
-/// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
+/// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says
+/// so.
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let sampled = Strewn::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
     progress::tick(progress, 1.0)?;
@@ -51,7 +54,7 @@ pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn P
 }
 
 impl Strewn {
-    /// Places for `count` points on `mesh`.
+    /// Computes places for `count` points on `mesh`.
     pub(crate) fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
         progress::tick(progress, 0.0)?;
         let cloud = &mesh.cloud;
@@ -81,7 +84,7 @@ impl Strewn {
     }
 }
 
-/// Corners in space; the curve goes from the first to the second.
+/// Corners in space. The curve runs from the first to the second.
 #[derive(Clone, Copy)]
 struct Triangle([DVec3; 3]);
 
@@ -96,7 +99,7 @@ impl Triangle {
         a + (b - a) * f64::from(second) + (c - a) * f64::from(third)
     }
 
-    /// Weights of the second and third corner at the place nearest to `point`.
+    /// Weights of the second and third corner at the place of the triangle nearest to `point`.
     fn nearest(&self, point: DVec3) -> DVec2 {
         let [a, b, c] = self.0;
         let (ab, ac, ap) = (b - a, c - a, point - a);
@@ -118,13 +121,13 @@ impl Triangle {
     }
 }
 
-/// Weights of the second and third corner, at the corners of a piece of a triangle through which the curve goes from the
-/// first to the second.
+/// A piece of a triangle: each of its corners as weights of the triangle's second and third corner. The curve runs
+/// through the piece from its first corner to its second.
 type Piece = [DVec2; 3];
 
 const WHOLE: Piece = [DVec2::ZERO, DVec2::X, DVec2::Y];
 
-/// The halves of a piece, as the curve goes through them.
+/// The two halves of a piece, in the curve's order.
 fn halves([from, to, apex]: Piece) -> [Piece; 2] {
     let middle = 0.5 * (from + to);
     [[from, apex, middle], [apex, to, middle]]
@@ -134,7 +137,7 @@ fn centre([a, b, c]: Piece) -> DVec2 {
     (a + b + c) / 3.0
 }
 
-/// The integral of the place over the first part `way` of the curve through a triangle of area one.
+/// Integral of the place over the first part `way`, 0 to 1, of the curve through a triangle of area one.
 fn moment(mut way: f64, depth: i32) -> DVec2 {
     let (mut piece, mut area, mut sum) = (WHOLE, 1.0, DVec2::ZERO);
     for _ in 0..depth {
@@ -152,7 +155,7 @@ fn moment(mut way: f64, depth: i32) -> DVec2 {
     sum + area * way * centre(piece)
 }
 
-/// The place at `way` along the curve, 0 to 1.
+/// Place at `way`, 0 to 1, along the curve through a triangle.
 fn place(mut way: f64, depth: i32) -> DVec2 {
     let mut piece = WHOLE;
     for _ in 0..depth {
@@ -164,12 +167,12 @@ fn place(mut way: f64, depth: i32) -> DVec2 {
     centre(piece)
 }
 
-/// The triangles that have an area, in the order of the curve.
+/// The triangles that have an area, in the curve's order.
 struct Surface<'a> {
     mesh: &'a Contents,
-    /// Corners in the sense of the curve.
+    /// Corners, ordered such that the curve runs from the first to the second.
     triangles: Vec<[u32; 3]>,
-    /// Areas of all triangles up to and including each.
+    /// Cumulative area up to and including each triangle.
     ways: Vec<f64>,
 }
 
@@ -219,8 +222,7 @@ impl<'a> Surface<'a> {
         self.ways.last().copied().unwrap_or(0.0)
     }
 
-    /// Sorts triangles along a Hilbert curve through space, which keeps neighbours together better than any other order
-    /// of boxes.
+    /// Sorts triangles along a Hilbert curve through space, which keeps neighbours together.
     fn sort(&self, triangles: &mut [[u32; 3]]) {
         let middle = |corners: &[u32; 3]| {
             let [a, b, c] = self.triangle_of(corners).0;
@@ -237,8 +239,8 @@ impl<'a> Surface<'a> {
         triangles.par_sort_by_cached_key(key);
     }
 
-    /// Which way the curve goes through each triangle: along the longest edge, so that halves are no needles, and out
-    /// where the next triangle is nearer.
+    /// How the curve passes through each triangle: along the longest edge, so that halves are no needles, and in the
+    /// direction that leaves nearer to the next triangle.
     fn entrances(&self, triangles: &[[u32; 3]]) -> Vec<u8> {
         let turn = |index: usize| {
             let [a, b, c] = self.triangle_of(&triangles[index]).0;
@@ -261,15 +263,15 @@ impl<'a> Surface<'a> {
         (0..triangles.len()).into_par_iter().map(turn).collect()
     }
 
-    /// The places of some of `count` points.
+    /// Places of the points `range` out of `count`.
     fn places(&self, range: std::ops::Range<usize>, count: usize, seed: u64) -> Vec<Place> {
         let patch = self.area() / count as f64;
         let mut triangle = self.ways.partition_point(|&way| way <= patch * range.start as f64);
         range.map(|i| self.place(i, patch, &mut triangle, seed)).collect()
     }
 
-    /// A place near the middle of patch `i`, which begins in `triangle` or after it; that is moved to where the patch
-    /// ends.
+    /// A place near the middle of patch `i`. `triangle` is at or before the triangle in which the patch begins, and is
+    /// moved to the triangle in which the patch ends.
     fn place(&self, i: usize, patch: f64, triangle: &mut usize, seed: u64) -> Place {
         let (start, end) = (patch * i as f64, patch * (i + 1) as f64);
         let last = self.triangles.len() - 1;
@@ -313,8 +315,8 @@ impl<'a> Surface<'a> {
         self.jittered(index, weights, start, end, patch, random)
     }
 
-    /// The part of a triangle that lies between two places on the way: where it begins and ends along the curve through
-    /// the triangle, 0 to 1.
+    /// The part of triangle `index` that lies between two positions on the curve: its start and end along the curve
+    /// through that triangle, 0 to 1.
     fn ends(&self, index: usize, start: f64, end: f64) -> [f64; 2] {
         let before = if index == 0 { 0.0 } else { self.ways[index - 1] };
         let area = self.ways[index] - before;
@@ -322,7 +324,7 @@ impl<'a> Surface<'a> {
         [way(start), way(end)]
     }
 
-    /// Area of such a part, and its middle.
+    /// Area and middle of the part of triangle `index` between two positions on the curve.
     fn part(&self, index: usize, start: f64, end: f64, patch: f64) -> (f64, DVec2) {
         let before = if index == 0 { 0.0 } else { self.ways[index - 1] };
         let area = self.ways[index] - before;
@@ -342,21 +344,21 @@ impl<'a> Surface<'a> {
         let [from, to] = self.ends(index, start, end);
         let way = from + (to - from) * random.unit();
         let weights = middle.lerp(place(way, depth(self.ways[index] - before, patch)), JITTER);
-        // Rounding must not carry a point out of its triangle.
+        // Rounding must not move a point out of its triangle.
         let (second, third) = (weights.x.clamp(0.0, 1.0), weights.y.clamp(0.0, 1.0));
         Place { triangle: index as u32, second: second as f32, third: third.min(1.0 - second) as f32 }
     }
 }
 
-/// Halvings of a triangle until its pieces are much smaller than a patch.
+/// Number of halvings of a triangle until its pieces are much smaller than a patch.
 fn depth(area: f64, patch: f64) -> i32 {
     (FINER + (area / patch).log2().ceil().clamp(0.0, 40.0) as i32).min(46)
 }
 
-/// Steps per axis of the Hilbert curve, as a power of two.
+/// Bits per axis of the Hilbert curve.
 const HILBERT_BITS: u32 = 16;
 
-/// How far along a Hilbert curve through a cube a cell lies (Skilling, "Programming the Hilbert curve", 2004).
+/// Position of a cell on a Hilbert curve through a cube (Skilling, "Programming the Hilbert curve", 2004).
 fn hilbert(mut cell: [u32; 3]) -> u64 {
     let mut bit = 1 << (HILBERT_BITS - 1);
     while bit > 1 {

@@ -1,4 +1,4 @@
-//! Points strewn over a mesh, wherever its vertices go.
+//! Sampled points of a mesh, which follow its vertices.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -6,25 +6,25 @@ use rayon::prelude::*;
 use super::Triangle;
 use crate::{Error, Field, FieldValues, PointCloud, Progress, progress};
 
-/// Places of points on the triangles of a mesh. The vertices may move: the points go with them.
+/// Places of points on the triangles of a mesh. The points follow the vertices if these move.
 pub(crate) struct Strewn {
-    /// Vertices of the mesh.
+    /// Number of vertices of the mesh.
     pub(super) vertices: usize,
-    /// Corners of the triangles that have points.
+    /// Corners of the triangles that have an area, in the curve's order.
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) places: Vec<Place>,
 }
 
 impl Strewn {
-    /// Whether the places are on a mesh of so many vertices.
+    /// Whether the places were computed on a mesh with this number of vertices.
     pub(crate) fn fits(&self, vertices: usize) -> bool {
         self.vertices == vertices
     }
 
-    /// The points, where the mesh has its vertices where `cloud` has them.
+    /// The points on the mesh whose vertices are at the positions of `cloud`.
     ///
     /// # Panics
-    /// If there are fewer than the mesh had.
+    /// If `cloud` has fewer points than the mesh had vertices.
     pub(crate) fn on(&self, cloud: &PointCloud, progress: &dyn Progress) -> Result<PointCloud, Error> {
         progress::tick(progress, 0.8)?;
         let world = |place: &Place| {
@@ -74,7 +74,7 @@ impl Strewn {
     }
 }
 
-/// A place on the surface: a triangle of those in order, and the weights of its second and third corners.
+/// A place on the surface: an index into `Strewn::triangles`, and the weights of the second and third corner.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) triangle: u32,
@@ -90,12 +90,12 @@ impl Place {
 
     fn mix(&self, [a, b, c]: [f64; 3]) -> f64 {
         let [first, second, third] = self.weights();
-        // A corner without weight may be no number.
+        // A corner of weight zero may be NaN.
         let part = |weight: f64, value: f64| if weight > 0.0 { weight * value } else { 0.0 };
         part(first, a) + part(second, b) + part(third, c)
     }
 
-    /// Which of the corners is nearest, by weight.
+    /// Index of the corner with the largest weight.
     fn nearest(&self) -> usize {
         let [first, second, third] = self.weights();
         if first >= second && first >= third {
@@ -108,7 +108,7 @@ impl Place {
     }
 }
 
-/// Interpolated normals are shorter than one.
+/// Makes interpolated normals unit vectors, because interpolation shortens them.
 fn normalize_normals(cloud: &mut PointCloud) {
     let find =
         |cloud: &PointCloud, name: &str| cloud.fields.iter().position(|field| field.name.eq_ignore_ascii_case(name));
