@@ -1,9 +1,9 @@
-//! Names of columns: what files call coordinates, colours and attributes, and what the caller says they are.
+//! Names of columns: coordinates, colours and attributes as files name them, and names that the caller gives.
 
 use super::{Job, shown, table::MAX_COLUMNS};
 use crate::Error;
 
-/// The names that the caller gives to the columns, nothing for one to leave out.
+/// The names that the caller gives to the columns; `None` for a column to leave out.
 pub(super) fn given(job: &Job<'_>) -> Result<Option<Vec<Option<String>>>, Error> {
     let Some(names) = &job.options.columns else { return Ok(None) };
     if names.len() > MAX_COLUMNS {
@@ -21,17 +21,17 @@ pub(super) fn given(job: &Job<'_>) -> Result<Option<Vec<Option<String>>>, Error>
     Ok(Some(names.iter().map(name).collect()))
 }
 
-/// Columns that a note lists.
+/// Largest number of columns that a note lists.
 const LISTED: usize = 24;
 
-/// What columns were taken for, for a note.
+/// Note that tells which names the columns got.
 pub(super) fn taken_for(names: &[Option<String>]) -> String {
     let shown = names.iter().map(|name| name.as_deref().map_or("-".into(), |name| shown(name.as_bytes())));
     let more = if names.len() > LISTED { format!(" and {} more", names.len() - LISTED) } else { String::new() };
     format!("columns taken for {}{more}; --columns overrides", shown.take(LISTED).collect::<Vec<_>>().join(" "))
 }
 
-/// Names of coordinates, the surer ones first.
+/// Names of x, y and z, the likeliest first.
 const AXES: [&[&str]; 3] = [
     &[
         "x",
@@ -83,24 +83,24 @@ const AXES: [&[&str]; 3] = [
     ],
 ];
 
-/// A name as it is compared: without case, blanks and signs between words.
+/// A name for comparison: lower case, letters and digits only.
 pub(super) fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// Where x, y and z are among the names, if they all are.
+/// Indices of x, y and z among the names, if all are there.
 pub(super) fn find_axes(names: &[String]) -> Option<[usize; 3]> {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let find = |axis: &[&str]| axis.iter().find_map(|name| plain.iter().position(|found| found == name));
     Some([find(AXES[0])?, find(AXES[1])?, find(AXES[2])?])
 }
 
-/// Whether this is how a longitude is called.
+/// Whether a name is one of longitude.
 pub(super) fn is_longitude(name: &str) -> bool {
     ["longitude", "lon", "long", "lng"].contains(&&*plain(name))
 }
 
-/// Names of the three channels of a colour; of several colours the first is taken.
+/// Names of the three channels of a colour. If a file has several colours, the first in this list is taken.
 const COLORS: [[&str; 3]; 5] = [
     ["red", "green", "blue"],
     ["diffusered", "diffusegreen", "diffuseblue"],
@@ -109,17 +109,17 @@ const COLORS: [[&str; 3]; 5] = [
     ["rf", "gf", "bf"],
 ];
 
-/// Where red, green and blue are among the names, if they all are.
+/// Indices of red, green and blue among the names, if all are there.
 pub(super) fn find_color(names: &[String]) -> Option<[usize; 3]> {
     let plain: Vec<String> = names.iter().map(|name| plain(name)).collect();
     let find = |name: &str| plain.iter().position(|found| found == name);
     COLORS.iter().find_map(|[red, green, blue]| Some([find(red)?, find(green)?, find(blue)?]))
 }
 
-/// PDAL's name for what files call by several; others stay as they are.
+/// PDAL's name of a field, if the field is known to PDAL; otherwise `name`.
 pub(super) fn field_name(name: &str) -> String {
     let plain = plain(name);
-    // CloudCompare writes the fields of a PLY with this before them.
+    // CloudCompare prefixes the fields of a PLY with `scalar`.
     let known = match plain.strip_prefix("scalar").unwrap_or(&plain) {
         "intensity" | "i" => "Intensity",
         "classification" | "class" => "Classification",
@@ -144,11 +144,12 @@ pub(super) fn field_name(name: &str) -> String {
     known.into()
 }
 
-/// Values that a field may have for each of them to become one of its own. Descriptors have more.
+/// Largest number of values per point for which each value of a field becomes a field of its own. Descriptors have
+/// more.
 pub(super) const MAX_COUNT: usize = 16;
 
-/// Names of the columns that a field of so many values is read as: none for padding, which `_` stands for, and for fields
-/// of too many.
+/// Names of the columns of a field with `count` values per point. Padding (`_`) and fields of more than [`MAX_COUNT`]
+/// values get none.
 pub(crate) fn numbered(name: &str, count: usize) -> Vec<String> {
     match count {
         _ if name == "_" => Vec::new(),

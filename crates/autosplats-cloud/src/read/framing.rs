@@ -1,17 +1,18 @@
-//! Files one after the other in a stream of bytes: where each begins and ends.
+//! Consecutive files in a stream of bytes: where each begins and ends.
 //!
 //! # How it works
 //!
-//! Only formats whose header tells how long they are can follow each other like this: PLY and PCD. Bytes come in any pieces
-//! and are looked at once. What cannot be the beginning of a file is skipped to the next that can, and told once.
+//! Only formats whose header states their length can follow each other: PLY and PCD. Bytes arrive in pieces of any size
+//! and are inspected once. Bytes that cannot begin a file are skipped up to the next possible beginning, and reported
+//! once.
 
 use super::{Job, MAX_HEADER_LINE, ReadOptions, pcd, ply, shown, text};
 use crate::{Error, error::message};
 
-/// Bytes of a header beyond which it is rather broken than long.
+/// Longest header, in bytes; a longer one means a broken file.
 const MAX_HEADER: usize = 16 * MAX_HEADER_LINE;
 
-/// What a file begins with, where one is looked for among other bytes.
+/// Beginnings of files that are searched for among other bytes.
 const MARKS: &[&[u8]] = &[
     b"ply\nformat ",
     b"ply\r\nformat ",
@@ -23,16 +24,16 @@ const MARKS: &[&[u8]] = &[
     b"VERSION ",
 ];
 
-/// What a file begins with where the one before ends.
+/// Beginnings of files that are accepted directly after a file.
 const BEGINNINGS: &[&[u8]] = &[b"ply\n", b"ply\r", b"ply ", b"#", b"VERSION ", b"FIELDS ", b"COLUMNS "];
 
-/// How long a file is behind its header.
+/// Length of a file after its header.
 pub(super) enum Body {
-    /// So many bytes.
+    /// This many bytes.
     Bytes(usize),
-    /// So many lines that hold more than blanks and comments.
+    /// This many lines, blank lines and comments not counted.
     Lines(usize),
-    /// Two numbers of 32 bits, the first of which is the number of bytes behind them.
+    /// Two 32-bit numbers, the first of which is the number of bytes after them.
     Sized,
     /// Records of unequal length.
     Records(ply::Records),
@@ -41,53 +42,53 @@ pub(super) enum Body {
 enum State {
     /// A file may begin here.
     Between,
-    /// What is here was told to be nothing.
+    /// Inside bytes that were reported as no file.
     Lost,
-    /// In a header, in the line that begins at `line`; none of its bytes before `looked` ends it.
+    /// Inside a header, in the line that begins at `line`. The line does not end before byte `looked`.
     Header { line: usize, looked: usize },
-    /// Behind the header. `at` is the first byte not counted yet, as a line or a record.
+    /// After the header. `at` is the first byte not yet counted as a line or a record.
     Body { body: Body, at: usize, looked: usize },
 }
 
 /// Finds files in a stream of bytes.
 pub(crate) struct Framing {
     bytes: Vec<u8>,
-    /// Bytes of the stream before those.
+    /// Number of bytes of the stream before `bytes`.
     before: u64,
     limit: usize,
     state: State,
 }
 
-/// What was found.
+/// A finding in the stream.
 pub(crate) enum Found {
-    /// The bytes of a file, which begins at this byte of the stream.
+    /// A file: the byte of the stream at which it begins, and its bytes.
     File(u64, Vec<u8>),
-    /// Bytes that are none, from which byte of the stream on and why.
+    /// Bytes that are no file: the byte of the stream at which they begin, and the reason.
     Refused(u64, String),
 }
 
 impl Framing {
-    /// Files have at most `limit` bytes.
+    /// Accepts files of at most `limit` bytes.
     pub(crate) fn new(limit: usize) -> Self {
         Self { bytes: Vec::new(), before: 0, limit, state: State::Between }
     }
 
-    /// Whether the bytes so far are the beginning of a file, as far as can be told.
+    /// Whether the stream so far ends inside a file.
     pub(crate) fn is_within(&self) -> bool {
         matches!(self.state, State::Header { .. } | State::Body { .. })
     }
 
-    /// Takes the bytes that follow.
+    /// Appends bytes of the stream.
     pub(crate) fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// What can be told of the bytes so far; nothing if more are needed.
+    /// The next finding, or `None` if more bytes are needed.
     pub(crate) fn next(&mut self) -> Option<Found> {
         loop {
             match &mut self.state {
                 State::Between => {
-                    // Some programs fill files up with zeros; what begins with them is no file.
+                    // Some programs pad files with zeros; zeros at the start of the stream are no padding.
                     let filled = self.before > 0;
                     let blank = |byte: &u8| byte.is_ascii_whitespace() || (filled && *byte == 0);
                     let start = self.bytes.iter().position(|byte| !blank(byte)).unwrap_or(self.bytes.len());
@@ -105,7 +106,7 @@ impl Framing {
                     let places = 0..self.bytes.len();
                     let found = places.into_iter().find(|&at| begins(&self.bytes[at..], MARKS) != Some(false));
                     self.skip(found.unwrap_or(self.bytes.len()));
-                    // A mark that is not whole yet is waited for.
+                    // Wait for the rest of a mark that is incomplete.
                     if !begins(&self.bytes, MARKS)? {
                         return None;
                     }
@@ -136,7 +137,7 @@ impl Framing {
         }
     }
 
-    /// What can be told of the bytes so far if no more come.
+    /// The finding in the remaining bytes at the end of the stream.
     pub(crate) fn end(&mut self) -> Option<Found> {
         match &self.state {
             State::Lost => return None,
@@ -150,10 +151,10 @@ impl Framing {
         Some(self.refuse(what, self.bytes.len()))
     }
 
-    /// What follows the header that ends at `end`, and where that begins.
+    /// The body that follows the header ending at `end`, and its first byte.
     fn measure(&self, end: usize) -> Result<(Body, usize), String> {
         let options = ReadOptions::default();
-        // Of the message only what is wrong is used.
+        // Only the reason of the error is used.
         let job =
             Job { path: "".as_ref(), progress: &(), bytes: &self.bytes[..end], options: &options, triangles: false };
         let measured = if self.bytes.starts_with(b"ply") { ply::body(&job) } else { pcd::body(&job) };
@@ -168,7 +169,7 @@ impl Framing {
         }
     }
 
-    /// Forgets the first bytes.
+    /// Discards the first bytes.
     fn skip(&mut self, bytes: usize) {
         self.bytes.drain(..bytes);
         self.before += bytes as u64;
@@ -181,7 +182,7 @@ impl Framing {
         Found::File(start, std::mem::replace(&mut self.bytes, rest))
     }
 
-    /// Goes on to the next mark behind these bytes.
+    /// Discards these bytes and searches for the next mark.
     fn refuse(&mut self, what: String, bytes: usize) -> Found {
         let start = self.before;
         self.skip(bytes);
@@ -194,14 +195,14 @@ fn too_long(bytes: &str, limit: usize) -> String {
     format!("its header announces {bytes} bytes where {limit} are allowed; send fewer points or raise the limit")
 }
 
-/// Whether bytes begin as one of these; nothing if that cannot be told yet.
+/// Whether bytes begin with one of the marks; `None` if more bytes are needed to decide.
 fn begins(bytes: &[u8], marks: &[&[u8]]) -> Option<bool> {
     let whole = marks.iter().any(|mark| bytes.starts_with(mark));
     let may = || marks.iter().any(|mark| mark.starts_with(bytes));
     if whole { Some(true) } else { (!may()).then_some(false) }
 }
 
-/// The first byte after the last line of a header, once that has come.
+/// The first byte after the last line of a header, once that byte has arrived.
 fn header_end(bytes: &[u8], line: &mut usize, looked: &mut usize) -> Option<usize> {
     let is_ply = bytes.starts_with(b"ply");
     // Lines of old PLY files end in a carriage return.
@@ -214,7 +215,8 @@ fn header_end(bytes: &[u8], line: &mut usize, looked: &mut usize) -> Option<usiz
         let word = bytes[*line..end].split(u8::is_ascii_whitespace).find(|word| !word.is_empty()).unwrap_or_default();
         let last = if is_ply { word == b"end_header" } else { word.eq_ignore_ascii_case(b"DATA") };
         if last && bytes[end] == b'\r' {
-            // Whether a line feed belongs to it shows the next byte; without any there is no body either.
+            // The next byte shows whether a line feed belongs to the line end. Without a next byte there is no body
+            // either.
             *looked = end;
             let next = bytes.get(end + 1)?;
             return Some(if *next == b'\n' { end + 2 } else { end + 1 });
@@ -226,7 +228,7 @@ fn header_end(bytes: &[u8], line: &mut usize, looked: &mut usize) -> Option<usiz
     }
 }
 
-/// The first byte after a body, once that has come.
+/// The first byte after a body, once the body has arrived.
 fn body_end(bytes: &[u8], body: &mut Body, at: &mut usize, looked: &mut usize) -> Result<Option<usize>, String> {
     match body {
         Body::Bytes(len) => Ok(Some(at.saturating_add(*len)).filter(|&end| end <= bytes.len())),

@@ -1,4 +1,4 @@
-//! Code of others kept from taking the program down.
+//! Catching panics of third-party code.
 
 use std::{
     cell::Cell,
@@ -11,10 +11,10 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Runs code of others on the bytes of a file; a panic becomes an error like any, and says nothing on standard error.
+/// Runs third-party code on the bytes of a file. A panic becomes an error and prints nothing on standard error.
 pub(crate) fn guard<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static QUIET: Once = Once::new();
-    // The hook is the process's: for every panic outside of here it does what it did before.
+    // The hook is global: panics outside of `guard` go to the previous hook.
     QUIET.call_once(|| {
         let before = take_hook();
         set_hook(Box::new(move |panic| {

@@ -1,4 +1,4 @@
-//! Text cut into pieces at line ends, to be parsed side by side.
+//! Text cut into pieces at line ends, for parallel parsing.
 
 use std::ops::Range;
 
@@ -10,8 +10,8 @@ use crate::Error;
 /// Bytes of text that one thread parses at a time. The number of threads does not change where the cuts are.
 const PIECE: usize = 1 << 19;
 
-/// Parses the text in `range` piece by piece, several at a time, and hands the outcomes to `take` in their order. Lines
-/// that a backslash continues are not torn apart.
+/// Parses the text in `range` piece by piece in parallel, and passes the results to `take` in order. Lines joined by
+/// backslashes stay in one piece.
 pub(super) fn in_pieces<T: Send>(
     job: &Job<'_>,
     range: Range<usize>,
@@ -37,13 +37,13 @@ pub(super) fn in_pieces<T: Send>(
     Ok(())
 }
 
-/// Whether a text ends in a line that a backslash joins with the next one.
+/// Whether a text ends in a line that a backslash joins with the next line.
 fn is_continued(text: &[u8]) -> bool {
     let line = text.strip_suffix(b"\n").unwrap_or(text);
     line.strip_suffix(b"\r").unwrap_or(line).ends_with(b"\\")
 }
 
-/// The lines of a piece that hold more than blanks and comments, trimmed, each with the byte that it starts at.
+/// The trimmed lines of a piece, except blank lines and comments, each with the byte at which it starts.
 pub(super) fn lines<'a>(text: &'a [u8], range: &Range<usize>) -> impl Iterator<Item = (usize, &'a [u8])> {
     let (mut at, end) = (range.start, range.end);
     std::iter::from_fn(move || {
@@ -60,7 +60,7 @@ pub(super) fn lines<'a>(text: &'a [u8], range: &Range<usize>) -> impl Iterator<I
     })
 }
 
-/// The start of the line after `lines` lines that hold more than blanks and comments, or nothing if the file ends before.
+/// The start of the line after `lines` lines, blank lines and comments not counted; `None` if the file ends before.
 pub(super) fn skip_lines(job: &Job<'_>, mut at: usize, lines: usize) -> Result<Option<usize>, Error> {
     let mut skipped = 0;
     while skipped < lines {

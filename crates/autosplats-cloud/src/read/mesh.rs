@@ -1,4 +1,4 @@
-//! What the readers of meshes share: faces to triangles, corners to points, positions to a cloud.
+//! Shared by the readers of meshes: faces to triangles, corners to points, positions to a cloud.
 
 use std::{
     hash::{BuildHasher, Hash, Hasher, RandomState},
@@ -13,12 +13,13 @@ use super::{
 };
 use crate::{Error, FieldValues, PointCloud};
 
-/// Triangles made of faces as they are read. A corner is the index of a point, or negative if there is no such point.
+/// Triangles made of faces while these are read. A corner is the index of a point, or negative if there is no such
+/// point.
 pub(super) struct Faces {
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Number of points that corners may be.
+    /// Number of points that corners may refer to.
     points: usize,
-    /// Faces with corners that do not exist.
+    /// Number of faces with corners that do not exist.
     left_out: usize,
 }
 
@@ -35,13 +36,13 @@ impl Faces {
         self.points = points;
     }
 
-    /// The point that a corner is, if there is one.
+    /// The point that a corner refers to, if it exists.
     fn point(&self, corner: i64) -> Option<u32> {
         let index = u32::try_from(corner).ok()?;
         ((index as usize) < self.points).then_some(index)
     }
 
-    /// Adds a face, cut into a fan of triangles about its first corner. Fewer than three corners are no face.
+    /// Adds a face, cut into a fan of triangles about its first corner. Fewer than three corners are ignored.
     pub(super) fn polygon(&mut self, corners: &[i64]) -> Result<(), Error> {
         if corners.len() < 3 {
             return Ok(());
@@ -56,8 +57,8 @@ impl Faces {
         Ok(())
     }
 
-    /// Adds a strip, in which every corner makes a triangle with the two before it; -1 begins another strip. Triangles
-    /// that use a point twice only lead the strip elsewhere.
+    /// Adds a triangle strip, in which every corner forms a triangle with the two before it. A corner of -1 begins
+    /// another strip. Triangles that use a point twice are skipped: they only continue the strip elsewhere.
     pub(super) fn strip(&mut self, corners: impl Iterator<Item = i64>) -> Result<(), Error> {
         let mut last = [-1; 2];
         let mut len = 0;
@@ -72,13 +73,13 @@ impl Faces {
             if len < 3 || a == b || b == corner || corner == a {
                 continue;
             }
-            // Every other triangle has the opposite sense in the strip.
+            // Every other triangle of a strip has the opposite orientation.
             self.polygon(&if len % 2 == 1 { [a, b, corner] } else { [b, a, corner] })?;
         }
         Ok(())
     }
 
-    /// Adds a fan, in which every corner makes a triangle with the one before it and the first.
+    /// Adds a triangle fan, in which every corner forms a triangle with the corner before it and the first.
     pub(super) fn fan(&mut self, mut corners: impl Iterator<Item = i64>) -> Result<(), Error> {
         let (Some(first), Some(mut last)) = (corners.next(), corners.next()) else { return Ok(()) };
         corners.try_for_each(|corner| {
@@ -94,7 +95,7 @@ impl Faces {
         Ok(())
     }
 
-    /// The triangles, after telling the user of faces left out.
+    /// The triangles; notes the number of faces left out.
     pub(super) fn finish(self, job: &Job<'_>) -> Vec<[u32; 3]> {
         if self.left_out > 0 {
             job.note(format!("{} faces have corners that do not exist; left out", self.left_out));
@@ -103,12 +104,13 @@ impl Faces {
     }
 }
 
-/// A cloud of positions in world coordinates, of which previews are handed out; `done` is the part of the work done before.
+/// A cloud of positions in world coordinates, with previews. `done` is the fraction of the work finished before.
 pub(super) fn cloud(job: &Job<'_>, positions: &[[f64; 3]], done: f32) -> Result<PointCloud, Error> {
     columns(job, bytemuck::cast_slice(positions), Scalar::F64, done)
 }
 
-/// A cloud of positions with the bits that the file has.
+/// A cloud of positions, with previews; keeps the file's `f32` values. `done` is the fraction of the work finished
+/// before.
 pub(super) fn cloud_f32(job: &Job<'_>, positions: &[[f32; 3]], done: f32) -> Result<PointCloud, Error> {
     columns(job, bytemuck::cast_slice(positions), Scalar::F32, done)
 }
@@ -129,7 +131,7 @@ fn columns(job: &Job<'_>, bytes: &[u8], scalar: Scalar, done: f32) -> Result<Poi
     table.into_cloud(job, "points")
 }
 
-/// Adds colours given as sRGB of 0 to 1; 16 bits of them too if all digits are wanted.
+/// Adds colours given as sRGB of 0 to 1. If all digits are wanted and 8 bits lose some, adds 16-bit fields too.
 pub(super) fn with_colors(
     job: &Job<'_>,
     mut cloud: PointCloud,
@@ -148,16 +150,16 @@ pub(super) fn with_colors(
     cloud.with_colors(colors)
 }
 
-/// Points that equal corners share: for each point the first corner that has it, and for each corner its point.
+/// Result of welding: for each point the first corner at it, and for each corner its point.
 pub(super) struct Welded {
     pub(super) firsts: Vec<u32>,
     pub(super) points: Vec<u32>,
 }
 
-/// Welds corners of equal `key` into one point, in the order in which they first appear.
+/// Welds corners of equal `key` into one point, in the order of first appearance.
 ///
-/// Corners are dealt out by their hash; each dealer keeps the first corner of every key. Which corner is dealt to whom
-/// changes nothing.
+/// The hash of its key assigns each corner to a shard, and each shard keeps the first corner of every key. The number
+/// of shards does not change the result.
 pub(super) fn weld<K: Hash + Eq + Send>(
     job: &Job<'_>,
     count: usize,
@@ -177,7 +179,7 @@ pub(super) fn weld<K: Hash + Eq + Send>(
         let mut seen = std::collections::HashMap::with_hasher(hash);
         for corner in 0..count {
             if corner % (1 << 16) == 0 {
-                // All go the same way side by side; one speaks for them, so that progress never falls.
+                // All shards walk the corners side by side; only the first reports, so that progress never falls.
                 if shard == 0 {
                     job.tick(part.start + part.len * corner as f32 / count as f32)?;
                 } else {
@@ -185,7 +187,7 @@ pub(super) fn weld<K: Hash + Eq + Send>(
                 }
             }
             let key = key(corner);
-            // The map itself uses the upper and the lower bits.
+            // The map itself uses the uppermost and the lowest bits of the hash.
             if hash.hash_one(&key) >> 32 & (shards as u64 - 1) != shard {
                 continue;
             }
@@ -207,19 +209,19 @@ pub(super) fn weld<K: Hash + Eq + Send>(
             firsts.push(corner as u32);
             points[corner] = firsts.len() as u32 - 1;
         } else {
-            // An earlier corner, which has its point already.
+            // The corner is welded to an earlier one, whose point is known.
             points[corner] = points[own];
         }
     }
     Ok(Welded { firsts, points })
 }
 
-/// The bits of a coordinate, of which two zeros are the same.
+/// The bits of a coordinate, equal for both zeros.
 pub(super) fn bits(value: f64) -> u64 {
     (value + 0.0).to_bits()
 }
 
-/// A fast hash with a secret, so that nobody can make a file whose points all collide.
+/// A fast hash with a secret, so that nobody can craft a file whose points all collide.
 #[derive(Clone, Copy)]
 struct Folded {
     state: u64,

@@ -1,14 +1,14 @@
-//! Files to point clouds, one module per format.
+//! Readers of point cloud files, one module per format.
 //!
 //! # How it works
 //!
-//! A file is mapped into memory and its format told by its first bytes, then by its extension. Every format ends in the
-//! same shape, a [`table`]: named columns of numbers at fixed distances, from which positions, colours and fields are
-//! taken in parallel. Binary PLY and PCD are such a table as they lie on the disk; their text and lists are first packed
-//! into one, while rows of bare text, which can be the largest, go straight into the columns of a cloud.
-//! LAS has columns of bits and integer coordinates and makes its cloud itself.
+//! A file is mapped into memory. Its format is recognised by its first bytes, then by its extension. Most formats end
+//! in the same shape, a [`table`]: named columns of numbers at fixed strides. Positions, colours and fields are taken
+//! from the table in parallel. Binary PLY and PCD already are such a table in the file; their text and lists are packed
+//! into a table first. Bare text, whose files can be the largest, is parsed straight into the columns of a cloud. LAS
+//! has columns of bits and integer coordinates and makes its cloud itself.
 //!
-//! A file is not trusted: what its header claims is checked against its size before anything is allocated.
+//! A file is not trusted: the claims of its header are checked against its size before anything is allocated.
 
 mod columns;
 mod depth_image;
@@ -52,24 +52,24 @@ use rayon::prelude::*;
 
 use crate::{Error, PointCloud, Progress, error::message, memory::check_memory, progress::tick};
 
-/// A kind of file: how to tell it from others, and what to do with it.
+/// A file format: how to recognise and how to read it.
 struct Format {
-    /// Name for messages and tables.
+    /// Name in messages and tables.
     name: &'static str,
-    /// Extensions of the file's name, in lower case and without the first dot.
+    /// Extensions of file names, in lower case and without the first dot.
     extensions: &'static [&'static str],
-    /// Whether the content begins as only this format does; the name is not looked at.
+    /// Whether the content starts as only this format does.
     recognised: fn(&[u8]) -> bool,
-    /// Whether points at exactly (0, 0, 0) are places where the sensor saw nothing, even a single one.
+    /// Whether coordinates are in the sensor's frame, so that even a single point at (0, 0, 0) is a missing return.
     sensor_frame: bool,
-    /// What the header says.
+    /// Reads the header.
     describe: fn(&Job<'_>) -> Result<Description, Error>,
-    /// The points, and the triangles of a mesh.
+    /// Reads the points, and the triangles of a mesh if asked for.
     read: fn(&Job<'_>) -> Result<Contents, Error>,
 }
 
-/// All formats. Of several that recognise a content, and of several with an extension, the first is taken; longer
-/// extensions go before shorter ones.
+/// All formats. The first that recognises a content is taken, otherwise the first with a matching extension. Longer
+/// extensions precede shorter ones.
 const FORMATS: &[&Format] = &[
     &las::FORMAT,
     &ply::FORMAT,
@@ -82,11 +82,11 @@ const FORMATS: &[&Format] = &[
     &raw::FORMAT,
     &ptx::FORMAT,
     &xyz::FORMAT,
-    // Its mark is only a number that fits the file's size, so it comes last.
+    // STL is recognised only by a number that fits the file's size, so it comes last.
     &stl::FORMAT,
 ];
 
-/// Formats of models alone, of which (0, 0, 0) is a point like any.
+/// Formats of meshes, in which a point at (0, 0, 0) is an ordinary point.
 const MODELS: &[&Format] = &[&gltf::FORMAT, &off::FORMAT, &obj::FORMAT, &stl::FORMAT];
 
 /// Names and extensions of the formats that [`read`] understands.
@@ -94,18 +94,18 @@ pub fn formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])
     FORMATS.iter().map(|format| (format.name, format.extensions))
 }
 
-/// The names of all formats, for a message.
+/// Names of all formats, for a message.
 pub(crate) fn format_names() -> String {
     FORMATS.iter().map(|format| format.name).collect::<Vec<_>>().join(", ")
 }
 
-/// What a file has: points, and triangles between them if it is a mesh.
+/// Contents of a file: points, and triangles between them if the file is a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contents {
     /// The points.
     pub cloud: PointCloud,
-    /// Corners of triangles, as indices of points; empty unless read by [`read_mesh`]. Polygons are cut into triangles,
-    /// faces with corners that do not exist are left out.
+    /// Corners of triangles, as indices of points; empty unless read by [`read_mesh`]. Polygons are cut into triangles.
+    /// Faces with corners that do not exist are left out.
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -117,17 +117,17 @@ impl From<PointCloud> for Contents {
 
 /// Reads a point cloud in any of the [`formats`], recognised by content first, then by extension.
 ///
-/// Coordinates above about 1e4 are stored about an origin of whole numbers, so that survey coordinates keep their
-/// precision; smaller ones keep the file's `f32` bits. Non-finite points stay in the cloud.
+/// Coordinates from about 1e4 on are stored relative to an origin of whole numbers, so that survey coordinates keep
+/// their precision. Smaller coordinates keep the file's `f32` values exactly. Non-finite points stay in the cloud.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read, [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
-/// for what is in it, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says so.
+/// [`Error::Io`] if the file cannot be read; [`Error::UnknownFormat`], [`Error::Malformed`] and [`Error::Unsupported`]
+/// for its content; [`Error::OutOfMemory`]; and [`Error::Cancelled`] if `progress` says so.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<PointCloud, Error> {
     read_with(path, &ReadOptions::default(), progress)
 }
 
-/// [Reads](read) a point cloud with options.
+/// Like [`read`], with options.
 ///
 /// # Errors
 /// Those of [`read`].
@@ -136,7 +136,7 @@ pub fn read_with(path: &Path, options: &ReadOptions, progress: &dyn Progress) ->
     read_bytes(path, &bytes, options, progress)
 }
 
-/// [Reads](read) a point cloud from the bytes of a file. Its name helps to recognise the format and stands in messages.
+/// Like [`read_with`], from the bytes of a file. `name` helps to recognise the format and appears in messages.
 ///
 /// # Errors
 /// Those of [`read`].
@@ -158,7 +158,7 @@ pub fn read_mesh(path: &Path, options: &ReadOptions, progress: &dyn Progress) ->
     read_mesh_bytes(path, &bytes, options, progress)
 }
 
-/// [Reads](read_mesh) points and triangles from the bytes of a file.
+/// Like [`read_mesh`], from the bytes of a file. `name` helps to recognise the format and appears in messages.
 ///
 /// # Errors
 /// Those of [`read`].
@@ -171,13 +171,13 @@ pub fn read_mesh_bytes(
     contents(&Job { path: name, progress, bytes, options, triangles: true })
 }
 
-/// Seconds that the first animation of a glTF lasts, and how many animations it has, if it has any.
+/// Duration of the first animation of a glTF in seconds, and the number of animations, if there are any.
 pub(crate) fn gltf_animation(name: &Path, bytes: &[u8]) -> Result<Option<(f64, usize)>, Error> {
     let options = ReadOptions::default();
     gltf::animation(&Job { path: name, progress: &(), bytes, options: &options, triangles: false })
 }
 
-/// The mesh of a glTF so many seconds into its first animation.
+/// The mesh of a glTF at a time of its first animation.
 pub(crate) fn read_gltf_at(
     name: &Path,
     bytes: &[u8],
@@ -188,8 +188,8 @@ pub(crate) fn read_gltf_at(
     gltf::read_at(&Job { path: name, progress, bytes, options: &options, triangles: true }, Some(seconds))
 }
 
-/// What the header of a file says, in milliseconds whatever its size; formats without a header that counts are looked
-/// at no further than their beginning.
+/// Reads the header of a file, in milliseconds whatever the file's size. Of formats without a header that states counts
+/// only the beginning is read.
 ///
 /// # Errors
 /// Those of [`read`], as far as the header shows them.
@@ -198,7 +198,7 @@ pub fn describe(path: &Path, options: &ReadOptions) -> Result<Description, Error
     describe_bytes(path, &bytes, options)
 }
 
-/// [Describes](describe) a file by its bytes.
+/// Like [`describe`], from the bytes of a file.
 ///
 /// # Errors
 /// Those of [`describe`].
@@ -207,7 +207,7 @@ pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Resul
     (format(&job)?.describe)(&job)
 }
 
-/// Refuses the few lines that Git LFS leaves in a file's place.
+/// Fails if the file is a Git LFS pointer instead of the data.
 pub(crate) fn check_not_lfs_pointer(job: &Job<'_>) -> Result<(), Error> {
     if job.bytes.starts_with(b"version https://git-lfs") {
         let what = "a pointer of Git LFS stands in the file's place; 'git lfs pull' fetches the file";
@@ -235,7 +235,7 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     }
     let mut contents = (format.read)(job)?;
     let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);
-    // A mesh would lose its corners.
+    // Dropping points would remove corners of a mesh.
     if !job.options.keep_no_returns && !model && contents.triangles.is_empty() {
         drop_no_returns(job, format, &mut contents.cloud);
     }
@@ -244,13 +244,14 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(contents)
 }
 
-/// Whether the caller may say what the columns are.
+/// Whether the caller may name the columns of this file.
 fn takes_columns(job: &Job<'_>, format: &Format) -> bool {
     [xyz::FORMAT.name, raw::FORMAT.name].contains(&format.name)
         || format.name == pcd::FORMAT.name && pcd::without_header(job)
 }
 
-/// Scanners write (0, 0, 0) where nothing came back. One such point alone may be a real one, unless a sensor stands there.
+/// Drops points at (0, 0, 0), which scanners write for missing returns. A single such point may be real, unless
+/// coordinates are in the sensor's frame.
 fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
     let total = cloud.len();
     let least = if format.sensor_frame { 1 } else { 2 };
@@ -260,9 +261,9 @@ fn drop_no_returns(job: &Job<'_>, format: &Format, cloud: &mut PointCloud) {
     }
 }
 
-/// Takes the points at (0, 0, 0) out if so many are no points, and returns how many they were.
+/// Removes the points at (0, 0, 0) if `if_so_many` accepts their number, and returns how many it removed.
 pub(crate) fn take_out_no_returns(cloud: &mut PointCloud, if_so_many: impl Fn(usize) -> bool) -> usize {
-    // About no origin, positions are world coordinates; of zeros no bit is set but the sign.
+    // With the origin at zero, positions are world coordinates. A zero has no bit set but the sign.
     let exact = cloud.origin() == DVec3::ZERO && cloud.residuals().is_none();
     let zero = |[x, y, z]: &[f32; 3]| (x.to_bits() | y.to_bits() | z.to_bits()) << 1 == 0;
     let absent = |i: usize| {
@@ -282,20 +283,20 @@ pub(crate) fn take_out_no_returns(cloud: &mut PointCloud, if_so_many: impl Fn(us
     count
 }
 
-/// Points that are looked at as one piece of work.
+/// Points checked for zeros as one piece of parallel work.
 const BLOCK: usize = 1 << 14;
 
-/// Bytes of a header line beyond which it is rather broken than long.
+/// Longest header line, in bytes; a longer one means a broken file.
 const MAX_HEADER_LINE: usize = 1 << 16;
 
-/// What every reader is given.
+/// Input of every reader.
 #[derive(Clone, Copy)]
 pub(crate) struct Job<'a> {
     pub(crate) path: &'a Path,
     pub(crate) progress: &'a dyn Progress,
     pub(crate) bytes: &'a [u8],
     pub(crate) options: &'a ReadOptions,
-    /// Whether triangles are wanted.
+    /// Whether triangles shall be read.
     pub(crate) triangles: bool,
 }
 
@@ -304,17 +305,17 @@ impl Job<'_> {
         tick(self.progress, fraction)
     }
 
-    /// Tells the user what is no error.
+    /// Reports a note to the user.
     pub(crate) fn note(&self, note: impl AsRef<str>) {
         self.progress.note(&message(note.as_ref()));
     }
 
-    /// Stops if the caller wants that, without news of how far the work is.
+    /// Fails if the caller cancels; reports no progress.
     fn go_on(&self) -> Result<(), Error> {
         if self.progress.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
-    /// Hands out points before the end, if somebody wants to see them.
+    /// Passes points to the caller before reading ends, if the caller wants chunks.
     fn preview(&self, points: impl FnOnce() -> Result<PointCloud, Error>) -> Result<(), Error> {
         if self.progress.wants_chunks() {
             self.go_on()?;
@@ -326,7 +327,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Refuses what would not fit into memory, before anything is allocated: `count` points of so many bytes.
+    /// Fails if `count` points of `bytes_per_point` bytes do not fit into memory, before anything is allocated.
     fn check_memory(&self, count: usize, bytes_per_point: usize) -> Result<(), Error> {
         let bytes = (count as u64).saturating_mul(bytes_per_point as u64);
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
@@ -341,14 +342,15 @@ impl Job<'_> {
         Error::Unsupported { path: self.path.into(), what: message(&what.into()) }
     }
 
-    /// The line that the byte at `offset` is in, as a place in an error.
+    /// The line that contains byte `offset`, as the place of an error.
     fn line(&self, offset: usize) -> String {
         let newlines = self.bytes[..offset.min(self.bytes.len())].iter().filter(|&&byte| byte == b'\n').count();
         format!("line {}", newlines + 1)
     }
 
-    /// Refuses binary data that went through a text conversion: every byte that was no UTF-8 has become U+FFFD, so
-    /// lengths and values are wrong. Intact floats are hardly ever valid UTF-8, and never with that character in it.
+    /// Fails if binary data passed through a text conversion. Such a conversion replaces every byte that is no UTF-8 by
+    /// U+FFFD, so lengths and values are wrong. Intact floats are hardly ever valid UTF-8, and never contain that
+    /// character.
     fn check_not_text_converted(&self, start: usize) -> Result<(), Error> {
         let sample = &self.bytes[start..self.bytes.len().min(start + (1 << 16))];
         let valid = match std::str::from_utf8(sample) {
@@ -367,13 +369,13 @@ impl Job<'_> {
     }
 }
 
-/// A piece of a file as it may stand in a message: short, and without characters that would act on a terminal.
+/// A piece of a file for a message: at most 40 bytes, without characters that act on a terminal.
 pub(crate) fn shown(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(40)]);
     text.chars().flat_map(char::escape_debug).collect()
 }
 
-/// The whole content of a file: mapped, or read where there is nothing to map, as for a pipe.
+/// The content of a file: mapped, or read if the file cannot be mapped, such as a pipe.
 pub(crate) enum Bytes {
     Mapped(memmap2::Mmap),
     Read(Vec<u8>),
@@ -385,9 +387,9 @@ impl Bytes {
         let mut file = File::open(path)?;
         let metadata = file.metadata()?;
         if metadata.is_file() && metadata.len() > 0 {
-            // SAFETY: the map is read-only and private to this call. Should another program shorten the file meanwhile,
-            // the system ends the process with a bus error; should it write to it, values are wrong but every access is
-            // checked against the length seen here. Both are documented risks of all programs that map files.
+            // SAFETY: the map is read-only and private to this call. If another program shortens the file meanwhile,
+            // the system ends the process with a bus error. If another program writes to the file, values are wrong,
+            // but every access is checked against the length at mapping. All programs that map files carry both risks.
             let map = unsafe { memmap2::Mmap::map(&file) }?;
             return Ok(Self::Mapped(map));
         }

@@ -1,5 +1,5 @@
-//! OBJ: vertices, with colours where they have them, and faces; groups, materials, texture coordinates and the normals of
-//! face corners say nothing of points.
+//! OBJ: vertices with optional colours, and faces. Groups, materials, texture coordinates and normals of face corners
+//! are ignored, because they do not describe points.
 
 use std::ops::Range;
 
@@ -16,10 +16,10 @@ pub(super) const FORMAT: Format =
 
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
 
-/// Colour of vertices that have none, among others that do.
+/// Colour of vertices without a colour, if others have one.
 const WHITE: [f32; 3] = [1.0; 3];
 
-/// Files up to this size are counted through when they are described: that takes milliseconds.
+/// Largest file, in bytes, that a description counts through; counting then takes milliseconds.
 const COUNTED: usize = 4 << 20;
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
@@ -57,7 +57,7 @@ fn check_text(job: &Job<'_>) -> Result<(), Error> {
     }
 }
 
-/// The first word of a line and the rest.
+/// The first word of a line, and the rest.
 fn split(line: &[u8]) -> (&[u8], &[u8]) {
     line.split_at(line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len()))
 }
@@ -82,7 +82,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         let scale = if mesh.colors.as_flattened().iter().any(|&value| value > 1.0) { 255.0 } else { 1.0 };
         cloud = mesh::with_colors(job, cloud, |i| mesh.colors[i].map(|value| value / scale))?;
     }
-    // Faces that came before their vertices.
+    // Faces that precede their vertices.
     faces.set_points(mesh.positions.len());
     let mut start = 0;
     for end in mesh.ends {
@@ -92,15 +92,15 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(Contents { cloud, triangles: faces.finish(job) })
 }
 
-/// All pieces put together.
+/// All pieces joined.
 #[derive(Default)]
 struct Mesh {
     positions: Vec<[f64; 3]>,
-    /// One per vertex, or none at all.
+    /// One per vertex, or empty.
     colors: Vec<[f32; 3]>,
     uncolored: usize,
     curves: usize,
-    /// Corners of faces that come before their vertices, and where each face ends among them.
+    /// Corners of the faces that precede their vertices, and the end of each such face among them.
     corners: Vec<i64>,
     ends: Vec<usize>,
 }
@@ -144,24 +144,24 @@ impl Mesh {
     }
 }
 
-/// A corner counted from the piece's first vertex, which is not known while the piece is parsed.
+/// Offset that marks a corner counted from the piece's first vertex, whose index is unknown while the piece is parsed.
 const RELATIVE: i64 = 1 << 60;
 
 fn resolve(corner: i64, before: usize) -> i64 {
-    // Relative corners are within 2^40 of the mark, others far below it.
+    // Marked corners are within 2^40 of the mark, others far below it.
     if corner > RELATIVE / 2 { corner - RELATIVE + before as i64 } else { corner }
 }
 
-/// The outcome for one piece of text.
+/// Result of parsing one piece of text.
 #[derive(Default)]
 struct Piece {
     positions: Vec<[f64; 3]>,
-    /// One per vertex up to the last that has one.
+    /// One per vertex, up to the last vertex that has a colour.
     colors: Vec<[f32; 3]>,
     uncolored: usize,
     curves: usize,
     corners: Vec<i64>,
-    /// Where each face ends among the corners.
+    /// End of each face among the corners.
     ends: Vec<usize>,
     error: Option<(usize, String)>,
 }
@@ -220,7 +220,7 @@ impl Piece {
         if len < 3 {
             return Err(format!("{len} values where a vertex has x, y and z; complete or remove the line"));
         }
-        // Weights, the fourth of four or seven numbers, are for curves.
+        // The fourth of four or seven numbers is a weight, which only curves use.
         let color = match len {
             6 => Some([a, b, c]),
             7 => Some([b, c, d]),

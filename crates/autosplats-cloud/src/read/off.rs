@@ -1,4 +1,4 @@
-//! OFF: vertices, with normals and colours where they have them, and faces, as text.
+//! OFF text: vertices with optional normals and colours, and faces.
 
 use std::ops::Range;
 
@@ -26,10 +26,10 @@ pub(super) const FORMAT: Format = Format {
 
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
 
-/// Rows looked at to tell what the numbers are.
+/// Rows sampled to find out what the numbers are.
 const SAMPLE: usize = 1000;
 
-/// What the first word says a vertex has besides its position.
+/// What a vertex has besides its position, according to the first word of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Kind {
     texture: bool,
@@ -40,7 +40,7 @@ struct Kind {
 }
 
 impl Kind {
-    /// The kind that a word names, if it ends in OFF.
+    /// The kind that a word ending in OFF names.
     fn of(word: &[u8]) -> Option<Self> {
         let mut rest = word.strip_suffix(b"OFF")?;
         let mut kind = Self::default();
@@ -86,7 +86,7 @@ impl Header {
             let line = line.split(|&byte| byte == b'#').next().unwrap_or_default();
             let mut words = text::values(line).peekable();
             if kind.is_none() {
-                // The word may be left out.
+                // The first word is optional.
                 let found = words.peek().and_then(|word| Kind::of(word));
                 if found.is_some() {
                     words.next();
@@ -116,7 +116,7 @@ impl Header {
             };
             let (vertices, faces) = (count("vertices")?, count("faces")?);
             let end = text::after_line_end(job.bytes, at);
-            // The shortest vertex is "0 0 0" and a line end, of which the last may be missing.
+            // The shortest vertex is "0 0 0" and a line end, and the last line end may be missing.
             if vertices.checked_mul(6).is_none_or(|bytes| bytes > job.bytes.len() - end + 1) {
                 let size = job.bytes.len();
                 return Err(fail(format!(
@@ -128,7 +128,7 @@ impl Header {
         Err(job.malformed(job.line(job.bytes.len()), "the file ends before the counts of vertices and faces"))
     }
 
-    /// What the numbers of a vertex are, told by the file's first word and the first rows.
+    /// Meaning of the numbers of a vertex, by the file's first word and the first rows.
     fn tokens(&self, job: &Job<'_>) -> Result<Vec<(&'static str, Token)>, Error> {
         let rest = self.end..job.bytes.len();
         let mut tokens = ["x", "y", "z"].map(|axis| (axis, Token::Store(Scalar::F64))).to_vec();
@@ -187,7 +187,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     if !job.bytes[header.end..].contains(&b'#') {
         return read_rows(job, &header);
     }
-    // Comments may follow the numbers of a line. Blanks in their place leave every line where it is.
+    // Comments may follow the numbers of a line. Replacing them by blanks keeps the position of every line.
     let mut comment = false;
     let blank = |&byte: &u8| {
         comment = byte != b'\n' && (comment || byte == b'#');
@@ -246,7 +246,7 @@ fn triangles(job: &Job<'_>, header: &Header) -> Result<Vec<[u32; 3]>, Error> {
     Ok(faces.finish(job))
 }
 
-/// The corners of a face: their count, themselves, and perhaps a colour.
+/// Parses a face: the count of corners, the corners, and perhaps a colour.
 fn row(line: &[u8], corners: &mut Vec<i64>) -> Result<(), String> {
     corners.clear();
     let mut values = text::values(line);

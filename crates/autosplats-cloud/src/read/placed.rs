@@ -1,4 +1,4 @@
-//! Clouds of points that come in several runs, one for each place of a scanner.
+//! Clouds of several scans, each with its own sensor pose.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,10 +9,11 @@ use super::{
 };
 use crate::{Error, PointCloud, merge::residual};
 
-/// Points handled between two looks at the caller's wish to stop.
+/// Points processed between two checks for cancellation.
 const BLOCK: usize = 1 << 18;
 
-/// One value per point of all runs, whose lengths are given: `run` makes what gives the value of each of a run's points.
+/// One value per point of all scans. `lens` holds the scans' lengths; `run(scan)` returns the function from a point's
+/// index to its value.
 pub(super) fn fill<T, V>(
     job: &Job<'_>,
     what: &str,
@@ -37,7 +38,7 @@ where
     Ok(values)
 }
 
-/// The cloud of all runs' points: `run` makes what gives the world coordinates of each of a run's points.
+/// The cloud of all scans' points. `run(scan)` returns the function from a point's index to its world coordinates.
 pub(super) fn place<V: Fn(usize) -> DVec3 + Sync + Send>(
     job: &Job<'_>,
     lens: &[usize],

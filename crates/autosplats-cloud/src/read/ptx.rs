@@ -1,7 +1,7 @@
-//! PTX: text of one or several scans, each a header of ten lines and then a line for every direction looked at.
+//! PTX: text of one or several scans, each a header of ten lines and one line per measured direction.
 //!
-//! The header has the columns and rows of the scan, the scanner's place and axes, and the 4 × 4 map of its frame to the
-//! world, for row vectors. The scans are found by counting lines, then parsed in parallel like any text.
+//! The header states the columns and rows of the scan, the scanner's position and axes, and the 4 × 4 matrix from its
+//! frame to the world, for row vectors. Scans are found by counting lines, then parsed in parallel.
 
 use std::ops::Range;
 
@@ -17,19 +17,19 @@ use super::{
 };
 use crate::{Axes, Error, FieldValues, PointCloud, Scan};
 
-/// Part of the work that parsing is.
+/// Fraction of the work that parsing takes.
 const PARSING: f32 = 0.8;
 
-/// Values on each line of a header.
+/// Number of values on each line of a header.
 const HEADER: [usize; 10] = [1, 1, 3, 3, 3, 3, 4, 4, 4, 4];
 
-/// Bytes of the shortest line of a point, `0 0 0` and its end.
+/// Bytes of the shortest line of a point: `0 0 0` and a line end.
 const MIN_LINE: usize = 6;
 
-/// A larger file is described by its first header alone.
+/// Largest file, in bytes, of which all scans are described; of larger files only the first.
 const WALKED: usize = 1 << 24;
 
-/// Points of a preview.
+/// Points of a preview chunk.
 const CHUNK: usize = 1 << 20;
 
 pub(super) const FORMAT: Format = Format {
@@ -41,18 +41,18 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-/// What stands before the points of a scan.
+/// Header of a scan.
 struct Header {
     columns: u64,
     rows: u64,
-    /// Maps the numbers of the file to world coordinates; may stretch.
+    /// Maps the numbers of the file to world coordinates; may scale.
     world_from_local: DMat4,
     world_from_sensor: DMat4,
     /// First byte of the first point.
     start: usize,
 }
 
-/// The scans of a file, with the bytes that their points have and the values of a line.
+/// A scan found in the file: its header, the byte range of its points, and the number of values per line.
 struct Walked {
     header: Header,
     count: usize,
@@ -60,7 +60,7 @@ struct Walked {
     width: usize,
 }
 
-/// A header at byte `at`, where a line begins, or the byte at which it is none and why.
+/// Parses the header at byte `at`, the start of a line. The error holds the byte and the reason.
 fn header(bytes: &[u8], mut at: usize) -> Result<Header, (usize, String)> {
     let mut values = [[0.0; 4]; 10];
     for (line, &width) in HEADER.iter().enumerate() {
@@ -90,18 +90,18 @@ fn header(bytes: &[u8], mut at: usize) -> Result<Header, (usize, String)> {
         at = text::after_line_end(bytes, at);
     }
     let vector = |line: usize| DVec3::new(values[line][0], values[line][1], values[line][2]);
-    // Row vectors are multiplied from the left, so that the rows of the file are the columns here.
+    // The file multiplies row vectors from the left, so its rows are the columns here.
     let column = |line: usize, last: f64| DVec4::from((vector(line), last));
     let world_from_local = DMat4::from_cols(column(6, 0.0), column(7, 0.0), column(8, 0.0), column(9, 1.0));
     let placed = DMat4::from_cols(column(3, 0.0), column(4, 0.0), column(5, 0.0), column(2, 1.0));
-    // The scanner stands at the origin of its frame. Programs that write world coordinates, with a map that changes
-    // nothing, tell by the other lines where that was.
+    // The scanner stands at the origin of its frame. Files in world coordinates have an identity matrix, and state the
+    // scanner's position in the other lines.
     let sensor = if world_from_local == DMat4::IDENTITY { placed } else { world_from_local };
     let whole = |line: usize| values[line][0] as u64;
     Ok(Header { columns: whole(0), rows: whole(1), world_from_local, world_from_sensor: rigid(sensor), start: at })
 }
 
-/// The map without its stretching.
+/// The map without its scaling.
 fn rigid(map: DMat4) -> DMat4 {
     let [x, y, z] = [map.x_axis, map.y_axis, map.z_axis].map(|axis| axis.truncate());
     let x = x.normalize_or_zero();
@@ -111,7 +111,7 @@ fn rigid(map: DMat4) -> DMat4 {
     DMat4::from_mat3_translation(turned, map.w_axis.truncate())
 }
 
-/// Finds the scans, and how their lines look; the lines of the first are not counted if no other is wanted.
+/// Finds the scans and the layout of their lines. With `only_first`, lines are not counted.
 fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<Walked>, Error> {
     let bytes = job.bytes;
     if bytes.is_empty() {
@@ -120,7 +120,7 @@ fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<Walked>, Error> {
     let mut scans = Vec::new();
     let mut at = 0;
     loop {
-        // Between scans.
+        // Blank lines between scans.
         while bytes.get(at).is_some_and(u8::is_ascii_whitespace) {
             at += 1;
         }
@@ -140,7 +140,7 @@ fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<Walked>, Error> {
         })?;
         let (end, lines) = if only_first { (bytes.len(), count) } else { after_lines(bytes, header.start, count) };
         if lines < count {
-            // As in all formats that count their points: half a scan may be taken for a whole one.
+            // An error, as in all formats that count their points: half a scan may be mistaken for a whole one.
             let what =
                 format!("the file ends after {lines} of {count} points of scan {}; copy it again", scans.len() + 1);
             return Err(job.malformed(job.line(bytes.len()), what));
@@ -158,7 +158,7 @@ fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<Walked>, Error> {
     }
 }
 
-/// The byte after so many lines from `at` on, and how many there are if the text ends before.
+/// The byte after `count` lines from `at` on, and the number of lines, which is lower if the text ends before.
 fn after_lines(bytes: &[u8], mut at: usize, count: usize) -> (usize, usize) {
     const BLOCK: usize = 1 << 14;
     let mut lines = 0;
@@ -181,15 +181,15 @@ fn after_lines(bytes: &[u8], mut at: usize, count: usize) -> (usize, usize) {
     (at, lines + usize::from(unfinished))
 }
 
-/// A scan's points as records: x, y and z in 24 bytes, intensity in 4, colour in 3.
+/// Points of a scan as records: x, y and z in 24 bytes, intensity in 4, colour in 3.
 struct Records {
     bytes: Vec<u8>,
     stride: usize,
-    /// First byte of intensity and colour.
+    /// Byte offset of the intensity, and of the colour.
     intensity: Option<usize>,
     color: Option<usize>,
     world_from_local: DMat4,
-    /// The points with a return, if not all have one.
+    /// Indices of the points with a return, unless all points have one.
     keep: Option<Vec<usize>>,
     count: usize,
 }
@@ -251,7 +251,7 @@ impl Records {
     }
 
     fn color(&self, point: usize) -> [u8; 3] {
-        // Grey, beside scans that have colours.
+        // Grey, if other scans have colours.
         self.color.map_or([200; 3], |at| {
             let record = self.record(point);
             [record[at], record[at + 1], record[at + 2]]
@@ -308,7 +308,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(cloud.with_axes(Axes::ZUp).with_scans(scans).into())
 }
 
-/// Positions and colours.
+/// Positions and colours of all scans.
 fn cloud(job: &Job<'_>, records: &[Records], lens: &[usize], part: impl Fn(u8) -> Part) -> Result<PointCloud, Error> {
     let cloud = place(job, lens, part(0), |scan| {
         let records = &records[scan];
@@ -324,7 +324,7 @@ fn cloud(job: &Job<'_>, records: &[Records], lens: &[usize], part: impl Fn(u8) -
     cloud.with_colors(colors)
 }
 
-/// Hands the points of a scan out for a preview.
+/// Passes the points of a scan to the caller as preview chunks.
 fn preview(job: &Job<'_>, records: &Records) -> Result<(), Error> {
     let quiet = Job { progress: &(), ..*job };
     let nothing = Part { start: 0.0, len: 0.0 };

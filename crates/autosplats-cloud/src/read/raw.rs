@@ -1,8 +1,8 @@
-//! Sweeps as bare records of 32-bit floats, without any header: KITTI's `.bin` (x y z intensity) and nuScenes' `.pcd.bin`
-//! (x y z intensity ring).
+//! Sweeps stored as headerless records of 32-bit floats: KITTI's `.bin` (x y z intensity) and nuScenes' `.pcd.bin` (x y
+//! z intensity ring).
 //!
-//! Nothing says how many numbers a point has, so a sample of records is looked at: read at the wrong width, coordinates
-//! turn up where intensities or rings have to be, and these are never negative.
+//! No header states how many numbers a point has, so a sample of records is inspected. At a wrong width, coordinates
+//! appear as intensities or rings; coordinates can be negative, intensities and rings cannot.
 
 use glam::DMat4;
 
@@ -24,16 +24,16 @@ pub(super) const FORMAT: Format = Format {
 /// Bytes of a number.
 const SIZE: usize = 4;
 
-/// Records looked at.
+/// Records sampled.
 const SAMPLE: usize = 4096;
 
-/// Further than any sensor sees, in metres.
+/// Bound of plausible coordinates, in metres; no sensor sees further.
 const RANGE: f32 = 1e4;
 
-/// What the numbers of a point are.
+/// Meaning of the numbers of a point.
 struct Layout {
     names: Vec<Option<String>>,
-    /// What the user should know of it.
+    /// Note for the user.
     note: Option<String>,
 }
 
@@ -43,7 +43,7 @@ impl Layout {
         if len == 0 {
             return Err(job.malformed("byte 0", "the file is empty; copy it again"));
         }
-        // Any data of more columns pass for three, so these come last.
+        // Three columns come last, because data of more columns pass for three as well.
         let with_ring: &[&str] = &["x", "y", "z", "intensity", "ring"];
         let guess =
             || [&with_ring[..4], with_ring, &with_ring[..3]].into_iter().find(|names| plausible(job.bytes, names));
@@ -109,7 +109,7 @@ fn plausible(bytes: &[u8], names: &[&str]) -> bool {
         if xyz.iter().any(|value| value.is_finite() && value.abs() >= RANGE) {
             return false;
         }
-        // Integers read as floats are next to nothing; sensors write NaN where nothing came back.
+        // Integers read as floats are tiny. Sensors write NaN for missing returns.
         let tiny = |value: f32| value != 0.0 && value.abs() < 1e-20;
         if xyz.iter().any(|&value| !value.is_finite() || tiny(value)) {
             odd += 1;

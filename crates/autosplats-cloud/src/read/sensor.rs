@@ -1,20 +1,21 @@
-//! Whether sensors can have stood where files say.
+//! Checks that sensors can have stood where a file states.
 
 use glam::DVec3;
 
 use super::Job;
 use crate::{PointCloud, Scan};
 
-/// Sensors stand this many times the size of what they saw away from it at most.
+/// Largest distance of a sensor from the middle of its points, as a multiple of the diagonal of their bounding box.
 const FAR: f64 = 20.0;
 
-/// Nor further than this from the cloud's origin: what is computed with them has to be finite.
+/// Largest distance of a sensor from the cloud's origin along an axis. Computations with larger values would overflow.
 const FARTHEST: f64 = 1e18;
 
-/// Points looked at in each scan for that.
+/// Points sampled per scan to estimate its bounding box.
 const BOUNDED: usize = 1000;
 
-/// Poses are often left out where points were moved into a survey's coordinates; the origin is then no place of a sensor.
+/// Drops scans whose sensor is too far away. Programs that move points into survey coordinates often leave out the
+/// pose, and the origin is then no sensor position.
 pub(super) fn drop_far(job: &Job<'_>, cloud: &mut PointCloud) {
     let kept: Vec<Scan> = cloud.scans.iter().filter(|scan| !is_far(cloud, scan)).cloned().collect();
     let count = cloud.scans.len() - kept.len();

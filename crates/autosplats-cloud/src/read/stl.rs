@@ -1,4 +1,4 @@
-//! STL: triangles, text or binary, whose corners are welded to points where they are equal.
+//! STL: triangles in text or binary, whose equal corners are welded to points.
 
 use std::ops::Range;
 
@@ -20,27 +20,27 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-/// Bytes before the first triangle of a binary file: a text, and the count of triangles.
+/// Bytes before the first triangle of a binary file: a text and the count of triangles.
 const HEADER: usize = 84;
 
-/// Bytes of a triangle: a normal, three corners, and two bytes of whatever.
+/// Bytes of a binary triangle: a normal, three corners and two unspecified bytes.
 const FACET: usize = 50;
 
-/// The parts of the work that parsing and welding are.
+/// Shares of the work of parsing and of welding.
 const PARSING: Part = Part { start: 0.0, len: 0.4 };
 const WELDING: Part = Part { start: 0.4, len: 0.4 };
 
-/// Files up to this size are counted through when they are described: that takes milliseconds.
+/// Largest file, in bytes, that a description counts through; counting then takes milliseconds.
 const COUNTED: usize = 4 << 20;
 
-/// The count of triangles, if the file is binary.
+/// The count of triangles in the header of a binary file.
 fn claimed(bytes: &[u8]) -> Option<usize> {
     let count = bytes.get(HEADER - 4..HEADER)?;
     usize::try_from(u32::from_le_bytes([count[0], count[1], count[2], count[3]])).ok()
 }
 
-/// Whether so many triangles are exactly the file. Binary files may begin with the word that text begins with, so this
-/// is what tells them apart.
+/// Whether `count` triangles fill the file exactly. This test tells binary from text, because a binary file may begin
+/// with the word that begins a text file.
 fn fits(bytes: &[u8], count: usize) -> bool {
     count.checked_mul(FACET).and_then(|len| len.checked_add(HEADER)) == Some(bytes.len())
 }
@@ -81,7 +81,7 @@ fn is(line: &[u8], word: &[u8]) -> bool {
     line.split(u8::is_ascii_whitespace).next().is_some_and(|first| first.eq_ignore_ascii_case(word))
 }
 
-/// The count of triangles that are there, and what to tell the user about it.
+/// The number of triangles in the file, and a note for the user if the header differs.
 fn facets(job: &Job<'_>) -> Result<(usize, Option<String>), Error> {
     let len = job.bytes.len();
     let Some(count) = claimed(job.bytes) else {
@@ -117,7 +117,7 @@ fn read_binary(job: &Job<'_>) -> Result<Contents, Error> {
     if let Some(note) = note {
         job.note(note);
     }
-    // Two indices a corner, and the table of points: about half a point a triangle, half of the table empty.
+    // Memory: two indices per corner, and the hash table, which is half empty, of about half a point per triangle.
     job.check_memory(count, 3 * 8 + 32)?;
     let corner = |index: usize| {
         let at = HEADER + index / 3 * FACET + 12 * (1 + index % 3);
@@ -188,13 +188,13 @@ fn read_text(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(Contents { cloud, triangles: faces.finish(job) })
 }
 
-/// The outcome for one piece of text, or for all of it.
+/// Result of parsing one piece of text, or all of it.
 #[derive(Default)]
 struct Piece {
     corners: Vec<[f64; 3]>,
-    /// Where each face ends among the corners.
+    /// End of each face among the corners.
     ends: Vec<usize>,
-    /// Whether the last solid that is spoken of has ended.
+    /// Whether the last solid mentioned has ended.
     closed: Option<bool>,
     error: Option<(usize, String)>,
 }

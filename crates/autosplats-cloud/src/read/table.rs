@@ -1,4 +1,4 @@
-//! Columns of numbers to a cloud: what binary and text formats share.
+//! Columns of numbers to a cloud, shared by binary and text formats.
 
 use std::ops::Range;
 
@@ -11,16 +11,16 @@ use super::{
 };
 use crate::{Error, FieldValues, PointCloud, merge::residual};
 
-/// Points handled between two looks at the caller's wish to stop: a few milliseconds.
+/// Points processed between two checks for cancellation: a few milliseconds of work.
 const BLOCK: usize = 1 << 18;
 
-/// Coordinates below this magnitude need no origin: `f32` steps there are below a millimetre.
+/// Coordinates below this magnitude need no origin: the `f32` step there is below a millimetre.
 pub(crate) const SMALL: f64 = 1e4;
 
-/// Values of a point beyond which a header is rather broken than rich.
+/// Largest number of values of a point; a header with more is broken.
 pub(crate) const MAX_COLUMNS: usize = 1024;
 
-/// The number types that files hold.
+/// Number types in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scalar {
     I8,
@@ -61,7 +61,7 @@ impl Scalar {
     }
 }
 
-/// A number that lies in a file in either byte order.
+/// A number that can be stored in either byte order.
 trait Number: Copy + Send + Sync {
     fn read(bytes: &[u8], at: usize, big_endian: bool) -> Self;
 }
@@ -80,7 +80,7 @@ macro_rules! number {
 }
 number!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
-/// One number per point: the one of point `i` starts at byte `offset + i * stride`.
+/// One number per point: the number of point `i` starts at byte `offset + i * stride`.
 #[derive(Clone, Debug)]
 pub(crate) struct Column {
     pub(crate) name: String,
@@ -95,10 +95,10 @@ impl Column {
     }
 }
 
-/// Points of a preview, about 16 MB of a file.
+/// Points of a preview chunk, about 16 MB of a file.
 pub(super) const CHUNK: usize = 1 << 20;
 
-/// Columns over some bytes.
+/// Columns over a piece of memory.
 pub(crate) struct Table<'a> {
     pub(crate) bytes: &'a [u8],
     pub(crate) count: usize,
@@ -106,12 +106,12 @@ pub(crate) struct Table<'a> {
     pub(crate) columns: Vec<Column>,
     /// Whether a column named `rgb` or `rgba` holds a colour packed into 32 bits.
     pub(crate) packed_rgb: bool,
-    /// Part of the whole work that was done before this.
+    /// Fraction of the whole work that is finished before this table is read.
     pub(crate) done: f32,
 }
 
 impl Table<'_> {
-    /// Makes the cloud. `place` is where an error about missing coordinates points to.
+    /// Makes the cloud. `place` is the place in errors about missing coordinates.
     pub(crate) fn into_cloud(mut self, job: &Job<'_>, place: &str) -> Result<PointCloud, Error> {
         if self.columns.len() > MAX_COLUMNS {
             return Err(job.malformed(place, format!("{} values a point; at most {MAX_COLUMNS}", self.columns.len())));
@@ -168,7 +168,7 @@ impl Table<'_> {
         for column in &self.columns {
             let values = self.field(job, column, part(step))?;
             step += 1;
-            // Two columns may be called as one, as `intensity` and `scalar_Intensity` are.
+            // Two columns may map to one name, as `intensity` and `scalar_Intensity` do.
             let mut name = field_name(&column.name);
             while cloud.fields().iter().any(|field| field.name == name) {
                 name.push('_');
@@ -178,7 +178,7 @@ impl Table<'_> {
         Ok(cloud)
     }
 
-    /// Hands out the points piece by piece, for those who want to see them before all is read.
+    /// Passes the points to the caller chunk by chunk, if the caller wants chunks.
     pub(super) fn preview(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
         if !job.progress.wants_chunks() {
             return Ok(());
@@ -197,7 +197,7 @@ impl Table<'_> {
         Ok(())
     }
 
-    /// Takes the columns of three names out, letter case ignored, if they are all there.
+    /// Removes and returns the columns of three names, if all are there. Letter case is ignored.
     fn take(&mut self, names: [&str; 3]) -> Option<[Column; 3]> {
         let find = |name: &str| self.columns.iter().position(|column| column.name.eq_ignore_ascii_case(name));
         let indices = [find(names[0])?, find(names[1])?, find(names[2])?];
@@ -210,7 +210,8 @@ impl Table<'_> {
         Some(taken)
     }
 
-    /// Every value that will be read lies within the bytes. Readers check this with better words; this is the backstop.
+    /// Checks that every value lies within the bytes. Readers check sizes with better messages; this is the last
+    /// resort.
     fn check_size(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
         let fits = |column: &Column| {
             let last = self.count.saturating_sub(1).checked_mul(column.stride)?;
@@ -249,12 +250,12 @@ impl Table<'_> {
 
         let [x, y, z] = xyz;
         let floats = xyz.iter().all(|column| column.scalar == Scalar::F32 && column.stride == x.stride);
-        // Within one record, and not each in a run of its own.
+        // All three lie within one record, not each in a run of its own.
         let first = x.offset.min(y.offset).min(z.offset);
         let together = x.offset.max(y.offset).max(z.offset) - first + 4 <= x.stride;
         let adjacent = y.offset == x.offset + 4 && z.offset == x.offset + 8;
         let positions = if origin == DVec3::ZERO && floats && together && adjacent && !self.big_endian {
-            // The common case, and the fast one: twelve bytes in a row, copied as they are.
+            // The common case, and the fast one: twelve adjacent bytes, copied unchanged.
             self.collect("positions", x, job, part, |record| {
                 let mut raw = [0; 12];
                 raw.copy_from_slice(&record[..12]);
@@ -275,7 +276,8 @@ impl Table<'_> {
         Ok((origin, positions?))
     }
 
-    /// As [`collect`], of what begins where the values of a column are: the last point's may end with its last value.
+    /// Like [`collect`], from the records that start at the values of `column`. The last point's record may end after
+    /// its value.
     fn collect<T: Send>(
         &self,
         what: &str,
@@ -294,7 +296,7 @@ impl Table<'_> {
         Ok(values)
     }
 
-    /// What `f32` lost of the positions, if all digits are wanted and some are lost.
+    /// What `f32` loses of the positions, if all digits are wanted and some are lost.
     fn residuals(&self, job: &Job<'_>, xyz: &[Column; 3], cloud: &PointCloud) -> Result<Option<Vec<[f32; 3]>>, Error> {
         let lossless = |column: &Column| column.scalar == Scalar::F32 || column.scalar.size() < 4;
         if !job.options.exact || cloud.origin() == DVec3::ZERO && xyz.iter().all(lossless) {
@@ -308,7 +310,7 @@ impl Table<'_> {
         collect("residuals", self.count, job, Part { start: 1.0, len: 0.0 }, lost).map(Some)
     }
 
-    /// Colours of any number type to 8 bits, and whether these say it all.
+    /// Colours of any number type as 8 bits, and whether 8 bits keep them exactly.
     fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: Part) -> Result<(Vec<[u8; 3]>, bool), Error> {
         let rgb = rgb.each_ref();
         if rgb.iter().all(|column| column.scalar == Scalar::U8) {
@@ -353,14 +355,14 @@ impl Table<'_> {
     }
 }
 
-/// How colours of any number type become 8 bits.
+/// Factor that converts colours of any number type to 8 bits.
 #[derive(Clone, Copy)]
 pub(crate) struct ColorScale(f64);
 
 impl ColorScale {
-    /// Wide types often hold 8-bit values, and floats 0 to 1 or 0 to 255, so the largest value decides.
+    /// Decides by the largest value, because wide types often hold 8-bit values, and floats 0 to 1 or 0 to 255.
     pub(crate) fn of(largest: f64, float: bool) -> Self {
-        // Full brightness may be exceeded a little, where colours were mixed.
+        // Mixed colours may exceed full brightness a little.
         Self(if largest >= 256.0 {
             1.0 / 256.0
         } else if float && largest <= 1.01 {
@@ -371,26 +373,26 @@ impl ColorScale {
     }
 
     pub(crate) fn byte(self, value: f64) -> u8 {
-        // 16-bit values are cut, not rounded: that returns the byte both of v * 256 and of v * 257.
+        // 16-bit values are cut, not rounded: that restores the byte both of v * 256 and of v * 257.
         let round = if self.0 < 1.0 { 0.0 } else { 0.5 };
         (value * self.0 + round) as u8
     }
 
-    /// Whether the byte says it all.
+    /// Whether 8 bits keep the value exactly.
     pub(super) fn keeps(self, value: f64) -> bool {
         let back = if self.0 < 1.0 { 257.0 } else { 1.0 / self.0 };
         (value - f64::from(self.byte(value)) * back).abs() < 1e-6
     }
 }
 
-/// The share of the progress bar that a step has.
+/// The range of the progress bar that a step covers: start and length, as fractions of the whole.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
     pub(super) start: f32,
     pub(super) len: f32,
 }
 
-/// One value per point, computed in parallel straight into its place.
+/// Computes one value per point in parallel, in place.
 pub(super) fn collect<T: Send>(
     what: &str,
     count: usize,
@@ -411,15 +413,15 @@ fn blocks(count: usize) -> impl Iterator<Item = Range<usize>> {
     (0..count).step_by(BLOCK).map(move |start| start..count.min(start + BLOCK))
 }
 
-/// Makes room for `additional` values, or says that there is none.
+/// Reserves room for `additional` values; `what` names them in the error.
 pub(super) fn reserve<T>(values: &mut Vec<T>, additional: usize, what: &str) -> Result<(), Error> {
     values
         .try_reserve(additional)
         .map_err(|_| Error::OutOfMemory { what: what.into(), bytes: additional.saturating_mul(size_of::<T>()) })
 }
 
-/// A point of whole numbers in the middle of the data: the median of a sample, which a few wild points do not move as
-/// they would move the centre of the bounds.
+/// A place of whole numbers in the middle of the points: the median of a sample. Outliers do not move a median as they
+/// move the centre of the bounds.
 pub(crate) fn middle(count: usize, world: impl Fn(usize) -> DVec3) -> DVec3 {
     let step = count.div_ceil(1024).max(1);
     let sample: Vec<DVec3> = (0..count).step_by(step).map(world).filter(|point| point.is_finite()).collect();

@@ -1,7 +1,7 @@
 //! Rows of numbers in text to packed records, in parallel.
 //!
-//! The text is cut into pieces at line ends, the pieces are parsed side by side, and each row becomes one record of
-//! little-endian numbers, which a [`Table`](super::table::Table) then reads.
+//! The text is cut into pieces at line ends, and the pieces are parsed in parallel. Each row becomes one record of
+//! little-endian numbers for a [`Table`](super::table::Table).
 
 use rayon::prelude::*;
 
@@ -14,10 +14,11 @@ use crate::Error;
 /// Bytes of text that one thread parses at a time.
 const PIECE: usize = 1 << 19;
 
-/// How coordinates in text are stored: it may hold more digits than the type declared for it, and all of them are read.
+/// Storage type of coordinates in text. Text may have more digits than the declared type holds, and all digits are
+/// read.
 pub(super) const TEXT: &str = "text";
 
-/// Whether a value is one that keeps all its digits.
+/// Whether a value is a coordinate, which keeps all its digits.
 pub(super) fn is_coordinate(name: &str) -> bool {
     ["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
 }
@@ -25,18 +26,18 @@ pub(super) fn is_coordinate(name: &str) -> bool {
 /// What to do with the next value of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Token {
-    /// Put it into the record.
+    /// Store the value in the record.
     Store(Scalar),
-    /// A colour packed into 32 bits, written as an integer or as the float of the same bits.
+    /// Store a colour packed into 32 bits, written as an integer or as the float of the same bits.
     Packed,
-    /// Leave it out.
+    /// Skip the value.
     Skip,
-    /// A count, and so many values to leave out.
+    /// Read a count and skip that many values.
     SkipList,
 }
 
 impl Token {
-    /// Bytes of it in the record.
+    /// Bytes of the value in the record.
     pub(super) fn size(self) -> usize {
         match self {
             Self::Store(scalar) => scalar.size(),
@@ -46,16 +47,16 @@ impl Token {
     }
 }
 
-/// How the rows of a text look.
+/// Layout of the rows of a text.
 pub(super) struct Rows<'a> {
     pub(super) tokens: &'a [Token],
-    /// Number of rows wanted; to the end of the file if absent.
+    /// Number of rows to read; `None` reads to the end of the file.
     pub(super) count: Option<usize>,
     /// Whether lines of a single integer are counts, not rows.
     pub(super) counts_between: bool,
 }
 
-/// The outcome for one piece of text.
+/// Result of parsing one piece of text.
 struct Piece {
     records: Vec<u8>,
     rows: usize,
@@ -63,13 +64,13 @@ struct Piece {
 }
 
 impl Rows<'_> {
-    /// Parses rows from byte `start` on. Returns the records and how many there are.
+    /// Parses rows from byte `start` on. Returns the records and their number.
     pub(super) fn parse(&self, job: &Job<'_>, start: usize, part: Part) -> Result<(Vec<u8>, usize), Error> {
         self.parse_and_show(job, start, part, |_, _| Ok(()))
     }
 
-    /// [Parses](Self::parse), and has `show` look at records and their number, about a million at a time, before those
-    /// after them are parsed.
+    /// Like [`parse`](Self::parse), and passes the records and their number to `show`, about a million at a time,
+    /// before the next ones are parsed.
     pub(super) fn parse_and_show(
         &self,
         job: &Job<'_>,
@@ -197,8 +198,8 @@ fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), Strin
     Ok(())
 }
 
-/// Packed colours are written as integers, as floats whose bits are meant, or, by old programs, as floats whose value
-/// is meant: those are whole numbers, which the bits of a colour never look like.
+/// Decodes a packed colour: an integer, a float whose bits are the colour, or, in old files, a float whose value is the
+/// colour. Such values are whole numbers, which floats of colour bits never are.
 fn packed(value: &[u8]) -> Result<u32, String> {
     if let Some(integer) = std::str::from_utf8(value).ok().and_then(|text| text.parse::<i64>().ok()) {
         return Ok(integer as u32);
@@ -208,7 +209,7 @@ fn packed(value: &[u8]) -> Result<u32, String> {
     Ok(if whole { number as u32 } else { (number as f32).to_bits() })
 }
 
-/// A number as text has it, `nan` and `inf` in any case included.
+/// A number, including `nan` and `inf` in any letter case.
 pub(super) fn number(value: &[u8]) -> Result<f64, String> {
     fast_float2::parse(value).or_else(|_| {
         // Windows writes -nan(ind) and 1.#QNAN.
@@ -220,27 +221,27 @@ pub(super) fn number(value: &[u8]) -> Result<f64, String> {
     })
 }
 
-/// The values of a line, between blanks, commas and semicolons.
+/// The values of a line, separated by blanks, commas or semicolons.
 pub(super) fn values(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|byte| matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')).filter(|value| !value.is_empty())
 }
 
-/// Whether a trimmed line holds nothing or a comment.
+/// Whether a trimmed line is empty or a comment.
 pub(super) fn is_blank(line: &[u8]) -> bool {
     line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
 }
 
-/// Whether a trimmed line is a single integer, as PTS has it before its points.
+/// Whether a trimmed line is a single integer, such as the count before the points of a PTS file.
 pub(super) fn is_count(line: &[u8]) -> bool {
     !line.is_empty() && line.iter().all(u8::is_ascii_digit)
 }
 
-/// The end of the line that `at` is in, without its line feed.
+/// The end of the line that contains byte `at`, without its line feed.
 pub(super) fn line_end(text: &[u8], at: usize) -> usize {
     text[at..].iter().position(|&byte| byte == b'\n').map_or(text.len(), |len| at + len)
 }
 
-/// The start of the line after the one that `at` is in.
+/// The start of the line after the one that contains byte `at`.
 pub(super) fn after_line_end(text: &[u8], at: usize) -> usize {
     (line_end(text, at) + 1).min(text.len())
 }

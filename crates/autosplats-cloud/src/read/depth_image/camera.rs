@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::Job;
 use crate::DepthCamera;
 
-/// Millimetres, as most depth cameras count.
+/// Default pixel values per metre: most depth cameras count millimetres.
 const PER_METRE: f64 = 1000.0;
 
 /// Names of files that hold a camera, as JSON or as bare numbers.
@@ -24,10 +24,10 @@ const FILES: [&str; 7] = [
     "camera-intrinsics.txt",
 ];
 
-/// Bytes beyond which such a file is something else.
+/// Largest size of a camera file, in bytes.
 const MAX_BYTES: u64 = 1 << 16;
 
-/// A camera and where it is known from.
+/// A camera and its source.
 pub(super) struct Camera {
     pub(super) camera: DepthCamera,
     pub(super) source: String,
@@ -35,7 +35,7 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// What the caller says, else a file beside the image or beside its folder, else an ordinary camera of that size.
+    /// The caller's camera, otherwise that of a file beside the image or beside its folder, otherwise a guess.
     pub(super) fn of(job: &Job<'_>, width: usize, height: usize) -> Self {
         let mut notes = Vec::new();
         if let Some(camera) = job.options.depth_camera {
@@ -66,7 +66,7 @@ impl Camera {
     }
 }
 
-/// A Kinect's angle of view, in millimetres.
+/// A camera with a Kinect's angle of view, for images in millimetres.
 fn ordinary(width: usize, height: usize) -> DepthCamera {
     let focal = 525.0 * width as f64 / 640.0;
     let middle = |len: usize| (len as f64 - 1.0) / 2.0;
@@ -83,12 +83,12 @@ fn parse(text: &str, width: usize, height: usize) -> Option<DepthCamera> {
     (usable && cx.is_finite() && cy.is_finite()).then_some(camera)
 }
 
-/// Values per metre, also where a file has metres per value.
+/// Values per metre; values below 1 are taken as metres per value.
 fn scale_of(scale: f64) -> f64 {
     if scale < 1.0 { 1.0 / scale } else { scale }
 }
 
-/// Open3D's form: sizes, and a matrix column by column; or values by name.
+/// Open3D's form: sizes and a matrix column by column; or values by name.
 fn from_json(json: &Value, width: usize, height: usize) -> Option<DepthCamera> {
     let inner = json.get("intrinsic").unwrap_or(json);
     let number = |names: &[&str]| names.iter().find_map(|name| inner.get(name).or(json.get(name))?.as_f64());
@@ -119,7 +119,7 @@ fn from_json(json: &Value, width: usize, height: usize) -> Option<DepthCamera> {
     Some(camera)
 }
 
-/// Three rows of three numbers, the upper left of a 4 × 4 matrix, or fx fy cx cy; a scale may follow.
+/// A 3 × 3 matrix, a 4 × 4 matrix with it in the upper left, or fx fy cx cy. A scale may follow, except after 4 × 4.
 fn from_numbers(text: &str) -> Option<DepthCamera> {
     let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default());
     let words =

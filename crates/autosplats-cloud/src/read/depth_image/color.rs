@@ -1,4 +1,4 @@
-//! The colours of a depth image, from a picture beside it.
+//! Colours of a depth image, from a picture beside it.
 
 use std::{
     fs::{metadata, read as read_file},
@@ -9,15 +9,15 @@ use image::{ImageFormat, ImageReader};
 
 use super::{super::guard, MAX_RATIO, decode};
 
-/// What a colour image is called where a depth image is called depth.
+/// Words that replace `depth` in the name of a colour image.
 const WORDS: [&str; 4] = ["color", "rgb", "colour", "image"];
 
 const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "ppm"];
 
-/// Bytes of a picture beyond which it is no picture of a depth camera.
+/// Largest size of a colour image, in bytes.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// The picture that goes with a depth image, by its name: `depth_1.pgm` and `color_1.png`, `depth/1.png` and `rgb/1.jpg`.
+/// The colour image of a depth image, found by name: `depth_1.pgm` and `color_1.png`, `depth/1.png` and `rgb/1.jpg`.
 pub(crate) fn beside(path: &Path) -> Option<PathBuf> {
     let stem = path.file_stem()?.to_str()?;
     let folder = path.parent()?;
@@ -30,7 +30,7 @@ pub(crate) fn beside(path: &Path) -> Option<PathBuf> {
             moved().zip(renamed.as_ref()).map(|(folder, stem)| folder.join(stem)),
         ];
         for base in bases.into_iter().flatten() {
-            // The stem may hold points of its own, as time stamps do.
+            // The stem may contain dots, as time stamps do.
             let named = |extension| PathBuf::from(format!("{}.{extension}", base.display()));
             if let Some(found) = EXTENSIONS.into_iter().map(named).find(|path| path.is_file()) {
                 return Some(found);
@@ -44,7 +44,7 @@ fn renamed_folder(folder: &Path, word: &str) -> Option<String> {
     renamed(folder.file_name()?.to_str()?, word)
 }
 
-/// `word` in the place of `depth`, in its letter case.
+/// Replaces the last `depth` of a name by `word` in the same letter case.
 fn renamed(name: &str, word: &str) -> Option<String> {
     let at = name.to_ascii_lowercase().rfind("depth")?;
     let old = &name[at..at + 5];
@@ -56,7 +56,7 @@ fn renamed(name: &str, word: &str) -> Option<String> {
     Some(format!("{}{word}{}", &name[..at], &name[at + 5..]))
 }
 
-/// The colours of the pixels, or why there are none.
+/// The colours of the pixels, or the reason why there are none.
 pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<Vec<[u8; 3]>, String> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let fault = |what: String| format!("{name}: {what}");

@@ -2,9 +2,8 @@
 //!
 //! # How it works
 //!
-//! The camera is what the caller says, else what a file beside the image says, else an ordinary one of that size. A
-//! picture of the same size whose name differs by `color` for `depth` gives the colours. Pixels without depth make no
-//! points.
+//! The camera is given by the caller, by a file beside the image, or else guessed. A picture of the same size, whose
+//! name has `color` instead of `depth`, gives the colours. Pixels without depth make no points.
 
 mod camera;
 pub(crate) mod color;
@@ -30,15 +29,15 @@ pub(super) const FORMAT: Format = Format {
 
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// The most bytes that one compressed byte of a PNG stands for.
+/// Largest number of bytes that one compressed byte of a PNG can expand to.
 const MAX_RATIO: usize = 1032;
 
-/// What the header of an image says.
+/// Header of an image.
 struct Header {
     width: usize,
     height: usize,
     format: String,
-    /// First byte after the header, and the greatest value, of a PGM.
+    /// Header of a PGM, if the image is one.
     pgm: Option<pgm::Header>,
 }
 
@@ -59,7 +58,7 @@ impl Header {
                 pgm: Some(header),
             });
         }
-        // Signature, length and name of the first chunk, then its content: all at fixed places.
+        // The first chunk's length and name follow the signature, then its content, all at fixed places.
         let Some(header) = job.bytes.get(12..29).filter(|header| header.starts_with(b"IHDR")) else {
             return Err(job.malformed("byte 12", "the PNG lacks its header; copy it again"));
         };
@@ -117,7 +116,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let header = Header::parse(job)?;
     let (width, height) = (header.width, header.height);
-    // The decoded image, positions and colours.
+    // Memory: the decoded image, positions and colours.
     job.check_memory(width * height, 2 + 12 + 3)?;
     let depths = match &header.pgm {
         Some(pgm) => pgm.values(job)?,
@@ -178,12 +177,12 @@ fn png_values(job: &Job<'_>, width: usize, height: usize) -> Result<Vec<u16>, Er
     Ok(image.into_raw())
 }
 
-/// Decodes an image of a size that was compared with the length of its file.
+/// Decodes an image whose size has been compared with the length of its file.
 fn decode(bytes: &[u8], format: ImageFormat, width: usize, height: usize) -> Result<DynamicImage, String> {
     let mut limits = Limits::default();
     limits.max_image_width = u32::try_from(width).ok();
     limits.max_image_height = u32::try_from(height).ok();
-    // Four channels of 16 bits at most, and as much again for the decoder.
+    // At most four channels of 16 bits, and as much again for the decoder.
     limits.max_alloc = Some((width as u64 * height as u64).saturating_mul(16).saturating_add(1 << 24));
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits);

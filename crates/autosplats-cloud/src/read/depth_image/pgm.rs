@@ -1,9 +1,9 @@
-//! PGM, grey images without compression. Values are kept as they are, whatever the greatest one is said to be.
+//! PGM, uncompressed grey images. Values are not rescaled by the stated maximum.
 
 use super::super::{Job, shown, table::reserve};
 use crate::Error;
 
-/// What the header of a PGM says.
+/// Header of a PGM.
 pub(super) struct Header {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -13,12 +13,12 @@ pub(super) struct Header {
     end: usize,
 }
 
-/// Whether the file begins as PGM does, in binary or as text.
+/// Whether the file begins like a PGM, binary or text.
 pub(super) fn recognised(bytes: &[u8]) -> bool {
     (bytes.starts_with(b"P5") || bytes.starts_with(b"P2")) && bytes.get(2).is_some_and(u8::is_ascii_whitespace)
 }
 
-/// The next run of bytes between blanks and comments, and the byte after it.
+/// The next word between blanks and comments, and the byte after it.
 fn word(bytes: &[u8], mut at: usize) -> (&[u8], usize) {
     while let Some(&byte) = bytes.get(at) {
         match byte {
@@ -54,7 +54,7 @@ impl Header {
             return Err(job.malformed(format!("byte {at}"), format!("{largest} is beyond 16 bits")));
         }
         let ascii = job.bytes[1] == b'2';
-        // A single blank ends the header. A value of text takes two bytes at least, the last one perhaps one.
+        // A single blank ends the header. A value of text takes at least two bytes, the last value perhaps one.
         let end = (at + 1).min(job.bytes.len());
         let fits = (job.bytes.len() - end + usize::from(ascii)) / 2;
         if largest > 255 && width * height > fits {

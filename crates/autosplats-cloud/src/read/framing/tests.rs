@@ -1,4 +1,4 @@
-//! Streams of files in pieces of every size, cut anywhere, with garbage and with lies in them.
+//! Streams of files in pieces of every size, cut anywhere, with garbage and false claims in them.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn ply(format: &str, end: &str, faces: usize, body: &[u8]) -> Vec<u8> {
     [header.as_bytes(), body].concat()
 }
 
-/// A file of each kind that can be in a stream.
+/// One file of each kind that a stream may contain.
 fn files() -> Vec<Vec<u8>> {
     let points: Vec<u8> = (0..6).flat_map(|value| (value as f32).to_le_bytes()).collect();
     let big: Vec<u8> = (0..6).flat_map(|value| (value as f32).to_be_bytes()).collect();
@@ -36,7 +36,7 @@ fn files() -> Vec<Vec<u8>> {
     ]
 }
 
-/// What is found if bytes come in pieces of this size, and whether any come back.
+/// The findings if bytes arrive in pieces of size `piece`.
 fn found(bytes: &[u8], piece: usize) -> Vec<Found> {
     let mut framing = Framing::new(1 << 20);
     let mut all = Vec::new();
@@ -88,7 +88,7 @@ fn a_stream_cut_anywhere_gives_the_files_before_the_cut() {
     for cut in 0..stream.len() {
         let found = found(&stream[..cut], 64);
         let before = ends.iter().filter(|&&end| end <= cut).count();
-        // Nobody can tell whether the last line of a text is whole if its line feed is missing.
+        // Without its line feed, the last line of a text may be incomplete.
         let last = stream[..cut].iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
         let in_text = stream[last..].iter().position(|&byte| byte == b'\n').map(|len| last + len + 1);
         let without_feed = in_text.is_some_and(|end| ends.contains(&end)) && whole(&found).len() == before + 1;

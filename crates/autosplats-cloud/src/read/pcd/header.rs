@@ -9,7 +9,7 @@ use super::super::{
 };
 use crate::{Axes, Error};
 
-/// How the values after the header are written.
+/// Encoding of the values after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -27,7 +27,7 @@ impl Encoding {
     }
 }
 
-/// A named number, or `count` of them, of each point.
+/// A named number, or `count` numbers, of each point.
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub(super) name: String,
@@ -35,19 +35,19 @@ pub(super) struct Field {
     pub(super) count: usize,
 }
 
-/// Where the sensor stood.
+/// Pose of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Viewpoint {
-    /// At the origin, unturned, which is also what programs write that do not know.
+    /// At the origin, unrotated. Programs that do not know the pose write this too.
     Identity,
     /// Elsewhere.
     At(DMat4),
-    /// No pose at all.
+    /// Not a valid pose.
     Broken,
 }
 
 impl Viewpoint {
-    /// From tx ty tz qw qx qy qz.
+    /// Parses tx ty tz qw qx qy qz.
     fn of(values: &[String]) -> Self {
         let values: Option<Vec<f64>> = values.iter().map(|value| value.parse().ok()).collect();
         let Some(&[x, y, z, qw, qx, qy, qz]) = values.as_deref() else { return Self::Broken };
@@ -64,7 +64,7 @@ impl Viewpoint {
     }
 }
 
-/// All that the header says.
+/// Contents of the header.
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
     pub(super) width: Option<usize>,
@@ -72,15 +72,15 @@ pub(super) struct Header {
     pub(super) points: usize,
     pub(super) encoding: Encoding,
     pub(super) viewpoint: Viewpoint,
-    /// What our own files say in a comment.
+    /// Axes, which only files of this project state, in a comment.
     pub(super) axes: Option<Axes>,
-    /// They also say if a viewpoint that looks like the default is where the sensor stood.
+    /// Whether an identity viewpoint is the sensor's true pose; files of this project state it in a comment.
     pub(super) knows_sensor: bool,
     /// First byte after the header.
     pub(super) end: usize,
 }
 
-/// The words of a header line, which is text; a broken one just has no sensible words.
+/// The words of a header line. A line of broken text has no known words.
 fn words(line: &[u8]) -> Vec<String> {
     String::from_utf8_lossy(line).split_ascii_whitespace().map(str::to_owned).collect()
 }
@@ -201,7 +201,7 @@ fn scalar_of(kind: &str, size: &str) -> Option<Scalar> {
     })
 }
 
-/// Whether the file begins as a PCD header does, comments apart.
+/// Whether the file begins with a PCD header; comments are skipped.
 pub(super) fn recognised(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(1 << 12)];
     let first = start.split(|&byte| byte == b'\n').map(words).find(|words| {

@@ -1,13 +1,13 @@
-//! The LZF compression of binary_compressed PCD files.
+//! LZF decompression for binary_compressed PCD files.
 
-/// Bytes between two looks at the caller's wish to stop.
+/// Output bytes between two checks for cancellation.
 const BLOCK: usize = 1 << 22;
 
-/// The most bytes that one compressed byte can stand for: three make a copy of at most 264.
+/// Largest number of bytes that one compressed byte can expand to: three bytes encode a copy of at most 264.
 pub(super) const MAX_RATIO: usize = 88;
 
-/// Appends what `input` stands for to `output`, at most `limit` bytes. Gives the place and kind of a fault; `go_on`
-/// is asked now and then with the bytes made so far, and its error ends the work.
+/// Decompresses `input` and appends to `output`, at most `limit` bytes. The inner error is the place and kind of a
+/// fault. `go_on` is called now and then with the number of bytes made so far; its error ends the work.
 pub(super) fn decompress<E>(
     input: &[u8],
     limit: usize,
@@ -43,7 +43,7 @@ pub(super) fn decompress<E>(
             if back >= len {
                 output.extend_from_within(from..from + len);
             } else {
-                // The copy overlaps what it makes: a repetition.
+                // The copy overlaps its own output: a repetition.
                 for index in from..from + len {
                     output.push(output[index]);
                 }

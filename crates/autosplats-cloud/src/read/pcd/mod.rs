@@ -20,7 +20,7 @@ use crate::{Axes, Error, PointCloud, Scan};
 pub(super) const FORMAT: Format =
     Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
 
-/// Part of the work that parsing text is.
+/// Share of the work that parsing text takes.
 const PARSING: Part = Part { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
@@ -59,21 +59,21 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     })
 }
 
-/// A file of this name without any header can only be meant as rows of numbers, so nothing is gained by refusing it.
+/// Note on a file named `.pcd` without a PCD header. Such a file can only be meant as rows of numbers.
 const NO_HEADER: &str = "there is no PCD header; read as text";
 
-/// Whether the file is no PCD but for its name.
+/// Whether the file has rows of numbers instead of a PCD header.
 pub(super) fn without_header(job: &Job<'_>) -> bool {
     !header::recognised(job.bytes) && xyz::looks_like_rows(job.bytes)
 }
 
-/// What follows the header, where, and how many bytes that and the points take at least; no number if it is beyond all
-/// bounds.
+/// The body after the header, its first byte, and the least number of bytes of the body; `None` if that number
+/// overflows.
 pub(super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize>), Error> {
     let header = Header::parse(job)?;
     let bytes = header.stride().and_then(|stride| header.points.checked_mul(stride));
     Ok(match header.encoding {
-        // A value and the end of the line.
+        // A value and a line end.
         Encoding::Ascii => (Body::Lines(header.points), header.end, header.points.checked_mul(2)),
         Encoding::Binary => (Body::Bytes(bytes.unwrap_or(usize::MAX)), header.end, bytes),
         Encoding::Compressed => (Body::Sized, header.end, bytes),
@@ -126,16 +126,16 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(if let Some(axes) = axes { cloud.with_axes(axes) } else { cloud }.into())
 }
 
-/// Fields left out that are told one by one.
+/// Largest number of left-out fields that are noted one by one.
 const LISTED: usize = 10;
 
-/// Neighbours looked at to find out from where an image of points was taken.
+/// Pairs of neighbours sampled to find out from where an image of points was taken.
 const RAYS: usize = 1 << 14;
 
-/// Where the sensor stood, if the file says more than the default, or is of our own and says that it was there.
+/// The sensor's pose, if VIEWPOINT is not the default, or if a file of this project states that the default is true.
 ///
-/// The points are not moved by it: the format calls VIEWPOINT the place that the points were acquired from, not a
-/// transformation to apply, and the programs that write and read PCD leave points alone.
+/// Points are not moved by the pose. The format calls VIEWPOINT the place from which the points were acquired, not a
+/// transformation to apply, and other programs leave points unmoved.
 fn scans(header: &Header, points: usize) -> Vec<Scan> {
     match header.viewpoint {
         Viewpoint::At(world_from_sensor) => vec![Scan { name: None, world_from_sensor, points: 0..points }],
@@ -148,8 +148,8 @@ fn at_the_origin(points: usize) -> Scan {
     Scan { name: None, world_from_sensor: DMat4::IDENTITY, points: 0..points }
 }
 
-/// An image of points was taken by a sensor. Where the file says no more than the default that was its origin, unless the
-/// points were moved since: seen from there, neighbours in a row are about the same angle apart, near or far.
+/// Whether an organised cloud was taken from the origin, although its VIEWPOINT is the default. Seen from the sensor,
+/// neighbours in a row of the image have about the same angle between them, near or far. Moved points do not.
 fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
     let Some(width) =
         header.width.filter(|&width| width > 0 && header.viewpoint == Viewpoint::Identity && header.height > 1)
@@ -169,8 +169,8 @@ fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
     middle > 0.0 && even * 10 >= angles.len() * 9
 }
 
-/// The columns over binary data. `place` makes offset and stride of a field from the bytes of a point before it and of
-/// itself.
+/// The columns over binary data. `place` returns offset and stride of a field, given the bytes of the fields before it
+/// and its own.
 fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, usize) -> (usize, usize)) -> Table<'a> {
     let mut columns = Vec::new();
     let mut before = 0;
@@ -193,7 +193,7 @@ fn ascii(job: &Job<'_>, header: &Header) -> Result<PointCloud, Error> {
     for field in &header.fields {
         let names = numbered(&field.name, field.count);
         if names.is_empty() {
-            // A line cannot be shorter than its values, which bounds what the header can ask for.
+            // A line is at least as long as its number of values, which bounds what the header can claim.
             if field.count > job.bytes.len().saturating_sub(tokens.len()) {
                 return Err(job.malformed("header", format!("a point of {} values", field.count)));
             }
@@ -255,10 +255,11 @@ fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Furthest that depth cameras see, metres, with room to spare.
+/// Largest range of depth cameras, in metres, with a margin.
 const DEPTH_CAMERA_RANGE: f32 = 20.0;
 
-/// Points in a depth camera's own frame: an image of points, or coloured ones nearer than such cameras see, all in front.
+/// Whether points are in a depth camera's own frame: an image of points, or coloured points within its range, 99 % of
+/// them in front.
 fn seen_from_origin(header: &Header, cloud: &PointCloud) -> bool {
     if header.viewpoint != Viewpoint::Identity || cloud.origin() != DVec3::ZERO {
         return false;

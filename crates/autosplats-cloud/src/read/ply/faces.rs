@@ -1,4 +1,4 @@
-//! The faces of a PLY file: polygons in an element `face`, strips of triangles in an element `tristrips`.
+//! The faces of a PLY file: polygons in an element `face`, triangle strips in an element `tristrips`.
 
 use std::ops::Range;
 
@@ -15,10 +15,10 @@ use super::{
 };
 use crate::Error;
 
-/// Reading faces is not seen on the progress bar: points come first.
+/// Progress of reading faces, which is not shown: points come first.
 const PART: Part = Part { start: 1.0, len: 0.0 };
 
-/// The triangles between so many points.
+/// The triangles between `points` points.
 pub(super) fn triangles(job: &Job<'_>, header: &Header, points: usize) -> Result<Vec<[u32; 3]>, Error> {
     let mut faces = Faces::new(points);
     for (index, element) in header.elements.iter().enumerate() {
@@ -51,7 +51,7 @@ pub(super) fn triangles(job: &Job<'_>, header: &Header, points: usize) -> Result
 struct Reader<'a> {
     job: &'a Job<'a>,
     element: &'a Element,
-    /// Which of the properties has the corners.
+    /// Index of the property that holds the corners.
     list: usize,
     strips: bool,
 }
@@ -61,7 +61,7 @@ impl Reader<'_> {
         if self.strips { faces.strip(corners.iter().copied()) } else { faces.polygon(corners) }
     }
 
-    /// The file ends in a face; the number before it is known.
+    /// Error if the file ends in a face; `complete` is the number of complete faces.
     fn cut_off(&self, complete: usize) -> Error {
         self.job.malformed(
             format!("byte {}", self.job.bytes.len()),
@@ -71,7 +71,7 @@ impl Reader<'_> {
 
     fn binary(&self, start: usize, big_endian: bool, faces: &mut Faces) -> Result<(), Error> {
         let bytes = self.job.bytes;
-        // A face takes a byte at least, a triangle twelve bytes of memory.
+        // A face takes at least one byte of the file; a triangle takes twelve bytes of memory.
         self.job.check_memory(self.element.count.min(bytes.len() - start), 12)?;
         let mut corners = Vec::new();
         let mut at = start;
@@ -161,12 +161,12 @@ fn corner(raw: &[u8], big_endian: bool, scalar: Scalar) -> i64 {
     match scalar {
         Scalar::F32 => whole(f32::from_bits(float(integer(raw, big_endian, Scalar::U32)) as u32).into()),
         Scalar::F64 => whole(f64::from_bits(float(integer(raw, big_endian, Scalar::I64)))),
-        // Beyond all bounds is as good as absent.
+        // A number out of range is a corner that does not exist.
         scalar => integer(raw, big_endian, scalar).unwrap_or(i64::MIN),
     }
 }
 
-/// A whole number as such, any other as a corner that does not exist.
+/// Converts a whole number; any other number becomes a corner that does not exist.
 fn whole(value: f64) -> i64 {
     if value.fract() == 0.0 { value as i64 } else { i64::MIN }
 }

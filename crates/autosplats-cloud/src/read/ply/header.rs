@@ -3,7 +3,7 @@
 use super::super::{Job, MAX_HEADER_LINE, shown, table::Scalar};
 use crate::{Axes, Error};
 
-/// How the values after the header are written.
+/// Encoding of the values after the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -26,11 +26,11 @@ impl Encoding {
 pub(super) struct Property {
     pub(super) name: String,
     pub(super) scalar: Scalar,
-    /// Type of the count, for a list.
+    /// Type of the count, if the property is a list.
     pub(super) list: Option<Scalar>,
 }
 
-/// A run of equal records: vertices, faces, whatever.
+/// A sequence of equal records, such as vertices or faces.
 #[derive(Clone, Debug)]
 pub(super) struct Element {
     pub(super) name: String,
@@ -39,7 +39,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Bytes of a record, if it has no list.
+    /// Bytes of a record, if the element has no list.
     pub(super) fn stride(&self) -> Option<usize> {
         self.properties
             .iter()
@@ -48,7 +48,7 @@ impl Element {
     }
 }
 
-/// All that the header says.
+/// Contents of the header.
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
@@ -129,7 +129,7 @@ impl Header {
     }
 }
 
-/// One line of the header and where the next begins. Lines end in LF, CR LF or, in old files, a bare CR.
+/// A line of the header, and the start of the next. Lines end in LF, CR LF or, in old files, a bare CR.
 fn header_line(bytes: &[u8], start: usize) -> (&[u8], usize) {
     let rest = &bytes[start..];
     let end = rest.iter().position(|byte| matches!(byte, b'\n' | b'\r')).unwrap_or(rest.len());

@@ -1,4 +1,4 @@
-//! How long a PLY is, told by its header and by the lengths of its lists.
+//! The length of a PLY, from its header and the lengths of its lists.
 
 use super::{
     super::{Job, framing::Body},
@@ -11,17 +11,18 @@ use crate::Error;
 pub(in super::super) struct Records {
     elements: Vec<Element>,
     big_endian: bool,
-    /// The element that the next byte is of, and the number of its records before that.
+    /// Index of the element that contains the next byte, and the number of its records before that byte.
     element: usize,
     record: usize,
 }
 
-/// What follows the header, where, and how many bytes that takes at least; no number if it is beyond all bounds.
+/// The body after the header, its first byte, and the least number of bytes of the body; `None` if that number
+/// overflows.
 pub(in super::super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize>), Error> {
     let Header { encoding, elements, end, .. } = Header::parse(job)?;
     if encoding == Encoding::Ascii {
         let lines = elements.iter().try_fold(0_usize, |sum, element| sum.checked_add(element.count));
-        // A value and the end of the line.
+        // A value and a line end.
         return Ok((Body::Lines(lines.unwrap_or(usize::MAX)), end, lines.and_then(|lines| lines.checked_mul(2))));
     }
     let size = |property: &Property| property.list.unwrap_or(property.scalar).size();
@@ -36,7 +37,8 @@ pub(in super::super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize
 }
 
 impl Records {
-    /// The first byte after the last record, once that has come. `at` is where the record of the next byte begins.
+    /// The first byte after the last record, once all have arrived. `at` is the start of the record that contains the
+    /// next byte.
     pub(in super::super) fn end(&mut self, bytes: &[u8], at: &mut usize) -> Result<Option<usize>, String> {
         while let Some(element) = self.elements.get(self.element) {
             if let Some(stride) = element.stride() {
@@ -59,7 +61,7 @@ impl Records {
         Ok(Some(*at))
     }
 
-    /// The first byte after a record.
+    /// The first byte after a record, once the record has arrived.
     fn record(&self, element: &Element, bytes: &[u8], mut at: usize) -> Result<Option<usize>, String> {
         for property in &element.properties {
             let size = property.scalar.size();

@@ -1,5 +1,5 @@
-//! PLY: ascii and binary of both byte orders, any properties in any order, further elements before and after; faces and
-//! strips of triangles where they are wanted.
+//! PLY: ascii and binary of both byte orders, with any properties in any order and further elements. Faces and triangle
+//! strips are read on request.
 
 mod faces;
 mod header;
@@ -23,13 +23,13 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-/// Other elements that are listed.
+/// Largest number of further elements that a description lists.
 const LISTED: usize = 100;
 
-/// Files up to this size are counted through when they are described: that takes milliseconds.
+/// Largest file, in bytes, whose strips a description counts through; counting then takes milliseconds.
 const COUNTED: usize = 4 << 20;
 
-/// Part of the work that packing text or lists into records is.
+/// Share of the work that packing text or lists into records takes.
 const PACKING: Part = Part { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
@@ -41,7 +41,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         None => property.scalar.name().into(),
     };
     let count = |name: &str| header.elements.iter().find(|element| element.name == name).map(|element| element.count);
-    // How many triangles a strip has is known when it is read.
+    // The number of triangles in a strip is known only by reading it.
     let in_strips = || {
         count("tristrips").filter(|_| job.bytes.len() <= COUNTED)?;
         faces::triangles(job, &header, vertex.count).ok().map(|triangles| triangles.len())
@@ -110,7 +110,7 @@ fn ascii(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -
     packed_table(&records, count, false, columns, offset).into_cloud(job, "header")
 }
 
-/// The fast path: records of equal length are a table as they lie in the file.
+/// The fast path: records of equal length form a table in the file itself.
 fn plain(
     job: &Job<'_>,
     header: &Header,
@@ -139,7 +139,7 @@ fn plain(
     table.into_cloud(job, "header")
 }
 
-/// Lists make records of unequal length: the other values are packed together first.
+/// Lists make records of unequal length, so the other values are packed first.
 fn with_lists(job: &Job<'_>, header: &Header, before: &[Element], vertex: &Element) -> Result<PointCloud, Error> {
     let start = skip(job, header, before, vertex)?;
     let mut columns = Vec::new();
@@ -187,8 +187,8 @@ fn skip(job: &Job<'_>, header: &Header, before: &[Element], wanted: &Element) ->
     Ok(at)
 }
 
-/// Goes through the records of an element with lists; `keep` gets the bytes of each value that is no list. Returns the
-/// first byte after the element.
+/// Walks through the records of an element with lists. `keep` receives the bytes of each value that is no list. Returns
+/// the first byte after the element.
 fn walk(
     job: &Job<'_>,
     header: &Header,
@@ -232,7 +232,7 @@ fn list_len(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<usize> {
     usize::try_from(integer(raw, big_endian, scalar)?).ok()
 }
 
-/// An integer of any width; nothing if it is none or beyond all bounds.
+/// An integer of any width; `None` if the type is a float or the value does not fit.
 fn integer(raw: &[u8], big_endian: bool, scalar: Scalar) -> Option<i64> {
     let mut bytes = [0; 8];
     let len = raw.len();

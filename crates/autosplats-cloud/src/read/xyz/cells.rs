@@ -1,24 +1,24 @@
-//! The values of a line: what separates them and how numbers are written.
+//! The values of a line: separators and number formats.
 
 use super::super::text;
 
-/// What stands between values.
+/// Separator between values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Separator {
     /// Any number of blanks, tabs, commas and semicolons.
     Any,
     /// Any number of blanks and tabs.
     Blank,
-    /// Exactly one; there are empty values between two.
+    /// Exactly one comma; two in a row enclose an empty value.
     Comma,
-    /// As with the comma.
+    /// Exactly one semicolon; two in a row enclose an empty value.
     Semicolon,
-    /// As with the comma.
+    /// Exactly one tab; two in a row enclose an empty value.
     Tab,
 }
 
 impl Separator {
-    /// The one byte that separates, if it is one.
+    /// The separating byte, if there is exactly one.
     pub(super) fn byte(self) -> Option<u8> {
         match self {
             Self::Any | Self::Blank => None,
@@ -38,7 +38,7 @@ impl Separator {
     }
 }
 
-/// How rows are written.
+/// Notation of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Dialect {
     pub(super) separator: Separator,
@@ -47,14 +47,14 @@ pub(super) struct Dialect {
 
 impl Dialect {
     pub(super) const ANY: Self = Self { separator: Separator::Any, decimal_comma: false };
-    /// For numbers that may have decimal commas.
+    /// Notation for testing numbers that may have decimal commas.
     pub(super) const COMMAS: Self = Self { separator: Separator::Blank, decimal_comma: true };
 
     pub(super) fn cells<'a>(&self, line: &'a [u8]) -> Cells<'a> {
         Cells { separator: self.separator, rest: Some(line) }
     }
 
-    /// The number in a cell, quotes and decimal commas taken off.
+    /// Parses the number in a cell, which may have quotes and a decimal comma.
     #[inline]
     pub(super) fn number(&self, cell: &[u8]) -> Result<f64, String> {
         match fast_float2::parse(cell) {
@@ -78,7 +78,7 @@ impl Dialect {
     }
 }
 
-/// A cell without blanks and quotes around it.
+/// A cell without the blanks and quotes around it.
 pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
     let cell = cell.trim_ascii();
     match cell {
@@ -87,7 +87,7 @@ pub(super) fn unquoted(cell: &[u8]) -> &[u8] {
     }
 }
 
-/// Whether a cell holds nothing, in one of the ways that tables have of saying so.
+/// Whether a cell is empty or holds a placeholder for a missing value.
 pub(super) fn is_missing(cell: &[u8]) -> bool {
     let cell = unquoted(cell);
     matches!(cell, b"" | b"-")
@@ -100,7 +100,7 @@ pub(super) struct Cells<'a> {
     rest: Option<&'a [u8]>,
 }
 
-/// Bytes that separate values in [`Separator::Any`].
+/// Whether a byte separates values in [`Separator::Any`].
 const fn separates(byte: u8) -> bool {
     matches!(byte, b' ' | b'\t' | b',' | b';' | b'\r')
 }
@@ -133,7 +133,7 @@ impl<'a> Iterator for Cells<'a> {
     }
 }
 
-/// A line without the blanks at its end; tabs there stand after a last empty value.
+/// A line without the blanks at its end. A tab at the end is kept, because it separates a last empty value.
 pub(super) fn trimmed(mut line: &[u8]) -> &[u8] {
     while let [start @ .., b' ' | b'\r'] = line {
         line = start;

@@ -1,4 +1,4 @@
-//! How the first rows are written: what separates the values, and where commas are decimal marks.
+//! Detection of the separator and of decimal commas from the first rows.
 
 use super::{
     super::{table::MAX_COLUMNS, text},
@@ -6,7 +6,7 @@ use super::{
 };
 
 impl Dialect {
-    /// How rows are written, and how many values they have. `named` is the number of names in a header.
+    /// The notation of the rows, and their number of values. `named` is the number of names in a header.
     pub(super) fn of(lines: &[&[u8]], named: Option<usize>) -> Result<(Self, usize), String> {
         let any = (Self::ANY, Self::ANY.cells(lines[0]).take(MAX_COLUMNS + 1).count());
         let lines = &lines[..lines.len().min(200)];
@@ -32,7 +32,7 @@ impl Dialect {
                     return Err("numbers with decimal commas among others; write all of them with points".into());
                 }
             }
-            // Several tabs in a row align columns, if no header says otherwise.
+            // Several tabs in a row align columns, unless a header has as many names.
             let aligned = separator == Separator::Tab && named != Some(width) && cells().any(<[u8]>::is_empty);
             let several = |cell: &[u8]| text::values(cell).nth(1).is_some() && numbers(cell);
             if !aligned && !cells().any(several) {
@@ -42,7 +42,7 @@ impl Dialect {
         Ok(any)
     }
 
-    /// The number of values that all lines have, one separator after the last value allowed.
+    /// The number of values that all lines share. One separator may follow the last value.
     fn common_width(&self, lines: &[&[u8]], named: Option<usize>) -> Option<usize> {
         let count = |line: &[u8]| {
             let mut last = &[][..];
@@ -58,7 +58,7 @@ impl Dialect {
     }
 }
 
-/// Whether blanks separate the numbers and commas stand inside them.
+/// Whether blanks separate the numbers and commas are decimal marks.
 fn decimal_commas(lines: &[&[u8]]) -> bool {
     lines.iter().all(|line| {
         let words = || line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());

@@ -1,4 +1,4 @@
-//! What columns are when nobody says so, from the values of the first rows.
+//! Guesses the meaning of unnamed columns from the values of the first rows.
 
 /// A value of a sampled row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +14,7 @@ impl Cell {
     }
 }
 
-/// Names for columns; `pts` if a count of points stands before them.
+/// Names for the columns; `pts` if a count of points precedes them.
 pub(super) fn guessed(rows: &[Vec<Cell>], width: usize, pts: bool) -> Vec<String> {
     let rest: &[&str] = match width {
         7 if pts && colors(rows, 4) => &["Intensity", "red", "green", "blue"],
@@ -33,7 +33,8 @@ pub(super) fn guessed(rows: &[Vec<Cell>], width: usize, pts: bool) -> Vec<String
     known.chain(unknown).collect()
 }
 
-/// Whether three columns are normals: all but a few of length 1, and not all along an axis, as pure colours would be.
+/// Whether three columns are normals: at least 90 % of length 1, and not all whole numbers from 0 on, as pure colours
+/// would be.
 fn unit_vectors(rows: &[Vec<Cell>], first: usize) -> bool {
     let three = |row: &Vec<Cell>| [0, 1, 2].map(|index| row[first + index].number());
     let unit = |row: &&Vec<Cell>| {
@@ -45,7 +46,7 @@ fn unit_vectors(rows: &[Vec<Cell>], first: usize) -> bool {
     fractional_or_negative && rows.iter().filter(unit).count() * 10 >= rows.len() * 9
 }
 
-/// Whether three columns can be colours: 0 to 1, to 255 or to 65535, and whole numbers beyond 1.
+/// Whether three columns can be colours: 0 to 1, or whole numbers up to 65535.
 fn colors(rows: &[Vec<Cell>], first: usize) -> bool {
     let values = || rows.iter().flat_map(|row| &row[first..first + 3]).map(|cell| cell.number());
     let largest = values().fold(0.0, f64::max);
@@ -57,17 +58,17 @@ fn constant(rows: &[Vec<Cell>], column: usize) -> bool {
     (first == 255.0 || first == 1.0) && rows.iter().all(|row| row[column].number() == first)
 }
 
-/// Whether a column has words and no number at all.
+/// Whether a column has words and no numbers.
 pub(super) fn words(rows: &[Vec<Cell>], column: usize) -> bool {
     let mut cells = rows.iter().map(|row| row[column]).filter(|cell| *cell != Cell::Missing).peekable();
     cells.peek().is_some() && cells.all(|cell| cell == Cell::Word)
 }
 
-/// Whether `f32` would not do for a column. Text does not say how wide its numbers are.
+/// Whether a column needs `f64`. Text does not state how wide its numbers are.
 pub(super) fn wide(rows: &[Vec<Cell>], column: usize, exact: bool) -> bool {
     rows.iter().map(|row| row[column].number()).any(|value| {
         let lost = f64::from(value as f32) != value;
-        // Decimals are hardly ever binary fractions; nothing is lost if the same decimal comes out again.
+        // Decimals are hardly ever binary fractions. Nothing is lost if `f32` prints the same decimal again.
         let decimal = || format!("{}", value as f32).parse() == Ok(value);
         value.is_finite() && lost && (value.abs() >= f64::from(1 << 24) || exact && !decimal())
     })

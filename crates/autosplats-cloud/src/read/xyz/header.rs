@@ -1,16 +1,16 @@
-//! A line of names before the points.
+//! A line of column names before the points.
 
 use super::super::{MAX_HEADER_LINE, columns, table::MAX_COLUMNS};
 use crate::Unit;
 
-/// Names of columns, and what they say of units.
+/// Names of columns, and the units they state.
 pub(super) struct Header {
     pub(super) names: Vec<String>,
     pub(super) units: Vec<Option<Unit>>,
 }
 
 impl Header {
-    /// The names in a header line, which may be a comment. Names may hold blanks where something else separates them.
+    /// Parses a header line, which may be a comment. Names may contain blanks if another separator is used.
     pub(super) fn parse(line: &[u8]) -> Option<Self> {
         if line.len() > MAX_HEADER_LINE {
             return None;
@@ -46,7 +46,7 @@ impl Header {
         Some(Self { names, units })
     }
 
-    /// Number of names, a separator after the last one not counted.
+    /// Number of names; a separator after the last name is not counted.
     pub(super) fn len(&self) -> usize {
         self.names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1)
     }
@@ -55,7 +55,7 @@ impl Header {
         columns::find_axes(&self.names).is_some()
     }
 
-    /// The names if they are as many as the values of a row; a separator may stand after the last one.
+    /// The names, if a row has as many values. A separator may follow the last name.
     pub(super) fn fitting(&self, width: usize) -> Option<&[String]> {
         let more = self.names.get(width..)?;
         (more.is_empty() || more.len() == 1 && more[0].is_empty()).then(|| &self.names[..width])

@@ -1,4 +1,4 @@
-//! What stands before the first point, and what the values of a row are.
+//! The lines before the first point, and the meaning of the values of a row.
 
 use super::{
     super::{Job, columns, shown, table::MAX_COLUMNS, text},
@@ -8,16 +8,16 @@ use super::{
 };
 use crate::{Crs, Error, Unit};
 
-/// Rows looked at to guess what the columns are.
+/// Rows sampled to guess the meaning of the columns.
 const SAMPLE: usize = 1000;
 
-/// Rows from which on a text without header is taken for points.
+/// Rows of numbers required to read a file of unknown name as points; a shorter file needs all its rows to be such.
 const SURE: usize = 2;
 
-/// What stands before the first point.
+/// The lines before the first point.
 pub(super) struct Preamble {
     header: Option<Header>,
-    /// Points that a count line promises.
+    /// Number of points that a count line states.
     pub(super) promised: Option<usize>,
     /// First byte of the first row.
     pub(super) start: usize,
@@ -67,9 +67,9 @@ impl Preamble {
     }
 }
 
-/// Whether a line is a row of values, most of them numbers, rather than a header.
+/// Whether a line is a row of values rather than a header: at least three values are numbers.
 fn is_row(line: &[u8]) -> bool {
-    // Blanks stand inside names where something else separates these.
+    // Names may contain blanks if another separator is used.
     let separator = [b';', b'\t', b','].into_iter().find(|separator| line.contains(separator));
     let numbers = |cells: &mut dyn Iterator<Item = &[u8]>| {
         cells.take(MAX_COLUMNS + 1).filter(|cell| Dialect::COMMAS.number(cell).is_ok()).count()
@@ -84,7 +84,7 @@ fn only_numbers(line: &[u8]) -> bool {
     text::values(line).take(MAX_COLUMNS + 1).all(|value| Dialect::ANY.number(value).is_ok())
 }
 
-/// Whether a text of unknown name has rows of three numbers or more, perhaps after comments and a header.
+/// Whether a text of unknown name has rows of three or more numbers, perhaps after comments and a header.
 pub(in super::super) fn looks_like_rows(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(1 << 13)];
     if start.contains(&0) || std::str::from_utf8(start).is_err_and(|error| error.error_len().is_some()) {
@@ -107,7 +107,7 @@ pub(in super::super) fn looks_like_rows(bytes: &[u8]) -> bool {
     count > 0
 }
 
-/// What becomes of a value of a row.
+/// Destination of a value of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
     Skip,
@@ -116,23 +116,23 @@ pub(super) enum Target {
     Field(usize),
 }
 
-/// What the values of a row are and how they are written.
+/// Meaning and notation of the values of a row.
 pub(super) struct Layout {
     pub(super) dialect: Dialect,
-    /// What becomes of each value.
+    /// Destination of each value.
     pub(super) targets: Vec<Target>,
-    /// Names of the fields, and whether they need double precision.
+    /// Names of the fields, and whether they need `f64`.
     pub(super) fields: Vec<(String, bool)>,
     pub(super) has_color: bool,
     pub(super) crs: Crs,
-    /// Names of all columns, nothing for those left out.
+    /// Names of all columns; `None` for those left out.
     pub(super) names: Vec<Option<String>>,
-    /// What the user should know.
+    /// Notes for the user.
     pub(super) notes: Vec<String>,
 }
 
 impl Layout {
-    /// Looks at the first rows; nothing if there is none.
+    /// Inspects the first rows; `None` if there are none.
     pub(super) fn of(job: &Job<'_>, preamble: &Preamble) -> Result<Option<Self>, Error> {
         let lines = sample(job.bytes, preamble.start);
         let Some(&(first, _)) = lines.first() else { return Ok(None) };
@@ -165,7 +165,7 @@ impl Layout {
             named(names, units, &mut crs, &mut notes)
         } else {
             let names = guessed(&rows, width, preamble.promised.is_some());
-            // Three columns leave nothing to guess, and PTS says itself what its columns are.
+            // Three columns leave nothing to guess, and PTS defines its columns.
             let pts = preamble.promised.is_some() && (width == 4 || width == 7 && names[4] == "red");
             let names: Vec<Option<String>> = names.into_iter().map(Some).collect();
             if width > 3 && !pts {
@@ -216,7 +216,7 @@ impl Layout {
     }
 }
 
-/// The first rows and where they are.
+/// The first rows, each with its first byte.
 fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
     let mut lines = Vec::new();
     let mut at = start;
@@ -230,7 +230,7 @@ fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
     lines
 }
 
-/// The values of the sampled rows, as far as these are as long as the first one.
+/// The values of the sampled rows, up to the first row that is shorter than the first.
 fn values(dialect: &Dialect, lines: &[&[u8]], width: usize) -> Vec<Vec<Cell>> {
     let cell = |value: &[u8]| match dialect.number(value) {
         _ if is_missing(value) => Cell::Missing,
@@ -241,7 +241,8 @@ fn values(dialect: &Dialect, lines: &[&[u8]], width: usize) -> Vec<Vec<Cell>> {
     lines.iter().map(row).take_while(|row| row.len() == width).collect()
 }
 
-/// Names from a header, with what they say of units. Without x, y and z among them the first three are these.
+/// Names from a header, and the units they state. If the names lack x, y or z, the first three columns become x, y and
+/// z.
 fn named(names: &[String], units: &[Option<Unit>], crs: &mut Crs, notes: &mut Vec<String>) -> Vec<Option<String>> {
     let mut names = names.to_vec();
     for (index, name) in names.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {

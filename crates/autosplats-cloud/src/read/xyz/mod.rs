@@ -1,8 +1,8 @@
-//! Text points: XYZ, PTS, CSV and their kin, which share columns of numbers and little else.
+//! Points in text: XYZ, PTS, CSV and similar, which share columns of numbers and little else.
 //!
-//! The columns are named by the caller, by a header line or comment, or else guessed from their number and the values of
-//! the first rows: 3 are positions, 4 add an intensity, 6 a colour or a normal, 7 both intensity and colour, and so on.
-//! What is guessed is told.
+//! The columns are named by the caller, or by a header line or comment. Otherwise they are guessed from their number
+//! and the values of the first rows: 3 are positions, 4 add an intensity, 6 a colour or a normal, 7 intensity and
+//! colour. Guesses are reported in a note.
 
 mod cells;
 mod dialect;

@@ -1,7 +1,7 @@
 //! Rows of numbers to a cloud, in parallel.
 //!
-//! The text is cut into pieces at line ends and the pieces are parsed side by side, each into columns of its own, which
-//! are then added to those of the cloud in order. Nothing but one batch of pieces is in memory besides the cloud.
+//! The text is cut into pieces at line ends. The pieces are parsed in parallel, each into columns of its own, which are
+//! appended to the cloud's columns in order. Besides the cloud, only one batch of pieces is in memory.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -23,13 +23,13 @@ const PIECE: usize = 1 << 19;
 /// Pieces parsed before their points are added to the cloud.
 const BATCH: usize = 16;
 
-/// Part of the work that parsing is.
+/// Fraction of the work that parsing takes.
 const PARSING: f32 = 0.95;
 
-/// Bytes of a line beyond which it is not looked at there.
+/// Longest line, in bytes, that the survey of the text reads.
 const MAX_LINE: usize = 1 << 16;
 
-/// Places looked at to find the middle of the points.
+/// Places in the text sampled to find the middle of the points.
 const PLACES: usize = 1024;
 
 /// Reads the rows from byte `start` on.
@@ -67,7 +67,7 @@ pub(super) fn read(job: &Job<'_>, layout: &Layout, start: usize, promised: Optio
     all.into_cloud(layout, origin, job.options.exact)
 }
 
-/// Compares the rows with what the counts between them say.
+/// Compares the number of rows with the stated counts.
 fn check_promise(job: &Job<'_>, rows: usize, first: Option<usize>, between: usize) -> Result<(), Error> {
     let Some(first) = first else { return Ok(()) };
     if rows < first {
@@ -83,14 +83,14 @@ fn check_promise(job: &Job<'_>, rows: usize, first: Option<usize>, between: usiz
     Ok(())
 }
 
-/// The origin for the points, and the bytes of a row, from rows all over the text.
+/// An origin for the points and the mean length of a row in bytes, from rows sampled all over the text.
 fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
     let text = job.bytes;
     let mut points = Vec::new();
     let (mut last, mut bytes) = (None, 0);
     for place in 0..PLACES {
         let offset = start + ((text.len() - start) as u128 * place as u128 / PLACES as u128) as usize;
-        // Not to the end of just any line: one could be as long as the file.
+        // The search for a line end is bounded, because a line may be as long as the file.
         let line_end = |at: usize| {
             let window = &text[at..text.len().min(at + MAX_LINE)];
             let end = window.iter().position(|&byte| byte == b'\n').map(|len| at + len);
@@ -115,7 +115,7 @@ fn survey(job: &Job<'_>, layout: &Layout, start: usize) -> (DVec3, usize) {
     }
     let middle = middle(points.len(), |i| points[i]);
     let origin = if middle.abs().max_element() < SMALL { DVec3::ZERO } else { middle };
-    // No row is shorter than three digits with something after each.
+    // The shortest row has three digits, each followed by a byte.
     (origin, bytes.checked_div(points.len()).unwrap_or(0).max(6))
 }
 
@@ -126,7 +126,7 @@ impl Layout {
     }
 }
 
-/// What the rows of a piece of text, or of all of it, hold.
+/// The values of a piece of text, or of all of it.
 struct Columns {
     positions: Vec<[f32; 3]>,
     residuals: Vec<[f32; 3]>,
@@ -134,14 +134,14 @@ struct Columns {
     fields: Vec<Values>,
 }
 
-/// Colours in as few bytes as hold all so far.
+/// Colours in the narrowest type that holds all values so far.
 enum Colors {
     /// Whole numbers of 0 to 255.
     Bytes(Vec<[u8; 3]>),
     Floats(Vec<[f32; 3]>),
 }
 
-/// Values of a field. Text does not say how wide its numbers are.
+/// Values of a field. Text does not state how wide its numbers are.
 enum Values {
     F32(Vec<f32>),
     F64(Vec<f64>),
@@ -221,7 +221,7 @@ fn floats(bytes: &[[u8; 3]]) -> Result<Vec<[f32; 3]>, Error> {
 
 fn with_colors(cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCloud, Error> {
     let floats = match colors {
-        // All of them black or of the darkest shade there is: rather floats that happen to be 0 or 1.
+        // If no value exceeds 1, the colours are rather floats that happen to be 0 or 1.
         Colors::Bytes(bytes) if bytes.par_iter().flatten().any(|&value| value > 1) => return cloud.with_colors(bytes),
         Colors::Bytes(bytes) => floats(&bytes)?,
         Colors::Floats(floats) => floats,
@@ -249,7 +249,7 @@ fn with_colors(cloud: PointCloud, colors: Colors, exact: bool) -> Result<PointCl
     Ok(cloud)
 }
 
-/// The outcome for one piece of text.
+/// Result of parsing one piece of text.
 struct Piece {
     columns: Columns,
     /// Sum of the counts between rows.
@@ -297,7 +297,7 @@ impl Parser<'_> {
             let cell = cells.next().ok_or_else(|| {
                 format!("{index} values where a point has {}; complete or remove the line", targets.len())
             })?;
-            // Numbers are tried first: hardly ever is one missing.
+            // Numbers are tried first, because values are hardly ever missing.
             let value = || match dialect.number(cell) {
                 Err(_) if is_missing(cell) => Ok(f64::NAN),
                 value => value,
