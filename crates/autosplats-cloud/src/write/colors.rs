@@ -1,4 +1,4 @@
-//! Colours of more than 8 bits, which a cloud that was read exactly has as fields.
+//! Colours of more than 8 bits, which an exactly read cloud has as fields.
 
 use std::mem::discriminant;
 
@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use crate::{FieldValues, PointCloud, read::ColorScale};
 
-/// Names of the fields.
+/// Names of the colour fields.
 pub(super) const CHANNELS: [&str; 3] = ["Red", "Green", "Blue"];
 
-/// The fields `Red`, `Green` and `Blue`, if a reader would make the cloud's colours of them. It would not where parts of
-/// different scales were put together, or only the dark points of a cloud are left.
+/// The fields `Red`, `Green` and `Blue`, if a reader would derive the cloud's colours from them. That fails if parts of
+/// different scales were joined, or if only a cloud's dark points are left.
 pub(super) fn wide_colors(cloud: &PointCloud) -> Option<[&FieldValues; 3]> {
     let find = |name: &str| cloud.fields().iter().find(|field| field.name == name).map(|field| &field.values);
     let [red, green, blue] = CHANNELS.map(find);

@@ -2,13 +2,14 @@
 
 use std::io::Write as _;
 
-/// Powers of ten that `f64` holds exactly, as far as they are used.
+/// Powers of ten that `f64` holds exactly.
 const TENS: [f64; 16] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
-/// Beyond this not every integer is an `f64`.
+/// 2⁵³: beyond it, not every integer is an `f64`.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// Appends `value` with as few decimals as `same` asks for: it is given the number that a reader would get.
+/// Appends `value` with as few decimals as possible. `same` decides whether the number that a reader would get is close
+/// enough.
 pub(super) fn push(text: &mut Vec<u8>, value: f64, same: impl Fn(f64) -> bool) {
     if value.is_finite() {
         for (decimals, ten) in TENS.iter().enumerate() {
@@ -16,7 +17,7 @@ pub(super) fn push(text: &mut Vec<u8>, value: f64, same: impl Fn(f64) -> bool) {
             if digits.abs() >= WHOLE {
                 break;
             }
-            // Correctly rounded, hence what the decimal is read as.
+            // A division is correctly rounded, so the result is what a reader gets.
             if same(digits / ten) {
                 push_fixed(text, digits.abs() as u64, decimals, value.is_sign_negative());
                 return;
@@ -26,7 +27,7 @@ pub(super) fn push(text: &mut Vec<u8>, value: f64, same: impl Fn(f64) -> bool) {
         text.extend(b"nan");
         return;
     }
-    // Very small, very large, infinite, or with all the digits there are.
+    // Very small, very large, infinite, or a number that needs all its digits.
     let single = format!("{:e}", value as f32);
     if single.parse().is_ok_and(same) {
         text.extend(single.as_bytes());
@@ -40,9 +41,9 @@ pub(super) fn push_integer(text: &mut Vec<u8>, value: u64) {
     push_fixed(text, value, 0, false);
 }
 
-/// Appends an integer with its last digits behind a point.
+/// Appends an integer, with its last `decimals` digits after a point.
 fn push_fixed(text: &mut Vec<u8>, mut digits: u64, decimals: usize, negative: bool) {
-    // The longest: a sign, 20 digits, a point.
+    // The longest text: a sign, 20 digits and a point.
     let mut buffer = [0; 24];
     let mut at = buffer.len();
     let mut written = 0;
@@ -114,7 +115,7 @@ mod tests {
             let single = f32::from_bits((bits >> 32) as u32);
             let back: f32 = f32_text(single).parse().unwrap();
             assert!(back == single || back.is_nan() && single.is_nan(), "{single:e} came back as {back:e}");
-            // Both odd ones and coordinates.
+            // Odd numbers as well as coordinates.
             for double in [f64::from_bits(bits), (bits >> 20) as f64 / 1e7, (bits >> 40) as f64 / 1e3] {
                 let back: f64 = f64_text(double).parse().unwrap();
                 assert!(back == double || back.is_nan() && double.is_nan(), "{double:e} came back as {back:e}");

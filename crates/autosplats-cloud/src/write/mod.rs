@@ -1,9 +1,9 @@
-//! Point clouds to files, one module per format.
+//! Writers of point cloud files, one module per format.
 //!
 //! # How it works
 //!
-//! A file appears complete or not at all: it is written beside its place under another name, which is removed on
-//! failure, and then renamed, replacing what was there. What a format cannot hold is told through
+//! A file appears complete or not at all. It is written under a temporary name in the same folder, then renamed, which
+//! replaces an existing file; on failure the temporary file is removed. What a format cannot hold is reported by
 //! [`Progress::note`], once per kind of loss.
 
 mod colors;
@@ -24,27 +24,27 @@ use std::{
 
 use crate::{Crs, Error, PointCloud, Progress, error::message, progress::tick};
 
-/// A kind of file that is written.
+/// A file format that can be written.
 struct Format {
-    /// Name for messages and tables.
+    /// Name in messages and tables.
     name: &'static str,
-    /// Extensions of the file's name, in lower case and without the first dot.
+    /// Extensions of file names, in lower case and without the first dot.
     extensions: &'static [&'static str],
     write: fn(&Job<'_>, &mut BufWriter<&mut File>) -> Result<(), Error>,
 }
 
-/// All formats; longer extensions go before shorter ones.
+/// All formats; longer extensions precede shorter ones.
 const FORMATS: &[Format] = &[ply::FORMAT, las::LAS, las::LAZ, pcd::FORMAT, e57::FORMAT, xyz::FORMAT];
 
-/// Names and extensions of the formats that [`write()`] makes.
+/// Names and extensions of the formats that [`write()`] can write.
 pub fn written_formats() -> impl Iterator<Item = (&'static str, &'static [&'static str])> {
     FORMATS.iter().map(|format| (format.name, format.extensions))
 }
 
-/// Bytes gathered before they go to the system.
+/// Size of the output buffer, in bytes.
 const BUFFER: usize = 1 << 20;
 
-/// What every writer is given.
+/// Input of every writer.
 struct Job<'a> {
     cloud: &'a PointCloud,
     path: &'a Path,
@@ -60,14 +60,13 @@ impl Job<'_> {
         Error::Io { path: self.path.into(), source }
     }
 
-    /// Tells the user what the format cannot hold.
+    /// Notes what the format cannot hold.
     fn note(&self, note: impl AsRef<str>) {
         self.progress.note(&message(note.as_ref()));
     }
 }
 
-/// Tells of sensors and coordinate system, if the cloud has such, and of what else is lost, that a format does not hold
-/// them.
+/// Notes that `format` cannot hold the sensors, the coordinate system and `others`, as far as the cloud has them.
 fn note_left_out(job: &Job<'_>, format: &str, others: &[(bool, &str)]) {
     let cloud = job.cloud;
     let all = [
@@ -82,19 +81,19 @@ fn note_left_out(job: &Job<'_>, format: &str, others: &[(bool, &str)]) {
 
 /// Writes `cloud` in the format that the extension of `path` names; see [`written_formats`].
 ///
-/// A cloud that was read [exactly](crate::ReadOptions::exact) loses nothing that the format can hold; what it cannot hold
-/// is told by [`Progress::note`]. The file appears complete or not at all, and replaces what was there.
+/// A cloud that was read [exactly](crate::ReadOptions::exact) keeps all digits that the format can hold. Losses are
+/// reported by [`Progress::note`]. The file appears complete or not at all, and replaces an existing file.
 ///
 /// # Errors
-/// [`Error::UnknownOutput`] for an extension that is not written, [`Error::Io`] if the file cannot be written,
-/// [`Error::Unsupported`] if the format cannot hold such a cloud, [`Error::Cancelled`] if `progress` says so.
+/// [`Error::UnknownOutput`] if no format has the extension, [`Error::Io`] if the file cannot be written,
+/// [`Error::Unsupported`] if the format cannot hold such a cloud, and [`Error::Cancelled`] if `progress` says so.
 pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
     let job = Job { cloud, path, progress };
     let format = format(path)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".autosplats-").suffix(".tmp");
-    // Temporary files are for their owner alone unless told otherwise; the result is a file like any.
+    // Temporary files are private by default; the result shall have usual permissions.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(folder).map_err(|source| job.io(source))?;
@@ -110,7 +109,7 @@ pub fn write(cloud: &PointCloud, path: &Path, progress: &dyn Progress) -> Result
 fn format(path: &Path) -> Result<&'static Format, Error> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     if name.ends_with(".copc.laz") {
-        // The name promises an octree to programs that read parts of the file.
+        // Programs that read parts of a file expect an octree in files of this name.
         let what = "COPC is not written; leave the '.copc' out of the name for plain LAZ";
         return Err(Error::Unsupported { path: path.into(), what: what.into() });
     }
@@ -119,15 +118,15 @@ fn format(path: &Path) -> Result<&'static Format, Error> {
     format.ok_or_else(|| Error::UnknownOutput { path: path.into() })
 }
 
-/// Whether [`write()`] knows a format for this name.
+/// Checks that a format has the extension of this name.
 ///
 /// # Errors
-/// [`Error::UnknownOutput`] if not.
+/// [`Error::UnknownOutput`] if none has.
 pub fn check_writable(path: &Path) -> Result<(), Error> {
     format(path).map(|_| ())
 }
 
-/// The names of all formats, for a message.
+/// Names and extensions of all formats, for a message.
 pub(crate) fn format_names() -> String {
     let shown = |format: &Format| format!("{} (.{})", format.name, format.extensions.join(" ."));
     FORMATS.iter().map(shown).collect::<Vec<_>>().join(", ")

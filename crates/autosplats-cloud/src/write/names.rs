@@ -1,8 +1,8 @@
-//! Names of fields as files can hold them.
+//! Names of fields that files can hold.
 
 use crate::Field;
 
-/// Names without blanks and separators, all different, none of them one of `taken`.
+/// Unique names without blanks and separators, different from those in `taken`.
 pub(super) fn unique_names(fields: &[&Field], taken: &[&str]) -> Vec<String> {
     let mut names: Vec<String> = taken.iter().map(|&name| name.into()).collect();
     for field in fields {

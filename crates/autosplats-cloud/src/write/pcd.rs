@@ -12,9 +12,9 @@ use crate::{Axes, Crs, Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "PCD", extensions: &["pcd"], write };
 
-/// Positions are floats if the cloud's origin is zero, else world coordinates in double precision: most programs read
-/// nothing but floats, so that doubles are left to coordinates that floats would ruin. Colours are packed into a field
-/// `rgb`.
+/// Writes positions as 32-bit floats if the cloud's origin is zero, otherwise world coordinates as 64-bit floats. Most
+/// programs read only 32-bit floats, so wider ones are used only for coordinates that need them. Colours are packed
+/// into a field `rgb`.
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let layout = Layout::of(cloud);
@@ -38,7 +38,7 @@ fn note_losses(job: &Job<'_>) {
     }
 }
 
-/// The pose of the sensor that saw all points.
+/// The pose of the sensor, if one sensor saw all points.
 fn only_pose(cloud: &PointCloud) -> Option<DMat4> {
     match cloud.scans() {
         [scan] if scan.points == (0..cloud.len()) => Some(scan.world_from_sensor),
@@ -46,7 +46,7 @@ fn only_pose(cloud: &PointCloud) -> Option<DMat4> {
     }
 }
 
-/// How a record is laid out: positions, colours, fields.
+/// Layout of a record: positions, colours, fields.
 struct Layout {
     doubles: bool,
     names: Vec<String>,
@@ -59,7 +59,7 @@ impl Layout {
         let fields: usize = cloud.fields().iter().map(|field| scalar(&field.values).1).sum();
         let stride = if doubles { 24 } else { 12 } + if cloud.colors().is_some() { 4 } else { 0 } + fields;
         let all: Vec<&Field> = cloud.fields().iter().collect();
-        // "_" would be padding.
+        // "_" means padding.
         Self { doubles, names: unique_names(&all, &["x", "y", "z", "rgb", "rgba", "_"]), stride }
     }
 
@@ -88,7 +88,7 @@ impl Layout {
             Some(Axes::Camera) => "# axes camera\n",
             None => "",
         };
-        // The default does not tell a sensor at the origin from none.
+        // The default viewpoint may mean a sensor at the origin or none.
         let sensor = if only_pose(cloud).is_some() { "# sensor at VIEWPOINT\n" } else { "" };
         let words =
             |word: &dyn Fn(&(&str, char, usize)) -> String| fields.iter().map(word).collect::<Vec<_>>().join(" ");
@@ -104,7 +104,7 @@ impl Layout {
         )
     }
 
-    /// Encodes as many points from `first` on as there is room for.
+    /// Encodes points from `first` on, as many as `records` has room for.
     fn encode(&self, cloud: &PointCloud, first: usize, records: &mut [u8]) {
         let range = first..first + records.len() / self.stride;
         let mut at = 0;
@@ -126,7 +126,7 @@ impl Layout {
         }
     }
 
-    /// Puts one value into every record at byte `at`, and moves `at` behind it.
+    /// Stores one value in every record at byte `at`, and advances `at`.
     fn place<const LEN: usize>(&self, records: &mut [u8], at: &mut usize, values: impl Iterator<Item = [u8; LEN]>) {
         for (record, value) in records.chunks_exact_mut(self.stride).zip(values) {
             record[*at..*at + LEN].copy_from_slice(&value);
@@ -141,7 +141,7 @@ fn viewpoint(pose: DMat4) -> String {
     format!("{} {} {} {w} {x} {y} {z}", place.x, place.y, place.z)
 }
 
-/// PCD's letter and size of the values' type.
+/// PCD's type letter and size of the values.
 fn scalar(values: &FieldValues) -> (char, usize) {
     match values {
         FieldValues::I8(_) => ('I', 1),

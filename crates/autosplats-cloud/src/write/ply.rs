@@ -1,4 +1,4 @@
-//! PLY, binary little endian: positions, colours and fields of any type, all their digits.
+//! PLY, binary little endian: positions, colours and fields of any type, with all their digits.
 
 use std::{
     fs::File,
@@ -18,11 +18,11 @@ use crate::{Axes, Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "PLY", extensions: &["ply"], write };
 
-/// Integers that doubles hold.
+/// Largest integer up to which `f64` holds all integers.
 const WHOLE: u64 = 1 << 53;
 
-/// Positions are floats if the cloud's origin is zero and it has no residuals, else world coordinates in double
-/// precision. Blanks in field names become underscores.
+/// Writes positions as 32-bit floats if the cloud has neither an origin nor residuals, otherwise world coordinates as
+/// 64-bit floats. Blanks in field names become underscores.
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let layout = Layout::of(cloud);
@@ -45,7 +45,7 @@ fn note_losses(job: &Job<'_>) {
     }
 }
 
-/// How a record is laid out: positions, colours, fields.
+/// Layout of a record: positions, colours, fields.
 struct Layout<'a> {
     doubles: bool,
     colors: Option<Colors<'a>>,
@@ -54,7 +54,7 @@ struct Layout<'a> {
     stride: usize,
 }
 
-/// Colours, with all their digits where the cloud has them.
+/// Colours, with all their digits if the cloud has them.
 enum Colors<'a> {
     Bytes(&'a [[u8; 3]]),
     Wide([&'a FieldValues; 3]),
@@ -96,7 +96,7 @@ impl<'a> Layout<'a> {
         header + "end_header\n"
     }
 
-    /// Encodes as many points from `first` on as there is room for.
+    /// Encodes points from `first` on, as many as `records` has room for.
     fn encode(&self, cloud: &PointCloud, first: usize, records: &mut [u8]) {
         let range = first..first + records.len() / self.stride;
         let mut at = 0;
@@ -129,7 +129,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Puts one value into every record at byte `at`, and moves `at` behind it.
+    /// Stores one value in every record at byte `at`, and advances `at`.
     fn place<const LEN: usize>(&self, records: &mut [u8], at: &mut usize, values: impl Iterator<Item = [u8; LEN]>) {
         for (record, value) in records.chunks_exact_mut(self.stride).zip(values) {
             record[*at..*at + LEN].copy_from_slice(&value);
@@ -157,18 +157,18 @@ fn scalar(values: &FieldValues) -> (&'static str, usize) {
         FieldValues::I32(_) => ("int", 4),
         FieldValues::U32(_) => ("uint", 4),
         FieldValues::F32(_) => ("float", 4),
-        // PLY has no wider integers; 53 bits survive.
+        // PLY has no 64-bit integers; 53 bits survive.
         FieldValues::U64(_) | FieldValues::I64(_) | FieldValues::F64(_) => ("double", 8),
     }
 }
 
-/// Names without blanks, all different, none of them a coordinate's or a colour's.
+/// Unique names without blanks, different from those of coordinates and colours.
 fn property_names(fields: &[&Field]) -> Vec<String> {
     let mut taken: Vec<String> = ["x", "y", "z", "red", "green", "blue"].map(String::from).into();
     for field in fields {
         let blank = |c: char| c.is_whitespace() || c.is_control();
         let mut name = match field.name.as_str() {
-            // What other programs look for.
+            // The names that other programs expect.
             "NormalX" => "nx".into(),
             "NormalY" => "ny".into(),
             "NormalZ" => "nz".into(),

@@ -1,4 +1,4 @@
-//! Records of equal length, encoded side by side: what PLY and PCD share.
+//! Records of equal length, encoded in parallel; shared by PLY and PCD.
 
 use std::{
     fs::File,
@@ -16,7 +16,7 @@ const BUFFER: usize = 4 << 20;
 /// Records that one thread encodes at a time.
 const PIECE: usize = 1 << 13;
 
-/// Writes a record of `stride` bytes for each point; `encode` fills those from a point on.
+/// Writes a record of `stride` bytes per point. `encode` fills the records from a given point on.
 pub(super) fn write_records(
     job: &Job<'_>,
     file: &mut BufWriter<&mut File>,

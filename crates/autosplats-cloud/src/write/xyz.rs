@@ -1,7 +1,6 @@
-//! Text: XYZ and its kin with a line of names, CSV, and PTS as Leica's programs have it.
+//! Text: XYZ and CSV with a line of names, and PTS as Leica's programs write it.
 //!
-//! Every number is written with as few digits as give it back: coordinates to what the cloud holds of them, colours as
-//! integers.
+//! Every number is written with the fewest digits that restore the cloud's number; colours are integers.
 
 use std::{
     fs::File,
@@ -23,22 +22,22 @@ use crate::{Error, Field, FieldValues, PointCloud, cloud::each_type};
 
 pub(super) const FORMAT: Format = Format { name: "text", extensions: &["xyz", "txt", "csv", "asc", "pts"], write };
 
-/// Points that one thread writes at a time.
+/// Points that one thread formats at a time.
 const PIECE: usize = 1 << 12;
 
-/// Pieces made before they go to the file.
+/// Pieces formatted before they are written.
 const BATCH: usize = 64;
 
-/// What stands in a row after the coordinates.
+/// Layout of a row after the coordinates.
 struct Layout<'a> {
     separator: u8,
     colors: Option<Channels<'a>>,
     fields: Vec<&'a Field>,
-    /// Whether the fields come before the colours, as in PTS.
+    /// Whether the fields precede the colours, as in PTS.
     fields_first: bool,
 }
 
-/// Colours, with all their digits where the cloud has them.
+/// Colours, with all their digits if the cloud has them.
 enum Channels<'a> {
     Bytes(&'a [[u8; 3]]),
     Wide([&'a FieldValues; 3]),
@@ -63,7 +62,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     Ok(())
 }
 
-/// A line of names and all that there is.
+/// A line of names and all values.
 fn table<'a>(cloud: &'a PointCloud, extension: &Path) -> (Layout<'a>, String) {
     let wide = wide_colors(cloud);
     let is_color = |field: &&Field| wide.is_some() && CHANNELS.contains(&&*field.name);
@@ -79,7 +78,7 @@ fn table<'a>(cloud: &'a PointCloud, extension: &Path) -> (Layout<'a>, String) {
     (Layout { separator: separator.as_bytes()[0], colors, fields, fields_first: false }, header)
 }
 
-/// The number of points, then x y z, intensity, red green blue as far as there are such.
+/// The number of points, then x y z, intensity and red green blue, as far as the cloud has them.
 fn pts<'a>(job: &Job<'a>) -> (Layout<'a>, String) {
     let cloud = job.cloud;
     let fields: Vec<&Field> = cloud.field("Intensity").into_iter().collect();
@@ -123,19 +122,19 @@ impl Layout<'_> {
         text
     }
 
-    /// World coordinates, each the shortest decimal from which the cloud's own numbers follow.
+    /// World coordinates, each the shortest decimal that restores the cloud's own numbers.
     fn position(&self, cloud: &PointCloud, point: usize, text: &mut Vec<u8>) {
         let position = cloud.positions()[point];
         let residual = cloud.residuals().map(|residuals| residuals[point]);
         let origin = cloud.origin();
         let bare = origin == DVec3::ZERO && residual.is_none();
-        // A sum has no negative zero.
+        // A sum never is a negative zero.
         let world = if bare { DVec3::from(position.map(f64::from)) } else { cloud.world_position(point) };
         for axis in 0..3 {
             if axis > 0 {
                 text.push(self.separator);
             }
-            // A product of an integer and a step has digits at its end that mean nothing.
+            // The last digits of an integer times a step carry no information.
             let meaningless = cloud.resolution().map_or(0.0, |step| 1e-6 * step[axis].abs());
             decimal::push(text, world[axis], |read| {
                 if (read - world[axis]).abs() < meaningless {

@@ -1,4 +1,4 @@
-//! The values of all scans to one cloud.
+//! Joins the values of all scans to one cloud.
 
 use std::collections::HashMap;
 
@@ -18,23 +18,23 @@ use super::{
 };
 use crate::{Axes, Error, PointCloud, Scan};
 
-/// Points of a preview.
+/// Points of a preview chunk.
 const CHUNK: usize = 1 << 20;
 
-/// A scan's header and its values.
+/// A scan's header and values.
 pub(super) struct Source<'a> {
     pub(super) header: &'a ScanHeader,
     pub(super) values: Values,
     coordinates: Coordinates,
     pose: DMat4,
-    /// The element that says which points have coordinates.
+    /// Index of the element that states which points have coordinates.
     state: Option<usize>,
-    /// The points kept, if not all are.
+    /// Indices of the points kept; `None` keeps all.
     keep: Option<Vec<u32>>,
     keep_invalid: bool,
 }
 
-/// The elements that make a position.
+/// Indices of the elements that make a position.
 #[derive(Clone, Copy)]
 enum Coordinates {
     Cartesian([usize; 3]),
@@ -43,7 +43,7 @@ enum Coordinates {
 }
 
 impl<'a> Source<'a> {
-    /// Finds out which points of a scan have been measured; tells how many have not.
+    /// Finds the points of a scan that have a position, and counts the others in `dropped`.
     pub(super) fn new(
         job: &Job<'_>,
         header: &'a ScanHeader,
@@ -78,7 +78,7 @@ impl<'a> Source<'a> {
         Ok(source)
     }
 
-    /// The points with a position; nothing if that is all of them.
+    /// Indices of the points with a position; `None` if all have one.
     fn measured(&self, dropped: &mut Dropped) -> Option<Vec<u32>> {
         let count = self.values.count as u32;
         let direction_only = |i: &u32| self.state(*i as usize) == 1;
@@ -92,7 +92,7 @@ impl<'a> Source<'a> {
             ],
         };
         let zeros = (0..count).into_par_iter().filter(|&i| at_scanner(i)).count();
-        // A single one may be real, and if all are there the file means something else by it.
+        // A single point at the scanner may be real. If all points are there, the file means something else by it.
         let drop_zeros = zeros > 1 && zeros < count as usize - without;
         dropped.directions += directions;
         dropped.nothing += without - directions;
@@ -102,7 +102,7 @@ impl<'a> Source<'a> {
         (without > 0 || drop_zeros).then(|| (0..count).into_par_iter().filter(keep).collect())
     }
 
-    /// 0 for a position, 1 for a direction alone, 2 for nothing.
+    /// Invalid state of a point: 0 for a position, 1 for a direction only, 2 for neither.
     fn state(&self, value: usize) -> i64 {
         self.state.map_or(0, |state| self.values.streams[state].integer(value))
     }
@@ -112,7 +112,7 @@ impl<'a> Source<'a> {
         self.keep.as_ref().map_or(self.values.count, Vec::len)
     }
 
-    /// Which of the scan's values belong to a point kept.
+    /// Index of a kept point among the scan's values.
     #[inline]
     pub(super) fn value_of(&self, point: usize) -> usize {
         self.keep.as_ref().map_or(point, |keep| keep[point] as usize)
@@ -150,13 +150,13 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Points that were not measured, of all scans.
+/// Counts of the points without a position, over all scans.
 #[derive(Default)]
 pub(super) struct Dropped {
     directions: usize,
     nothing: usize,
     at_scanner: usize,
-    /// Not dropped, because the scan has no others.
+    /// Points at the scanner that are kept, because their scan has no others.
     kept_at_scanner: usize,
 }
 
@@ -174,7 +174,7 @@ impl Dropped {
     }
 }
 
-/// Hands the points of a scan out for a preview.
+/// Passes the points of a scan to the caller as preview chunks.
 pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     let quiet = Job { progress: &(), ..*job };
     let part = Part { start: 0.0, len: 0.0 };
@@ -190,7 +190,7 @@ pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Makes the cloud of all scans; `done` is the part of the work that was done before. For `trusted` see
+/// Makes the cloud of all scans. `done` is the fraction of the work finished before; for `trusted` see
 /// [`is_of_scanner`].
 pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: f32) -> Result<PointCloud, Error> {
     let lens: Vec<usize> = sources.iter().map(Source::len).collect();
@@ -236,16 +236,17 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: 
         is_of_scanner(source.header, trusted).then(scan)
     });
     let scans: Vec<Scan> = scans.collect();
-    // The standard does not say which way is up, but scanners stand upright, and so do those who write the format. What no scanner
-    // saw and is small is a thing that was turned by hand.
+    // The standard does not state which axis points up, but scanners stand upright, and programs that write E57 use Z
+    // up. A small cloud that no scanner saw is an object turned by hand.
     if !scans.is_empty() || !cloud.is_small() {
         cloud = cloud.with_axes(Axes::ZUp);
     }
     Ok(cloud.with_scans(scans))
 }
 
-/// Whether points come from a scanner, and are not a model or a merged cloud that was saved like a scan. Programs that know
-/// of no scanner leave out the pose or write one that changes nothing; `trusted` ones write a pose for scanners alone.
+/// Whether points come from a scanner, not from a model or a merged cloud that was saved like a scan. Programs without
+/// a scanner leave out the pose or write an identity. `trusted` files, those of this project, have a pose for scanners
+/// only.
 pub(super) fn is_of_scanner(header: &ScanHeader, trusted: bool) -> bool {
     if trusted {
         return header.pose.is_some();
@@ -261,7 +262,7 @@ pub(super) fn is_of_scanner(header: &ScanHeader, trusted: bool) -> bool {
 struct Wanted {
     name: String,
     kind: Kind,
-    /// By the scan's index, rising.
+    /// Pairs of scan index, ascending, and source of the values.
     taken: Vec<(usize, Taken)>,
 }
 
@@ -271,14 +272,14 @@ impl Wanted {
     }
 }
 
-/// How a field's value is had from a scan's.
+/// Source of a field's value in a scan.
 #[derive(Clone, Copy)]
 enum Taken {
-    /// As it is, with something added.
+    /// The element's value plus a constant.
     Plain { element: usize, add: i64 },
-    /// A time that counts from another, unless a further element says that it is invalid.
+    /// A time that counts from `start`, unless the element `invalid` marks it as invalid.
     Time { element: usize, start: f64, invalid: Option<usize> },
-    /// A component of a vector, turned by the scan's pose.
+    /// A component of a vector, rotated by the scan's pose.
     Normal { elements: [usize; 3], row: DVec3 },
 }
 
@@ -300,7 +301,7 @@ impl Taken {
             }
             Self::Normal { elements, row } => {
                 let [x, y, z] = elements.map(|element| streams[element].value(value));
-                // Without a turn nothing is added, so that infinities stay what they are.
+                // Without a rotation the component is returned unchanged, so that infinities stay infinite.
                 match row {
                     DVec3::X => x,
                     DVec3::Y => y,
@@ -312,7 +313,7 @@ impl Taken {
     }
 }
 
-/// Elements that are no fields: positions, colours, and what says whether they are there.
+/// Elements that do not become fields: positions, colours and their validity.
 const NO_FIELDS: [&str; 11] = [
     "cartesianX",
     "cartesianY",
@@ -327,7 +328,7 @@ const NO_FIELDS: [&str; 11] = [
     "colorBlue",
 ];
 
-/// The fields of all scans together, in the order in which they come up.
+/// The fields of all scans, in order of appearance.
 fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<Wanted> {
     let mut fields: Vec<Wanted> = Vec::new();
     let mut by_name: HashMap<String, usize> = HashMap::new();
@@ -357,7 +358,7 @@ fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<Wanted> {
     fields
 }
 
-/// Fields that some scans lack are filled up, which must not take more memory than the file justifies.
+/// Drops fields that some scans lack if filling them up would take more memory than the file's size justifies.
 fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<Wanted>) {
     let total: usize = sources.iter().map(Source::len).sum();
     let mut budget = job.bytes.len().saturating_mul(8).saturating_add(1 << 20);
@@ -403,7 +404,7 @@ fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<Wanted>) {
     }
 }
 
-/// The fields of one scan: names, what their values are, and how to have them.
+/// The fields of one scan: names, value types and sources.
 fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, Taken)> {
     let header = source.header;
     let rows = DMat3::from_mat4(source.pose).transpose();
@@ -416,7 +417,7 @@ fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, Taken)> {
     let mut fields: Vec<(String, Kind, Taken)> = Vec::new();
     for (index, element) in header.elements.iter().enumerate() {
         let kind = Kind::of(element.stored, job.options.exact);
-        // A constant zero says nothing.
+        // A constant zero carries no information.
         let nothing = element.stored.bits() == 0
             && matches!(element.stored, Stored::Integer { min: 0, .. } | Stored::Scaled { min: 0, offset: 0.0, .. });
         if element.stored == Stored::Text || nothing || element.prefix.is_none() && NO_FIELDS.contains(&&*element.name)

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{Error, FieldValues, PointCloud};
 
-/// Colour of the points of a scan that has none, beside scans that have.
+/// Colour of the points of a scan without colours, if another scan has colours.
 const GREY: [u8; 3] = [200; 3];
 
 /// The colours of a scan.
@@ -17,7 +17,7 @@ const GREY: [u8; 3] = [200; 3];
 pub(super) struct Colors<'a> {
     source: &'a Source<'a>,
     elements: [usize; 3],
-    /// The values of black, and those of full colour.
+    /// The values of black and of full colour, per channel.
     limits: [[f64; 2]; 3],
 }
 
@@ -65,7 +65,7 @@ impl<'a> Colors<'a> {
         self.source.values.streams[self.elements[channel]].value(self.source.value_of(point))
     }
 
-    /// 0 to 1.
+    /// The value of a channel, 0 to 1.
     fn part(&self, channel: usize, point: usize) -> f64 {
         let [low, high] = self.limits[channel];
         (self.value(channel, point) - low) / (high - low)
@@ -74,7 +74,7 @@ impl<'a> Colors<'a> {
     pub(super) fn bytes(&self, point: usize) -> [u8; 3] {
         [0, 1, 2].map(|channel| match self.limits[channel] {
             [0.0, 255.0] => (self.value(channel, point) + 0.5) as u8,
-            // Cut, not rounded, which returns the byte both of v * 256 and of v * 257.
+            // Values are cut, not rounded: that restores the byte both of v * 256 and of v * 257.
             [0.0, 65535.0] => (self.value(channel, point) / 256.0) as u8,
             _ => (self.part(channel, point) * 255.0 + 0.5) as u8,
         })
@@ -84,7 +84,7 @@ impl<'a> Colors<'a> {
         (self.part(channel, point) * 65535.0 + 0.5) as u16
     }
 
-    /// Whether 8 bits say all.
+    /// Whether 8 bits keep all colours exactly.
     fn narrow(&self) -> bool {
         let same = |i| {
             let bytes = self.bytes(i);
@@ -94,7 +94,7 @@ impl<'a> Colors<'a> {
     }
 }
 
-/// Adds colours, if any scan has some, and what 8 bits lose of them, if that is wanted.
+/// Adds colours, if any scan has some. If all digits are wanted and 8 bits lose some, adds 16-bit fields too.
 pub(super) fn color_fields(
     job: &Job<'_>,
     sources: &[Source<'_>],

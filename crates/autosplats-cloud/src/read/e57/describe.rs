@@ -1,4 +1,4 @@
-//! What the XML section says, without a look at the points.
+//! Describes a file by its XML section, without reading the points.
 
 use glam::{DMat4, DVec3};
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{Error, Scan};
 
-/// Scans whose particulars are listed one by one.
+/// Largest number of scans described one by one.
 const LISTED: usize = 100;
 
 pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
@@ -77,7 +77,7 @@ fn details(root: &Root) -> Vec<(String, String)> {
     details
 }
 
-/// The bounds of all scans in world coordinates, if all have some.
+/// The bounds of all scans in world coordinates, if all scans have bounds.
 fn bounds(scans: &[ScanHeader]) -> Option<[DVec3; 2]> {
     let mut all: Option<[DVec3; 2]> = None;
     for scan in scans.iter().filter(|scan| scan.points > 0) {
@@ -93,13 +93,13 @@ fn bounds(scans: &[ScanHeader]) -> Option<[DVec3; 2]> {
     all
 }
 
-/// GPS time as people write it. The leap seconds of calendars are left out: they would need a table that grows.
+/// GPS time as a date. Leap seconds are ignored: they would need a table that grows.
 fn date(seconds: f64) -> String {
     if !(0.0..1e11).contains(&seconds) {
         return format!("{seconds} s of GPS time");
     }
     let whole = seconds as i64;
-    // Days since 0000-03-01, so that leap days end a year; GPS time begins with 1980-01-06.
+    // Days since 0000-03-01, so that leap days end a year. GPS time begins on 1980-01-06.
     let days = whole / 86400 + 723_125;
     let (era, of_era) = (days / 146_097, days % 146_097);
     let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
@@ -112,7 +112,7 @@ fn date(seconds: f64) -> String {
     format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02} GPS time")
 }
 
-/// Text of the file in one line, fit for a terminal.
+/// Text of the file in one line, without characters that act on a terminal.
 fn shown_text(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     if line.len() > 40 { line.chars().take(200).flat_map(char::escape_debug).collect() } else { shown(line.as_bytes()) }

@@ -1,19 +1,19 @@
-//! The values of a point as an E57 file stores them, bit by bit.
+//! The bit-packed values of a point in an E57 file.
 
 use crate::FieldValues;
 
 /// One value of each point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {
-    /// Name without a namespace's prefix.
+    /// Name without the prefix of a namespace.
     pub(super) name: String,
-    /// The prefix, of what an extension defines.
+    /// Prefix of the namespace, if an extension defines the element.
     pub(super) prefix: Option<String>,
     pub(super) stored: Stored,
 }
 
 impl Element {
-    /// Whether this is the element of the standard with that name.
+    /// Whether this is the standard's element of that name.
     pub(super) fn is(&self, name: &str) -> bool {
         self.prefix.is_none() && self.name == name
     }
@@ -23,7 +23,7 @@ impl Element {
     }
 }
 
-/// How a value is stored.
+/// Storage type of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Stored {
     Single,
@@ -33,19 +33,19 @@ pub(super) enum Stored {
         min: i64,
         max: i64,
     },
-    /// An integer that is to be multiplied and moved.
+    /// An integer with a scale and an offset.
     Scaled {
         min: i64,
         max: i64,
         scale: f64,
         offset: f64,
     },
-    /// Of any length, so that values cannot be told apart without reading them all.
+    /// Text of any length, so that one value cannot be found without reading those before it.
     Text,
 }
 
 impl Stored {
-    /// Bits of a value; none for constants, which need no place, and for text.
+    /// Bits of a value; 0 for constants, which take no space, and for text.
     pub(super) fn bits(self) -> u32 {
         match self {
             Self::Single => 32,
@@ -57,7 +57,7 @@ impl Stored {
         }
     }
 
-    /// For people.
+    /// Description of the storage type for people.
     pub(super) fn describe(self) -> String {
         match self {
             Self::Single => "float32".into(),
@@ -74,7 +74,7 @@ impl Stored {
     }
 }
 
-/// What the values of a field are, of all scans taken together.
+/// Type of the values of a field, joined over all scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Kind {
     Integer { min: i64, max: i64 },
@@ -83,7 +83,8 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Scaled integers of up to 24 bits can be told apart as `f32`, but only `f64` has their digits.
+    /// The type for stored values. `f32` tells scaled integers of up to 24 bits apart, but only `f64` keeps their
+    /// digits.
     pub(super) fn of(stored: Stored, exact: bool) -> Self {
         match stored {
             Stored::Single => Self::Single,
@@ -93,7 +94,7 @@ impl Kind {
         }
     }
 
-    /// What holds the values of both.
+    /// A type that holds the values of both.
     pub(super) fn join(self, other: Self) -> Self {
         let narrow = |kind| match kind {
             Self::Single => true,
@@ -109,7 +110,7 @@ impl Kind {
         }
     }
 
-    /// No values, in the narrowest type that holds them.
+    /// An empty list of the narrowest type that holds the values.
     pub(super) fn values(self) -> FieldValues {
         match self {
             Self::Single => FieldValues::F32(Vec::new()),
@@ -146,9 +147,9 @@ impl Kind {
     }
 }
 
-/// The values of one element for all points of a scan, in a row and with no gaps.
+/// The values of one element for all points of a scan, contiguous and bit-packed.
 pub(super) struct Stream {
-    /// With [`PADDING`](Self::PADDING) after the last value.
+    /// The packed values, followed by [`PADDING`](Self::PADDING) bytes.
     pub(super) bytes: Vec<u8>,
     stored: Stored,
     bits: u32,
@@ -156,7 +157,7 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// A value is read as eight bytes from its first one on, and one more.
+    /// Bytes needed after the last value: a value is read as the eight bytes from its first one on, and one more.
     pub(super) const PADDING: usize = 9;
 
     pub(super) fn new(bytes: Vec<u8>, stored: Stored) -> Self {
@@ -164,7 +165,7 @@ impl Stream {
         Self { bytes, stored, bits, mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0) }
     }
 
-    /// The bits of a value as they are stored.
+    /// The raw bits of a value.
     #[inline]
     fn raw(&self, index: usize) -> u64 {
         let bit = index * self.bits as usize;
@@ -178,7 +179,7 @@ impl Stream {
         value & self.mask
     }
 
-    /// The value, if it is an integer; floats are cut.
+    /// The value as an integer; floats are cut.
     #[inline]
     pub(super) fn integer(&self, index: usize) -> i64 {
         match self.stored {
@@ -187,7 +188,7 @@ impl Stream {
         }
     }
 
-    /// The value; integers beyond 2⁵³ are rounded.
+    /// The value as a float; integers beyond 2⁵³ are rounded.
     #[inline]
     pub(super) fn value(&self, index: usize) -> f64 {
         let raw = self.raw(index);

@@ -1,12 +1,13 @@
-//! E57: pages with checksums, an XML section that says what is where, and packets of points, each bit packed.
+//! E57: pages with checksums, an XML section that describes the content, and packets of bit-packed points. See
+//! docs/decisions/0019-own-e57.md.
 //!
 //! # How it works
 //!
-//! [`pages`] takes the checksums out, [`xml`] reads the descriptions of all scans, [`packets`] puts the bits of each
-//! value of the points together, which [`element`] unpacks at any place, and [`cloud`] makes the points of all scans one
-//! cloud, poses applied.
+//! [`pages`] strips the checksums. [`xml`] reads the descriptions of all scans. [`packets`] joins the bits of each
+//! element into one stream, and [`element`] unpacks a value at any index. [`cloud`] joins the points of all scans and
+//! applies their poses.
 //!
-//! Damage costs the scans that it is in; what is left is read.
+//! Damage costs only the scans that it affects; the others are read.
 
 mod cloud;
 mod colors;
@@ -20,13 +21,13 @@ use self::{cloud::Dropped, cloud::Source, pages::Pages, xml::Root, xml::ScanHead
 use super::{Contents, Format, Job, table::MAX_COLUMNS};
 use crate::Error;
 
-/// The first bytes of a file.
+/// First bytes of a file.
 const MAGIC: &[u8] = b"ASTM-E57";
 
-/// Losses in scans that are told one by one.
+/// Largest number of losses in scans that are noted one by one.
 const TOLD: usize = 10;
 
-/// Part of the work that putting the values together is.
+/// Fraction of the work that joining the streams takes.
 const GATHERING: f32 = 0.4;
 
 pub(super) const FORMAT: Format = Format {
@@ -38,7 +39,7 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-/// The header and the XML section.
+/// Reads the header and the XML section.
 fn open<'a>(job: &Job<'a>) -> Result<(Pages<'a>, Root), Error> {
     let pages = Pages::new(job)?;
     let xml = pages.xml(job)?;
@@ -87,7 +88,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(cloud::cloud(job, &sources, root.is_ours(), GATHERING)?.with_crs(root.crs).into())
 }
 
-/// The values of one scan.
+/// Reads the values of one scan.
 fn source<'a>(
     job: &Job<'_>,
     pages: &Pages<'_>,
@@ -103,7 +104,7 @@ fn source<'a>(
     Source::new(job, header, values, dropped)
 }
 
-/// What of a scan is not there or not read.
+/// Descriptions of what is missing or not read of a scan.
 fn losses(header: &ScanHeader, source: &Source<'_>) -> impl Iterator<Item = String> {
     let (count, points) = (source.values.count, header.points);
     let cut = ((count as u64) < points).then(|| format!("the data end after {count} of {points} points"));

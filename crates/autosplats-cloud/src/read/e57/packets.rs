@@ -1,7 +1,7 @@
-//! The packets that the points of a scan lie in.
+//! The packets that hold the points of a scan.
 //!
-//! Each packet has a piece of every element's values; the pieces of an element, one after the other, are its values bit
-//! by bit. They are put together first, so that any value can then be had at once.
+//! Each packet has a piece of every element's values. The pieces of an element, joined, are its values bit by bit. They
+//! are joined first, so that any value can be accessed by index.
 
 use std::ops::Range;
 
@@ -21,24 +21,25 @@ const SECTION_HEADER: usize = 32;
 /// Bytes of packets that one thread copies at a time.
 const GROUP: usize = 1 << 20;
 
-/// Groups copied between two looks at the caller's wish to stop.
+/// Groups copied between two checks for cancellation.
 const BATCH: usize = 16;
 
 /// The values of a scan.
 pub(super) struct Values {
-    /// Points there are; fewer than claimed if the data end early.
+    /// Number of points; lower than claimed if the data end early.
     pub(super) count: usize,
     pub(super) streams: Vec<Stream>,
 }
 
-/// Packets in a row, and what the streams hold before the first of them.
+/// Consecutive packets, and the bytes in each stream before the first of them.
 struct Group {
     range: Range<usize>,
     filled: Vec<usize>,
 }
 
-/// Puts the values of a scan together. `left` is what scans before it have left of the file's bytes: no byte belongs to
-/// two scans, so that memory stays within the file's size whatever it claims. `part` is the share of the work.
+/// Joins the values of a scan. `left` is the number of the file's bytes that earlier scans have not used. No byte
+/// belongs to two scans, so memory stays within the file's size whatever the file claims. `part` is the range of the
+/// work.
 pub(super) fn gather(
     job: &Job<'_>,
     pages: &Pages<'_>,
@@ -60,7 +61,7 @@ pub(super) fn gather(
 
     let available = filled.iter().zip(stored()).filter(|(_, stored)| stored.bits() > 0);
     let available = available.map(|(&bytes, stored)| (bytes as u64).saturating_mul(8) / u64::from(stored.bits())).min();
-    // Constants take no place, so only a bound says how many are believed. Real points take several bytes.
+    // Constants take no space, so only a bound limits the claimed number. Real points take several bytes.
     let count = available.unwrap_or(0).min(scan.points);
     if count > (end - section.start) as u64 || available.is_none() {
         let bytes = end - section.start;
@@ -80,7 +81,7 @@ pub(super) fn gather(
     Ok(Values { count: count as usize, streams })
 }
 
-/// Where the packets of a scan lie.
+/// The byte range of the packets of a scan.
 fn section(job: &Job<'_>, pages: &Pages<'_>, scan: &ScanHeader) -> Result<Range<usize>, Error> {
     let start = pages.logical(job, "the points", scan.offset)?;
     let fail = |what: &str| job.malformed(format!("byte {}", scan.offset), what);
@@ -100,12 +101,12 @@ fn section(job: &Job<'_>, pages: &Pages<'_>, scan: &ScanHeader) -> Result<Range<
     };
     let data = pages.logical(job, "the packets", u64_at(16))?;
     let length = usize::try_from(u64_at(8)).unwrap_or(usize::MAX);
-    // A length that cannot be is not needed, as long as there are packets enough.
+    // An impossible length is ignored: reading stops when the packets have enough values.
     let end = start.checked_add(length).filter(|&end| end > data && end <= pages.len());
     Ok(data..end.unwrap_or(pages.len()))
 }
 
-/// Goes through the packets until there are values enough. Returns the packets in groups, and the bytes of each stream.
+/// Walks the packets until they hold enough values. Returns the packets in groups, and the bytes of each stream.
 fn survey(
     job: &Job<'_>,
     pages: &Pages<'_>,
@@ -126,7 +127,7 @@ fn survey(
         let packet = match packet(job, pages, at..section.end, needed.len(), &mut lengths) {
             Ok(packet) => packet,
             Err(error) => {
-                // Damage is the likeliest reason for packets that are none.
+                // Damage is the likeliest cause of an invalid packet.
                 pages.check(job, section.start..at + 1)?;
                 return Err(error);
             }
@@ -150,13 +151,13 @@ fn survey(
     Ok((groups, filled))
 }
 
-/// The start of the packet after one that begins at `at`: lengths are multiples of four, or are meant to be.
+/// The start of the packet after the one at `at`. Lengths are multiples of four, or meant to be.
 fn after(at: usize, packet: &Range<usize>) -> usize {
     at + (packet.end - at).next_multiple_of(4)
 }
 
-/// The packet at the start of `range`: returns the rest of it, which is the pieces of the streams in turn, and puts
-/// their lengths into `lengths`, none if it has no data.
+/// Parses the packet at the start of `range`. Returns the byte range of its streams' pieces, and stores their lengths
+/// in `lengths`, which is empty if the packet has no data.
 fn packet(
     job: &Job<'_>,
     pages: &Pages<'_>,

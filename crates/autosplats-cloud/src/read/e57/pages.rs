@@ -1,6 +1,7 @@
-//! The pages of an E57 file: every one ends in a checksum, which is no part of the data.
+//! The pages of an E57 file, each of which ends in a checksum.
 //!
-//! Two kinds of addresses follow: a *physical* one is a byte of the file, a *logical* one counts the data alone.
+//! There are two kinds of addresses. A *physical* address is a byte of the file; a *logical* address counts data bytes
+//! only.
 
 use std::ops::Range;
 
@@ -15,19 +16,19 @@ const CHECKSUM: usize = 4;
 /// Bytes of the file's header.
 const HEADER: usize = 48;
 
-/// Pages checked between two looks at the caller's wish to stop.
+/// Pages verified between two checks for cancellation.
 const BLOCK: usize = 1 << 15;
 
-/// The pages of a file, and where its XML lies.
+/// The pages of a file, and the place of its XML.
 #[derive(Clone, Copy)]
 pub(super) struct Pages<'a> {
     bytes: &'a [u8],
-    /// Bytes of a page, its checksum included.
+    /// Bytes of a page, including its checksum.
     size: usize,
     pub(super) version: (u32, u32),
     /// Physical address and logical length of the XML.
     xml: (u64, u64),
-    /// Physical length that the header tells.
+    /// Physical length of the file according to its header.
     claimed: u64,
 }
 
@@ -55,17 +56,17 @@ impl<'a> Pages<'a> {
         Ok(Self { bytes, size: size as usize, version, xml: (u64_at(24), u64_at(32)), claimed: u64_at(16) })
     }
 
-    /// Bytes of data in all whole pages.
+    /// Bytes of data in all complete pages.
     pub(super) fn len(&self) -> usize {
         self.bytes.len() / self.size * (self.size - CHECKSUM)
     }
 
-    /// Whether the file is shorter than it says.
+    /// Whether the file is shorter than its header states.
     pub(super) fn cut_off(&self) -> bool {
         self.claimed > self.bytes.len() as u64
     }
 
-    /// The logical address of a physical one that a file has, if there is data at it.
+    /// Converts a physical address from the file to a logical one; fails if there is no data at it.
     pub(super) fn logical(&self, job: &Job<'_>, what: &str, physical: u64) -> Result<usize, Error> {
         let fail = |why: String| Err(job.malformed(format!("byte {}", self.bytes.len()), why));
         if physical >= (self.bytes.len() / self.size * self.size) as u64 {
@@ -79,12 +80,12 @@ impl<'a> Pages<'a> {
         Ok(page * (self.size - CHECKSUM) + within)
     }
 
-    /// The physical address of a logical one.
+    /// Converts a logical address to a physical one.
     pub(super) fn physical(&self, logical: usize) -> usize {
         logical / (self.size - CHECKSUM) * self.size + logical % (self.size - CHECKSUM)
     }
 
-    /// Copies data from logical address `at` on. There must be as much.
+    /// Copies data from logical address `at` on; there must be enough.
     pub(super) fn copy(&self, mut at: usize, mut out: &mut [u8]) {
         let data = self.size - CHECKSUM;
         while !out.is_empty() {
@@ -97,7 +98,7 @@ impl<'a> Pages<'a> {
         }
     }
 
-    /// Compares the checksums of all pages that a logical range touches.
+    /// Verifies the checksums of all pages that overlap a logical range.
     pub(super) fn check(&self, job: &Job<'_>, range: Range<usize>) -> Result<(), Error> {
         let data = self.size - CHECKSUM;
         let pages = range.start / data..range.end.div_ceil(data).min(self.bytes.len() / self.size);
@@ -105,7 +106,7 @@ impl<'a> Pages<'a> {
             job.go_on()?;
             let wrong = |page: &usize| {
                 let (data, checksum) = self.bytes[page * self.size..][..self.size].split_at(data);
-                // Big endian, unlike all else in the file.
+                // Big endian, unlike everything else in the file.
                 crc32c::crc32c(data).to_be_bytes() != checksum
             };
             let block = start..pages.end.min(start + BLOCK);
@@ -119,7 +120,7 @@ impl<'a> Pages<'a> {
         Ok(())
     }
 
-    /// The XML, as bytes.
+    /// The bytes of the XML section.
     pub(super) fn xml(&self, job: &Job<'_>) -> Result<Vec<u8>, Error> {
         let start = self.logical(job, "the XML section", self.xml.0)?;
         let len = usize::try_from(self.xml.1).unwrap_or(usize::MAX);

@@ -1,4 +1,4 @@
-//! What the XML section says: scans, their poses and the values of their points.
+//! The XML section: scans, their poses and the elements of their points.
 
 use glam::{DMat4, DQuat, DVec3};
 use roxmltree::{Document, Node, ParsingOptions};
@@ -9,16 +9,16 @@ use super::{
 };
 use crate::{Crs, Error, Unit};
 
-/// Bytes of a tag beyond which it is rather broken than long: attributes are compared with one another.
+/// Longest tag, in bytes: the parser compares all attributes of a tag with one another.
 const MAX_TAG: usize = 1 << 13;
 
-/// Letters of the name of a coordinate system.
+/// Longest name of a coordinate system, in characters.
 const MAX_NAME: usize = 200;
 
-/// Declarations of namespaces beyond which they are an attack: nested ones are all kept at every level.
+/// Most namespace declarations. More are an attack: the parser keeps nested ones at every level.
 const MAX_NAMESPACES: usize = 1 << 10;
 
-/// The XML section.
+/// Contents of the XML section.
 pub(super) struct Root {
     pub(super) writer: Option<String>,
     pub(super) guid: Option<String>,
@@ -32,7 +32,7 @@ pub(super) struct Root {
 }
 
 impl Root {
-    /// Whether the file is one of ours.
+    /// Whether this project wrote the file.
     pub(super) fn is_ours(&self) -> bool {
         self.writer.as_ref().is_some_and(|writer| writer.starts_with("autosplats "))
     }
@@ -42,26 +42,26 @@ impl Root {
 pub(super) struct ScanHeader {
     pub(super) name: Option<String>,
     pub(super) description: Option<String>,
-    /// Maker, model and serial number.
+    /// Vendor, model and serial number.
     pub(super) sensor: Option<String>,
-    /// Seconds of GPS time that time stamps count from.
+    /// Start of the time stamps, in seconds of GPS time.
     pub(super) start: Option<f64>,
     pub(super) pose: Option<DMat4>,
     /// Physical address of the points.
     pub(super) offset: u64,
     pub(super) points: u64,
     pub(super) elements: Vec<Element>,
-    /// In the scanner's frame.
+    /// Bounds in the scanner's frame.
     pub(super) bounds: Option<[DVec3; 2]>,
     pub(super) max_range: Option<f64>,
-    /// Least and greatest row and column.
+    /// Least and greatest row, and least and greatest column.
     pub(super) indices: Option<[[i64; 2]; 2]>,
     /// Least and greatest value of red, green and blue.
     pub(super) color_limits: [Option<[f64; 2]>; 3],
 }
 
 impl ScanHeader {
-    /// The element of the standard with that name, by its place in the file.
+    /// Index of the standard's element of that name.
     pub(super) fn element(&self, name: &str) -> Option<usize> {
         self.elements.iter().position(|element| element.is(name))
     }
@@ -71,7 +71,7 @@ impl ScanHeader {
         found.iter().all(Option::is_some).then(|| found.map(Option::unwrap_or_default))
     }
 
-    /// As it stands in a message: its number, counted from 1, and name.
+    /// The scan's number, counted from 1, and name, for a message.
     pub(super) fn shown(&self, index: usize) -> String {
         match &self.name {
             Some(name) => format!("scan {} '{}'", index + 1, shown(name.as_bytes())),
@@ -91,7 +91,7 @@ impl Root {
         let fail = |what: String| job.malformed("XML section", what);
         check(text).map_err(fail)?;
         let options = ParsingOptions {
-            // A node takes far more memory than the letters it is made of.
+            // A node takes far more memory than its text.
             nodes_limit: u32::try_from(text.len() / 8 + 1000).unwrap_or(u32::MAX),
             ..ParsingOptions::default()
         };
@@ -134,7 +134,8 @@ impl Root {
     }
 }
 
-/// Refuses what would take the parser long: it compares all attributes of a tag, and keeps the namespaces at every level.
+/// Rejects text that would take the parser long: it compares all attributes of a tag, and keeps namespaces at every
+/// level.
 fn check(text: &str) -> Result<(), String> {
     let bytes = text.as_bytes();
     let mut at = 0;
@@ -173,7 +174,7 @@ fn scan(node: Node<'_, '_>) -> Result<ScanHeader, String> {
     let prototype = child(points, "prototype").ok_or("its points have no prototype")?;
     let mut elements = Vec::new();
     for node in prototype.descendants().skip(1).filter(Node::is_element) {
-        // Groups of values have their members among the descendants.
+        // Structures and vectors are skipped; their members are among the descendants.
         if !matches!(node.attribute("type"), Some("Structure" | "Vector")) {
             elements.push(element(node)?);
         }
@@ -187,7 +188,7 @@ fn scan(node: Node<'_, '_>) -> Result<ScanHeader, String> {
     };
     let cartesian = axes.map(|axis| limits("cartesianBounds", axis).filter(|[low, high]| low <= high));
     let bounds = match cartesian {
-        // Writers without anything to bound write the greatest number there is.
+        // Writers without bounds write the greatest number there is.
         [Some(x), Some(y), Some(z)] if [x, y, z].iter().flatten().all(|value| value.abs() < 1e30) => {
             Some([DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1])])
         }
@@ -245,7 +246,7 @@ fn element(node: Node<'_, '_>) -> Result<Element, String> {
             return Err(format!("{name} is of unknown type '{other}'"));
         }
     };
-    // The standard's own elements have the namespace of the whole, which has no prefix.
+    // The standard's own elements are in the root's namespace, which has no prefix.
     let own = node.tag_name().namespace() == node.document().root_element().tag_name().namespace();
     let prefix = node.tag_name().namespace().and_then(|uri| node.lookup_prefix(uri)).map(String::from);
     Ok(Element { name: name.into(), prefix: prefix.filter(|prefix| !own && !prefix.is_empty()), stored })
@@ -263,7 +264,7 @@ fn pose(node: Node<'_, '_>) -> Result<Option<DMat4>, String> {
     if !rotation.is_finite() || !translation.is_finite() {
         return Err("its pose is not finite".into());
     }
-    // A missing rotation is all zero here, and means none.
+    // A missing rotation is read as all zeros and means none.
     let rotation = if rotation.length() > 1e-9 { rotation.normalize() } else { DQuat::IDENTITY };
     Ok(Some(DMat4::from_rotation_translation(rotation, translation)))
 }
@@ -294,14 +295,14 @@ fn children<'a, 'input>(node: Node<'a, 'input>, name: &str) -> impl Iterator<Ite
     child(node, name).into_iter().flat_map(|list| list.children().filter(Node::is_element))
 }
 
-/// The text of a child, if there is any.
+/// The text of a child, unless it is empty.
 fn text(node: Node<'_, '_>, name: &str) -> Option<String> {
     let text = child(node, name)?.children().filter_map(|piece| piece.text()).collect::<String>();
     let text = text.trim();
     (!text.is_empty()).then(|| text.into())
 }
 
-/// The value of a node of any number type; one without text is zero.
+/// The value of a node of any number type; zero if the node has no text.
 fn number(node: Node<'_, '_>) -> Option<f64> {
     let value = match node.text().map(str::trim) {
         None | Some("") => 0.0,
@@ -312,12 +313,12 @@ fn number(node: Node<'_, '_>) -> Option<f64> {
     if scaled { Some(value * attribute("scale", 1.0)? + attribute("offset", 0.0)?) } else { Some(value) }
 }
 
-/// A point of time in seconds of GPS time; zero is what writers put who know none.
+/// A date in seconds of GPS time. Writers that do not know the date write zero.
 fn time(node: Node<'_, '_>, name: &str) -> Option<f64> {
     number(child(child(node, name)?, "dateTimeValue")?).filter(|&value| value != 0.0 && value.is_finite())
 }
 
-/// A message of the parser, which may have pieces of the file in it.
+/// A message of the parser, which may quote the file, for display.
 fn shown_long(message: &str) -> String {
     message.chars().take(200).flat_map(char::escape_debug).collect()
 }

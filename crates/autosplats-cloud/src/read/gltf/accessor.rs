@@ -10,18 +10,18 @@ use super::{
 };
 use crate::Error;
 
-/// The numbers of an accessor, all within the bytes there are.
+/// The numbers of an accessor, all within the bytes of the buffer.
 pub(super) struct Values<'a> {
     base: Elements<'a>,
     normalized: bool,
     count: usize,
     width: usize,
-    /// Elements that differ from those of the base: their indices, and they themselves.
+    /// Indices and values of the elements that differ from the base.
     sparse: Option<(Elements<'a>, Elements<'a>)>,
     place: String,
 }
 
-/// A run of elements; none if they are all zero.
+/// A sequence of elements; all are zero if there are no bytes.
 struct Elements<'a> {
     bytes: Option<&'a [u8]>,
     scalar: Scalar,
@@ -41,7 +41,7 @@ pub(super) fn scalar(component_type: u32) -> Option<Scalar> {
     })
 }
 
-/// Numbers of an element; none for matrices.
+/// Numbers per element; `None` for matrices.
 pub(super) fn width(shape: Shape) -> Option<usize> {
     match shape {
         Shape::Scalar => Some(1),
@@ -53,7 +53,7 @@ pub(super) fn width(shape: Shape) -> Option<usize> {
 }
 
 impl<'a> Values<'a> {
-    /// Finds the numbers of accessor `index`, each element of which must have as many as `widths` says.
+    /// Finds the numbers of accessor `index`. The numbers per element must be one of `widths`.
     pub(super) fn find(
         job: &Job<'_>,
         root: &Root<'_>,
@@ -112,7 +112,7 @@ impl<'a> Values<'a> {
         self.count
     }
 
-    /// The vectors, of which missing numbers are 0 and surplus ones left out.
+    /// The elements as vectors: missing numbers are 0, surplus numbers are dropped.
     pub(super) fn vectors(&self, job: &Job<'_>, part: Part) -> Result<Vec<[f32; 3]>, Error> {
         let mut vectors =
             collect("vertices", self.count, job, part, |i| self.base.vector(i, self.width, self.normalized))?;
@@ -175,7 +175,7 @@ impl Elements<'_> {
     }
 
     fn index(&self, index: usize) -> u32 {
-        // Narrower ones are filled up with zeros.
+        // Narrower types are padded with zeros.
         u32::from_le_bytes(self.raw(index, 0))
     }
 

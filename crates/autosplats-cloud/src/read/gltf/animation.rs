@@ -1,4 +1,4 @@
-//! How the nodes of a glTF move and its meshes change shape.
+//! Animations of a glTF: moving nodes and morphing meshes.
 
 use std::collections::HashMap;
 
@@ -53,7 +53,7 @@ enum Interpolation {
     CubicSpline,
 }
 
-/// What an animation has put in place of what the file says of a node.
+/// Values of a node that an animation replaces.
 #[derive(Default)]
 pub(super) struct NodePose {
     pub(super) translation: Option<[f64; 3]>,
@@ -62,7 +62,7 @@ pub(super) struct NodePose {
     weights: Option<Vec<f64>>,
 }
 
-/// All nodes at one moment.
+/// The animated values of all nodes at one time.
 pub(super) struct Pose {
     nodes: HashMap<usize, NodePose>,
 }
@@ -71,12 +71,12 @@ pub(super) struct Pose {
 struct Curve {
     times: Vec<f64>,
     values: Vec<f64>,
-    /// Numbers of a value.
+    /// Numbers per value.
     width: usize,
     interpolation: Interpolation,
 }
 
-/// Seconds that the first animation lasts, and how many there are; nothing if there is none.
+/// Duration of the first animation in seconds, and the number of animations; `None` if there are none.
 pub(in super::super) fn animation(job: &Job<'_>) -> Result<Option<(f64, usize)>, Error> {
     let container = Container::open(job)?;
     let root = container.root(job)?;
@@ -92,10 +92,10 @@ pub(in super::super) fn animation(job: &Job<'_>) -> Result<Option<(f64, usize)>,
     Ok(Some((end, root.animations.len())))
 }
 
-/// Numbers that a byte of the files may become by being used in several ways.
+/// Most numbers per byte of the files; accessors that share bytes yield more numbers than bytes.
 const MAX_NUMBERS_PER_BYTE: usize = 64;
 
-/// Numbers that an animation may have, whatever its file says.
+/// Most numbers that an animation may use, whatever its file claims.
 fn most_numbers(job: &Job<'_>, buffers: &Buffers<'_>) -> usize {
     job.bytes.len().saturating_add(buffers.len_beside()).saturating_mul(MAX_NUMBERS_PER_BYTE)
 }
@@ -118,7 +118,7 @@ fn load<'a>(
 }
 
 impl Pose {
-    /// Where the first animation has everything at a time.
+    /// The state of the first animation at a time.
     pub(super) fn at(job: &Job<'_>, root: &Root<'_>, chunk: Option<&[u8]>, seconds: f64) -> Result<Self, Error> {
         let mut nodes: HashMap<usize, NodePose> = HashMap::new();
         let Some(Animation { channels, samplers }) = root.animations.first() else { return Ok(Self { nodes }) };
@@ -132,7 +132,7 @@ impl Pose {
                 "translation" | "scale" => Some(3),
                 "rotation" => Some(4),
                 "weights" => None,
-                // Of extensions, which move other things.
+                // Extensions may animate other things.
                 _ => continue,
             };
             let Some(sampler) = samplers.get(*sampler) else {
@@ -157,7 +157,7 @@ impl Pose {
         self.nodes.get(&index)
     }
 
-    /// How much of each target is added to a mesh that a node shows.
+    /// Weights of the morph targets of a mesh at a node.
     pub(super) fn weights(&self, root: &Root<'_>, node: Option<usize>, mesh: &Mesh) -> Vec<f64> {
         let animated = node.and_then(|node| self.node(node)?.weights.clone());
         let own = || node.and_then(|node| Some(root.nodes.get(node)?.weights.as_ref()?.to_vec()));
@@ -186,10 +186,10 @@ impl Curve {
         Ok(Self { times, values, width: own, interpolation })
     }
 
-    /// The value at a time; before the first and after the last it stays. Rotations are turned the short way.
+    /// The value at a time, constant before the first and after the last key. Rotations take the short way.
     fn at(&self, seconds: f64, rotation: bool) -> Vec<f64> {
         let cubic = self.interpolation == Interpolation::CubicSpline;
-        // Of a spline each time has a slope before it, the value, and a slope after it.
+        // A spline has three values per key: the slope before, the value, and the slope after.
         let set = |key: usize, which: usize| {
             let start = if cubic { 3 * key + which } else { key } * self.width;
             &self.values[start..start + self.width]

@@ -1,4 +1,4 @@
-//! The bytes that a glTF speaks of: in the file, in its text, or in files beside it.
+//! The buffers of a glTF: in the file, in its text, or in files beside it.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -8,16 +8,16 @@ use super::super::{Bytes, Job, guard, shown};
 use super::json::Root;
 use crate::Error;
 
-/// Padding may be left out, as some programs do.
+/// Base64 with optional padding, which some programs leave out.
 const BASE64: engine::GeneralPurpose = engine::GeneralPurpose::new(
     &alphabet::STANDARD,
     engine::GeneralPurposeConfig::new().with_decode_padding_mode(engine::DecodePaddingMode::Indifferent),
 );
 
-/// Bytes of a file's name, with folders.
+/// Longest file name with folders, in bytes.
 const MAX_NAME: usize = 1024;
 
-/// The buffers that were asked for.
+/// The loaded buffers.
 pub(super) struct Buffers<'a> {
     loaded: Vec<Option<Data<'a>>>,
 }
@@ -39,7 +39,7 @@ impl Data<'_> {
 }
 
 impl<'a> Buffers<'a> {
-    /// Loads the buffers of these numbers.
+    /// Loads the buffers with the indices `wanted`.
     pub(super) fn load(
         job: &Job<'_>,
         root: &Root<'a>,
@@ -77,14 +77,14 @@ impl<'a> Buffers<'a> {
         self.loaded.get(index)?.as_ref().map(Data::bytes)
     }
 
-    /// Bytes of all that are not in the file itself.
+    /// Bytes of all buffers in other files.
     pub(super) fn len_beside(&self) -> usize {
         let beside = |data: &Data<'_>| if let Data::Beside(bytes) = data { bytes.len() } else { 0 };
         self.loaded.iter().flatten().map(beside).sum()
     }
 }
 
-/// The content of a URI after `data:`.
+/// Decodes a URI after its `data:`.
 fn decode(job: &Job<'_>, place: &str, uri: &str) -> Result<Vec<u8>, Error> {
     let Some((kind, content)) = uri.split_once(',') else {
         return Err(job.malformed(place, "its URI 'data:' has no comma; export the file again"));
@@ -97,13 +97,13 @@ fn decode(job: &Job<'_>, place: &str, uri: &str) -> Result<Vec<u8>, Error> {
     decoded.map_err(|what| job.malformed(place, format!("{what}; export the file again")))
 }
 
-/// A file in the same folder or below it. Other places are not looked at, whatever a file says.
+/// Opens a file in the same folder or below it. Other places are never opened, whatever the file says.
 fn beside(job: &Job<'_>, place: &str, uri: &str) -> Result<Bytes, Error> {
     let decoded = percent_decoded(uri);
     let name = String::from_utf8_lossy(&decoded);
     let relative = Path::new(&*name);
     let inside = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    // The name would stand in messages as it is.
+    // The name appears in messages unchanged.
     let fit = name.len() <= MAX_NAME && !name.contains(|c: char| c.is_control() || matches!(c, ':' | '\\'));
     if !inside || name.is_empty() || !fit {
         let what =

@@ -1,5 +1,5 @@
-//! The parts of a glTF's JSON that say where points are. Everything else is skipped while it is parsed, and what is kept
-//! takes no more than a few dozen times the bytes of the text.
+//! The parts of a glTF's JSON that describe points. Everything else is skipped while parsing. What is kept takes at
+//! most a few dozen times the bytes of the text.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use super::super::{Job, guard};
 use super::animation::{Animation, NodePose};
 use crate::Error;
 
-/// All of it.
+/// The whole document.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Root<'a> {
@@ -72,7 +72,7 @@ struct NodeExtensions {
 }
 
 impl Node {
-    /// Maps the node's own coordinates to its parent's, where an animation has put it in place of the file.
+    /// Maps the node's own coordinates to its parent's. Animated values replace the file's.
     pub(super) fn parent_from_node(&self, animated: Option<&NodePose>) -> DMat4 {
         if let Some(matrix) = &self.matrix {
             return DMat4::from_cols_array(matrix);
@@ -82,7 +82,7 @@ impl Node {
         let vector = |animated: &Option<[f64; 3]>, own: &Option<Box<[f64; 3]>>, default| {
             animated.or_else(|| own.as_deref().copied()).map_or(default, DVec3::from)
         };
-        // A rotation of length zero is none.
+        // A rotation of length zero means none.
         let rotation = animated.rotation.or_else(|| self.rotation.as_deref().copied()).map_or(DQuat::IDENTITY, |own| {
             let rotation = DQuat::from_array(own);
             if rotation.length() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
@@ -132,7 +132,7 @@ impl Primitive {
     }
 }
 
-/// Accessors of the values of vertices.
+/// Accessors of the vertices' values.
 #[derive(Clone, Copy, Deserialize, PartialEq, Eq, Hash)]
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
@@ -162,7 +162,7 @@ struct Pbr {
 }
 
 impl Material {
-    /// What colours are multiplied by, linear.
+    /// Linear factor of the colours.
     pub(super) fn base_color(&self) -> [f32; 3] {
         let factor = self.pbr_metallic_roughness.as_ref().and_then(|pbr| pbr.base_color_factor);
         factor.map_or([1.0; 3], |[red, green, blue, _]| [red, green, blue])
@@ -184,7 +184,7 @@ pub(super) struct Accessor {
     pub(super) sparse: Option<Box<Sparse>>,
 }
 
-/// How many numbers an element of an accessor has.
+/// Numbers per element of an accessor.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "UPPERCASE")]
 pub(super) enum Shape {
@@ -314,7 +314,7 @@ impl<'a> Container<'a> {
             } else {
                 format!("line {line}, column {column}")
             };
-            // Names from the file may be in it.
+            // The message may contain names from the file.
             let what = error.to_string().replace(char::is_control, " ");
             let what = what.split(" at line ").next().unwrap_or_default();
             let what: String = what.chars().take(200).collect();

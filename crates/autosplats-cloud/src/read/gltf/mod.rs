@@ -1,9 +1,9 @@
-//! glTF 2 and GLB: the points of all meshes that the scene shows, where it shows them.
+//! glTF 2 and GLB: the points of all meshes in the scene, at their places.
 //!
 //! # How it works
 //!
-//! The JSON tells which meshes are shown where ([`plan`]), which says how many points there will be before anything is
-//! made. Then the buffers that are needed are found, and every primitive's vertices are moved to their places.
+//! The JSON states which meshes are placed where ([`plan`]), and thus the number of points before any is made. Then the
+//! buffers that are needed are loaded, and the vertices of every primitive are transformed to the world.
 
 mod accessor;
 mod animation;
@@ -38,7 +38,7 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-/// Steps within a primitive are not seen on the progress bar; there are many.
+/// Progress of a step within a primitive. There are many primitives, so a step takes no share of its own.
 fn part(start: f32) -> Part {
     Part { start, len: 0.0 }
 }
@@ -80,7 +80,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     read_at(job, None)
 }
 
-/// The scene so many seconds into its first animation.
+/// The scene at a time of its first animation; as modelled without a time.
 pub(super) fn read_at(job: &Job<'_>, seconds: Option<f64>) -> Result<Contents, Error> {
     let container = Container::open(job)?;
     let root = container.root(job)?;
@@ -115,7 +115,7 @@ pub(super) fn read_at(job: &Job<'_>, seconds: Option<f64>) -> Result<Contents, E
     Ok(Contents { cloud, triangles: faces.finish(job) })
 }
 
-/// The buffers that the shown primitives need.
+/// Indices of the buffers that the placed primitives need.
 fn wanted(job: &Job<'_>, root: &Root<'_>, plan: &Plan<'_>) -> impl Iterator<Item = usize> {
     let mut needed = vec![false; root.accessors.len()];
     for shown in &plan.shown {
@@ -130,13 +130,13 @@ fn wanted(job: &Job<'_>, root: &Root<'_>, plan: &Plan<'_>) -> impl Iterator<Item
     buffers_of(root, needed)
 }
 
-/// The buffers that accessors are in.
+/// Indices of the buffers that hold the needed accessors.
 fn buffers_of(root: &Root<'_>, needed: Vec<bool>) -> impl Iterator<Item = usize> {
     let views = root.accessors.iter().zip(needed).filter(|(_, needed)| *needed).flat_map(|(accessor, _)| {
         let sparse = accessor.sparse.as_ref().map(|sparse| [sparse.indices.buffer_view, sparse.values.buffer_view]);
         accessor.buffer_view.into_iter().chain(sparse.into_iter().flatten())
     });
-    // Compressed data beside which there are none uncompressed is told apart when it is used.
+    // Buffers with compressed data only are skipped here; using them fails later with a message.
     let loadable = |view: usize| {
         let view = root.buffer_views.get(view)?;
         let nowhere = view.is_meshopt() && root.buffers.get(view.buffer).is_some_and(|buffer| buffer.uri.is_none());
@@ -148,7 +148,7 @@ fn buffers_of(root: &Root<'_>, needed: Vec<bool>) -> impl Iterator<Item = usize>
     buffers.into_iter()
 }
 
-/// What is needed to read a primitive.
+/// Context of reading a primitive.
 struct Scene<'a> {
     job: &'a Job<'a>,
     root: &'a Root<'a>,
@@ -157,7 +157,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// Vectors of vertices, with those of the targets added to them.
+    /// Vectors of the vertices, with the weighted morph targets added.
     fn morphed(
         &self,
         index: usize,
@@ -190,9 +190,9 @@ impl Scene<'_> {
 /// The points of all primitives.
 struct Points {
     positions: Vec<[f64; 3]>,
-    /// sRGB, where any primitive has colours.
+    /// 16-bit sRGB, if any primitive has colours.
     colors: Option<Vec<[u16; 3]>>,
-    /// Where all primitives have normals.
+    /// Present if all primitives have normals.
     normals: Option<[Vec<f32>; 3]>,
 }
 
@@ -249,7 +249,7 @@ fn base_color(root: &Root<'_>, shown: &Shown<'_>) -> [f32; 3] {
     material.map_or([1.0; 3], |material| material.base_color())
 }
 
-/// A linear brightness as sRGB in 16 bits.
+/// A linear brightness as 16-bit sRGB.
 fn srgb(linear: f32) -> u16 {
     let value = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
     (value * 65535.0 + 0.5) as u16
@@ -280,7 +280,7 @@ fn add_faces(scene: &Scene<'_>, shown: &Shown<'_>, faces: &mut Faces) -> Result<
         STRIP => faces.strip((0..count).map(corner))?,
         _ => faces.fan((0..count).map(corner))?,
     }
-    // Mirrored meshes are seen from the other side.
+    // Mirroring reverses the orientation of triangles.
     if shown.world_from_mesh.determinant() < 0.0 {
         faces.triangles[before..].iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
     }

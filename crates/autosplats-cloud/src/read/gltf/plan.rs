@@ -1,4 +1,4 @@
-//! Which meshes a glTF shows, and where.
+//! Selects the meshes that a glTF shows, and their places.
 
 use std::{collections::HashMap, rc::Rc};
 
@@ -10,49 +10,49 @@ use super::animation::Pose;
 use super::json::{Attributes, Primitive, Root};
 use crate::Error;
 
-/// Points that a byte of the files may become by showing meshes at several places.
+/// Most points per byte of the files; meshes placed repeatedly yield more points than bytes.
 const MAX_POINTS_PER_BYTE: usize = 64;
 
-/// Points that meshes shown at several places may become in any case.
+/// Number of points, and of primitives, that is allowed for files of any size.
 const ALWAYS: usize = 1 << 16;
 
-/// Bytes of the file for each primitive shown, beyond those that may be shown in any case: a node that shows a mesh
-/// takes more, and so does a primitive.
+/// Least bytes of the file per placed primitive, beyond those allowed for any file. A node with a mesh takes more, and
+/// so does a primitive.
 const BYTES_PER_SHOWN: usize = 8;
 
-/// A primitive at one of the places where it is shown.
+/// A primitive at one of its places.
 pub(super) struct Shown<'a> {
     pub(super) primitive: &'a Primitive,
     pub(super) world_from_mesh: DMat4,
-    /// Its first point.
+    /// Index of its first point.
     pub(super) first: usize,
     /// Number of its points.
     pub(super) count: usize,
-    /// Whether another primitive has brought its points already.
+    /// Whether its points are those of an earlier primitive.
     pub(super) shared: bool,
-    /// How much of each target is added to its shape.
+    /// Weights of the morph targets.
     pub(super) weights: Rc<[f64]>,
 }
 
 impl<'a> Shown<'a> {
-    /// The targets that move its vertices.
+    /// The morph targets with a weight other than zero, and these weights.
     pub(super) fn targets(&self) -> impl Iterator<Item = (&'a Attributes, f64)> {
         self.primitive.targets.iter().zip(self.weights.iter().copied()).filter(|(_, weight)| *weight != 0.0)
     }
 }
 
-/// All that is shown.
+/// Everything that the scene shows.
 #[derive(Default)]
 pub(super) struct Plan<'a> {
     pub(super) shown: Vec<Shown<'a>>,
     pub(super) points: usize,
-    /// Corners of triangles and of strips of them.
+    /// Corners of triangles, strips and fans.
     pub(super) corners: usize,
     pub(super) faces: usize,
     pub(super) notes: Vec<String>,
 }
 
-/// Drawing modes, as glTF numbers them.
+/// glTF's drawing modes for triangles, triangle strips and triangle fans.
 pub(super) const TRIANGLES: u32 = 4;
 pub(super) const STRIP: u32 = 5;
 pub(super) const FAN: u32 = 6;
@@ -97,7 +97,7 @@ impl<'a> Plan<'a> {
                 if primitive.is_draco() && accessor.buffer_view.is_none() {
                     return Err(draco(job));
                 }
-                // The same vertices may be moved in several ways.
+                // Morphing moves the same vertices in several ways, so morphed points are not shared.
                 let moved = !primitive.targets.is_empty() && !weights.is_empty();
                 let shared = known.get(&primitive.attributes).copied().filter(|_| !moved);
                 let first = shared.unwrap_or(plan.points);
@@ -133,7 +133,7 @@ impl<'a> Plan<'a> {
         Ok(plan)
     }
 
-    /// Refuses meshes shown so often that a small file would fill the memory.
+    /// Fails if meshes are placed so often that a small file would fill the memory.
     pub(super) fn check_size(&self, job: &Job<'_>, bytes: usize) -> Result<(), Error> {
         let bound = bytes.saturating_mul(MAX_POINTS_PER_BYTE).max(ALWAYS);
         let moved = |shown: &Shown<'_>| shown.count.saturating_mul(shown.targets().count());
@@ -144,7 +144,7 @@ impl<'a> Plan<'a> {
                 format!("they show {most} points, too many for a file of {bytes} bytes; split it or export it again");
             return Err(job.malformed("nodes", what));
         }
-        // Positions are in f64 until their origin is known.
+        // Positions are kept as `f64` until their origin is known.
         job.check_memory(self.points, 24 + 12)?;
         job.check_memory(if job.triangles { self.corners } else { 0 }, 12)
     }
@@ -154,8 +154,8 @@ fn draco(job: &Job<'_>) -> Error {
     job.unsupported("the mesh is compressed by Draco, which is not read; export it without compression")
 }
 
-/// The meshes of the scene, each with the transform of its node and the node. A node belongs to one parent, so each is visited once:
-/// cycles end, and nothing is repeated beyond the number of nodes.
+/// The meshes of the scene, each with its node and the node's transform. A node has one parent, so each node is visited
+/// once. Cycles thus end, and nothing repeats beyond the number of nodes.
 fn places(
     job: &Job<'_>,
     root: &Root<'_>,

@@ -1,14 +1,13 @@
-//! The values of the points, filled from records in pieces that threads work on side by side.
+//! The values of the points, filled from records by threads in parallel.
 //!
 //! # How it works
 //!
-//! All columns are allocated at once, but as zeros that the system hands out when they are first touched. A piece is a
-//! run of points with its part of every column. Values go into it only where some of them are not zero, so a column that
-//! stays zero takes no memory, and in the end it is left out: it was not recorded.
+//! All columns are allocated at once, as zeros that the system provides on first touch. A piece is a run of points with
+//! its part of every column. A piece writes a column only if some value is not zero. So a column that stays zero takes
+//! no memory, and is finally left out as not recorded.
 //!
-//! Colours are 16 bits in the file, but many writers put 8-bit values there. A byte is kept of each: the low one as long
-//! as no value above 255 has been seen; when one is, all values before it are known to have been at most 255, so that
-//! their high bytes are zero.
+//! Colours have 16 bits in the file, but many writers store 8-bit values. One byte is kept of each: the low byte until
+//! a value above 255 appears. All values before it are then known to be at most 255, so their high bytes are zero.
 
 use std::{
     ops::Range,
@@ -27,21 +26,21 @@ use crate::{
     merge::residual,
 };
 
-/// Records that stay in the innermost cache while each of their values is taken.
+/// Records that stay in the innermost cache while their values are taken one field after the other.
 const CACHED: usize = 1 << 9;
 
-/// What a field is made of.
+/// Source of a field in a record.
 #[derive(Clone, Debug)]
 pub(super) enum Source {
     /// A value of the point format.
     Own(Place),
-    /// One of red, green and blue as 16 bits.
+    /// Byte offset of a 16-bit red, green or blue.
     Color(usize),
-    /// An extra value.
+    /// A value in the extra bytes.
     Extra(Extra),
 }
 
-/// A field to be: its name and where its values lie.
+/// A future field: its name and the place of its values.
 #[derive(Clone, Debug)]
 pub(super) struct Dimension {
     pub(super) name: String,
@@ -77,7 +76,7 @@ impl Dimension {
         })
     }
 
-    /// Bytes a value takes in the cloud.
+    /// Bytes of a value in the cloud.
     pub(super) fn size(&self) -> usize {
         match &self.source {
             Source::Own(Place::Bits { .. } | Place::I8(_)) => 1,
@@ -95,14 +94,14 @@ impl Dimension {
     }
 }
 
-/// What was seen among the values of some points.
+/// Facts about the values of some points.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Seen {
-    /// By field, whether a value is not zero.
+    /// Whether any value is not zero, by field.
     fields: Vec<bool>,
     residuals: bool,
     colors: bool,
-    /// Whether 8 bits lose something of a colour.
+    /// Whether 8 bits lose some of a colour.
     lossy_colors: bool,
 }
 
@@ -118,11 +117,11 @@ impl Seen {
     }
 }
 
-/// All values of all points.
+/// The values of all points.
 pub(super) struct Columns<'a> {
     header: &'a Header,
     origin: DVec3,
-    /// Where the colours lie in a record.
+    /// Byte offset of the colours in a record.
     colors_at: Option<usize>,
     dimensions: Vec<Dimension>,
     positions: Vec<[f32; 3]>,
@@ -130,13 +129,13 @@ pub(super) struct Columns<'a> {
     residuals: Vec<[f32; 3]>,
     colors: Vec<[u8; 3]>,
     fields: Vec<FieldValues>,
-    /// Whether a colour above 255 has been seen.
+    /// Whether a colour above 255 has been found.
     wide_colors: AtomicBool,
     seen: Seen,
 }
 
 impl<'a> Columns<'a> {
-    /// Columns of zeros for `count` points.
+    /// Makes columns of zeros for `count` points.
     pub(super) fn new(
         header: &'a Header,
         origin: DVec3,
@@ -164,8 +163,8 @@ impl<'a> Columns<'a> {
         })
     }
 
-    /// Has `work` fill runs of so many points from point `start` on, side by side: it is given the index of the run and
-    /// its part of the columns. Returns what it said went wrong, by run.
+    /// Lets `work` fill consecutive runs of points, of the lengths `counts`, from point `start` on in parallel. `work`
+    /// receives the run's index and its part of the columns. Returns the result of each run.
     pub(super) fn fill(
         &mut self,
         start: usize,
@@ -217,8 +216,8 @@ impl<'a> Columns<'a> {
         errors
     }
 
-    /// Takes points out, whose ranges are in order. Those that are kept move down and nothing is noted of single points:
-    /// a small file may claim millions that cannot be decompressed, and their memory was never touched.
+    /// Removes ranges of points, which must be in order. Kept points move down, and no mask is allocated: a small file
+    /// may claim millions of points that cannot be decompressed, whose memory is untouched.
     pub(super) fn remove(&mut self, ranges: &[Range<usize>]) {
         remove(&mut self.positions, ranges);
         remove(&mut self.residuals, ranges);
@@ -228,7 +227,7 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// A copy of some points, as far as they are known.
+    /// A copy of some points, with the fields known so far.
     pub(super) fn preview(&self, range: Range<usize>) -> Result<PointCloud, Error> {
         let mut cloud = PointCloud::new(self.origin, self.positions[range.clone()].to_vec()).with_axes(Axes::ZUp);
         if self.seen.colors {
@@ -239,7 +238,7 @@ impl<'a> Columns<'a> {
                 FieldValues::U8(v) => FieldValues::U8(v[range.clone()].to_vec()),
                 FieldValues::U16(v) => FieldValues::U16(v[range.clone()].to_vec()),
                 FieldValues::F64(v) => FieldValues::F64(v[range.clone()].to_vec()),
-                // Enough for a preview.
+                // These types suffice for a preview.
                 _ => continue,
             };
             cloud = cloud.with_field(name, values)?;
@@ -247,7 +246,7 @@ impl<'a> Columns<'a> {
         Ok(cloud)
     }
 
-    /// Whether a field is worth keeping: not all zero, or one of three 16-bit colours of which 8 bits lose something.
+    /// Whether a field is kept: it is not all zero, or it is a 16-bit colour of which 8 bits lose some.
     fn is_recorded(&self, index: usize) -> bool {
         match self.dimensions[index].source {
             Source::Color(_) => self.seen.lossy_colors,
@@ -255,8 +254,8 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// The fields worth keeping, by index, with names that are all different: an extra value may be called as one of the
-    /// point format's own is.
+    /// Indices and unique names of the fields to keep. A value in the extra bytes may have the name of a value of the
+    /// point format.
     fn names(&self) -> Vec<(usize, String)> {
         let mut names: Vec<(usize, String)> = Vec::new();
         for (index, dimension) in self.dimensions.iter().enumerate().filter(|(index, _)| self.is_recorded(*index)) {
@@ -269,8 +268,8 @@ impl<'a> Columns<'a> {
         names
     }
 
-    /// Makes the cloud; what is zero for every point was not recorded and is left out. The second value says whether the
-    /// colours were 8 bits in the 16 that the format has.
+    /// Makes the cloud; a field that is zero at every point was not recorded and is left out. The second result tells
+    /// whether the 16-bit colours hold 8-bit values.
     pub(super) fn into_cloud(mut self) -> (PointCloud, bool) {
         let mut names = self.names().into_iter().peekable();
         let fields = self.fields.into_iter().enumerate().filter_map(|(index, values)| {
@@ -303,14 +302,14 @@ pub(super) struct Piece<'a> {
     colors: &'a mut [[u8; 3]],
     fields: Vec<Slice<'a>>,
     seen: Seen,
-    /// Leading points whose colours were taken for 8 bits.
+    /// Number of leading points whose colours were read as 8 bits.
     narrow: usize,
-    /// Points filled.
+    /// Number of points filled.
     done: usize,
 }
 
 impl Piece<'_> {
-    /// Takes the values of the next points out of their records.
+    /// Fills the next points from their records.
     pub(super) fn take(&mut self, records: &[u8]) {
         records.chunks(CACHED * self.header.record_len).for_each(|records| self.take_cached(records));
     }
@@ -369,7 +368,7 @@ impl Piece<'_> {
 
 macro_rules! slices {
     ($($variant:ident($type:ty)),*) => {
-        /// Values of a field to be filled.
+        /// Part of a field that is being filled.
         enum Slice<'a> {
             $($variant(&'a mut [$type])),*
         }
@@ -381,14 +380,14 @@ macro_rules! slices {
                 }
             }
 
-            /// Takes the first values off.
+            /// Splits off the first values.
             fn split(&mut self, count: usize) -> Self {
                 match self {
                     $(Self::$variant(values) => Self::$variant(split(values, count))),*
                 }
             }
 
-            /// Takes the values of an unscaled extra value; whether any is not zero.
+            /// Fills values from an unscaled value in the extra bytes; returns whether any is not zero.
             fn take_plain<'r>(
                 &mut self,
                 range: Range<usize>,
@@ -407,7 +406,7 @@ macro_rules! slices {
 slices!(U8(u8), I8(i8), U16(u16), I16(i16), U32(u32), I32(i32), U64(u64), I64(i64), F32(f32), F64(f64));
 
 impl Slice<'_> {
-    /// Takes the values out of some records; whether any is not zero.
+    /// Fills values from some records; returns whether any is not zero.
     fn take<'r>(
         &mut self,
         range: Range<usize>,
@@ -434,7 +433,7 @@ impl Slice<'_> {
                     None => f64::NAN,
                 })
             }
-            // Floats have a value that means none, integers keep theirs.
+            // Floats have NaN for a missing value; integers keep the file's marker.
             (Self::F32(v), Source::Extra(extra)) if extra.no_data.is_some() => {
                 put(&mut v[range], records, |record| extra.number(record).map_or(f32::NAN, |number| number as f32))
             }
@@ -447,7 +446,7 @@ impl Slice<'_> {
     }
 }
 
-/// Puts values into their places unless all are zero; whether any is not.
+/// Stores values unless all are zero; returns whether any is not zero.
 fn put<'r, T: Copy + Default + PartialEq>(
     values: &mut [T],
     records: impl Iterator<Item = &'r [u8]> + Clone,
@@ -463,7 +462,7 @@ fn put<'r, T: Copy + Default + PartialEq>(
     true
 }
 
-/// Takes the first elements off.
+/// Splits off the first elements.
 fn split<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     let whole = std::mem::take(slice);
     let (first, rest) = whole.split_at_mut(count.min(whole.len()));
@@ -471,7 +470,7 @@ fn split<'a, T>(slice: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     first
 }
 
-/// Takes ranges of elements out, which are in order.
+/// Removes ranges of elements, which must be in order.
 fn remove<T: Copy>(values: &mut Vec<T>, ranges: &[Range<usize>]) {
     if values.is_empty() {
         return;
@@ -486,13 +485,13 @@ fn remove<T: Copy>(values: &mut Vec<T>, ranges: &[Range<usize>]) {
     values.shrink_to_fit();
 }
 
-/// Makes colours black. Those that are black are not written to: they may be points that could not be decompressed, whose
-/// memory was never touched.
+/// Makes colours black. Black ones are not written to: they may be points that could not be decompressed, whose memory
+/// is untouched.
 fn clear(colors: &mut [[u8; 3]]) {
     colors.iter_mut().filter(|color| **color != [0; 3]).for_each(|color| *color = [0; 3]);
 }
 
-/// Memory of zeros, which is not touched before it is used.
+/// Zeroed memory, which the system provides on first touch.
 fn zeroed<T: Zeroable>(count: usize, what: &str) -> Result<Vec<T>, Error> {
     try_zeroed_vec(count)
         .map_err(|()| Error::OutOfMemory { what: what.into(), bytes: count.saturating_mul(size_of::<T>()) })

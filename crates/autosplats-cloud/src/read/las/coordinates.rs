@@ -1,4 +1,4 @@
-//! What the coordinates of a LAS file mean.
+//! Coordinate system of a LAS file.
 
 use glam::DVec3;
 
@@ -9,16 +9,16 @@ use crate::{
     las,
 };
 
-/// Coordinates that are known no finer than this cannot be degrees of a scan: 1e-5 of them are a metre.
+/// Coarsest scale of coordinates that may be degrees: 1e-5 degrees are about a metre.
 const FINEST_DEGREE: f64 = 1e-5;
 
-/// The coordinate system, and what is to be noted of it.
+/// The coordinate system, and notes about it.
 pub(super) struct Meaning {
     pub(super) crs: Crs,
     pub(super) notes: Vec<String>,
 }
 
-/// Well-known text goes before GeoTIFF keys, which fill what it does not say.
+/// Reads the coordinate system. Well-known text takes precedence; GeoTIFF keys add what the text does not state.
 pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
     let mut notes = Vec::new();
     let data = |id| records.find(las::PROJECTION, id).map(|record| record.data);
@@ -38,7 +38,7 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
             crs.epsg = crs.epsg.or(keys.crs.epsg);
             crs.name = crs.name.or(keys.crs.name);
             crs.unit = crs.unit.or(keys.crs.unit);
-            // Text of a horizontal system says nothing of heights.
+            // Text of a horizontal system does not describe heights.
             let heights = wkt.heights.or(keys.heights);
             crs.vertical_unit = heights.filter(|&unit| Some(unit) != crs.unit);
             crs.geotiff = keys.crs.geotiff;
@@ -50,7 +50,7 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
     let bounds = header.sane_bounds().filter(|_| header.points > 0);
     if let Some([low, high]) = bounds {
         let distance = ((low + high) / 2.0).length();
-        // From the bottom of the sea to where aeroplanes fly.
+        // The range covers the bottom of the sea and the height of aeroplanes.
         if geocentric && !(6.3e6..6.5e6).contains(&distance) {
             let metres = format!("{:.0} km", distance / 1000.0);
             notes.push(format!(
@@ -68,8 +68,8 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
     Meaning { crs, notes }
 }
 
-/// Whether coordinates without a system are longitude and latitude, with heights in metres or feet: on the globe, fine
-/// enough, and in a box that is far too high for its edges.
+/// Whether coordinates without a system look like longitude and latitude with heights in metres or feet. Such
+/// coordinates are on the globe, finely scaled, and in a box far higher than wide.
 fn looks_like_degrees(low: DVec3, high: DVec3, scale: DVec3) -> bool {
     let size = high - low;
     let on_globe = low.x >= -180.0 && high.x <= 180.0 && low.y >= -90.0 && high.y <= 90.0;

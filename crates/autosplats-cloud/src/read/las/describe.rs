@@ -1,4 +1,4 @@
-//! What the header and the records around the points say.
+//! Describes a file by its header and variable length records.
 
 use super::super::{Attribute, Description, Job};
 use super::{
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{Error, las};
 
-/// Bytes of what COPC says of its tree.
+/// Bytes of the COPC info record.
 const COPC_INFO: usize = 160;
 
 pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
@@ -33,7 +33,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
             Source::Color(_) => "uint16".into(),
             Source::Extra(extra) => extra.stored(),
         };
-        // Colours stand between the time and what follows.
+        // Colours are listed after the time and before the other values.
         if dimension.name == "Infrared" || matches!(dimension.source, Source::Extra(_)) {
             attributes.extend(colors.by_ref());
         }
@@ -72,7 +72,7 @@ pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     })
 }
 
-/// What is not there of what the header tells, as far as it shows without decoding.
+/// What is missing of the points that the header claims, as far as that shows without decoding.
 fn missing(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Option<String> {
     if header.compressed {
         return laz::Compressed::open(job, header, records).err().map(|error| match error {
@@ -97,7 +97,7 @@ fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {
     let flags = ["GPS time is standard time", "waveforms inside", "waveforms outside", "returns are synthetic", "WKT"];
     let set = flags.into_iter().enumerate().filter(|(bit, _)| header.global_encoding >> bit & 1 == 1);
     detail("global encoding", set.map(|(_, flag)| flag).collect::<Vec<_>>().join(", "));
-    // Some are written as -0.
+    // Some files store -0.
     detail("offset of coordinates", header.offset.to_array().map(|value| (value + 0.0).to_string()).join(", "));
     detail("variable length records", records.all.len().to_string());
     let returns = &header.points_by_return;
@@ -106,7 +106,7 @@ fn details(header: &Header, records: &Records<'_>) -> Vec<(String, String)> {
     details
 }
 
-/// Day of the year and year as people write it; nothing if there is none.
+/// A day of the year and a year as a date; empty if invalid.
 fn date((day, year): (u16, u16)) -> String {
     let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
     let lengths = [31, if leap { 29 } else { 28 }, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
@@ -120,12 +120,12 @@ fn date((day, year): (u16, u16)) -> String {
     String::new()
 }
 
-/// A number as a text of digits has it, without zeros at the end.
+/// Shortens decimal text: removes zeros at the end.
 fn short(digits: &str) -> String {
     digits.parse::<f64>().map_or_else(|_| digits.to_owned(), |value| value.to_string())
 }
 
-/// What COPC says of its octree.
+/// Facts about the octree of a COPC file.
 fn tree_details(info: &[u8]) -> Vec<(String, String)> {
     let double = |index: usize| f64::from_le_bytes(bytes_at(info, 8 * index));
     let center = [0, 1, 2].map(|axis| short(&format!("{:.3}", double(axis)))).join(", ");

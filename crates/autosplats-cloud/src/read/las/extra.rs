@@ -8,21 +8,21 @@ use super::{
 };
 use crate::las;
 
-/// An extra value of each point.
+/// A value in the extra bytes of each point.
 #[derive(Clone, Debug)]
 pub(super) struct Extra {
     pub(super) name: String,
     pub(super) scalar: Scalar,
-    /// Where it lies in a record.
+    /// Byte offset in a record.
     pub(super) at: usize,
-    /// Scale and offset, where they change anything; the result is in double precision.
+    /// Scale and offset, unless they change nothing; scaled values become `f64`.
     pub(super) scaled: Option<(f64, f64)>,
-    /// The bits that stand for no value, 8 bytes whatever the type.
+    /// Marker of a missing value, in 8 bytes for all types.
     pub(super) no_data: Option<[u8; 8]>,
 }
 
 impl Extra {
-    /// The number in a record, unless it is the one that stands for none.
+    /// The value in a record, unless it is the marker of a missing value.
     #[inline]
     pub(super) fn number(&self, record: &[u8]) -> Option<f64> {
         macro_rules! read {
@@ -47,7 +47,7 @@ impl Extra {
         }
     }
 
-    /// How it is stored, for people.
+    /// Description of the storage type for people.
     pub(super) fn stored(&self) -> String {
         match self.scaled {
             None => self.scalar.name().into(),
@@ -57,12 +57,12 @@ impl Extra {
     }
 }
 
-/// Reads the descriptions, which may be in several records. What is wrong is told in notes.
+/// Reads the descriptions, which may be in several records. Faults are returned as notes.
 pub(super) fn extras(header: &Header, records: &Records<'_>) -> (Vec<Extra>, Vec<String>) {
     let base = las::RECORD_LEN[header.format];
     let mut at = base;
     let mut extras: Vec<Extra> = Vec::new();
-    // Those that are no fields.
+    // Names that do not become fields.
     let mut names: Vec<String> = ["X", "Y", "Z", "Red", "Green", "Blue"].map(String::from).into();
     let mut notes = Vec::new();
     let described = records.all.iter().filter(|record| record.id == las::EXTRA_BYTES && record.user == las::SPEC);
@@ -71,7 +71,7 @@ pub(super) fn extras(header: &Header, records: &Records<'_>) -> (Vec<Extra>, Vec
     for raw in descriptors {
         let (kind, options) = (raw[2], raw[3]);
         if kind == 0 {
-            // Bytes without a meaning; the options are their number.
+            // Bytes without a meaning; `options` is their number.
             at += usize::from(options);
             undescribed += usize::from(options);
             continue;
@@ -123,7 +123,7 @@ pub(super) fn extras(header: &Header, records: &Records<'_>) -> (Vec<Extra>, Vec
     (extras, notes)
 }
 
-/// Type and number of the values behind a type number of the specification.
+/// Type and count of the values with a type number of the specification.
 fn data_type(kind: u8) -> Option<(Scalar, usize)> {
     use Scalar::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
     let scalars = [U8, I8, U16, I16, U32, I32, U64, I64, F32, F64];

@@ -1,15 +1,14 @@
-//! The GPS times of compressed records.
+//! The GPS times of compressed records. See docs/decisions/0020-laz-codec.md.
 //!
 //! # How it works
 //!
-//! A time is its 64 bits as an integer, coded as the difference from the one before: a small multiple, told by a code, of a
-//! step that the sequence usually takes, and a correction. Where scanners take turns their times alternate, so four
-//! sequences are remembered, and a code switches to another of them, in which the time is coded anew.
+//! The 64 bits of a time are coded as an integer, as the difference from the previous time. A code states a multiple of
+//! the sequence's usual step, and a correction follows. Scanners that alternate have alternating times. Four sequences
+//! are therefore kept, and a code switches to another one, in which the time is coded anew.
 //!
-//! That is the place where damaged data can go round for ever: a code that is repeated costs less and less, in the end
-//! some ten-thousandths of a bit, so that a few bytes can be millions of switches for one point. A writer switches to the
-//! sequence that it needs, so more than a handful is damage. (The `laz` crate calls itself for each, until the stack is
-//! full.)
+//! Damaged data can loop at that switch. A repeated code costs less and less, finally some ten-thousandths of a bit, so
+//! a few bytes may encode millions of switches for one point. A writer switches straight to the sequence it needs, so
+//! many switches mean damage. (The `laz` crate recurses at each switch until its stack overflows.)
 
 use std::io::{self, Cursor, Read};
 
@@ -20,24 +19,25 @@ use laz::{
     record::FieldDecompressor,
 };
 
-/// A writer needs one; from anywhere, three reach all.
+/// Most switches of sequence per time. Writers need one, and three reach every sequence.
 const MAX_SWITCHES: usize = 8;
 
 const SEQUENCES: usize = 4;
 
-/// Multiples of the step that codes tell of, 0 to 500 and -1 to -10.
+/// Number of codes for multiples of the step: 0 to 500, and -1 to -10.
 const MULTIPLES: u32 = 511;
 
-/// After so many times that are no multiple of the step, in one sequence, the step is what the last of them took.
+/// Largest number of differences in a sequence that do not fit its step. After one more, that difference becomes the
+/// step.
 const MAX_STRAYS: u8 = 3;
 
-/// Decodes times that follow each other.
+/// Decoder of consecutive times.
 pub(super) struct GpsTimes {
     sequences: [Sequence; SEQUENCES],
-    /// The sequence of the last time, and the one that began last.
+    /// Index of the sequence of the last time, and of the newest sequence.
     current: usize,
     newest: usize,
-    /// Codes of a sequence that has no step yet, and of one that has.
+    /// Models of the codes in a sequence without a step, and in one with a step.
     resting: ArithmeticModel,
     moving: ArithmeticModel,
     correction: IntegerDecompressor,
@@ -56,14 +56,15 @@ enum Code {
     Repeat,
     /// About a multiple of the step.
     Multiple(u32),
-    /// Too far from all sequences: it begins one.
+    /// Too far from all sequences: the time begins a new one.
     Begin,
-    /// In the sequence that is so many further on.
+    /// In the sequence this many places further on.
     Switch(usize),
 }
 
 impl GpsTimes {
-    /// Whether there is a code for times that repeat; records of formats 6 and up say it elsewhere.
+    /// A decoder after the time `first`. `repeats` adds a code for repeated times; point formats 6 and up state repeats
+    /// elsewhere.
     pub(super) fn new(first: i64, repeats: bool) -> Self {
         let others = u32::from(repeats) + SEQUENCES as u32;
         let mut sequences = [Sequence::default(); SEQUENCES];
@@ -104,7 +105,7 @@ impl GpsTimes {
     }
 }
 
-/// What the symbols are of a sequence whose times have not changed.
+/// Meaning of a symbol in a sequence whose times have not changed yet.
 fn resting(symbol: u32, repeats: bool) -> Code {
     match (symbol, repeats) {
         (0, true) => Code::Repeat,
@@ -113,7 +114,7 @@ fn resting(symbol: u32, repeats: bool) -> Code {
     }
 }
 
-/// What the symbols are of a sequence that has a step.
+/// Meaning of a symbol in a sequence with a step.
 fn moving(symbol: u32, repeats: bool) -> Code {
     match (symbol.checked_sub(MULTIPLES), repeats) {
         (None, _) => Code::Multiple(symbol),
@@ -137,7 +138,7 @@ impl Sequence {
         correction: &mut IntegerDecompressor,
     ) -> io::Result<i64> {
         let times = |factor: i32| self.step.wrapping_mul(factor);
-        // The difference that is expected, how corrections to it are coded, and whether it is far from what was expected.
+        // The expected difference, the context of its correction, and whether the difference does not fit the step.
         let (expected, context, stray) = match code {
             _ if self.step == 0 => (0, 0, false),
             0 => (0, 7, true),
@@ -161,7 +162,7 @@ impl Sequence {
     }
 }
 
-/// The times of formats 1 to 5 from the second version of their compression on.
+/// The times of point formats 1 to 5, from version 2 of the compression on.
 pub(super) struct GpsTime11(GpsTimes);
 
 impl Default for GpsTime11 {

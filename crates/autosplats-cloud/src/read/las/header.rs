@@ -9,14 +9,14 @@ use crate::{Error, las};
 const SHORT: usize = 227;
 const LONG: usize = 375;
 
-/// What the header says, checked as far as reading needs it.
+/// Contents of the header, checked as far as reading needs.
 pub(super) struct Header {
-    /// Major and minor.
+    /// Major and minor version.
     pub(super) version: (u8, u8),
     pub(super) global_encoding: u16,
     pub(super) system: String,
     pub(super) software: String,
-    /// Day of the year, and the year.
+    /// Day of the year, and year.
     pub(super) created: (u16, u16),
     pub(super) format: usize,
     pub(super) record_len: usize,
@@ -24,9 +24,9 @@ pub(super) struct Header {
     pub(super) points: u64,
     pub(super) points_by_return: Vec<u64>,
     pub(super) point_data: usize,
-    /// First byte after the header, where the variable length records begin, and how many there should be.
+    /// First byte after the header, where the variable length records begin, and their number.
     pub(super) records: (usize, u32),
-    /// The same of the extended records after the points.
+    /// First byte and number of the extended records after the points.
     pub(super) extended: (u64, u32),
     pub(super) scale: DVec3,
     pub(super) offset: DVec3,
@@ -111,13 +111,13 @@ impl Header {
         (low.cmple(high).all() && inside(low) && inside(high)).then_some(self.bounds)
     }
 
-    /// Name and version, without the encoding.
+    /// Name and version of the format, without the encoding.
     pub(super) fn version_name(&self) -> String {
         format!("LAS {}.{}", self.version.0, self.version.1)
     }
 }
 
-/// Little-endian numbers at fixed places, which are known to be there.
+/// Little-endian numbers at fixed offsets, which must be within the bytes.
 struct Raw<'a>(&'a [u8]);
 
 impl Raw<'_> {
@@ -139,14 +139,14 @@ impl Raw<'_> {
         u64::from_le_bytes(self.bytes(at))
     }
 
-    /// Three doubles, `step` bytes from one to the next.
+    /// Three `f64`, `step` bytes apart.
     fn vector(&self, at: usize, step: usize) -> DVec3 {
         let axis = |index: usize| f64::from_le_bytes(self.bytes(at + step * index));
         DVec3::new(axis(0), axis(1), axis(2))
     }
 }
 
-/// The text before the first zero, without characters that would act on a terminal.
+/// The text before the first zero byte, without characters that act on a terminal.
 pub(super) fn text(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|&byte| byte == 0).unwrap_or(bytes.len());
     let text = String::from_utf8_lossy(&bytes[..end]);

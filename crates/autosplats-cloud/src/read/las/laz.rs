@@ -1,10 +1,10 @@
-//! The compressed records of LAZ and COPC.
+//! The compressed records of LAZ and COPC. See docs/decisions/0020-laz-codec.md.
 //!
 //! # How it works
 //!
-//! Records are compressed in chunks, and a table at the end says how long each chunk is. Chunks are independent, so
-//! several are decompressed side by side with the `laz` crate's record decompressors. Its own readers are not used, as
-//! they allocate what the chunk table claims; here every claim is compared with the length of the file first.
+//! Records are compressed in chunks, and a table at the end states the length of each chunk. Chunks are independent, so
+//! several are decompressed in parallel with the record decompressors of the `laz` crate. The crate's readers are not
+//! used: they allocate what the chunk table claims. Here every claim is first compared with the length of the file.
 
 use std::{io::Cursor, ops::Range};
 
@@ -26,27 +26,27 @@ use super::{
 };
 use crate::Error;
 
-/// Points decompressed before they are taken apart, while they are in cache.
+/// Points decompressed before their values are taken, while they are in the cache.
 const PIECE: usize = 1 << 11;
 
-/// Chunks decompressed side by side; files of very short ones would need much memory for bookkeeping.
+/// Most chunks decompressed in parallel; many very short chunks would need much memory for bookkeeping.
 const MAX_CHUNKS: usize = 1 << 10;
 
-/// Points that one byte can stand for. Real data need a byte or more for each; a chunk of 50,000 equal points is about
-/// 70 bytes.
+/// Most points per byte of the file. Real data need a byte or more per point; a chunk of 50,000 equal points takes
+/// about 70 bytes.
 const MAX_RATIO: u64 = 1024;
 
-/// A run of records that is decompressed from its beginning.
+/// A run of records that can only be decompressed from its beginning.
 struct Chunk {
     bytes: Range<usize>,
     points: usize,
-    /// Whether what it says of itself cannot be.
+    /// Whether the lengths in the chunk are impossible.
     inconsistent: bool,
 }
 
 /// The compressed points of a file.
 pub(super) struct Compressed<'a> {
-    /// Points that the chunks hold, and how many more the header tells of.
+    /// Number of points in the chunks, and number of further points that the header claims.
     pub(super) points: usize,
     pub(super) missing: u64,
     bytes: &'a [u8],
@@ -56,7 +56,7 @@ pub(super) struct Compressed<'a> {
 }
 
 impl<'a> Compressed<'a> {
-    /// Finds the chunks; nothing if there are no points.
+    /// Finds the chunks; `None` if there are no points.
     pub(super) fn open(job: &Job<'a>, header: &Header, records: &Records<'a>) -> Result<Option<Self>, Error> {
         if header.points == 0 {
             return Ok(None);
@@ -112,20 +112,20 @@ impl<'a> Compressed<'a> {
     }
 }
 
-/// Where the decompression stands.
+/// State of the decompression.
 struct Filling<'a, 'b> {
     file: &'a Compressed<'a>,
     job: &'a Job<'a>,
     columns: &'a mut Columns<'b>,
-    /// Points that are done with.
+    /// Number of points processed.
     done: usize,
     damaged: Vec<Range<usize>>,
-    /// What is wrong with the first that is damaged.
+    /// Fault of the first damaged chunk.
     why: String,
 }
 
 impl Filling<'_, '_> {
-    /// Decompresses chunks side by side.
+    /// Decompresses chunks in parallel.
     fn batch(&mut self, chunks: &[Chunk]) -> Result<(), Error> {
         self.tick()?;
         let file = self.file;
@@ -158,8 +158,8 @@ impl Filling<'_, '_> {
         preview(self.job, self.columns, start, self.done - start)
     }
 
-    /// Decompresses a chunk that is too long for one batch, as old writers make them, piece by piece: what comes before a
-    /// fault can be kept.
+    /// Decompresses a chunk too long for one batch, as old writers make them. It works piece by piece, so that the
+    /// points before a fault are kept.
     fn long_chunk(&mut self, chunk: &Chunk) -> Result<(), Error> {
         let end = self.done + chunk.points;
         let file = self.file;
@@ -219,7 +219,7 @@ impl Filling<'_, '_> {
     }
 }
 
-/// How the points are compressed, and whether in chunks: one of the variable length records after the header.
+/// The compression record, and whether the points are in chunks.
 fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<(LazVlr, bool), Error> {
     let Some(record) = records.find(LazVlr::USER_ID, LazVlr::RECORD_ID) else {
         let what = "the points are compressed, but the record that says how is missing; copy the file again";
@@ -227,7 +227,7 @@ fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<
     };
     let fail = |what| job.malformed(format!("byte {}", record.at), format!("bad compression record ({what})"));
     let vlr = guard(|| LazVlr::from_buffer(record.data).map_err(|error| error.to_string())).map_err(fail)?;
-    // The compressor is the first number: 1 is a single run, as the oldest writers made it; 2 and 3 are chunks.
+    // The first number is the compressor: 1 is a single run, as the oldest writers made; 2 and 3 are chunks.
     match (record.data[0], layered(vlr.items())) {
         (1, false) => Ok((vlr, false)),
         (2, false) | (3, true) => Ok((vlr, true)),
@@ -235,12 +235,12 @@ fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<
     }
 }
 
-/// Whether chunks keep each kind of value apart, as those of formats 6 and up do.
+/// Whether chunks store each kind of value apart, as those of point formats 6 and up do.
 fn layered(items: &[LazItem]) -> bool {
     items.first().is_some_and(|item| item.version() >= 3)
 }
 
-/// The parts that records are compressed in make up a whole record of the format, in the right order.
+/// Checks that the compressed items form a complete record of the point format, in the right order.
 fn check_items(items: &[LazItem], header: &Header) -> Result<(), String> {
     let wide = header.format >= 6;
     let size = |item: &LazItem| match item.item_type() {
@@ -261,7 +261,7 @@ fn check_items(items: &[LazItem], header: &Header) -> Result<(), String> {
     }
 }
 
-/// Finds the chunks. Nothing that follows trusts more than what is checked here.
+/// Finds the chunks. Later code trusts only what is checked here.
 fn chunks(bytes: &[u8], header: &Header, vlr: &LazVlr, chunked: bool) -> Result<Vec<Chunk>, String> {
     let points = usize::try_from(header.points).map_err(|_| "too many points".to_owned())?;
     let cut = || "the file ends before its chunk table; it is cut off, copy it again".to_owned();
@@ -270,7 +270,7 @@ fn chunks(bytes: &[u8], header: &Header, vlr: &LazVlr, chunked: bool) -> Result<
     }
     let start = header.point_data + 8;
     let offset_at = |at: usize| Some(i64::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
-    // A writer that cannot go back leaves -1 and puts the offset at the very end.
+    // A writer that cannot seek back leaves -1 and stores the offset at the very end.
     let inside = |offset: &i64| usize::try_from(*offset).is_ok_and(|at| at >= start && at < bytes.len());
     let table = offset_at(header.point_data)
         .filter(inside)
@@ -280,7 +280,7 @@ fn chunks(bytes: &[u8], header: &Header, vlr: &LazVlr, chunked: bool) -> Result<
     let count = bytes.get(table + 4..).and_then(|rest| rest.first_chunk()).copied().map(u32::from_le_bytes);
     let count = count.ok_or_else(cut)? as usize;
     if count > (bytes.len() - start) / header.record_len {
-        // Every chunk begins with one whole record.
+        // Every chunk begins with one uncompressed record.
         return Err(format!("{count} chunks cannot be in a file of this size"));
     }
     let variable = vlr.uses_variable_size_chunks();
@@ -307,8 +307,8 @@ fn chunks(bytes: &[u8], header: &Header, vlr: &LazVlr, chunked: bool) -> Result<
     Ok(chunks)
 }
 
-/// A layered chunk gives, after its first record and the number of points, the length of each layer; the decompressor
-/// allocates them as they are claimed, so they must be in the chunk.
+/// Whether the layers of a chunk fit into it. Their lengths follow the first record and the number of points, and the
+/// decompressor allocates what they claim.
 pub(super) fn layers_fit(chunk: &[u8], items: &[LazItem], record_len: usize) -> bool {
     let layers: usize = items
         .iter()
@@ -326,7 +326,7 @@ pub(super) fn layers_fit(chunk: &[u8], items: &[LazItem], record_len: usize) -> 
 
 pub(super) type Decompressor<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + Send + Sync + 'a>;
 
-/// Parts are ours where damaged data would fill the stack of the crate's.
+/// Makes a decompressor. Items on which damage would overflow the crate's stack are decoded by this project's code.
 pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Decompressor<'a>, String> {
     let theirs = |decompressor: &mut dyn RecordDecompressor<Cursor<&'a [u8]>>, item: LazItem| {
         decompressor.set_fields_from(&vec![item]).map_err(|error| error.to_string())
@@ -351,7 +351,7 @@ pub(super) fn decompressor<'a>(items: &[LazItem], chunk: &'a [u8]) -> Result<Dec
     Ok(Box::new(decompressor))
 }
 
-/// Decompresses the next records; an error comes with the number of those before it.
+/// Decompresses the next records. An error holds the number of complete records before it.
 fn decompress(
     decompressor: &mut (dyn RecordDecompressor<Cursor<&[u8]>> + Send + Sync),
     records: &mut [u8],

@@ -1,13 +1,13 @@
-//! LAS 1.0 to 1.4, all point formats; compressed as LAZ or COPC too.
+//! LAS 1.0 to 1.4, all point formats, also compressed as LAZ or COPC.
 //!
 //! # How it works
 //!
-//! The [`header`] tells where the points are and how long their records; the variable length [`records`] say what
-//! [extra values](extra) they have and what the coordinates mean. Points are decoded in runs, side by side, straight into
-//! their [`columns`]: runs of [`laz`] are chunks, each decompressed piece by piece and taken apart while it is in cache.
+//! The [`header`] states where the points are and how long their records. The variable length [`records`] describe the
+//! [extra bytes](extra) and the coordinate system. Points are decoded in parallel runs straight into their [`columns`].
+//! Runs of [`laz`] are chunks, decompressed piece by piece; values are taken while a piece is in the cache.
 //!
-//! Positions are taken about an origin that is known before: the middle of the bounds that the header claims, if a sample
-//! of the points agrees, else the middle of the sample.
+//! The origin of the positions is chosen in advance. It is the middle of the claimed bounds if a sample of the points
+//! agrees, otherwise the middle of the sample.
 
 mod columns;
 mod coordinates;
@@ -30,13 +30,13 @@ use self::{
 use super::{Contents, Format, Job, table::middle};
 use crate::{Error, las};
 
-/// Points decoded between two looks at the caller's wish to stop, and of a preview.
+/// Points decoded between two checks for cancellation, and points of a preview chunk.
 const BATCH: usize = 1 << 19;
 
-/// Uncompressed points that one thread takes at a time.
+/// Uncompressed points that one thread decodes at a time.
 const RUN: usize = 1 << 13;
 
-/// Edge of a box of points for which one origin serves `f32` well.
+/// Largest edge of a box of points for which one origin suits `f32`.
 const WIDE: f64 = 1e6;
 
 pub(super) const FORMAT: Format = Format {
@@ -101,7 +101,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     Ok(cloud.with_crs(meaning.crs).with_resolution(header.scale.abs()).into())
 }
 
-/// All values of a point but coordinates and colours, and what is to be noted of them.
+/// All values of a point except coordinates and colours, and notes about them.
 fn dimensions(header: &Header, records: &Records<'_>) -> (Vec<Dimension>, Vec<String>) {
     let own = las::places(header.format).into_iter();
     let own = own.map(|(name, place)| Dimension { name: name.into(), source: Source::Own(place) });
@@ -118,7 +118,7 @@ fn dimensions(header: &Header, records: &Records<'_>) -> (Vec<Dimension>, Vec<St
     (dimensions, notes)
 }
 
-/// Points whose records are complete, and how many are missing.
+/// The number of complete records, and the number of missing ones.
 fn complete(job: &Job<'_>, header: &Header) -> Result<(usize, u64), Error> {
     let held = (job.bytes.len() - header.point_data) / header.record_len;
     let points = usize::try_from(header.points).map_or(held, |points| points.min(held));
@@ -129,7 +129,7 @@ fn complete(job: &Job<'_>, header: &Header) -> Result<(usize, u64), Error> {
     Ok((points, header.points - points as u64))
 }
 
-/// Where positions are best taken about; `sample` are the coordinates of some points.
+/// The origin of the positions; `sample` gives the coordinates of some points.
 fn origin(header: &Header, count: usize, sample: impl Fn(usize) -> DVec3) -> DVec3 {
     let middle = middle(count, sample);
     match header.sane_bounds() {
@@ -162,7 +162,7 @@ fn uncompressed(job: &Job<'_>, header: &Header, columns: &mut Columns<'_>, point
     Ok(())
 }
 
-/// Shows points that were just filled.
+/// Passes newly filled points to the caller as a preview chunk.
 fn preview(job: &Job<'_>, columns: &Columns<'_>, start: usize, count: usize) -> Result<(), Error> {
     job.preview(|| columns.preview(start..start + count))
 }

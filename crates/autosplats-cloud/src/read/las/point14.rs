@@ -1,13 +1,15 @@
-//! The part of compressed records that point formats 6 and up share, POINT14: position, returns, flags, times ….
+//! POINT14, the part of compressed records that point formats 6 and up share: position, returns, flags, time and
+//! others. See docs/decisions/0020-laz-codec.md.
 //!
 //! # How it works
 //!
-//! Each kind of value has a layer of its own in the chunk, and each scanner channel its own statistics, which begin as
-//! copies of the last point of the channel before. A symbol says which values differ from the last point of the channel.
-//! The others are predicted: a coordinate's difference by the median of the last five of the same kind of return, heights
-//! and intensities by the last of the same kind; corrections are coded in contexts that say how large the ones before were.
+//! Each kind of value has its own layer in the chunk. Each scanner channel has its own statistics, which begin as
+//! copies of the previous channel's last point. A symbol states which values differ from the last point of the channel.
+//! The others are predicted. A coordinate's step is predicted by the median of the last five steps of the same kind of
+//! return, heights and intensities by the last value of the same kind. Corrections are coded in contexts given by the
+//! size of earlier corrections.
 //!
-//! The `laz` crate decodes all this too, and what it codes with is used here, but damaged times overflow its stack
+//! The `laz` crate decodes POINT14 too, and its coder is used here. But damaged times overflow the crate's stack
 //! ([`gps_time`](super::gps_time)).
 
 use std::io::{self, Cursor, ErrorKind, Read as _};
@@ -27,21 +29,20 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
-/// Bytes of the record's part.
+/// Bytes of POINT14 in a record.
 const LEN: usize = 30;
 
 const CHANNELS: usize = 4;
 
-/// Layers, in the order of the chunk: channel, returns, x and y; z; class; flags; intensity; angle; user data; source; time.
-/// Those are left empty in which all points are the same.
+/// Number of layers. Their order in the chunk: channel, returns, x and y; z; class; flags; intensity; angle; user data;
+/// source; time. A layer is empty if its value is the same for all points.
 pub(super) const LAYERS: usize = 9;
 
 type Layer = ArithmeticDecoder<Cursor<Vec<u8>>>;
 
-/// Decodes the part of one chunk's records.
+/// Decoder of POINT14 in the records of one chunk.
 pub(super) struct Point14 {
-    /// Whether the parts after this one are told the channel of every point, or only of those where it changes, as the
-    /// first writers did.
+    /// Whether later items receive the channel of every point, or only where it changes, as the first writers had it.
     tells_channel: bool,
     sizes: [u32; LAYERS],
     layers: [Option<Layer>; LAYERS],
@@ -50,7 +51,7 @@ pub(super) struct Point14 {
 }
 
 impl Point14 {
-    /// For version 3 or 4 of the compression.
+    /// A decoder for version 3 or 4 of the compression.
     pub(super) fn new(version: u16) -> Self {
         Self {
             tells_channel: version > 3,
@@ -71,7 +72,7 @@ impl<'a> LayeredFieldDecompressor<Cursor<&'a [u8]>> for Point14 {
         LEN
     }
 
-    /// All values are decoded.
+    /// Always decodes all values.
     fn set_selection(&mut self, _: DecompressionSelection) {}
 
     fn init_first_point(
@@ -137,12 +138,12 @@ impl<'a> LayeredFieldDecompressor<Cursor<&'a [u8]>> for Point14 {
     }
 }
 
-/// What of a point differs from the last one of its channel.
+/// Bits that state which values differ from the last point of the channel.
 #[derive(Clone, Copy)]
 struct Changes(u32);
 
 impl Changes {
-    /// The last point of all, that is.
+    /// Whether the channel differs from that of the previous point.
     fn channel(self) -> bool {
         self.0 & 64 != 0
     }
@@ -163,7 +164,7 @@ impl Changes {
         self.0 & 4 != 0
     }
 
-    /// 0 if it is the same, 1 if it is one more, 2 if one less, 3 if neither.
+    /// 0 for the same number, 1 for one more, 2 for one less, 3 for another.
     fn return_number(self) -> u32 {
         self.0 & 3
     }
@@ -174,15 +175,15 @@ impl Changes {
 struct Point {
     position: [i32; 3],
     intensity: u16,
-    /// The number of the return in the lower half, how many there are of the pulse in the upper.
+    /// Return number in the lower four bits, number of returns of the pulse in the upper four.
     returns: u8,
-    /// The channel in the bits 4 and 5.
+    /// Flags, with the channel in bits 4 and 5.
     flags: u8,
     class: u8,
     user_data: u8,
     angle: i16,
     source: u16,
-    /// The bits of the floating point number.
+    /// The bits of the floating-point number.
     time: i64,
 }
 
@@ -222,26 +223,26 @@ impl Point {
         self.flags = self.flags & 0xcf | (channel as u8 & 3) << 4;
     }
 
-    /// The number of the return, and how many there are.
+    /// Return number, and number of returns.
     fn returns(&self) -> (u8, u8) {
         (self.returns & 15, self.returns >> 4)
     }
 }
 
-/// What is remembered of a scanner channel.
+/// State of a scanner channel.
 struct Channel {
     last: Point,
     time_changed: bool,
-    /// By the kind of return and whether the time changed: the last steps in x and y.
+    /// The last steps in x and y, by the kind of return and whether the time changed.
     steps: [[Median; 2]; 12],
-    /// By how many returns are to come.
+    /// Last height, by the number of returns still to come.
     heights: [i32; 8],
     intensities: [u16; 8],
     changes: [ArithmeticModel; 8],
     next_channel: ArithmeticModel,
     return_counts: Models<16>,
     return_numbers: Models<16>,
-    /// Of the same pulse.
+    /// Steps of the return number within a pulse.
     return_skips: ArithmeticModel,
     classes: Models<64>,
     flags: Models<64>,
@@ -256,7 +257,7 @@ struct Channel {
 }
 
 impl Channel {
-    /// A channel whose points begin after this one.
+    /// A channel whose points follow this one.
     fn new(last: Point) -> Self {
         let model = |symbols| ArithmeticModelBuilder::new(symbols).build();
         let integer =
@@ -285,7 +286,7 @@ impl Channel {
         }
     }
 
-    /// What kind of return the last point was.
+    /// Kind of the last return: first or not, last or not, new time or not.
     fn kind(&self) -> usize {
         let (number, count) = self.last.returns();
         usize::from(number == 1) | usize::from(number >= count) << 1 | usize::from(self.time_changed) << 2
@@ -335,7 +336,7 @@ impl Channel {
             last.class = layer.decode_symbol(model)? as u8;
         }
         if let Some(layer) = flags {
-            // Without the channel, which is between them.
+            // Flags without the channel bits between them.
             let model = self.flags.get(usize::from(last.flags & 15 | last.flags >> 2 & 48));
             let coded = layer.decode_symbol(model)? as u8;
             last.flags = last.flags & 48 | coded & 15 | (coded & 48) << 2;

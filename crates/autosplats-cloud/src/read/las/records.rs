@@ -3,24 +3,24 @@
 use super::header::{Header, text};
 use crate::las::{EVLR_HEADER, VLR_HEADER};
 
-/// One record: whose it is, its number and what it holds.
+/// One record: user id, record id and data.
 pub(super) struct Record<'a> {
     pub(super) user: String,
     pub(super) id: u16,
     pub(super) data: &'a [u8],
-    /// The byte of the file at which it begins.
+    /// First byte of the record in the file.
     pub(super) at: usize,
 }
 
-/// All records of a file as far as they are there.
+/// All records of a file that are present.
 pub(super) struct Records<'a> {
     pub(super) all: Vec<Record<'a>>,
-    /// What is wrong with them.
+    /// Faults of the records.
     pub(super) notes: Vec<String>,
 }
 
 impl<'a> Records<'a> {
-    /// Walks through the records; a count or length that lies ends the walk.
+    /// Walks through the records; an impossible count or length ends the walk.
     pub(super) fn read(bytes: &'a [u8], header: &Header) -> Self {
         let mut all = Vec::new();
         let mut notes = Vec::new();

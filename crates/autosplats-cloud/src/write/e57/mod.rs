@@ -1,8 +1,8 @@
-//! E57: a scan for each place of a scanner, positions in its frame, in double precision where `f32` would lose digits.
+//! E57: one scan per sensor, with positions in the sensor's frame, in double precision if `f32` would lose digits.
 //!
-//! Kept are positions to some 1e-15 of the largest coordinate, colours of 8 and 16 bits, fields of any type but unsigned
-//! integers beyond 63 bits, and poses. Points that no scanner has seen come last. E57 means metres, so coordinates in
-//! other units are converted.
+//! Positions are exact to some 1e-15 of the largest coordinate. Colours of 8 and 16 bits, poses, and fields of any type
+//! are kept, except unsigned integers beyond 63 bits. Points that no sensor saw come last. E57 requires metres, so
+//! coordinates in other units are converted.
 
 mod pages;
 mod values;
@@ -23,7 +23,7 @@ use crate::{Axes, Error, FieldValues, PointCloud, Unit, check_memory};
 
 pub(super) const FORMAT: Format = Format { name: "E57", extensions: &["e57"], write };
 
-/// Bytes of a packet at most.
+/// Largest size of a packet, in bytes.
 const PACKET: usize = 1 << 16;
 
 /// Packets encoded at a time.
@@ -33,7 +33,7 @@ const BATCH: usize = 64;
 struct Run {
     name: Option<String>,
     pose: Option<DMat4>,
-    /// In the cloud, one after the other.
+    /// Ranges of points in the cloud.
     ranges: Vec<Range<usize>>,
     len: usize,
 }
@@ -55,7 +55,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     pages.finish(&xml).map_err(|source| job.io(source))
 }
 
-/// The cloud in metres, if it says that it is in something else.
+/// The cloud in metres, if it states another unit.
 fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
     let cloud = job.cloud;
     let Some(unit) = cloud.crs().unit else { return Ok(None) };
@@ -63,7 +63,7 @@ fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
     if scale == Some(DVec3::ONE) || scale.is_none() && unit != Unit::Degree {
         return Ok(None);
     }
-    // A copy, and what `f32` loses of its positions.
+    // Memory: a copy, and the residuals of its positions.
     let bytes = cloud.byte_len() + 12 * cloud.len();
     check_memory(&format!("{} points in metres", cloud.len()), bytes as u64)?;
     let mut metric = cloud.clone();
@@ -80,12 +80,12 @@ fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
     Ok(Some(metric))
 }
 
-/// Tells what cannot be held.
+/// Notes what the format cannot hold.
 fn notes(job: &Job<'_>, known: &Known<'_>) {
     let cloud = job.cloud;
     let is_lost = match cloud.axes() {
         Some(Axes::YUp | Axes::Camera) => true,
-        // Readers take it that what is larger, or scanned, has Z up.
+        // Readers assume Z up for clouds that are large or were scanned.
         Some(Axes::ZUp) => cloud.is_small() && cloud.scans().is_empty(),
         None => false,
     };
@@ -102,7 +102,7 @@ fn notes(job: &Job<'_>, known: &Known<'_>) {
     }
 }
 
-/// The scans of the cloud, and the points outside of them.
+/// The scans of the cloud, then the points outside of all scans.
 fn runs(job: &Job<'_>) -> Vec<Run> {
     let cloud = job.cloud;
     let mut scans: Vec<_> = cloud.scans().iter().collect();
@@ -158,7 +158,7 @@ fn scan<'a>(
 ) -> Result<ScanEntry, Error> {
     let cloud = job.cloud;
     let frame = run.pose.map_or(Frame::WORLD, |pose| {
-        // The turn as readers will have it: from the quaternion.
+        // The rotation as readers will compute it, from the quaternion.
         let rotation = DMat3::from_quat(glam::DQuat::from_mat4(&pose).normalize());
         Frame { rotation, translation: pose.w_axis.truncate() }
     });
@@ -173,7 +173,7 @@ fn scan<'a>(
 
     let fixed = 6 + 2 * values.len() + 4;
     let bits: usize = values.iter().map(|value| value.source.bits()).sum();
-    // Whole bytes of every stream, so that no value lies in two packets.
+    // Every stream gets whole bytes, so that no value lies in two packets.
     let per_packet = PACKET.saturating_sub(fixed) * 8 / bits / 8 * 8;
     if per_packet == 0 {
         return Err(Error::Unsupported {
@@ -230,7 +230,7 @@ fn scan<'a>(
 }
 
 impl Run {
-    /// Indices of some of its points in the cloud.
+    /// Indices in the cloud of some of the run's points.
     fn points(&self, wanted: Range<usize>) -> Vec<usize> {
         let mut points = Vec::with_capacity(wanted.len());
         let mut start = 0;
@@ -244,7 +244,7 @@ impl Run {
     }
 }
 
-/// One packet: the values of some points, those of each kind together.
+/// One packet: the values of some points, one stream after the other.
 fn packet(job: &Job<'_>, frame: Frame, values: &[Value<'_>], points: &[usize]) -> Vec<u8> {
     let start = 6 + 2 * values.len();
     let mut packet = Vec::with_capacity(PACKET);

@@ -1,26 +1,27 @@
-//! Data to pages, each with a checksum at its end.
+//! Splits data into pages, each with a checksum at its end.
 
 use std::{
     fs::File,
     io::{BufWriter, Result, Seek as _, SeekFrom, Write as _},
 };
 
-/// Bytes of a page, and of the data in it.
+/// Bytes of a page.
 const PAGE: u64 = 1024;
+/// Bytes of data in a page.
 const DATA: usize = 1020;
 
 /// Bytes of the file's header.
 const HEADER: usize = 48;
 
-/// A file in the making.
+/// A file that is being written.
 pub(super) struct Pages<'a, 'b> {
     file: &'a mut BufWriter<&'b mut File>,
-    /// Data of the page that is not full.
+    /// Data of the page that is not full yet.
     page: Vec<u8>,
-    /// Data of the first page, which has the header and is written again in the end.
+    /// Data of the first page, which has the header and is rewritten at the end.
     first: Option<Vec<u8>>,
     written: u64,
-    /// Of all checksums: tells files apart.
+    /// Hash of all checksums, which tells files apart.
     hash: u64,
 }
 
@@ -29,7 +30,7 @@ impl<'a, 'b> Pages<'a, 'b> {
         Self { file, page: vec![0; HEADER], first: None, written: 0, hash: 0xcbf2_9ce4_8422_2325 }
     }
 
-    /// Where in the file the data will be that come so many bytes after those there are.
+    /// Physical address of the data that follow after `after` more bytes.
     pub(super) fn physical(&self, after: u64) -> u64 {
         let at = self.page.len() as u64 + after;
         (self.written + at / DATA as u64) * PAGE + at % DATA as u64
@@ -51,7 +52,7 @@ impl<'a, 'b> Pages<'a, 'b> {
         Ok(())
     }
 
-    /// Zeros up to a multiple of four, where sections begin.
+    /// Appends zeros up to a multiple of four, where sections begin.
     pub(super) fn align(&mut self) -> Result<()> {
         let missing = self.page.len().next_multiple_of(4) - self.page.len();
         self.write(&[0; 4][..missing])
@@ -69,7 +70,7 @@ impl<'a, 'b> Pages<'a, 'b> {
         Ok(())
     }
 
-    /// Writes the XML section, the last of all, and the header, which tells where it is.
+    /// Writes the XML section, which comes last, and the header, which holds its address.
     pub(super) fn finish(mut self, xml: &str) -> Result<()> {
         self.align()?;
         let start = self.physical(0);

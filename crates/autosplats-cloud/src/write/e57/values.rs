@@ -1,41 +1,41 @@
-//! The values of a point, each as a stream of its own.
+//! The values of a point, each in its own stream.
 
 use glam::{DMat3, DVec3};
 
 use super::super::{Job, colors::wide_colors};
 use crate::{Field, FieldValues, PointCloud};
 
-/// One value of each point: how it is called, stored and had.
+/// One value of each point: name and source.
 pub(super) struct Value<'a> {
     /// Name, with the prefix of an extension.
     pub(super) name: String,
     pub(super) source: Source<'a>,
 }
 
-/// Where a value comes from.
+/// Source and storage of a value.
 #[derive(Clone, Copy)]
 pub(super) enum Source<'a> {
     Position {
         axis: usize,
         single: bool,
     },
-    /// Whether there is a position: two bits.
+    /// Whether a point has a position, in two bits.
     State,
     Color(usize),
     Field(&'a FieldValues),
-    /// Returns are counted from 0.
+    /// A return number, counted from 0.
     FromZero(&'a FieldValues),
-    /// In double precision whatever the field is.
+    /// A field as 64-bit floats, whatever its type.
     Double(&'a FieldValues),
     Normal {
         fields: [&'a FieldValues; 3],
         axis: usize,
-        /// In single precision, because nothing is turned.
+        /// Whether to store 32-bit floats; possible if nothing is rotated.
         single: bool,
     },
 }
 
-/// The frame of a scan: what maps world coordinates to it.
+/// Pose of a scan: rotation and translation from the scan's frame to the world.
 #[derive(Clone, Copy)]
 pub(super) struct Frame {
     pub(super) rotation: DMat3,
@@ -71,7 +71,7 @@ impl Source<'_> {
         }
     }
 
-    /// The attributes of its element in the XML section.
+    /// Attributes of the value's element in the XML section.
     pub(super) fn stored(self) -> String {
         let integer = |min: i64, max: i64| format!("type=\"Integer\" minimum=\"{min}\" maximum=\"{max}\"");
         let float = |single| if single { "type=\"Float\" precision=\"single\"" } else { "type=\"Float\"" };
@@ -137,7 +137,7 @@ impl Source<'_> {
     }
 }
 
-/// Integers are stored by their distance from the least of their type.
+/// Appends values minus `less`. Integers are stored as the distance from the least value of their type.
 fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
     macro_rules! put {
         ($v:expr, $min:expr, $less:expr) => {
@@ -153,7 +153,7 @@ fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
         FieldValues::I16(v) => put!(v, i16::MIN, i16::from(less)),
         FieldValues::U32(v) => put!(v, 0, u32::from(less)),
         FieldValues::I32(v) => put!(v, i32::MIN, i32::from(less)),
-        // Half the range of a signed integer is above the least one.
+        // The stored minimum is that of a signed integer, half the range below zero.
         FieldValues::U64(v) => put!(v, 1 << 63, u64::from(less)),
         FieldValues::I64(v) => put!(v, i64::MIN, i64::from(less)),
         FieldValues::F32(v) => points.iter().for_each(|&i| out.extend(v[i].to_le_bytes())),
@@ -161,7 +161,7 @@ fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
     }
 }
 
-/// What takes a look at all points, of which there may be many scans.
+/// Facts that take a pass over all points, computed once for all scans.
 pub(super) struct Known<'a> {
     /// Colours of 16 bits.
     pub(super) wide_colors: Option<[&'a FieldValues; 3]>,
@@ -180,13 +180,13 @@ impl<'a> Known<'a> {
         }
     }
 
-    /// A field as it is, but for integers that E57 cannot hold.
+    /// A field unchanged, or as floats if E57 cannot hold its integers.
     fn source(&self, field: &'a Field) -> Source<'a> {
         if self.beyond.contains(&&*field.name) { Source::Double(&field.values) } else { Source::Field(&field.values) }
     }
 }
 
-/// All values of the points of a cloud: `single` positions or double ones, with `state` if some have none.
+/// All values of a cloud's points: positions in 32 bits if `single`, with a `state` if some points have no position.
 pub(super) fn values<'a>(job: &Job<'a>, known: &Known<'a>, frame: Frame, single: bool, state: bool) -> Vec<Value<'a>> {
     let cloud = job.cloud;
     let mut all = Vec::new();
@@ -245,7 +245,7 @@ pub(super) fn values<'a>(job: &Job<'a>, known: &Known<'a>, frame: Frame, single:
     all
 }
 
-/// Whether integers are beyond 63 bits.
+/// Whether some integers exceed 63 bits.
 fn beyond(values: &FieldValues) -> bool {
     matches!(values, FieldValues::U64(values) if values.iter().any(|&value| i64::try_from(value).is_err()))
 }
@@ -262,7 +262,7 @@ fn returns(cloud: &PointCloud) -> bool {
     counts.is_some() && number.is_some_and(|number| (0..number.len()).all(|i| number.get(i) >= 1.0))
 }
 
-/// A name that XML allows.
+/// Replaces characters that an XML name must not have.
 pub(super) fn xml_name(name: &str) -> String {
     let fit = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.') { c } else { '_' };
     let mut fit: String = name.chars().map(fit).collect();

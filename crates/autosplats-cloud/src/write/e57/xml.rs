@@ -6,28 +6,28 @@ use glam::{DMat4, DQuat, DVec3};
 
 use crate::Crs;
 
-/// Of surface normals, an extension that others know.
+/// Namespace of the extension for surface normals, which other programs know.
 const NORMALS: &str = "http://www.libe57.org/E57_NOR_surface_normals.txt";
 
-/// Of fields that E57 has no name for.
+/// Namespace of fields without a name in E57.
 const FIELDS: &str = "urn:autosplats:fields";
 
-/// What is told of a scan.
+/// Description of a scan.
 pub(super) struct ScanEntry {
     pub(super) name: Option<String>,
-    /// Of a scanner; points that belong to none have none.
+    /// Pose of the sensor; `None` for points of no sensor.
     pub(super) pose: Option<DMat4>,
     pub(super) bounds: Option<[DVec3; 2]>,
     pub(super) max_color: Option<u16>,
-    /// Least and greatest intensity, and whether they are integers.
+    /// Least and greatest intensity, and whether intensities are integers.
     pub(super) intensity: Option<([f64; 2], bool)>,
     pub(super) offset: u64,
     pub(super) points: usize,
-    /// An element for each value of a point.
+    /// The XML elements of a point's values.
     pub(super) prototype: String,
 }
 
-/// The whole section; `hash` makes the identifiers.
+/// The whole section; identifiers are derived from `hash`.
 pub(super) fn xml(scans: &[ScanEntry], crs: &Crs, hash: u64) -> String {
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     xml += "<e57Root type=\"Structure\" xmlns=\"http://www.astm.org/COMMIT/E57/2010-e57-v1.0\"";
@@ -110,7 +110,7 @@ impl ScanEntry {
     }
 }
 
-/// An identifier that the content makes, so that the same cloud gives the same file.
+/// An identifier derived from the content, so that the same cloud gives the same file.
 fn guid(hash: u64, index: u64) -> String {
     let mix = |seed: u64| {
         let mut z = hash ^ seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -119,7 +119,7 @@ fn guid(hash: u64, index: u64) -> String {
         z ^ (z >> 31)
     };
     let (a, b) = (mix(2 * index + 1), mix(2 * index + 2));
-    // Version 8: made in a way of one's own.
+    // Version 8: made in a custom way.
     format!(
         "{{{:08X}-{:04X}-8{:03X}-{:04X}-{:012X}}}",
         a >> 32,
@@ -130,7 +130,7 @@ fn guid(hash: u64, index: u64) -> String {
     )
 }
 
-/// Text as XML has it; characters that it cannot have become blanks.
+/// Escapes text for XML; characters that XML does not allow become blanks.
 fn escaped(text: &str) -> String {
     let mut escaped = String::new();
     for c in text.chars() {

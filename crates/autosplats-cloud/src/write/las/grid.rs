@@ -1,4 +1,4 @@
-//! The integers that coordinates become: steps of a scale from an offset.
+//! Quantisation of coordinates: integers count steps from an offset.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -6,29 +6,33 @@ use rayon::prelude::*;
 use super::super::Job;
 use crate::{Error, Unit};
 
-/// Steps that 32 bits hold to either side, a little less.
+/// Largest number of steps from the offset, slightly less than 32 bits hold.
 const REACH: f64 = 2_147_483_600.0;
 
-/// Steps without a finer wish: a millionth of the cloud, but a millimetre or, in degrees, as much at most.
+/// Step as a fraction of the cloud's size, if the cloud states no resolution; rounded down to a power of ten.
 const PART: f64 = 1e-6;
+/// Coarsest step in the cloud's unit, if the cloud states no resolution.
 const STEP: f64 = 1e-3;
+/// Coarsest step in degrees, about a millimetre.
 const STEP_DEGREES: f64 = 1e-8;
+/// Finest step, if the cloud states no resolution.
 const FINEST: f64 = 1e-12;
 
-/// A part of a step by which coordinates may miss their integer, as those do that went through `f32`.
+/// Largest distance of a coordinate from its integer, in steps, that is not noted; rounding to `f32` causes such
+/// distances.
 const SLACK: f64 = 0.25;
 
-/// Points that are asked where the integers lie, if they do not lie at round places.
+/// Number of points tried as the offset, if no round offset fits.
 const SAMPLES: usize = 5;
 
-/// Coordinates are `offset + integer * scale`.
+/// A coordinate is `offset + integer * scale`.
 pub(super) struct Grid {
     pub(super) scale: DVec3,
     pub(super) offset: DVec3,
 }
 
 impl Grid {
-    /// Finds the grid for `count` points, and notes what it loses.
+    /// Finds the grid for `count` points, and notes its losses.
     pub(super) fn of(job: &Job<'_>, count: usize, world: impl Fn(usize) -> DVec3 + Sync) -> Result<Self, Error> {
         let cloud = job.cloud;
         let known = cloud.resolution().filter(|step| step.is_finite() && step.cmpgt(DVec3::ZERO).all());
@@ -56,7 +60,7 @@ impl Grid {
             check_spread(job, count, &world, scale)?;
         }
 
-        // How far points are from their integers along each axis: at most, and altogether in thousandths.
+        // Distances of the points from their integers along each axis: the greatest, and the sum in thousandths.
         let off = |offset: DVec3| {
             let miss = |i: usize| {
                 let steps = (world(i) - offset) / scale;
@@ -74,7 +78,7 @@ impl Grid {
             if known.is_none() || miss.max_element() <= SLACK {
                 break;
             }
-            // The file's offset was no multiple of its scale: any of its points will do that was not moved since.
+            // The original offset is no multiple of its scale. Any point that was not moved since can serve as offset.
             let place = world(sample);
             let steps = ((DVec3::midpoint(low, high) - place) / scale).round();
             let near = DVec3::from_array([0, 1, 2].map(|axis| {
@@ -83,7 +87,7 @@ impl Grid {
             }));
             let (most, others) = off(near);
             for axis in 0..3 {
-                // By all points, so that those which were moved do not take the others off their places.
+                // The sum over all points decides, so that moved points do not displace the others.
                 if others[axis] < sums[axis] {
                     (offset[axis], miss[axis], sums[axis]) = (near[axis], most[axis], others[axis]);
                 }
@@ -98,7 +102,7 @@ impl Grid {
     }
 }
 
-/// The step wished for, or that times a power of ten that lets 32 bits reach over `size`.
+/// The wished step times the least power of ten with which 32 bits cover `size`.
 fn fitting(wished: f64, size: f64) -> f64 {
     let mut step = wished;
     while size > 2.0 * REACH * step {
@@ -107,7 +111,8 @@ fn fitting(wished: f64, size: f64) -> f64 {
     step
 }
 
-/// Zero if integers reach from there, else a place in the middle: a whole number if that is a number of steps.
+/// Zero if the integers reach from there, otherwise a place in the middle: a whole number if that is a multiple of the
+/// step.
 fn round_offset(low: f64, high: f64, step: f64) -> f64 {
     if low.abs().max(high.abs()) <= REACH * step {
         return 0.0;
@@ -119,7 +124,7 @@ fn round_offset(low: f64, high: f64, step: f64) -> f64 {
     if reached && (steps - steps.round()).abs() < 1e-3 { whole } else { (middle / step).round() * step }
 }
 
-/// Refuses a cloud in which a few points are so far away that the steps would be too long for all others.
+/// Fails if a few points are so far away that the step would be too coarse for all others.
 fn check_spread(job: &Job<'_>, count: usize, world: impl Fn(usize) -> DVec3, scale: DVec3) -> Result<(), Error> {
     let sample: Vec<DVec3> = (0..count).step_by(count.div_ceil(1024).max(1)).map(world).collect();
     let spread = |axis: usize| {

@@ -1,4 +1,4 @@
-//! The header and the records before the points.
+//! The header and the variable length records before the points.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -12,20 +12,20 @@ use crate::{
     las::{self, EXTRA_DESCRIPTOR, VLR_HEADER},
 };
 
-/// Bytes of the headers of LAS 1.2 and 1.4.
+/// Bytes of the headers of LAS 1.2 and of LAS 1.4.
 const SHORT: usize = 227;
 const LONG: usize = 375;
 
-/// Bytes that a record before the points holds.
+/// Most bytes of data in a variable length record.
 const MAX_VLR: usize = 65_535;
 
-/// What is only known when all points are encoded.
+/// Facts that are known only after all points are encoded.
 #[derive(Clone, Debug)]
 pub(super) struct Totals {
     low: [i32; 3],
     high: [i32; 3],
     points: u64,
-    /// Points by return number; of those without one none are counted.
+    /// Number of points by return number; points without one are not counted.
     returns: [u64; 15],
 }
 
@@ -34,7 +34,7 @@ impl Totals {
         Self { low: [i32::MAX; 3], high: [i32::MIN; 3], points: 0, returns: [0; 15] }
     }
 
-    /// What some records add.
+    /// The totals of some records.
     pub(super) fn of(records: &[u8], plan: &Plan<'_>) -> Self {
         let mut totals = Self::new();
         let mask = if plan.is_wide() { 15 } else { 7 };
@@ -65,7 +65,7 @@ impl Totals {
     }
 }
 
-/// Header and records as they lie in the file, and the byte at which the points begin.
+/// Header and records as stored in the file, and the byte at which the points begin.
 pub(super) fn bytes(plan: &Plan<'_>, totals: &Totals, compression: Option<&LazVlr>) -> (Vec<u8>, usize) {
     let (records, count, wkt) = records(plan, compression);
     let header_len = if plan.is_wide() { LONG } else { SHORT };
@@ -84,7 +84,7 @@ pub(super) fn bytes(plan: &Plan<'_>, totals: &Totals, compression: Option<&LazVl
     put(&mut bytes, [start as u32, count].map(u32::to_le_bytes));
     bytes.push(plan.format as u8 | if compression.is_some() { 0x80 } else { 0 });
     put(&mut bytes, [(plan.record_len as u16).to_le_bytes()]);
-    // LAS 1.4 has these counts further down, and they are zero here for its own point formats.
+    // These legacy counts are zero for the point formats of LAS 1.4, which stores the counts further down.
     let short = |count: u64| if plan.is_wide() { 0 } else { count as u32 };
     put(&mut bytes, [short(totals.points).to_le_bytes()]);
     put(&mut bytes, [0, 1, 2, 3, 4].map(|i| short(totals.returns[i]).to_le_bytes()));
@@ -106,7 +106,7 @@ pub(super) fn bytes(plan: &Plan<'_>, totals: &Totals, compression: Option<&LazVl
     (bytes, start)
 }
 
-/// The variable length records, their number, and whether the coordinate system is among them as text.
+/// The variable length records, their number, and whether one holds the coordinate system as text.
 fn records(plan: &Plan<'_>, compression: Option<&LazVlr>) -> (Vec<u8>, u32, bool) {
     let mut bytes = Vec::new();
     let mut count = 0;
@@ -146,7 +146,7 @@ fn records(plan: &Plan<'_>, compression: Option<&LazVlr>) -> (Vec<u8>, u32, bool
     }
     if let Some(vlr) = compression {
         let mut data = Vec::new();
-        // A vector takes everything.
+        // Writing to a vector cannot fail.
         let written = vlr.write_to(&mut data);
         debug_assert!(written.is_ok(), "memory is written to");
         record(LazVlr::USER_ID, LazVlr::RECORD_ID, "laz", &data);
@@ -155,14 +155,15 @@ fn records(plan: &Plan<'_>, compression: Option<&LazVlr>) -> (Vec<u8>, u32, bool
     (bytes, count, wkt)
 }
 
-/// The keys that came with the cloud; without, for LAS 1.2 or where there is no text, what is known in their language.
+/// The cloud's own GeoTIFF keys. Without them, and if LAS 1.2 or missing text require keys, new ones state what is
+/// known.
 fn keys(plan: &Plan<'_>, crs: &Crs, wkt: bool) -> Option<GeoKeys> {
     let fit = |keys: &GeoKeys| {
         keys.directory.len() * 2 <= MAX_VLR && keys.doubles.len() * 8 <= MAX_VLR && keys.ascii.len() < MAX_VLR
     };
     let own = crs.geotiff.clone().filter(fit);
     let known = crs.epsg.is_some() || crs.unit.is_some() || crs.name.is_some();
-    // The keys for what is measured from the middle of the earth are not written.
+    // Keys for geocentric systems are not written.
     let geocentric = || crs.wkt.as_deref().is_some_and(|text| Found::from_wkt(text).geocentric);
     own.or_else(|| (known && !(wkt && plan.is_wide()) && !geocentric()).then(|| GeoKeys::describe(crs)))
 }
@@ -181,7 +182,7 @@ fn padded<const LEN: usize>(text: &str) -> [u8; LEN] {
     bytes
 }
 
-/// Day of the year, from 1, and year.
+/// Day of the year, counted from 1, and year.
 fn today() -> (u16, u16) {
     let mut days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs() / 86_400);
     let mut year: u16 = 1970;

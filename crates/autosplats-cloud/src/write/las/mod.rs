@@ -1,10 +1,10 @@
-//! LAS and LAZ: versions 1.2 and 1.4, with extra bytes for what the point format has no place for.
+//! LAS and LAZ, versions 1.2 and 1.4, with extra bytes for values that the point format cannot hold.
 //!
 //! # How it works
 //!
-//! A [`plan`] chooses the point format by the fields that the cloud has and a [`grid`] for the coordinates, which are
-//! integers in the file. Records are encoded in parallel, a batch at a time, and go to the file as they are or through
-//! the `laz` crate's parallel compressor. Bounds and counts are gathered on the way, so the [`header`] is written twice.
+//! A [`plan`] chooses the point format by the cloud's fields, and a [`grid`] for the coordinates, which are integers in
+//! the file. Records are encoded in parallel, batch by batch, and written directly or through the `laz` crate's
+//! parallel compressor. Bounds and counts are gathered on the way, so the [`header`] is written twice.
 
 mod grid;
 mod header;
@@ -25,7 +25,7 @@ use crate::Error;
 pub(super) const LAS: Format = Format { name: "LAS", extensions: &["las"], write: |job, file| write(job, file, false) };
 pub(super) const LAZ: Format = Format { name: "LAZ", extensions: &["laz"], write: |job, file| write(job, file, true) };
 
-/// Points of a compressed chunk, as everybody makes them.
+/// Points of a compressed chunk: the customary number.
 const CHUNK: usize = 50_000;
 
 /// Points that one thread encodes at a time.
@@ -53,7 +53,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>, compressed: bool) -> Re
     file.write_all(&head).map_err(io)
 }
 
-/// How the records are compressed.
+/// The compression record.
 fn compression(job: &Job<'_>, plan: &Plan<'_>) -> Result<LazVlr, Error> {
     let items = LazItemRecordBuilder::default_for_point_format_id(plan.format as u8, plan.extra_len() as u16);
     Ok(LazVlrBuilder::new(items.map_err(|error| failed(job, &error))?).with_fixed_chunk_size(CHUNK as u32).build())
@@ -63,7 +63,7 @@ fn failed(job: &Job<'_>, error: &laz::LasZipError) -> Error {
     job.io(std::io::Error::other(error.to_string()))
 }
 
-/// Hands the records of all points on, some at a time.
+/// Passes the records of all points to `hand_on`, batch by batch.
 fn encode(
     job: &Job<'_>,
     plan: &Plan<'_>,

@@ -1,4 +1,4 @@
-//! Which point format a cloud gets, and where each of its values goes.
+//! Chooses the point format of a cloud, and the place of each value.
 
 use std::borrow::Cow;
 
@@ -15,10 +15,10 @@ use crate::{
     las::{self, ANGLE_STEP, EXTRA_DESCRIPTOR, Place},
 };
 
-/// Whole numbers that doubles hold.
+/// 2⁵³: up to it, `f64` holds all integers.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// Bytes of the longest record, and of a name.
+/// Most bytes of a record, and of a name.
 const MAX_RECORD: usize = 65_535;
 const MAX_NAME: usize = 32;
 
@@ -29,14 +29,14 @@ pub(super) struct Plan<'a> {
     pub(super) record_len: usize,
     pub(super) scale: DVec3,
     pub(super) offset: DVec3,
-    /// The points that are written, if not all.
+    /// Indices of the points that are written; `None` for all.
     kept: Option<Vec<usize>>,
     own: Vec<(Place, Cow<'a, FieldValues>)>,
     colors: Option<(usize, Colors<'a>)>,
     extras: Vec<Extra<'a>>,
 }
 
-/// Where colours come from.
+/// Source of the colours.
 enum Colors<'a> {
     Bytes(&'a [[u8; 3]]),
     Wide([&'a [u16]; 3]),
@@ -50,7 +50,7 @@ struct Extra<'a> {
 }
 
 impl<'a> Plan<'a> {
-    /// Makes the plan, and notes what is lost.
+    /// Makes the plan, and notes its losses.
     pub(super) fn of(job: &Job<'a>) -> Result<Self, Error> {
         let cloud = job.cloud;
         let finite = |i: usize| cloud.world_position(i).is_finite();
@@ -94,7 +94,7 @@ impl<'a> Plan<'a> {
                     }
                     own.push((place, Cow::Borrowed(&field.values)));
                 }
-                // What is not recorded is zero.
+                // A value that is zero at every point counts as not recorded.
                 None if range.is_zero() && is_known(&field.name) => {}
                 place => {
                     let scale = IntensityScale::of(field, range).zip(place);
@@ -138,12 +138,12 @@ impl<'a> Plan<'a> {
         self.kept.as_ref().map_or(self.cloud.len(), Vec::len)
     }
 
-    /// The cloud's point behind a point of the file.
+    /// Index in the cloud of a point of the file.
     pub(super) fn point(&self, index: usize) -> usize {
         self.kept.as_ref().map_or(index, |kept| kept[index])
     }
 
-    /// Bytes of a record beyond its format.
+    /// Bytes of a record beyond its point format.
     pub(super) fn extra_len(&self) -> usize {
         self.record_len - las::RECORD_LEN[self.format]
     }
@@ -152,14 +152,14 @@ impl<'a> Plan<'a> {
         las::is_wide(self.format)
     }
 
-    /// Whether times are larger than those within a week are.
+    /// Whether some times exceed those within a GPS week.
     pub(super) fn has_standard_time(&self) -> bool {
         const WEEK: f64 = 604_800.0;
         let times = self.own.iter().find(|(place, _)| matches!(place, Place::F64(_)));
         times.is_some_and(|(_, values)| (0..values.len()).into_par_iter().any(|i| values.get(i).abs() > WEEK))
     }
 
-    /// Encodes points into records, all of them; `point` gives the point of the cloud for each.
+    /// Fills `records` completely; `point` maps a record's index to its point in the cloud.
     pub(super) fn encode(&self, records: &mut [u8], point: impl Fn(usize) -> usize) {
         let len = self.record_len;
         let point = &point;
@@ -198,7 +198,7 @@ impl<'a> Plan<'a> {
         }
     }
 
-    /// The descriptions of the extra bytes.
+    /// Descriptors of the extra bytes.
     pub(super) fn descriptors(&self) -> Vec<[u8; EXTRA_DESCRIPTOR]> {
         let describe = |extra: &Extra<'_>| {
             let mut raw = [0; EXTRA_DESCRIPTOR];
@@ -210,7 +210,7 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Has every record get something of its point.
+/// Calls `put` for every record with its point.
 fn each(records: &mut [u8], len: usize, point: &impl Fn(usize) -> usize, put: impl Fn(&mut [u8], usize)) {
     records.chunks_exact_mut(len).enumerate().for_each(|(i, record)| put(record, point(i)));
 }
@@ -228,7 +228,7 @@ fn angles_are_rounded(values: &FieldValues) -> bool {
     (0..values.len()).into_par_iter().any(|i| off(values.get(i)))
 }
 
-/// Three fields of 16-bit colours.
+/// The 16-bit colour fields.
 fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
     match colors::wide_colors(cloud)? {
         [FieldValues::U16(red), FieldValues::U16(green), FieldValues::U16(blue)] => Some([red, green, blue]),
@@ -236,12 +236,12 @@ fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
     }
 }
 
-/// The smallest and the largest value of a field.
+/// Least and greatest value of a field.
 #[derive(Clone, Copy)]
 struct Range {
     low: f64,
     high: f64,
-    /// Whether all are whole numbers.
+    /// Whether all values are whole numbers.
     whole: bool,
     finite: bool,
 }
@@ -267,7 +267,7 @@ impl Range {
     }
 
     fn within(&self, low: f64, high: f64) -> bool {
-        // Without points there is nothing that does not fit.
+        // Without points everything fits.
         self.low > self.high || self.finite && self.low >= low && self.high <= high
     }
 
@@ -277,16 +277,16 @@ impl Range {
             Place::I8(_) => self.whole && self.within(-128.0, 127.0),
             Place::U16(_) => self.whole && self.within(0.0, 65_535.0),
             Place::Angle(_) => self.within(-180.0, 180.0),
-            // Not those who rely on more digits; no number is a number here.
+            // Integers beyond 2⁵³ do not fit; NaN is allowed here.
             Place::F64(_) => !self.finite || !self.whole || self.within(-WHOLE, WHOLE),
         }
     }
 }
 
-/// What the intensities are called that were scaled for their place: as they were, for those who want them.
+/// Name of the field that keeps the original values of scaled intensities.
 const EXACT_INTENSITY: &str = "ExactIntensity";
 
-/// The range of intensities that becomes the 16 bits that LAS has for them.
+/// Range of intensities that is mapped to the 16 bits of LAS.
 #[derive(Clone, Copy)]
 struct IntensityScale {
     low: f64,
@@ -294,19 +294,20 @@ struct IntensityScale {
 }
 
 impl IntensityScale {
-    /// For intensities that do not fit as they are: most formats have 0 to 1, of which nothing would be left.
+    /// Returns a scale for intensities that do not fit unchanged. Most formats use 0 to 1, of which nothing would be
+    /// left.
     fn of(field: &Field, range: Range) -> Option<Self> {
         let Range { low, high, .. } = range;
         let usable = low < high && low.is_finite() && high.is_finite();
-        // Of no numbers at all, the lowest is above the highest.
+        // If all values are NaN, the least one is above the greatest.
         let is_unit = low >= 0.0 && low <= high && high <= 1.0;
         let scale = if is_unit { Self { low: 0.0, high: 1.0 } } else { Self { low, high } };
         (field.name.eq_ignore_ascii_case("Intensity") && (usable || is_unit)).then_some(scale)
     }
 
-    /// The values as steps; no number is no intensity.
+    /// The scaled values; NaN becomes 0.
     fn apply(self, values: &FieldValues) -> FieldValues {
-        // Ranges of doubles may be wider than doubles reach.
+        // Halving avoids overflow: a range of `f64` may exceed the largest `f64`.
         let part = |i| (values.get(i) / 2.0 - self.low / 2.0) / (self.high / 2.0 - self.low / 2.0);
         FieldValues::U16((0..values.len()).into_par_iter().map(|i| (65_535.0 * part(i)).round() as u16).collect())
     }
@@ -317,13 +318,13 @@ fn is_known(name: &str) -> bool {
     [3, 8].into_iter().flat_map(las::places).any(|(known, _)| name.eq_ignore_ascii_case(known))
 }
 
-/// The point format: of LAS 1.2 unless something needs what 1.4 brought.
+/// The point format: of LAS 1.2, unless some value needs LAS 1.4.
 fn choose(fields: &[(&Field, Range)], colored: bool, count: usize) -> usize {
     let needs_wide = |&(field, range): &(&Field, Range)| {
         let find =
             |format: usize| las::places(format).into_iter().find(|(name, _)| field.name.eq_ignore_ascii_case(name));
         let fits = |format: usize| find(format).is_some_and(|(_, place)| range.fits(place));
-        // Of returns, headers before count five.
+        // LAS 1.2 counts five returns.
         let many =
             field.name.to_ascii_lowercase().contains("returns") || field.name.eq_ignore_ascii_case("ReturnNumber");
         let fits_narrow = fits(3) && !(many && range.high > 5.0);
@@ -347,7 +348,7 @@ fn choose(fields: &[(&Field, Range)], colored: bool, count: usize) -> usize {
     }
 }
 
-/// The number of a type among those of extra bytes.
+/// Type number of the values among those of extra bytes.
 fn data_type(values: &FieldValues) -> u8 {
     match values {
         FieldValues::U8(_) => 1,
@@ -372,7 +373,7 @@ fn size(values: &FieldValues) -> usize {
     }
 }
 
-/// A name of at most 32 bytes that no other extra value has.
+/// A unique name of at most 32 bytes.
 fn extra_name(name: &str, others: &[Extra<'_>]) -> String {
     let cut = |name: &str, len: usize| {
         let end = (0..=len.min(name.len())).rev().find(|&end| name.is_char_boundary(end)).unwrap_or(0);
@@ -390,7 +391,7 @@ fn extra_name(name: &str, others: &[Extra<'_>]) -> String {
     unique
 }
 
-/// A name as it may stand in a message.
+/// A name for display in a message.
 fn shown(name: &str) -> String {
     name.chars().take(60).flat_map(char::escape_debug).collect()
 }

@@ -1,14 +1,15 @@
-//! What predictions are made from, and what corrections to them are coded in.
+//! Statistics for predicting values, and the models in which corrections are coded.
 
 use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
 
-/// The context of a correction that follows one of so many bits; odd ones are for single returns.
+/// The context of a correction that follows one of `bits` bits, limited to `most`. It is even; odd contexts are for
+/// single returns.
 pub(super) fn size(bits: u32, most: u32) -> u32 {
     bits.min(most) & !1
 }
 
-/// Kinds of returns whose steps resemble each other, 0 to 5. Writers number returns from 1, but some from 0, and some
-/// leave out one of the two numbers or swap them, so there is a kind for all.
+/// Kind of a return, 0 to 5; steps within a kind are alike. Writers number returns from 1, some from 0, and some leave
+/// out or swap one of the two numbers, so every combination has a kind.
 pub(super) fn return_kind(count: u8, number: u8) -> u8 {
     const OF_NONE: [u8; 16] = [0, 1, 2, 3, 4, 5, 3, 4, 4, 5, 5, 5, 5, 5, 5, 5];
     let (low, high) = if count < number { (count, number) } else { (number, count) };
@@ -24,7 +25,7 @@ pub(super) fn return_kind(count: u8, number: u8) -> u8 {
     }
 }
 
-/// Models that are made when they are first used: most of them never are.
+/// Models created on first use, because most are never used.
 pub(super) struct Models<const N: usize> {
     models: [Option<ArithmeticModel>; N],
     symbols: u32,
@@ -40,7 +41,7 @@ impl<const N: usize> Models<N> {
     }
 }
 
-/// Roughly the median of the last values: a new one takes the place of the least or of the greatest, in turns.
+/// Approximate median of the last values. A new value replaces the least or the greatest one.
 #[derive(Clone, Copy)]
 pub(super) struct Median {
     sorted: [i32; 5],
@@ -62,7 +63,7 @@ impl Median {
         let [a, b, middle, d, e] = self.sorted;
         let [p, q, r, s] = if self.drop_greatest { [a, b, middle, d] } else { [b, middle, d, e] };
         self.sorted = [p.min(value), q.min(value).max(p), r.min(value).max(q), s.min(value).max(r), s.max(value)];
-        // The next is dropped on the same side until one has come in on the other.
+        // One side keeps losing values until a new value arrives on that side.
         self.drop_greatest = if self.drop_greatest { value < middle } else { value <= middle };
     }
 }

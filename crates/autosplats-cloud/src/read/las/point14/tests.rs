@@ -1,4 +1,4 @@
-//! Our parts of compressed records against those of the `laz` crate, bit for bit, and what they make of damage.
+//! Compares the project's decoders with those of the `laz` crate, bit for bit, and tests damaged data.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up should fail")]
 
@@ -22,7 +22,7 @@ use laz::{
 
 use super::{super::laz::decompressor, LAYERS, LEN};
 
-/// Splitmix: numbers that are the same on every computer.
+/// Splitmix64: the same numbers on every computer.
 struct Random(u64);
 
 impl Random {
@@ -42,14 +42,14 @@ impl Random {
         self.below(count) == 0
     }
 
-    /// A number of any size, the small ones as often as the large ones.
+    /// A number of any size, small sizes as often as large ones.
     fn any_size(&mut self) -> i64 {
         let bits = self.below(64);
         self.next() as i64 >> bits
     }
 }
 
-/// Times of scanners that take turns, of pulses that come again and again, and all others.
+/// Times of alternating scanners, of repeated pulses, and arbitrary ones.
 struct Times {
     sequences: [(i64, i64); 6],
     current: usize,
@@ -82,9 +82,9 @@ impl Times {
     }
 }
 
-/// Records that a scanner could have made, and none would: each seed is of another kind.
+/// Records that a scanner could make, and some that none would; each seed gives another mixture.
 fn records(len: usize, count: usize, random: &mut Random) -> Vec<Vec<u8>> {
-    // How rarely each kind of value changes; the last is never.
+    // How rarely each kind of value changes; the last entry means never.
     let mut rarity = || [1, 2, 5, 20, 300, usize::MAX][random.below(6)];
     let [channel_rarity, wild, returns, flags, class, user, intensity, angle, source, time, rest] =
         std::array::from_fn(|_| rarity());
@@ -193,12 +193,12 @@ fn generated_records_are_what_was_compressed() {
         for chunk in 0..2 {
             let mut records = records(len.max(LEN), count, &mut random);
             if !is_layered(items) {
-                // The time is elsewhere.
+                // The time is stored elsewhere in these formats.
                 let time = |record: &mut Vec<u8>| record.copy_within(22..30, 20);
                 records.iter_mut().for_each(time);
                 records.iter_mut().for_each(|record| record.truncate(len));
             }
-            // The crate adds without wrapping.
+            // The crate adds without wrapping, which may panic.
             let Ok(compressed) = catch_unwind(|| compress(items, &records)) else { continue };
             let mut ours = decompressor(items, &compressed).unwrap();
             let mut theirs = theirs(items, &compressed);
@@ -227,7 +227,7 @@ fn data() -> Option<PathBuf> {
     None
 }
 
-/// How a file is compressed, and the points and bytes of each of its chunks.
+/// The compression of a file, and the points and bytes of each of its chunks.
 fn chunks(bytes: &[u8]) -> (Vec<LazItem>, Vec<(usize, &[u8])>) {
     let number = |at: usize, len: usize| {
         bytes[at..at + len].iter().rev().fold(0, |number, &byte| number << 8 | usize::from(byte))
@@ -301,7 +301,7 @@ fn as_fast_as_the_crate() {
     }
 }
 
-/// Where panics of this thread come from, as long as it is some.
+/// Places of the panics on this thread during `work`.
 fn panics(work: impl FnOnce()) -> Vec<String> {
     thread_local! {
         static PLACES: RefCell<Option<Vec<String>>> = const { RefCell::new(None) };
@@ -374,7 +374,7 @@ fn damage_is_an_error_or_other_values() {
     assert!(start.elapsed() < Duration::from_secs(60), "it took {:?}", start.elapsed());
 }
 
-/// A layer of codes that all say that the time is in another sequence: some bytes.
+/// A layer of a few bytes whose codes all switch to another sequence.
 fn switches(symbols: u32, switch: u32) -> Vec<u8> {
     let mut encoder = laz::encoders::ArithmeticEncoder::new(Cursor::new(Vec::new()));
     let mut model = ArithmeticModelBuilder::new(symbols).with_compression(true).build();
