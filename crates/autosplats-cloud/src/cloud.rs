@@ -9,9 +9,8 @@ use crate::{Crs, Error, Progress, identity::Identity};
 /// Points of one frame: positions and the attributes that the scanner recorded.
 ///
 /// A position is stored as three `f32` relative to an `f64` [`origin`](Self::origin). Survey coordinates reach 5e6,
-/// where one `f32` step is half a metre. World coordinates are `origin + position`. A file read
-/// [exactly](crate::ReadOptions::exact) adds a [residual](Self::residuals) to that sum. Every attribute has one entry
-/// per point.
+/// where one `f32` step is half a metre. World coordinates are `origin + position`, plus a [residual](Self::residuals)
+/// if the file was read [exactly](crate::ReadOptions::exact). Every attribute has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
     pub(crate) origin: DVec3,
@@ -31,8 +30,8 @@ pub struct PointCloud {
 pub struct Scan {
     /// Name in the file.
     pub name: Option<String>,
-    /// Pose of the sensor: maps the sensor's frame to world coordinates and keeps lengths. The cloud's points are
-    /// already in world coordinates.
+    /// Pose of the sensor: maps its frame to world coordinates and keeps lengths. The points already are in world
+    /// coordinates.
     pub world_from_sensor: DMat4,
     /// Indices of the points that the sensor saw.
     pub points: Range<usize>,
@@ -52,8 +51,8 @@ pub enum Axes {
     ZUp,
     /// Y up, seen first from +Z. Usual for models.
     YUp,
-    /// A camera's own frame: x right, y down, z forward. The points were seen from the origin, so they look right only
-    /// from there.
+    /// A camera's own frame: x right, y down, z forward. The points were seen from the origin and look right only from
+    /// there.
     Camera,
 }
 
@@ -242,9 +241,8 @@ impl PointCloud {
         self.positions.is_empty()
     }
 
-    /// A number that identifies the cloud's points and attributes within this process. Clones share the number; changed
-    /// points, colours, fields or scans get another. A cached copy, as on a graphics card, is outdated if the number
-    /// differs.
+    /// Identifies the cloud's points and attributes within this process. Clones share the number; changed points,
+    /// colours, fields or scans get another. A cached copy, as on a graphics card, is outdated if the number differs.
     pub fn identity(&self) -> u64 {
         self.identity.0
     }

@@ -1,5 +1,4 @@
-//! Conversion of degrees and feet to metres, for pictures, which need equal units along all axes, and for files in
-//! metres.
+//! Degrees and feet to metres: pictures need equal units along all axes, and some files need metres.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,12 +15,11 @@ const STEPS: f64 = 1e6;
 
 impl PointCloud {
     /// Converts longitude and latitude to metres if x and y are in [degrees](Unit::Degree), and returns whether they
-    /// were. x then points east and y north from the cloud's middle; z is converted to metres and keeps its zero. Other
-    /// clouds stay unchanged.
+    /// were. x then points east and y north from the cloud's middle; z is converted to metres and keeps its zero.
     ///
     /// Lengths are right at the cloud's middle. As on any flat map they are wrong elsewhere: 100 km north or south,
-    /// east-west lengths are off by one or two percent. Residuals are added to the new positions. Sensors are moved but
-    /// not rotated.
+    /// east-west lengths are off by one or two percent. Residuals join the new positions. Sensors are moved but not
+    /// rotated.
     pub fn to_local_metres(&mut self) -> bool {
         self.local_metres(None).is_some_and(|local| self.to_metres_on(&local))
     }

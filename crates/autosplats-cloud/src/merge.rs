@@ -131,8 +131,7 @@ fn turn_normals(fields: &mut [Field], parts: &[(&PointCloud, DMat4)]) {
     }
 }
 
-/// Rotates the normals of those `points` for which `which` is true, if all three normal fields are floats. Lengths are
-/// kept.
+/// Rotates the normals of those `points` for which `which` is true, if all three fields are floats. Lengths are kept.
 pub(crate) fn turn(fields: &mut [Field], points: Range<usize>, pose: &DMat4, which: impl Fn(usize) -> bool + Sync) {
     let find = |name: &str| {
         fields.iter().position(|Field { name: own, values }| {

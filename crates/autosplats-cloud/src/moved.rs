@@ -40,9 +40,8 @@ impl PointCloud {
     /// Moves the points for which `which` is true by an affine map of world coordinates, in `f64`. All other points
     /// keep their exact positions. Normals of floats are rotated with their points; scans stay where they are.
     ///
-    /// Rounding errors go to the residuals if the cloud has some. To keep all digits, set [zero
-    /// residuals](Self::with_residuals) first. For a cloud in degrees pass the map `local`; `matrix` then applies to
-    /// metres on that map.
+    /// Rounding errors go to the residuals if the cloud has some; set [zeros](Self::with_residuals) first to keep all
+    /// digits. For a cloud in degrees pass the map `local`; `matrix` then applies to metres on that map.
     pub fn move_points(&mut self, which: impl Fn(usize) -> bool + Sync, matrix: &DMat4, local: Option<&LocalMetres>) {
         let moved = |place: DVec3| match local {
             None => matrix.transform_point3(place),

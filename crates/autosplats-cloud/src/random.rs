@@ -15,8 +15,7 @@ impl Random {
         random
     }
 
-    /// The numbers of item `number` in generated scenes. This seeding is fixed: other numbers would change the scenes'
-    /// points.
+    /// The numbers of item `number` in generated scenes. The seeding is fixed: other numbers would be other points.
     pub(crate) fn of_scene(number: u64) -> Self {
         let mut seed = Self(number ^ 0x5EED_A570_5B1A_7500);
         Self(seed.bits())

@@ -25,8 +25,7 @@ impl PointCloud {
         }
     }
 
-    /// Updates the ranges of the scans. There may be as many scans as points, so one pass over the points finds all
-    /// range ends.
+    /// Updates the ranges of the scans in one pass over the points: there may be as many scans as points.
     fn move_scans(&mut self, keep: &[bool]) {
         let mut ends: Vec<usize> = self.scans.iter().flat_map(|scan| [scan.points.start, scan.points.end]).collect();
         ends.sort_unstable();

@@ -9,8 +9,7 @@ use crate::{Error, PointCloud, Progress, identity::Identity, merge::residual, pr
 const BLOCK: usize = 1 << 20;
 
 impl PointCloud {
-    /// Keeps the points inside a box of world coordinates, faces included. Points without a finite position are
-    /// removed.
+    /// Keeps the points inside a box of world coordinates, faces included. Points without a finite position go.
     pub fn crop(&mut self, min: DVec3, max: DVec3) {
         let inside: Vec<bool> = (0..self.len())
             .into_par_iter()

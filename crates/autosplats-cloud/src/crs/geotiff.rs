@@ -5,9 +5,8 @@ use super::{Crs, Found, Unit};
 /// Keys of a GeoTIFF header with their parameters, as stored in its three tags.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GeoKeys {
-    /// The key directory: version, revision, minor revision, number of keys; then four numbers per key. These are the
-    /// key's number, the tag of its value (0: in the directory), the count of values, and the value or the index of the
-    /// first.
+    /// The key directory: version, revision, minor revision, number of keys; then four numbers per key. These are its
+    /// number, the tag of its value (0: in the directory), the count of values, and the value or the first one's index.
     pub directory: Vec<u16>,
     /// The floating-point values that keys refer to.
     pub doubles: Vec<f64>,

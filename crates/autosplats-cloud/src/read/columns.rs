@@ -144,12 +144,10 @@ pub(super) fn field_name(name: &str) -> String {
     known.into()
 }
 
-/// Largest number of values per point for which each value of a field becomes a field of its own. Descriptors have
-/// more.
+/// Largest number of values per point for which each becomes a field of its own. Descriptors have more.
 pub(super) const MAX_COUNT: usize = 16;
 
-/// Names of the columns of a field with `count` values per point. Padding (`_`) and fields of more than [`MAX_COUNT`]
-/// values get none.
+/// Names of a field's columns, one per value. Padding (`_`) and fields of more than [`MAX_COUNT`] values get none.
 pub(crate) fn numbered(name: &str, count: usize) -> Vec<String> {
     match count {
         _ if name == "_" => Vec::new(),

@@ -3,8 +3,7 @@
 //! # How it works
 //!
 //! Only formats whose header states their length can follow each other: PLY and PCD. Bytes arrive in pieces of any size
-//! and are inspected once. Bytes that cannot begin a file are skipped up to the next possible beginning, and reported
-//! once.
+//! and are inspected once. Bytes that cannot begin a file are skipped up to the next beginning, and reported once.
 
 use super::{Job, MAX_HEADER_LINE, ReadOptions, pcd, ply, shown, text};
 use crate::{Error, error::message};
@@ -215,8 +214,7 @@ fn header_end(bytes: &[u8], line: &mut usize, looked: &mut usize) -> Option<usiz
         let word = bytes[*line..end].split(u8::is_ascii_whitespace).find(|word| !word.is_empty()).unwrap_or_default();
         let last = if is_ply { word == b"end_header" } else { word.eq_ignore_ascii_case(b"DATA") };
         if last && bytes[end] == b'\r' {
-            // The next byte shows whether a line feed belongs to the line end. Without a next byte there is no body
-            // either.
+            // The next byte shows whether a line feed belongs to the line end. Without one there is no body.
             *looked = end;
             let next = bytes.get(end + 1)?;
             return Some(if *next == b'\n' { end + 2 } else { end + 1 });

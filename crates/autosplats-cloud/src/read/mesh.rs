@@ -13,8 +13,7 @@ use super::{
 };
 use crate::{Error, FieldValues, PointCloud};
 
-/// Triangles made of faces while these are read. A corner is the index of a point, or negative if there is no such
-/// point.
+/// Triangles made of faces while these are read. A corner is the index of a point, or negative if there is none.
 pub(super) struct Faces {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Number of points that corners may refer to.
@@ -109,8 +108,7 @@ pub(super) fn cloud(job: &Job<'_>, positions: &[[f64; 3]], done: f32) -> Result<
     columns(job, bytemuck::cast_slice(positions), Scalar::F64, done)
 }
 
-/// A cloud of positions, with previews; keeps the file's `f32` values. `done` is the fraction of the work finished
-/// before.
+/// Like [`cloud`], with the file's `f32` values kept exactly.
 pub(super) fn cloud_f32(job: &Job<'_>, positions: &[[f32; 3]], done: f32) -> Result<PointCloud, Error> {
     columns(job, bytemuck::cast_slice(positions), Scalar::F32, done)
 }

@@ -68,8 +68,7 @@ struct Format {
     read: fn(&Job<'_>) -> Result<Contents, Error>,
 }
 
-/// All formats. The first that recognises a content is taken, otherwise the first with a matching extension. Longer
-/// extensions precede shorter ones.
+/// All formats, in order of precedence: by content first, then by extension. Longer extensions precede shorter ones.
 const FORMATS: &[&Format] = &[
     &las::FORMAT,
     &ply::FORMAT,
@@ -348,9 +347,8 @@ impl Job<'_> {
         format!("line {}", newlines + 1)
     }
 
-    /// Fails if binary data passed through a text conversion. Such a conversion replaces every byte that is no UTF-8 by
-    /// U+FFFD, so lengths and values are wrong. Intact floats are hardly ever valid UTF-8, and never contain that
-    /// character.
+    /// Fails if binary data passed through a text conversion, which replaces every byte that is no UTF-8 by U+FFFD.
+    /// Lengths and values are then wrong. Intact floats are hardly ever valid UTF-8, and never contain that character.
     fn check_not_text_converted(&self, start: usize) -> Result<(), Error> {
         let sample = &self.bytes[start..self.bytes.len().min(start + (1 << 16))];
         let valid = match std::str::from_utf8(sample) {

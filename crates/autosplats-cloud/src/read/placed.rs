@@ -12,8 +12,7 @@ use crate::{Error, PointCloud, merge::residual};
 /// Points processed between two checks for cancellation.
 const BLOCK: usize = 1 << 18;
 
-/// One value per point of all scans. `lens` holds the scans' lengths; `run(scan)` returns the function from a point's
-/// index to its value.
+/// One value per point of all scans, whose lengths are `lens`. `run(scan)` returns the function of a point's index.
 pub(super) fn fill<T, V>(
     job: &Job<'_>,
     what: &str,

@@ -1,5 +1,4 @@
-//! Sweeps stored as headerless records of 32-bit floats: KITTI's `.bin` (x y z intensity) and nuScenes' `.pcd.bin` (x y
-//! z intensity ring).
+//! Sweeps stored as headerless 32-bit floats: KITTI's `.bin` (x y z intensity), nuScenes' `.pcd.bin` (and ring).
 //!
 //! No header states how many numbers a point has, so a sample of records is inspected. At a wrong width, coordinates
 //! appear as intensities or rings; coordinates can be negative, intensities and rings cannot.

@@ -210,8 +210,7 @@ impl Table<'_> {
         Some(taken)
     }
 
-    /// Checks that every value lies within the bytes. Readers check sizes with better messages; this is the last
-    /// resort.
+    /// Checks that every value lies within the bytes. Readers check first, with better messages.
     fn check_size(&self, job: &Job<'_>, place: &str) -> Result<(), Error> {
         let fits = |column: &Column| {
             let last = self.count.saturating_sub(1).checked_mul(column.stride)?;
@@ -276,8 +275,8 @@ impl Table<'_> {
         Ok((origin, positions?))
     }
 
-    /// Like [`collect`], from the records that start at the values of `column`. The last point's record may end after
-    /// its value.
+    /// Like [`collect`], from the records that start at the values of `column`. The last record may end after its
+    /// value.
     fn collect<T: Send>(
         &self,
         what: &str,

@@ -14,8 +14,7 @@ use crate::Error;
 /// Bytes of text that one thread parses at a time.
 const PIECE: usize = 1 << 19;
 
-/// Storage type of coordinates in text. Text may have more digits than the declared type holds, and all digits are
-/// read.
+/// Storage type of coordinates in text. All digits are read, even if the declared type holds fewer.
 pub(super) const TEXT: &str = "text";
 
 /// Whether a value is a coordinate, which keeps all its digits.

@@ -30,9 +30,8 @@ const PIECE: usize = 1 << 12;
 /// How far a point moves from the middle of its patch towards a random place in the patch, so that no pattern shows.
 const JITTER: f64 = 0.3;
 
-/// Share of a patch's area from which a triangle's part of the patch gets the point in its own middle. With smaller
-/// parts the place nearest to the patch's middle is used. That place lies on an edge, where points of other patches may
-/// lie too.
+/// Share of a patch that must lie in one triangle for the point to be at that part's own middle. Otherwise the point is
+/// at the place nearest to the patch's middle. That place is on an edge, where points of other patches may lie too.
 const LARGE: f64 = 0.3;
 
 /// Halvings beyond those that make a piece as small as a patch.
@@ -45,8 +44,7 @@ const FINER: i32 = 6;
 /// corners, get no points. The same `seed` gives the same points on any number of threads.
 ///
 /// # Errors
-/// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], and [`Error::Cancelled`] if `progress` says
-/// so.
+/// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], [`Error::Cancelled`] if `progress` says so.
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
     let sampled = Strewn::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
     progress::tick(progress, 1.0)?;

@@ -8,8 +8,7 @@ const TENS: [f64; 16] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10,
 /// 2⁵³: beyond it, not every integer is an `f64`.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// Appends `value` with as few decimals as possible. `same` decides whether the number that a reader would get is close
-/// enough.
+/// Appends `value` with as few decimals as `same` allows, which is called with the number that a reader would get.
 pub(super) fn push(text: &mut Vec<u8>, value: f64, same: impl Fn(f64) -> bool) {
     if value.is_finite() {
         for (decimals, ten) in TENS.iter().enumerate() {

@@ -13,8 +13,7 @@ use crate::{Axes, Crs, Error, Field, FieldValues, PointCloud, cloud::each_type};
 pub(super) const FORMAT: Format = Format { name: "PCD", extensions: &["pcd"], write };
 
 /// Writes positions as 32-bit floats if the cloud's origin is zero, otherwise world coordinates as 64-bit floats. Most
-/// programs read only 32-bit floats, so wider ones are used only for coordinates that need them. Colours are packed
-/// into a field `rgb`.
+/// programs read 32-bit floats only. Colours are packed into a field `rgb`.
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let layout = Layout::of(cloud);

@@ -190,8 +190,7 @@ pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     Ok(())
 }
 
-/// Makes the cloud of all scans. `done` is the fraction of the work finished before; for `trusted` see
-/// [`is_of_scanner`].
+/// Makes the cloud of all scans. `done` is the finished fraction of the work; for `trusted` see [`is_of_scanner`].
 pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: f32) -> Result<PointCloud, Error> {
     let lens: Vec<usize> = sources.iter().map(Source::len).collect();
     let total: usize = lens.iter().sum();
@@ -244,9 +243,8 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: 
     Ok(cloud.with_scans(scans))
 }
 
-/// Whether points come from a scanner, not from a model or a merged cloud that was saved like a scan. Programs without
-/// a scanner leave out the pose or write an identity. `trusted` files, those of this project, have a pose for scanners
-/// only.
+/// Whether points come from a scanner, not from a model or a merged cloud saved like a scan. Programs without a scanner
+/// leave out the pose or write an identity. `trusted` files, this project's, have poses for scanners only.
 pub(super) fn is_of_scanner(header: &ScanHeader, trusted: bool) -> bool {
     if trusted {
         return header.pose.is_some();

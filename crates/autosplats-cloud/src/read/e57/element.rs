@@ -83,8 +83,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// The type for stored values. `f32` tells scaled integers of up to 24 bits apart, but only `f64` keeps their
-    /// digits.
+    /// The type for stored values. `f32` tells scaled integers of up to 24 bits apart; only `f64` keeps their digits.
     pub(super) fn of(stored: Stored, exact: bool) -> Self {
         match stored {
             Stored::Single => Self::Single,

@@ -1,11 +1,9 @@
-//! E57: pages with checksums, an XML section that describes the content, and packets of bit-packed points. See
-//! docs/decisions/0019-own-e57.md.
+//! E57: pages with checksums, an XML section, and packets of bit-packed points. See docs/decisions/0019-own-e57.md.
 //!
 //! # How it works
 //!
-//! [`pages`] strips the checksums. [`xml`] reads the descriptions of all scans. [`packets`] joins the bits of each
-//! element into one stream, and [`element`] unpacks a value at any index. [`cloud`] joins the points of all scans and
-//! applies their poses.
+//! [`pages`] strips the checksums, and [`xml`] reads the descriptions of the scans. [`packets`] joins the bits of each
+//! element to one stream, and [`element`] unpacks any value. [`cloud`] joins all points and applies the poses.
 //!
 //! Damage costs only the scans that it affects; the others are read.
 

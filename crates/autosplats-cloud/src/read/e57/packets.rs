@@ -38,8 +38,7 @@ struct Group {
 }
 
 /// Joins the values of a scan. `left` is the number of the file's bytes that earlier scans have not used. No byte
-/// belongs to two scans, so memory stays within the file's size whatever the file claims. `part` is the range of the
-/// work.
+/// belongs to two scans, so memory stays within the file's size. `part` is the range of the work.
 pub(super) fn gather(
     job: &Job<'_>,
     pages: &Pages<'_>,

@@ -1,7 +1,6 @@
 //! The pages of an E57 file, each of which ends in a checksum.
 //!
-//! There are two kinds of addresses. A *physical* address is a byte of the file; a *logical* address counts data bytes
-//! only.
+//! There are two kinds of addresses: a *physical* one is a byte of the file; a *logical* one counts data bytes only.
 
 use std::ops::Range;
 

@@ -134,8 +134,7 @@ impl Root {
     }
 }
 
-/// Rejects text that would take the parser long: it compares all attributes of a tag, and keeps namespaces at every
-/// level.
+/// Rejects text that would take the parser long; see [`MAX_TAG`] and [`MAX_NAMESPACES`].
 fn check(text: &str) -> Result<(), String> {
     let bytes = text.as_bytes();
     let mut at = 0;

@@ -16,8 +16,7 @@ const MAX_POINTS_PER_BYTE: usize = 64;
 /// Number of points, and of primitives, that is allowed for files of any size.
 const ALWAYS: usize = 1 << 16;
 
-/// Least bytes of the file per placed primitive, beyond those allowed for any file. A node with a mesh takes more, and
-/// so does a primitive.
+/// Least bytes of the file per placed primitive, beyond those allowed for any file. A node with a mesh takes more.
 const BYTES_PER_SHOWN: usize = 8;
 
 /// A primitive at one of its places.

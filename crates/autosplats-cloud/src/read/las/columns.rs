@@ -254,8 +254,7 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// Indices and unique names of the fields to keep. A value in the extra bytes may have the name of a value of the
-    /// point format.
+    /// Indices and unique names of the fields to keep. Extra bytes may repeat a name of the point format.
     fn names(&self) -> Vec<(usize, String)> {
         let mut names: Vec<(usize, String)> = Vec::new();
         for (index, dimension) in self.dimensions.iter().enumerate().filter(|(index, _)| self.is_recorded(*index)) {
@@ -485,8 +484,7 @@ fn remove<T: Copy>(values: &mut Vec<T>, ranges: &[Range<usize>]) {
     values.shrink_to_fit();
 }
 
-/// Makes colours black. Black ones are not written to: they may be points that could not be decompressed, whose memory
-/// is untouched.
+/// Makes colours black. Black ones are not written to: points that failed to decompress keep their memory untouched.
 fn clear(colors: &mut [[u8; 3]]) {
     colors.iter_mut().filter(|color| **color != [0; 3]).for_each(|color| *color = [0; 3]);
 }

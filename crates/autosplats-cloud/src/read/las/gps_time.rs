@@ -27,8 +27,7 @@ const SEQUENCES: usize = 4;
 /// Number of codes for multiples of the step: 0 to 500, and -1 to -10.
 const MULTIPLES: u32 = 511;
 
-/// Largest number of differences in a sequence that do not fit its step. After one more, that difference becomes the
-/// step.
+/// Most differences in a sequence that do not fit its step. The next such difference becomes the step.
 const MAX_STRAYS: u8 = 3;
 
 /// Decoder of consecutive times.
@@ -63,8 +62,7 @@ enum Code {
 }
 
 impl GpsTimes {
-    /// A decoder after the time `first`. `repeats` adds a code for repeated times; point formats 6 and up state repeats
-    /// elsewhere.
+    /// A decoder after the time `first`. `repeats` adds a code for repeated times, which formats 6 and up do not need.
     pub(super) fn new(first: i64, repeats: bool) -> Self {
         let others = u32::from(repeats) + SEQUENCES as u32;
         let mut sequences = [Sequence::default(); SEQUENCES];

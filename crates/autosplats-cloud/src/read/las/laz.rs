@@ -32,8 +32,7 @@ const PIECE: usize = 1 << 11;
 /// Most chunks decompressed in parallel; many very short chunks would need much memory for bookkeeping.
 const MAX_CHUNKS: usize = 1 << 10;
 
-/// Most points per byte of the file. Real data need a byte or more per point; a chunk of 50,000 equal points takes
-/// about 70 bytes.
+/// Most points per byte of the file. Real data need a byte or more per point, but a chunk of equal points far less.
 const MAX_RATIO: u64 = 1024;
 
 /// A run of records that can only be decompressed from its beginning.

@@ -1,15 +1,14 @@
-//! POINT14, the part of compressed records that point formats 6 and up share: position, returns, flags, time and
-//! others. See docs/decisions/0020-laz-codec.md.
+//! POINT14, the part of compressed records that point formats 6 and up share. See docs/decisions/0020-laz-codec.md.
 //!
 //! # How it works
 //!
 //! Each kind of value has its own layer in the chunk. Each scanner channel has its own statistics, which begin as
 //! copies of the previous channel's last point. A symbol states which values differ from the last point of the channel.
-//! The others are predicted. A coordinate's step is predicted by the median of the last five steps of the same kind of
-//! return, heights and intensities by the last value of the same kind. Corrections are coded in contexts given by the
-//! size of earlier corrections.
+//! The others are predicted: a coordinate's step by the median of the last five steps of the same kind of return,
+//! heights and intensities by the last one of the kind. Corrections are coded in contexts given by the size of earlier
+//! ones.
 //!
-//! The `laz` crate decodes POINT14 too, and its coder is used here. But damaged times overflow the crate's stack
+//! The `laz` crate's coder is used here. Its POINT14 is not: damaged times overflow its stack
 //! ([`gps_time`](super::gps_time)).
 
 use std::io::{self, Cursor, ErrorKind, Read as _};

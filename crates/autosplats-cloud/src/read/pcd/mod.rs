@@ -67,8 +67,7 @@ pub(super) fn without_header(job: &Job<'_>) -> bool {
     !header::recognised(job.bytes) && xyz::looks_like_rows(job.bytes)
 }
 
-/// The body after the header, its first byte, and the least number of bytes of the body; `None` if that number
-/// overflows.
+/// The body after the header, its first byte, and its least number of bytes; `None` if that number overflows.
 pub(super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize>), Error> {
     let header = Header::parse(job)?;
     let bytes = header.stride().and_then(|stride| header.points.checked_mul(stride));
@@ -169,8 +168,7 @@ fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
     middle > 0.0 && even * 10 >= angles.len() * 9
 }
 
-/// The columns over binary data. `place` returns offset and stride of a field, given the bytes of the fields before it
-/// and its own.
+/// The columns over binary data. `place` maps the bytes before a field and its own to its offset and stride.
 fn table<'a>(header: &Header, bytes: &'a [u8], done: f32, place: impl Fn(usize, usize) -> (usize, usize)) -> Table<'a> {
     let mut columns = Vec::new();
     let mut before = 0;
@@ -258,8 +256,7 @@ fn decompress(job: &Job<'_>, header: &Header, stride: usize) -> Result<Vec<u8>, 
 /// Largest range of depth cameras, in metres, with a margin.
 const DEPTH_CAMERA_RANGE: f32 = 20.0;
 
-/// Whether points are in a depth camera's own frame: an image of points, or coloured points within its range, 99 % of
-/// them in front.
+/// Whether an image of points, or coloured points in a depth camera's range, are in the camera's frame: 99 % in front.
 fn seen_from_origin(header: &Header, cloud: &PointCloud) -> bool {
     if header.viewpoint != Viewpoint::Identity || cloud.origin() != DVec3::ZERO {
         return false;

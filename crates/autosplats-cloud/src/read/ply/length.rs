@@ -16,8 +16,7 @@ pub(in super::super) struct Records {
     record: usize,
 }
 
-/// The body after the header, its first byte, and the least number of bytes of the body; `None` if that number
-/// overflows.
+/// The body after the header, its first byte, and its least number of bytes; `None` if that number overflows.
 pub(in super::super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize>), Error> {
     let Header { encoding, elements, end, .. } = Header::parse(job)?;
     if encoding == Encoding::Ascii {
@@ -37,8 +36,7 @@ pub(in super::super) fn body(job: &Job<'_>) -> Result<(Body, usize, Option<usize
 }
 
 impl Records {
-    /// The first byte after the last record, once all have arrived. `at` is the start of the record that contains the
-    /// next byte.
+    /// The first byte after the last record, once all have arrived. `at` is the start of the current record.
     pub(in super::super) fn end(&mut self, bytes: &[u8], at: &mut usize) -> Result<Option<usize>, String> {
         while let Some(element) = self.elements.get(self.element) {
             if let Some(stride) = element.stride() {

@@ -33,8 +33,7 @@ pub(super) fn guessed(rows: &[Vec<Cell>], width: usize, pts: bool) -> Vec<String
     known.chain(unknown).collect()
 }
 
-/// Whether three columns are normals: at least 90 % of length 1, and not all whole numbers from 0 on, as pure colours
-/// would be.
+/// Whether three columns are normals: 90 % of length 1, with fractions or negative values, which pure colours lack.
 fn unit_vectors(rows: &[Vec<Cell>], first: usize) -> bool {
     let three = |row: &Vec<Cell>| [0, 1, 2].map(|index| row[first + index].number());
     let unit = |row: &&Vec<Cell>| {

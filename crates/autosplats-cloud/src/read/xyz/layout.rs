@@ -241,8 +241,7 @@ fn values(dialect: &Dialect, lines: &[&[u8]], width: usize) -> Vec<Vec<Cell>> {
     lines.iter().map(row).take_while(|row| row.len() == width).collect()
 }
 
-/// Names from a header, and the units they state. If the names lack x, y or z, the first three columns become x, y and
-/// z.
+/// Names from a header, and the units they state. If x, y or z is missing, the first three columns are taken for them.
 fn named(names: &[String], units: &[Option<Unit>], crs: &mut Crs, notes: &mut Vec<String>) -> Vec<Option<String>> {
     let mut names = names.to_vec();
     for (index, name) in names.iter_mut().enumerate().filter(|(_, name)| name.is_empty()) {

@@ -18,8 +18,7 @@ const STEP_DEGREES: f64 = 1e-8;
 /// Finest step, if the cloud states no resolution.
 const FINEST: f64 = 1e-12;
 
-/// Largest distance of a coordinate from its integer, in steps, that is not noted; rounding to `f32` causes such
-/// distances.
+/// Distance of a coordinate from its integer, in steps, above which a loss is noted. `f32` causes smaller ones.
 const SLACK: f64 = 0.25;
 
 /// Number of points tried as the offset, if no round offset fits.
@@ -111,8 +110,8 @@ fn fitting(wished: f64, size: f64) -> f64 {
     step
 }
 
-/// Zero if the integers reach from there, otherwise a place in the middle: a whole number if that is a multiple of the
-/// step.
+/// Zero if the integers reach from there, otherwise a place in the middle, a whole number if that is a multiple of
+/// `step`.
 fn round_offset(low: f64, high: f64, step: f64) -> f64 {
     if low.abs().max(high.abs()) <= REACH * step {
         return 0.0;

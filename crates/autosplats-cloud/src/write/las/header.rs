@@ -155,8 +155,7 @@ fn records(plan: &Plan<'_>, compression: Option<&LazVlr>) -> (Vec<u8>, u32, bool
     (bytes, count, wkt)
 }
 
-/// The cloud's own GeoTIFF keys. Without them, and if LAS 1.2 or missing text require keys, new ones state what is
-/// known.
+/// The cloud's own GeoTIFF keys; without them new ones, if LAS 1.2 or missing text require keys.
 fn keys(plan: &Plan<'_>, crs: &Crs, wkt: bool) -> Option<GeoKeys> {
     let fit = |keys: &GeoKeys| {
         keys.directory.len() * 2 <= MAX_VLR && keys.doubles.len() * 8 <= MAX_VLR && keys.ascii.len() < MAX_VLR

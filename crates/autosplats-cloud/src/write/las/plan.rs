@@ -294,8 +294,7 @@ struct IntensityScale {
 }
 
 impl IntensityScale {
-    /// Returns a scale for intensities that do not fit unchanged. Most formats use 0 to 1, of which nothing would be
-    /// left.
+    /// A scale for intensities that do not fit unchanged, such as the 0 to 1 of most formats.
     fn of(field: &Field, range: Range) -> Option<Self> {
         let Range { low, high, .. } = range;
         let usable = low < high && low.is_finite() && high.is_finite();

@@ -2,8 +2,7 @@
 
 use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
 
-/// The context of a correction that follows one of `bits` bits, limited to `most`. It is even; odd contexts are for
-/// single returns.
+/// Context of a correction that follows one of `bits` bits, at most `most`; even, as odd ones are for single returns.
 pub(super) fn size(bits: u32, most: u32) -> u32 {
     bits.min(most) & !1
 }
