@@ -31,7 +31,7 @@ pub enum Error {
         path: PathBuf,
     },
     /// The extension of an output file names no format that can be written.
-    #[error("{}: its name tells no format that is written; {} can be", path.display(), crate::write::format_names())]
+    #[error("{}: unknown output format; {} can be written", path.display(), crate::write::format_names())]
     UnknownOutput {
         /// The file.
         path: PathBuf,
@@ -73,7 +73,7 @@ pub enum Error {
         rule: &'static str,
     },
     /// A mesh has no triangle with an area, so there is no surface to sample.
-    #[error("there is no surface to strew points over: no triangle has an area; take the points as they are")]
+    #[error("there is no surface to sample: no triangle has an area; use the points as they are")]
     NoSurface,
     /// No generated scene has this name.
     #[error("no scene is called {given:?}; there are:{known}")]

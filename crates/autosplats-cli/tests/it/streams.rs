@@ -197,7 +197,7 @@ fn streams_that_show_nothing_say_so() {
     input(&mut child).write_all(b"1 2 3\n4 5 6\n7 8 9\n").expect("it reads");
     let (code, _, stderr) = end(child);
     let last = stderr.lines().last().unwrap_or_default();
-    assert!(code == Some(3) && last.contains("begins no PLY or PCD"), "of another format: {stderr}");
+    assert!(code == Some(3) && last.contains("is neither PLY nor PCD"), "of another format: {stderr}");
     folder.fail(&["render", "-", "--resume", "-o", "f_%d.png"], 2, &["--resume", "live"]);
     std::fs::create_dir(folder.path("scans")).expect("a folder");
     folder.write("scans/a.ply", &sheet(0));

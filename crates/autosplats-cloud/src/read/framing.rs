@@ -96,7 +96,7 @@ impl Framing {
                         true => self.state = State::Header { line: 0, looked: 0 },
                         false => {
                             let what =
-                                format!("'{}' begins no PLY or PCD", shown(&self.bytes[..self.bytes.len().min(16)]));
+                                format!("'{}' is neither PLY nor PCD", shown(&self.bytes[..self.bytes.len().min(16)]));
                             return Some(self.refuse(what, 1));
                         }
                     }

@@ -209,7 +209,7 @@ pub fn describe_bytes(name: &Path, bytes: &[u8], options: &ReadOptions) -> Resul
 /// Fails if the file is a Git LFS pointer instead of the data.
 pub(crate) fn check_not_lfs_pointer(job: &Job<'_>) -> Result<(), Error> {
     if job.bytes.starts_with(b"version https://git-lfs") {
-        let what = "a pointer of Git LFS stands in the file's place; 'git lfs pull' fetches the file";
+        let what = "this is a Git LFS pointer instead of the file; 'git lfs pull' fetches the file";
         return Err(job.malformed("line 1", what));
     }
     Ok(())
@@ -230,7 +230,7 @@ fn contents(job: &Job<'_>) -> Result<Contents, Error> {
     job.tick(0.0)?;
     let format = format(job)?;
     if job.options.columns.is_some() && !takes_columns(job, format) {
-        job.note(format!("--columns is for text and bare records; {} says itself what its columns are", format.name));
+        job.note(format!("--columns is for text and headerless records; {} names its own columns", format.name));
     }
     let mut contents = (format.read)(job)?;
     let model = MODELS.iter().any(|model| model.name == format.name) || ply::is_mesh(job);

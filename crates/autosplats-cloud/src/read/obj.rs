@@ -52,7 +52,7 @@ fn check_text(job: &Job<'_>) -> Result<(), Error> {
         return Err(job.malformed("byte 0", "the file is empty; copy it again"));
     }
     match job.bytes[..job.bytes.len().min(1 << 16)].iter().position(|&byte| byte == 0) {
-        Some(at) => Err(job.malformed(format!("byte {at}"), "this is no text, hence no OBJ mesh; save it as one")),
+        Some(at) => Err(job.malformed(format!("byte {at}"), "this is not text, so not an OBJ mesh; save it as one")),
         None => Ok(()),
     }
 }

@@ -112,7 +112,7 @@ impl Header {
                 Some(word) => std::str::from_utf8(word)
                     .ok()
                     .and_then(|word| word.parse::<usize>().ok())
-                    .ok_or_else(|| fail(format!("'{}' is no count of {what}", shown(word)))),
+                    .ok_or_else(|| fail(format!("'{}' is not a count of {what}", shown(word)))),
             };
             let (vertices, faces) = (count("vertices")?, count("faces")?);
             let end = text::after_line_end(job.bytes, at);

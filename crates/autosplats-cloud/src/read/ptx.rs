@@ -346,7 +346,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let walked = walk(job, !all)?;
     let mut notes = Vec::new();
     if !all {
-        notes.push("only the first scan is described; where others begin takes counting all lines".into());
+        notes.push("only the first scan is described; finding the others would take counting all lines".into());
     }
     let mut start = 0;
     let scans = walked.iter().map(|scan| {

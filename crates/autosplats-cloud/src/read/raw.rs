@@ -50,7 +50,7 @@ impl Layout {
             let stride = SIZE * names.len();
             if !len.is_multiple_of(stride) {
                 let what = format!(
-                    "the file ends inside a point of {} floats as --columns names them; name as many as there are",
+                    "the file ends inside a point: --columns names {} floats per point; name all there are",
                     names.len()
                 );
                 return Err(job.malformed(format!("byte {len}"), what));
@@ -69,7 +69,7 @@ impl Layout {
         let Some(names) = guess() else {
             return Err(job.malformed(
                 "byte 0",
-                "these are no plausible points of 4, 5 or 3 floats (x y z intensity ring); name what they are by \
+                "these are no plausible points of 4, 5 or 3 floats (x y z intensity ring); name the columns with \
                  --columns",
             ));
         };

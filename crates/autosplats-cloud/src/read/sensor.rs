@@ -20,7 +20,7 @@ pub(super) fn drop_far(job: &Job<'_>, cloud: &mut PointCloud) {
     let kept: Vec<Scan> = cloud.scans.iter().filter(|scan| !is_far(cloud, scan)).cloned().collect();
     let count = cloud.scans.len() - kept.len();
     if count > 0 {
-        job.note(format!("{count} of the sensors' places are far from all that was seen; taken for unknown"));
+        job.note(format!("{count} sensor positions are far from all that was seen; treated as unknown"));
         cloud.scans = kept;
     }
 }

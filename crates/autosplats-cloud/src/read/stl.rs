@@ -95,7 +95,7 @@ fn facets(job: &Job<'_>) -> Result<(usize, Option<String>), Error> {
     }
     // Programs that write without knowing the count leave it empty.
     if (count == 0 || count == u32::MAX as usize) && there > 0 && (len - HEADER).is_multiple_of(FACET) {
-        return Ok((there, Some(format!("the header says {count} triangles, there are {there}; all are taken"))));
+        return Ok((there, Some(format!("the header states {count} triangles, but there are {there}; all are read"))));
     }
     if count > there {
         let what = format!("the file ends after {there} of {count} triangles; it is cut off, copy it again");
@@ -226,7 +226,7 @@ impl Piece {
             self.closed = Some(is(line, b"endsolid"));
         } else if ![&b"facet"[..], b"outer", b"endfacet", b"color"].iter().any(|word| is(line, word)) {
             let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-            return Err(format!("'{}' is no word of an STL file; remove the line or copy the file again", shown(word)));
+            return Err(format!("'{}' is not an STL keyword; remove the line or copy the file again", shown(word)));
         }
         Ok(())
     }

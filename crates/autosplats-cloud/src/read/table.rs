@@ -322,7 +322,7 @@ impl Table<'_> {
         let float = rgb.iter().any(|column| matches!(column.scalar, Scalar::F32 | Scalar::F64));
         let scale = ColorScale::of(largest, float);
         if !float && largest <= 255.0 && rgb.iter().any(|column| column.scalar.size() > 1) && self.count > 0 {
-            job.note("colours of 16 bits or more have no value above 255; taken for 8 bits");
+            job.note("colours of 16 bits or more have no value above 255; read as 8 bits");
         }
         let colors =
             collect("colours", self.count, job, part, |i| rgb.map(|column| scale.byte(self.value_f64(column, i))))?;

@@ -177,7 +177,7 @@ fn store(scalar: Scalar, value: &[u8], record: &mut Vec<u8>) -> Result<(), Strin
         ($type:ty) => {{
             let number = number(value)?;
             if number < <$type>::MIN as f64 || number > <$type>::MAX as f64 || number.is_nan() {
-                return Err(format!("{number} is no {}", stringify!($type)));
+                return Err(format!("{number} does not fit {}", stringify!($type)));
             }
             record.extend((number as $type).to_le_bytes());
         }};
@@ -216,7 +216,7 @@ pub(super) fn number(value: &[u8]) -> Result<f64, String> {
         if lower.starts_with(b"-nan") || lower.starts_with(b"nan(") || lower.windows(2).any(|pair| pair == b"#q") {
             return Ok(f64::NAN);
         }
-        Err(format!("'{}' is no number", shown(value)))
+        Err(format!("'{}' is not a number", shown(value)))
     })
 }
 

@@ -70,7 +70,7 @@ impl Job<'_> {
 fn note_left_out(job: &Job<'_>, format: &str, others: &[(bool, &str)]) {
     let cloud = job.cloud;
     let all = [
-        (!cloud.scans().is_empty(), "where the sensors stood"),
+        (!cloud.scans().is_empty(), "the poses of the sensors"),
         (*cloud.crs() != Crs::default(), "the coordinate system"),
     ];
     let losses: Vec<&str> = all.iter().chain(others).filter(|(lost, _)| *lost).map(|(_, what)| *what).collect();

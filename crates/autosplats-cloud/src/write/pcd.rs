@@ -33,7 +33,7 @@ fn note_losses(job: &Job<'_>) {
         job.note("PCD does not hold the coordinate system");
     }
     if !cloud.scans().is_empty() && only_pose(cloud).is_none() {
-        job.note("PCD holds one place of a sensor for all points; the several ones are left out");
+        job.note("PCD holds one sensor pose for all points; several are left out");
     }
 }
 

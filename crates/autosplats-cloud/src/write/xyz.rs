@@ -47,7 +47,7 @@ fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let cloud = job.cloud;
     let extension = job.path.extension().map(|extension| extension.to_ascii_lowercase()).unwrap_or_default();
     let (layout, header) = if extension == "pts" { pts(job) } else { table(cloud, Path::new(&extension)) };
-    let up = (cloud.axes().is_some(), "which way is up");
+    let up = (cloud.axes().is_some(), "which axis is up");
     note_left_out(job, "text", &[up]);
     file.write_all(header.as_bytes()).map_err(|source| job.io(source))?;
     for start in (0..cloud.len()).step_by(PIECE * BATCH) {
@@ -85,7 +85,7 @@ fn pts<'a>(job: &Job<'a>) -> (Layout<'a>, String) {
     let lost: Vec<&str> =
         cloud.fields().iter().map(|field| field.name.as_str()).filter(|name| *name != "Intensity").collect();
     if !lost.is_empty() {
-        job.note(format!("PTS holds intensities and colours alone; left out: {}", lost.join(", ")));
+        job.note(format!("PTS holds only intensities and colours; left out: {}", lost.join(", ")));
     }
     let colors = cloud.colors().map(Channels::Bytes);
     (Layout { separator: b' ', colors, fields, fields_first: true }, format!("{}\n", cloud.len()))

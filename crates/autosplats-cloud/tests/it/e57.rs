@@ -120,7 +120,7 @@ fn fields_of_every_type_come_back() {
             .unwrap();
         let (back, notes) = round_trip(&cloud, &EXACT);
         assert_eq!((back.positions(), back.colors()), (cloud.positions(), cloud.colors()), "{count}: every bit");
-        assert_eq!(notes, ["E57 does not say which way is up"], "{count}: told");
+        assert_eq!(notes, ["E57 does not store which axis is up"], "{count}: told");
         assert_eq!(back.fields().len(), if count == 0 { back.fields().len() } else { cloud.fields().len() }, "{count}");
         for field in back.fields() {
             if field.name == "ReturnNumber" {
@@ -233,7 +233,7 @@ fn what_somebody_could_stand_in_has_z_up() {
         let cloud = PointCloud::new(DVec3::new(0.0, 500.0, 0.0), positions).with_scans(scans).with_axes(Axes::ZUp);
         let (back, notes) = round_trip(&cloud, &ReadOptions::default());
         assert_eq!(back.axes(), axes, "{size} metres, {} scans", cloud.scans().len());
-        assert_eq!(notes.join("").contains("which way is up"), axes.is_none(), "{size} metres: {notes:?}");
+        assert_eq!(notes.join("").contains("which axis is up"), axes.is_none(), "{size} metres: {notes:?}");
     }
 }
 
@@ -270,7 +270,7 @@ fn what_cannot_be_held_is_told() {
     assert_eq!(back.fields()[1].values, FieldValues::U8(vec![4, 5, 6]), "and keep their values");
     assert_eq!(back.fields()[2].values.get(0), u64::MAX as f64, "as near as floats come");
     let all = notes.join("\n");
-    for words in ["metres", "'two words' is called two_words", "63 bits", "several scans share", "no rotation"] {
+    for words in ["metres", "'two words' is called two_words", "63 bits", "several scans share", "scale or mirror"] {
         assert!(all.contains(words), "'{words}' is not in: {all}");
     }
 }
@@ -301,7 +301,7 @@ fn coordinates_are_written_in_metres() {
         );
         assert_eq!(back.crs().unit, Some(Unit::Metre), "{unit:?}");
         assert_eq!(back.crs().epsg, told.is_empty().then_some(2992), "{unit:?}: a system in feet is not of metres");
-        let converted = notes.iter().any(|note| note.contains("E57 means metres") && note.contains(told));
+        let converted = notes.iter().any(|note| note.contains("E57 requires metres") && note.contains(told));
         assert_eq!(converted, !told.is_empty(), "{unit:?}: {notes:?}");
     }
     let degrees = Crs { unit: Some(Unit::Degree), vertical_unit: Some(Unit::Metre), ..Crs::default() };
@@ -389,12 +389,12 @@ fn claims_that_lie_are_refused() {
     let cases = [
         ("type=\"Float\" precision=\"single\"", "type=\"Complex\"", "unknown type 'Complex'"),
         ("minimum=\"0\" maximum=\"255\"", "minimum=\"9\" maximum=\"1\"", "minimum 9 is above maximum 1"),
-        ("minimum=\"0\" maximum=\"255\"", "minimum=\"x\"", "'x' is no integer"),
+        ("minimum=\"0\" maximum=\"255\"", "minimum=\"x\"", "'x' is not an integer"),
         (single, "", "a packet of 4 values where points have 3"),
         ("fileOffset=\"48\"", "fileOffset=\"4\"", "no compressed vector"),
         ("<e57Root", "<f57Root", "e57Root"),
         ("cartesianY", "cartesianQ", "neither x, y and z"),
-        ("recordCount=\"300\"", "recordCount=\"-30\"", "'-30' is no recordCount"),
+        ("recordCount=\"300\"", "recordCount=\"-30\"", "'-30' is not a valid recordCount"),
     ];
     for (from, to, words) in cases {
         let lie = changed(&bytes, from, to);

@@ -402,7 +402,7 @@ fn long_text_keeps_its_order() {
     assert_eq!(cloud.len(), 200_000, "all rows");
     assert!((0..cloud.len()).all(|i| cloud.world_position(i).x == i as f64), "in order");
     let broken = lines.replace("150000 4 0.5", "150000 four 0.5");
-    assert!(error("a.xyz", broken.as_bytes()).contains("line 150001: 'four' is no number"), "the place is right");
+    assert!(error("a.xyz", broken.as_bytes()).contains("line 150001: 'four' is not a number"), "the place is right");
 }
 
 #[test]

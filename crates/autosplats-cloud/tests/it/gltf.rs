@@ -289,12 +289,12 @@ fn buffers_in_the_text_and_beside_it() {
         let message = read_with("sub/a.gltf", uri).unwrap_err();
         assert!(message.contains("buffer 0") && message.contains("only files beside this one"), "{uri}: {message}");
     }
-    assert!(read_with("a.gltf", "sub").unwrap_err().contains("is no file"), "a folder");
+    assert!(read_with("a.gltf", "sub").unwrap_err().contains("is not a file"), "a folder");
     assert!(read_with("a.gltf", "missing.bin").unwrap_err().contains("missing.bin"), "the missing file is named");
     std::fs::write(folder.path().join("short.bin"), &builder.buffer[..20]).unwrap();
     assert!(read_with("a.gltf", "short.bin").unwrap_err().contains("buffer 0: it has 20 of 60 bytes"), "cut off");
     let broken = builder.json("\"uri\":\"data:;base64,!!!\",", &rest);
-    assert!(error("a.gltf", broken.as_bytes()).contains("no base64"), "broken base64");
+    assert!(error("a.gltf", broken.as_bytes()).contains("not base64"), "broken base64");
 }
 
 #[test]

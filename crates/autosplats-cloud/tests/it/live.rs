@@ -119,7 +119,7 @@ fn what_is_refused_is_said_and_the_next_frame_read() {
         assert!(!message.contains(char::is_control), "{message:?}");
     };
     sender.send([b"\x1b[31m nonsense \0".to_vec(), good.clone()].concat()).unwrap();
-    refused(&mut live, "begins no PLY or PCD");
+    refused(&mut live, "is neither PLY nor PCD");
     assert_eq!(update(&mut live).cloud.len(), 10, "after garbage");
     let claims = String::from_utf8_lossy(&good).replace("POINTS 10", "POINTS 238609295").into_bytes();
     sender.send([&claims[..200], &good].concat()).unwrap();

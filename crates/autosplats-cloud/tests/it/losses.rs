@@ -84,11 +84,11 @@ fn losses_are_told() {
     let notes = |name| through(name, &cloud).0.join("\n");
     assert_eq!(
         notes("a.ply"),
-        "PLY does not hold where the sensors stood, the coordinate system\nid: integers beyond 53 bits are rounded",
+        "PLY does not hold the poses of the sensors, the coordinate system\nid: integers beyond 53 bits are rounded",
         "PLY"
     );
-    assert_eq!(notes("a.xyz"), "text does not hold where the sensors stood, the coordinate system, which way is up");
-    assert!(notes("a.las").contains("LAS does not say which way is up"), "{}", notes("a.las"));
+    assert_eq!(notes("a.xyz"), "text does not hold the poses of the sensors, the coordinate system, which axis is up");
+    assert!(notes("a.las").contains("LAS does not store which axis is up"), "{}", notes("a.las"));
 }
 
 #[test]

@@ -213,7 +213,7 @@ fn obj_of_every_kind() {
         assert_eq!((&*description.format, attributes(&description)), ("OBJ", vec!["x", "y", "z"]), "named");
     }
     assert!(error("a.obj", b"v 1 2\n").contains("line 1: 2 values"), "too few");
-    assert!(error("a.obj", b"v 1 2 3\nv 1 x 3\n").contains("line 2: 'x' is no number"), "no number");
+    assert!(error("a.obj", b"v 1 2 3\nv 1 x 3\n").contains("line 2: 'x' is not a number"), "no number");
     assert!(error("a.obj", b"hello\n").contains("no vertex"), "other text");
     assert!(error("a.obj", b"v 1 2 3\n\0\0").contains("byte 8"), "no text");
 }
@@ -313,7 +313,7 @@ fn off_of_every_kind() {
     );
     assert!(error("a.off", b"OFF BINARY\n").contains("save the mesh as"), "binary");
     assert!(error("a.off", b"4OFF\n1 0 0\n0 0 0 1\n").contains("three dimensions"), "four dimensions");
-    assert!(error("a.off", b"OFF\n5 -4 0\n").contains("line 2: '-4' is no count of faces"), "negative");
+    assert!(error("a.off", b"OFF\n5 -4 0\n").contains("line 2: '-4' is not a count of faces"), "negative");
     assert!(error("a.off", b"hello\n").contains("line 1: an OFF file begins"), "another text");
     assert!(error("a.off", b"OFF\n9999 0 0\n0 0 0\n").contains("line 2: 9999 vertices cannot be"), "lying");
     assert!(error("a.off", b"OFF\n3 0 0\n0 0 0\n0.00 0.00 0.0\n").contains("the file ends after"), "cut off");
@@ -379,7 +379,7 @@ fn stl_corners_are_welded() {
     let (longer, notes) = mesh("a.stl", &[&binary[..], b"junk"].concat());
     assert!(longer.triangles.len() == 3 && notes.contains("4 bytes after"), "{notes}");
     let (unknown, notes) = mesh("a.stl", &binary_stl("", 0, &facets));
-    assert!(unknown.triangles.len() == 3 && notes.contains("says 0 triangles, there are 3"), "{notes}");
+    assert!(unknown.triangles.len() == 3 && notes.contains("states 0 triangles, but there are 3"), "{notes}");
     assert!(error("a.stl", &binary_stl("", 4_000_000_000, &facets)).contains("after 3 of 4000000000"), "lying");
 }
 

@@ -237,7 +237,7 @@ fn triangles_that_are_none_get_no_points() {
         let result = sample_surface(&Contents { triangles, ..mesh.clone() }, 5, 1, &());
         assert!(matches!(result, Err(Error::NoSurface)), "no area: {result:?}");
     }
-    assert!(Error::NoSurface.to_string().contains("take the points"), "the remedy is told");
+    assert!(Error::NoSurface.to_string().contains("use the points"), "the remedy is told");
     struct Stop;
     impl Progress for Stop {
         fn report(&self, _fraction: f32) {}

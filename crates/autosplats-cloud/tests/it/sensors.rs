@@ -408,7 +408,7 @@ fn written_pcd_reads_back() {
     let scan = |points| Scan { name: None, world_from_sensor: pose, points };
     let two = PointCloud::new(DVec3::ZERO, positions(4)).with_scans(vec![scan(0..2), scan(2..4)]);
     write(&two, &path, &ear).unwrap();
-    assert!(ear.0.into_inner().unwrap()[0].contains("one place"), "several sensors are told to be lost");
+    assert!(ear.0.into_inner().unwrap()[0].contains("one sensor pose"), "several sensors are told to be lost");
     assert!(read_with(&path, &ReadOptions::default(), &()).unwrap().scans().is_empty(), "and lost");
     let named = PointCloud::new(DVec3::ZERO, positions(4)).with_colors(colors(4)).unwrap();
     let named = named.with_field("two words", FieldValues::U8(vec![7; 4])).unwrap();

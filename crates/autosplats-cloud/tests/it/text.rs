@@ -183,13 +183,13 @@ fn gaps_words_and_comments() {
 fn errors_have_places() {
     for (name, text, words) in [
         ("a.csv", "x,y,z,i\n1,2,3,4\n1,,3,4\n", ["line 3", "y is missing"]),
-        ("a.csv", "x,y,z,i\n1,2,3,4\n1,2,3,four\n", ["line 3", "'four' is no number"]),
+        ("a.csv", "x,y,z,i\n1,2,3,4\n1,2,3,four\n", ["line 3", "'four' is not a number"]),
         ("a.csv", "x,y,z\n1,2,3\n1,2\n", ["line 3", "2 values where a point has 3"]),
         ("a.csv", "x,y,z\n1,2,3\n1,2,3,4\n", ["line 3", "from '4' on"]),
-        ("a.csv", "x,y,z\n1,two,3\n", ["line 2", "'two' is no number"]),
-        ("a.xyz", "1 2 3\n4 5 six\n", ["line 2", "'six' is no number"]),
+        ("a.csv", "x,y,z\n1,two,3\n", ["line 2", "'two' is not a number"]),
+        ("a.xyz", "1 2 3\n4 5 six\n", ["line 2", "'six' is not a number"]),
         ("a.xyz", "1 2 3\r4 5 6\r", ["carriage returns", "line feeds"]),
-        ("a.pts", "99999999999999999999\n1 2 3\n", ["line 1", "beyond all bounds"]),
+        ("a.pts", "99999999999999999999\n1 2 3\n", ["line 1", "too large"]),
     ] {
         let message = read_noting(name, text, &ReadOptions::default()).unwrap_err().to_string();
         assert!(words.iter().all(|word| message.contains(word)), "{message} should contain {words:?}");
@@ -361,5 +361,5 @@ fn pts_is_written_as_its_readers_want_it() {
     write(&cloud, &path, &ear).unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "1\n1 2.5 -3 -2048 9 8 7\n", "Leica's order");
     let notes = ear.notes.into_inner().unwrap();
-    assert_eq!(notes, ["PTS holds intensities and colours alone; left out: Ring"], "what is lost is told");
+    assert_eq!(notes, ["PTS holds only intensities and colours; left out: Ring"], "what is lost is told");
 }

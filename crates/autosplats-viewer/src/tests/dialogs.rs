@@ -123,7 +123,7 @@ fn a_name_that_cannot_be_written_is_told_in_place() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut window = Window::with_statue();
     for (command, name, why) in [
-        (Command::Export, "points.unknown", "tells no format"),
+        (Command::Export, "points.unknown", "unknown output format"),
         (Command::Screenshot, "picture.bmp", "The name has to end in .png"),
         (Command::Film, "film.bmp", "The name has to end in .png, .mp4"),
         (Command::SaveState, "", "This is a folder"),

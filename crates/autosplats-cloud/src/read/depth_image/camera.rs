@@ -51,15 +51,15 @@ impl Camera {
             }
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let Some(camera) = read_to_string(&path).ok().and_then(|text| parse(&text, width, height)) else {
-                notes.push(format!("{name} is no camera of 3 × 3 or 4 numbers; not used"));
+                notes.push(format!("{name} holds no camera of 3 × 3 or 4 numbers; ignored"));
                 continue;
             };
-            notes.push(format!("the camera is that of {name}"));
+            notes.push(format!("the camera is read from {name}"));
             return Self { camera, source: name, notes };
         }
         notes.push(
-            "no camera is known, a Kinect's angle of view and millimetres are taken; a file camera.txt with \
-             fx fy cx cy and the values per metre beside the image says more"
+            "no camera is known; a Kinect's angle of view and millimetres are assumed; to state it, put a file \
+             camera.txt with fx fy cx cy and the values per metre beside the image"
                 .into(),
         );
         Self { camera: ordinary(width, height), source: "a guess".into(), notes }

@@ -81,7 +81,7 @@ pub(super) fn read(path: &Path, width: usize, height: usize) -> Result<Vec<[u8; 
     });
     let image = decoded.map_err(fault)?.into_rgb8();
     if image.dimensions() != (width as u32, height as u32) {
-        return Err(fault("the size of the image is not that of its header".into()));
+        return Err(fault("the size of the image differs from its header".into()));
     }
     Ok(image.pixels().map(|pixel| pixel.0).collect())
 }

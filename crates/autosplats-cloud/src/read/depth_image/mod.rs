@@ -172,7 +172,7 @@ fn png_values(job: &Job<'_>, width: usize, height: usize) -> Result<Vec<u16>, Er
     let image = guard(|| decode(job.bytes, ImageFormat::Png, width, height)).map_err(|what| fault(&what))?;
     let DynamicImage::ImageLuma16(image) = image else { return Err(no_depth(job, "no 16-bit grey")) };
     if image.dimensions() != (width as u32, height as u32) {
-        return Err(fault("the size of the image is not that of its header"));
+        return Err(fault("the size of the image differs from its header"));
     }
     Ok(image.into_raw())
 }

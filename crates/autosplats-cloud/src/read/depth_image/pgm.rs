@@ -47,7 +47,7 @@ impl Header {
             let place = format!("byte {at}");
             at = end;
             let number = number(word).filter(|number| (1..1 << 24).contains(number));
-            number.ok_or_else(|| job.malformed(place, format!("'{}' is no {what} of an image", shown(word))))
+            number.ok_or_else(|| job.malformed(place, format!("'{}' is not a valid {what} of an image", shown(word))))
         };
         let (width, height, largest) = (next("width")?, next("height")?, next("greatest value")?);
         if largest > 65535 {
@@ -84,7 +84,7 @@ impl Header {
             let (word, end) = word(job.bytes, at);
             at = end;
             let value = number(word).and_then(|value| u16::try_from(value).ok()).ok_or_else(|| {
-                let what = format!("'{}' is no value of pixel {} of {count}", shown(word), pixel + 1);
+                let what = format!("'{}' is not a value of pixel {} of {count}", shown(word), pixel + 1);
                 job.malformed(job.line(at), what)
             })?;
             values.push(value);

@@ -350,7 +350,7 @@ fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<Wanted> {
         }
     }
     if left_out > 0 {
-        job.note(format!("{left_out} values of the points have names that others have, or are too many; left out"));
+        job.note(format!("{left_out} values per point are left out: their names repeat, or there are too many"));
     }
     limit_fill(job, sources, &mut fields);
     fields

@@ -54,7 +54,7 @@ impl<'a> Colors<'a> {
                 };
                 colors.limits = [[0.0, full]; 3];
             } else if largest <= 255.0 && largest > 1.0 {
-                job.note("colours have limits above 255, but no value is; taken for 8 bits");
+                job.note("colour limits exceed 255, but no value does; read as 8 bits");
                 colors.limits = [[0.0, 255.0]; 3];
             }
         }
@@ -108,7 +108,7 @@ pub(super) fn color_fields(
     }
     let grey = lens.iter().zip(&colors).filter(|(_, colors)| colors.is_none()).map(|(len, _)| len).sum::<usize>();
     if grey > 0 {
-        job.note(format!("{grey} points are of scans without colours; grey"));
+        job.note(format!("{grey} points belong to scans without colours; they become grey"));
     }
     let bytes = fill(job, "colours", lens, part, |index| {
         let colors = &colors[index];

@@ -64,7 +64,7 @@ pub(super) fn gather(
     let count = available.unwrap_or(0).min(scan.points);
     if count > (end - section.start) as u64 || available.is_none() {
         let bytes = end - section.start;
-        let what = format!("{} points in {bytes} bytes, less than a byte each; they are not believed", scan.points);
+        let what = format!("{} points in {bytes} bytes, less than a byte each; that is implausible", scan.points);
         return Err(job.malformed(format!("byte {}", scan.offset), what));
     }
 

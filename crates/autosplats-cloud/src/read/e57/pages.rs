@@ -35,7 +35,7 @@ impl<'a> Pages<'a> {
     pub(super) fn new(job: &Job<'a>) -> Result<Self, Error> {
         let bytes = job.bytes;
         if !bytes.starts_with(super::MAGIC) {
-            return Err(job.malformed("byte 0", "an E57 file begins with 'ASTM-E57', this one does not"));
+            return Err(job.malformed("byte 0", "an E57 file begins with 'ASTM-E57'; this one does not"));
         }
         if bytes.len() < HEADER {
             return Err(

@@ -85,7 +85,7 @@ impl Root {
         let mut notes = Vec::new();
         let text = String::from_utf8_lossy(xml);
         if text.contains('\u{fffd}') {
-            notes.push("the XML section is no UTF-8 in places; names may have lost letters".into());
+            notes.push("the XML section is not UTF-8 in places; names may have lost letters".into());
         }
         let text = text.trim_end_matches('\0');
         let fail = |what: String| job.malformed("XML section", what);
@@ -168,7 +168,7 @@ fn scan(node: Node<'_, '_>) -> Result<ScanHeader, String> {
     let points = child(node, "points").ok_or("no points")?;
     let attribute = |name: &str| {
         let value = points.attribute(name).ok_or_else(|| format!("its points have no {name}"))?;
-        value.trim().parse::<u64>().map_err(|_| format!("'{}' is no {name}", shown(value.as_bytes())))
+        value.trim().parse::<u64>().map_err(|_| format!("'{}' is not a valid {name}", shown(value.as_bytes())))
     };
     let prototype = child(points, "prototype").ok_or("its points have no prototype")?;
     let mut elements = Vec::new();
@@ -218,13 +218,13 @@ fn element(node: Node<'_, '_>) -> Result<Element, String> {
         Some(text) => text
             .trim()
             .parse()
-            .map_err(|_| format!("{attribute} of {name}: '{}' is no integer", shown(text.as_bytes()))),
+            .map_err(|_| format!("{attribute} of {name}: '{}' is not an integer", shown(text.as_bytes()))),
     };
     let float = |attribute: &str, default: f64| match node.attribute(attribute) {
         None => Ok(default),
         Some(text) => match text.trim().parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("{attribute} of {name}: '{}' is no number", shown(text.as_bytes()))),
+            _ => Err(format!("{attribute} of {name}: '{}' is not a number", shown(text.as_bytes()))),
         },
     };
     let bounds = || {

@@ -148,7 +148,7 @@ fn headers_that_lie_are_refused_before_their_bytes_have_come() {
         (with("POINTS 2", "POINTS 357913942"), "4294967"),
         (with("POINTS 2", "POINTS 18446744073709551615"), "announces more"),
         (with("COUNT 1 1 1", "COUNT 9999999999999999999 1 1"), "announces more"),
-        (with("COUNT 1 1 1", "COUNT 1 1 -1"), "no count"),
+        (with("COUNT 1 1 1", "COUNT 1 1 -1"), "'-1' is invalid"),
         (with("DATA binary", "DATA ternary"), "unknown DATA"),
         ([pcd("ascii", b"0 0 0\n"), good.clone()].concat(), "1 lines of points are missing"),
         ([vast.as_bytes(), &good].concat(), "announces more"),

@@ -101,7 +101,7 @@ fn most_numbers(job: &Job<'_>, buffers: &Buffers<'_>) -> usize {
 }
 
 fn spend(job: &Job<'_>, left: &mut usize, numbers: usize) -> Result<(), Error> {
-    let what = "it uses its numbers again and again, too often for a file of this size; export it again";
+    let what = "it reuses its numbers too often for a file of this size; export it again";
     *left = left.checked_sub(numbers).ok_or_else(|| job.malformed("animation 0", what))?;
     Ok(())
 }

@@ -61,7 +61,7 @@ impl<'a> Buffers<'a> {
                     None => Data::Beside(beside(job, &place(), uri)?),
                 },
                 None if index == 0 && chunk.is_some() => Data::Inside(chunk.unwrap_or_default()),
-                None => return Err(job.malformed(place(), "its bytes are nowhere; export the file again")),
+                None => return Err(job.malformed(place(), "its bytes are missing; export the file again")),
             };
             let len = found.bytes().len();
             if len < buffer.byte_length {
@@ -93,7 +93,7 @@ fn decode(job: &Job<'_>, place: &str, uri: &str) -> Result<Vec<u8>, Error> {
         return Ok(percent_decoded(content));
     }
     job.check_memory(content.len(), 1)?;
-    let decoded = guard(|| BASE64.decode(content).map_err(|error| format!("it is no base64: {error}")));
+    let decoded = guard(|| BASE64.decode(content).map_err(|error| format!("it is not base64: {error}")));
     decoded.map_err(|what| job.malformed(place, format!("{what}; export the file again")))
 }
 
@@ -113,7 +113,7 @@ fn beside(job: &Job<'_>, place: &str, uri: &str) -> Result<Bytes, Error> {
     let path: PathBuf = job.path.parent().unwrap_or(Path::new("")).join(relative);
     let io = |source| Error::Io { path: path.clone(), source };
     if !std::fs::metadata(&path).map_err(io)?.is_file() {
-        return Err(job.malformed(place, format!("'{}' is no file", shown(uri.as_bytes()))));
+        return Err(job.malformed(place, format!("'{}' is not a file", shown(uri.as_bytes()))));
     }
     Bytes::open(&path).map_err(io)
 }

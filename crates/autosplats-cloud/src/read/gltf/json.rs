@@ -318,7 +318,7 @@ impl<'a> Container<'a> {
             let what = error.to_string().replace(char::is_control, " ");
             let what = what.split(" at line ").next().unwrap_or_default();
             let what: String = what.chars().take(200).collect();
-            job.malformed(place, format!("{what}; this is no glTF 2, export it again"))
+            job.malformed(place, format!("{what}; this is not glTF 2, export it again"))
         })?;
         if !root.asset.version.starts_with("2.") {
             let version: String = root.asset.version.chars().take(20).flat_map(char::escape_debug).collect();

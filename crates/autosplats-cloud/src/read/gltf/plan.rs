@@ -201,7 +201,7 @@ fn places(
         stack.extend(node.children.iter().rev().map(|&child| (child, world_from_node)));
     }
     if again > 0 && root.scene.is_some() {
-        notes.push(format!("{again} times a node is listed again, which glTF forbids; shown once"));
+        notes.push(format!("nodes are listed {again} times too often, which glTF forbids; each is shown once"));
     }
     if skinned {
         notes.push("the mesh has a skeleton; it is taken as modelled, not as posed".into());

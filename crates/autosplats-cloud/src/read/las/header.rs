@@ -39,7 +39,7 @@ impl Header {
         let bytes = job.bytes;
         let fail = |at: usize, what: String| job.malformed(format!("byte {at}"), what);
         if !bytes.starts_with(b"LASF") && bytes.len() >= 4 {
-            return Err(fail(0, "a LAS file begins with 'LASF', this one does not".into()));
+            return Err(fail(0, "a LAS file begins with 'LASF'; this one does not".into()));
         }
         let long = bytes.len() > 25 && bytes[24] == 1 && bytes[25] >= 4;
         let needed = if long { LONG } else { SHORT };
@@ -59,7 +59,7 @@ impl Header {
         }
         let (scale, offset) = (raw.vector(131, 8), raw.vector(155, 8));
         if !scale.is_finite() || !offset.is_finite() || scale.abs().min_element() == 0.0 {
-            return Err(fail(131, format!("coordinates cannot be made with scale {scale} and offset {offset}")));
+            return Err(fail(131, format!("invalid scale {scale} or offset {offset} of the coordinates")));
         }
         let point_data = raw.u32(96) as usize;
         if point_data > bytes.len() {

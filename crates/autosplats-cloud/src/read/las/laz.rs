@@ -221,7 +221,7 @@ impl Filling<'_, '_> {
 /// The compression record, and whether the points are in chunks.
 fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<(LazVlr, bool), Error> {
     let Some(record) = records.find(LazVlr::USER_ID, LazVlr::RECORD_ID) else {
-        let what = "the points are compressed, but the record that says how is missing; copy the file again";
+        let what = "the points are compressed, but their compression record is missing; copy the file again";
         return Err(job.malformed(format!("byte {}", header.records.0), what));
     };
     let fail = |what| job.malformed(format!("byte {}", record.at), format!("bad compression record ({what})"));
@@ -230,7 +230,7 @@ fn compression(job: &Job<'_>, header: &Header, records: &Records<'_>) -> Result<
     match (record.data[0], layered(vlr.items())) {
         (1, false) => Ok((vlr, false)),
         (2, false) | (3, true) => Ok((vlr, true)),
-        (compressor, _) => Err(fail(format!("compressor {compressor} does not go with its items"))),
+        (compressor, _) => Err(fail(format!("compressor {compressor} does not fit its items"))),
     }
 }
 

@@ -83,7 +83,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     columns.remove(&damaged);
     let (cloud, narrow) = columns.into_cloud();
     if narrow {
-        notes.push("colours have no value above 255; taken for 8 bits in the 16 of the format".into());
+        notes.push("no colour value exceeds 255; the 16-bit colours are read as 8 bits".into());
     }
     let claimed = header.points;
     if lost > 0 {
@@ -113,7 +113,7 @@ fn dimensions(header: &Header, records: &Records<'_>) -> (Vec<Dimension>, Vec<St
         notes.push("waveforms are not read".into());
     }
     if header.version.0 != 1 || header.version.1 > 4 {
-        notes.push(format!("{} is no version that is known; read as well as could be", header.version_name()));
+        notes.push(format!("{} is an unknown version; read as well as possible", header.version_name()));
     }
     (dimensions, notes)
 }

@@ -29,7 +29,7 @@ impl<'a> Records<'a> {
         walk(before_points, start, claimed, VLR_HEADER, &mut all);
         if (all.len() as u64) < u64::from(claimed) {
             let are = if all.len() == 1 { "is" } else { "are" };
-            notes.push(format!("the header tells of {claimed} records before the points; there {are} {}", all.len()));
+            notes.push(format!("the header states {claimed} records before the points; there {are} {}", all.len()));
         }
         let before = all.len();
         let (start, claimed) = header.extended;
@@ -37,7 +37,7 @@ impl<'a> Records<'a> {
         walk(bytes, start, claimed, EVLR_HEADER, &mut all);
         if ((all.len() - before) as u64) < u64::from(claimed) {
             let found = all.len() - before;
-            notes.push(format!("the header tells of {claimed} records after the points; there are {found}"));
+            notes.push(format!("the header states {claimed} records after the points; there are {found}"));
         }
         Self { all, notes }
     }

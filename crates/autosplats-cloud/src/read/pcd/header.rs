@@ -111,7 +111,7 @@ impl Header {
             let Some((keyword, values)) = words.split_first() else { continue };
             let number = || {
                 let value = values.first().map_or("", String::as_str);
-                value.parse::<usize>().map_err(|_| fail(format!("{keyword} '{}' is no count", shown(value.as_bytes()))))
+                value.parse::<usize>().map_err(|_| fail(format!("{keyword} '{}' is invalid", shown(value.as_bytes()))))
             };
             match keyword.to_ascii_uppercase().as_str() {
                 "VERSION" => {}
@@ -138,7 +138,7 @@ impl Header {
                 word if word.starts_with('#') => {}
                 word => {
                     let word = shown(word.as_bytes());
-                    let what = format!("'{word}' is no word of a PCD header; if the file is plain text, name it .xyz");
+                    let what = format!("'{word}' is not a PCD header keyword; if the file is plain text, name it .xyz");
                     return Err(fail(what));
                 }
             }
@@ -157,7 +157,7 @@ impl Header {
                     fail(format!("no type {} of {} bytes", shown(kind.as_bytes()), shown(size.as_bytes())))
                 })?;
                 let count =
-                    count.parse().map_err(|_| fail(format!("COUNT '{}' is no count", shown(count.as_bytes()))))?;
+                    count.parse().map_err(|_| fail(format!("COUNT '{}' is invalid", shown(count.as_bytes()))))?;
                 Ok(Field { name, scalar, count })
             });
         let fields = fields.collect::<Result<_, Error>>()?;

@@ -111,7 +111,7 @@ impl Header {
                         return Err(fail("an element needs a name and a count".into()));
                     };
                     let count =
-                        count.parse().map_err(|_| fail(format!("'{}' is no count", shown(count.as_bytes()))))?;
+                        count.parse().map_err(|_| fail(format!("'{}' is not a count", shown(count.as_bytes()))))?;
                     elements.push(Element { name: name.into(), count, properties: Vec::new() });
                 }
                 Some("property") => {

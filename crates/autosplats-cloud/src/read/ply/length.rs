@@ -70,7 +70,7 @@ impl Records {
             let Some(raw) = bytes.get(at..at + count.size()) else { return Ok(None) };
             let len = list_len(raw, self.big_endian, count).and_then(|len| len.checked_mul(size));
             let end = len.and_then(|len| at.checked_add(count.size())?.checked_add(len));
-            at = end.ok_or_else(|| format!("record {} has a list of a length that cannot be", self.record + 1))?;
+            at = end.ok_or_else(|| format!("record {} has a list of an impossible length", self.record + 1))?;
         }
         Ok((at <= bytes.len()).then_some(at))
     }

@@ -65,7 +65,7 @@ pub(super) fn is_mesh(job: &Job<'_>) -> bool {
 
 fn vertices(job: &Job<'_>, header: &Header) -> Result<usize, Error> {
     let index = header.elements.iter().position(|element| element.name == "vertex");
-    index.ok_or_else(|| job.malformed("header", "there is no element 'vertex', hence no points"))
+    index.ok_or_else(|| job.malformed("header", "there is no element 'vertex', so there are no points"))
 }
 
 fn read(job: &Job<'_>) -> Result<Contents, Error> {
@@ -206,7 +206,7 @@ fn walk(
             let name = shown(element.name.as_bytes());
             job.malformed(format!("byte {at}"), format!("{what} in {name} {} of {}", record + 1, element.count))
         };
-        let cut = || fail("the file ends, it is cut off or damaged; copy it again;");
+        let cut = || fail("cut off or damaged, copy the file again: the file ends");
         let mut next = at;
         for property in &element.properties {
             let size = property.scalar.size();

@@ -29,7 +29,7 @@ impl Dialect {
                     return Ok((Self { separator, decimal_comma: true }, width));
                 }
                 if points {
-                    return Err("numbers with decimal commas among others; write all of them with points".into());
+                    return Err("some numbers have decimal commas, others points; use points throughout".into());
                 }
             }
             // Several tabs in a row align columns, unless a header has as many names.

@@ -44,7 +44,7 @@ impl Preamble {
             } else if text::is_count(line) {
                 promised = std::str::from_utf8(line).ok().and_then(|line| line.parse().ok());
                 if promised.is_none() {
-                    return Err(job.malformed(job.line(at), "this count of points is beyond all bounds"));
+                    return Err(job.malformed(job.line(at), "this count of points is too large"));
                 }
             } else if is_row(line) || only_numbers(line) {
                 break;

@@ -31,7 +31,7 @@ fn check_is_text(job: &Job<'_>) -> Result<(), Error> {
         return Err(job.malformed("byte 0", "the file is empty; copy it again"));
     }
     if let Some(at) = start.iter().position(|&byte| byte == 0) {
-        return Err(job.malformed(format!("byte {at}"), "this is no text of 8-bit characters; save it as UTF-8 text"));
+        return Err(job.malformed(format!("byte {at}"), "this is not 8-bit text; save it as UTF-8 text"));
     }
     if !start.contains(&b'\n') && start.trim_ascii_end().contains(&b'\r') {
         return Err(job.unsupported("lines end in carriage returns alone; save them with line feeds"));

@@ -76,7 +76,7 @@ fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
         metric.to_local_metres();
         "degrees become metres about the middle of the points, east, north and up".into()
     };
-    job.note(format!("E57 means metres: {what}; the coordinate system is left out"));
+    job.note(format!("E57 requires metres: {what}; the coordinate system is left out"));
     Ok(Some(metric))
 }
 
@@ -90,7 +90,7 @@ fn notes(job: &Job<'_>, known: &Known<'_>) {
         None => false,
     };
     if is_lost {
-        job.note("E57 does not say which way is up");
+        job.note("E57 does not store which axis is up");
     }
     for field in cloud.fields() {
         if known.beyond.contains(&&*field.name) {
@@ -131,7 +131,7 @@ fn runs(job: &Job<'_>) -> Vec<Run> {
         job.note("points that several scans share are written with the first of them");
     }
     if bent {
-        job.note("poses that are no rotation are written without their turn");
+        job.note("poses that scale or mirror are written without rotation");
     }
     let len = outside.iter().map(Range::len).sum();
     if len > 0 || runs.is_empty() {
@@ -178,7 +178,7 @@ fn scan<'a>(
     if per_packet == 0 {
         return Err(Error::Unsupported {
             path: job.path.into(),
-            what: format!("{} fields are more than a packet of E57 holds; write PLY", cloud.fields().len()),
+            what: format!("{} fields do not fit into a packet of E57; write PLY", cloud.fields().len()),
         });
     }
     let packet_len = |points: usize| {

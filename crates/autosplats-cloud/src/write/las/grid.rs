@@ -135,8 +135,8 @@ fn check_spread(job: &Job<'_>, count: usize, world: impl Fn(usize) -> DVec3, sca
         let spread = spread(axis);
         if spread > 0.0 && scale[axis] > spread / 1000.0 {
             let what = format!(
-                "some points are so far away that 32 bits would leave steps of {} in {name} for all of them; leave them \
-                 out first, or write PLY",
+                "some points are so far away that 32 bits would round all points to steps of {} in {name}; crop the cloud \
+                 first, or write PLY",
                 scale[axis]
             );
             return Err(Error::Unsupported { path: job.path.into(), what });

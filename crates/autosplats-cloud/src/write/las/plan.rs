@@ -62,10 +62,10 @@ impl<'a> Plan<'a> {
             job.note(format!("{dropped} points without finite coordinates are left out; LAS cannot hold them"));
         }
         if !cloud.scans().is_empty() {
-            job.note("LAS has no place for the scanners' positions; they are left out");
+            job.note("LAS cannot hold sensor positions; they are left out");
         }
         if matches!(cloud.axes(), Some(Axes::YUp | Axes::Camera)) {
-            job.note("LAS does not say which way is up, and z is taken for it; here it is y");
+            job.note("LAS does not store which axis is up; readers assume z, but here it is y");
         }
         let point = |i: usize| kept.as_ref().map_or(i, |kept| kept[i]);
         let grid = grid::Grid::of(job, count, |i| cloud.world_position(point(i)))?;
@@ -102,11 +102,11 @@ impl<'a> Plan<'a> {
                         own.push((place, Cow::Owned(scale.apply(&field.values))));
                         let [low, high] = [scale.low, scale.high].map(|end| end as f32);
                         job.note(format!(
-                            "intensities of {low} to {high} are scaled to 0 to 65535; {EXACT_INTENSITY} has them as they were"
+                            "intensities of {low} to {high} are scaled to 0 to 65535; {EXACT_INTENSITY} keeps the original values"
                         ));
                     } else if place.is_some() || is_known(&field.name) {
                         job.note(format!(
-                            "the values of {} do not fit their place; they become extra bytes",
+                            "the values of {} do not fit their place in LAS; they become extra bytes",
                             field.name
                         ));
                     }
@@ -122,7 +122,7 @@ impl<'a> Plan<'a> {
             }
         }
         if record_len > MAX_RECORD {
-            let what = format!("a point would take {record_len} bytes; LAS has {MAX_RECORD}; write PLY instead");
+            let what = format!("a point would take {record_len} bytes; LAS allows {MAX_RECORD}; write PLY instead");
             return Err(Error::Unsupported { path: job.path.into(), what });
         }
         let source = match (wide_colors, cloud.colors()) {
