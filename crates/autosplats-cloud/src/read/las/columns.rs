@@ -367,7 +367,7 @@ impl Piece<'_> {
 
 macro_rules! slices {
     ($($variant:ident($type:ty)),*) => {
-        /// Part of a field that is being filled.
+        /// Values of a field that a piece fills.
         enum Slice<'a> {
             $($variant(&'a mut [$type])),*
         }

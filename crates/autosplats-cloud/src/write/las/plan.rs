@@ -286,7 +286,7 @@ impl Range {
 /// Name of the field that keeps the original values of scaled intensities.
 const EXACT_INTENSITY: &str = "ExactIntensity";
 
-/// Range of intensities that is mapped to the 16 bits of LAS.
+/// Intensities that are mapped to the 16 bits of LAS.
 #[derive(Clone, Copy)]
 struct IntensityScale {
     low: f64,
