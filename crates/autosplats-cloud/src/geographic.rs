@@ -14,8 +14,8 @@ const ECCENTRICITY_2: f64 = 6.694_379_990_141_316e-3;
 const STEPS: f64 = 1e6;
 
 impl PointCloud {
-    /// Converts longitude and latitude to metres if x and y are in [degrees](Unit::Degree), and returns whether they
-    /// were. x then points east and y north from the cloud's middle; z is converted to metres and keeps its zero.
+    /// Converts to metres if x and y are longitude and latitude in [degrees](Unit::Degree), and returns whether they
+    /// were. The new x points east and y north from the cloud's middle. z is converted to metres and keeps its zero.
     ///
     /// Lengths are right at the cloud's middle. As on any flat map they are wrong elsewhere: 100 km north or south,
     /// east-west lengths are off by one or two percent. Residuals join the new positions. Sensors are moved but not

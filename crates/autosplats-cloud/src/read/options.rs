@@ -15,8 +15,8 @@ pub struct ReadOptions {
     pub depth_camera: Option<DepthCamera>,
 }
 
-/// A pinhole depth camera. A pixel (u, v) of depth `z` is the point `((u - cx) z / fx, (v - cy) z / fy, z)`; `z` is the
-/// pixel's value divided by `scale`.
+/// A pinhole depth camera. The depth `z` of a pixel (u, v) is the pixel's value divided by `scale`.
+/// Its point is `((u - cx) z / fx, (v - cy) z / fy, z)`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DepthCamera {
     /// Focal length along the image's rows, in pixels.

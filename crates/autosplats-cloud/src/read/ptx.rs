@@ -1,7 +1,7 @@
 //! PTX: text of one or several scans, each a header of ten lines and one line per measured direction.
 //!
-//! The header states the columns and rows of the scan, the scanner's position and axes, and the 4 × 4 matrix from its
-//! frame to the world, for row vectors. Scans are found by counting lines, then parsed in parallel.
+//! The header states the size of the scan in columns and rows, and the scanner's position and axes. A 4 × 4 matrix maps
+//! the scanner's frame to the world, for row vectors. Scans are found by counting lines, then parsed in parallel.
 
 use std::ops::Range;
 

@@ -237,8 +237,8 @@ impl<'a> Surface<'a> {
         triangles.par_sort_by_cached_key(key);
     }
 
-    /// How the curve passes through each triangle: along the longest edge, so that halves are no needles, and in the
-    /// direction that leaves nearer to the next triangle.
+    /// How the curve passes through each triangle: along the longest edge, so that halves are no needles. Of the two
+    /// directions it takes the one that ends nearer to the next triangle.
     fn entrances(&self, triangles: &[[u32; 3]]) -> Vec<u8> {
         let turn = |index: usize| {
             let [a, b, c] = self.triangle_of(&triangles[index]).0;

@@ -1,8 +1,8 @@
 //! Points in text: XYZ, PTS, CSV and similar, which share columns of numbers and little else.
 //!
 //! The columns are named by the caller, or by a header line or comment. Otherwise they are guessed from their number
-//! and the values of the first rows: 3 are positions, 4 add an intensity, 6 a colour or a normal, 7 intensity and
-//! colour. Guesses are reported in a note.
+//! and the first rows, and the guess is noted. Three columns are positions; four add an intensity, six a colour or a
+//! normal, and seven both intensity and colour.
 
 mod cells;
 mod dialect;
