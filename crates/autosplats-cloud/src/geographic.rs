@@ -11,7 +11,7 @@ const SEMI_MAJOR: f64 = 6_378_137.0;
 const ECCENTRICITY_2: f64 = 6.694_379_990_141_316e-3;
 
 /// Steps per degree to which the map's centre is rounded; a step is about 11 cm.
-const STEPS: f64 = 1e6;
+const STEPS_PER_DEGREE: f64 = 1e6;
 
 impl PointCloud {
     /// Converts to metres if x and y are longitude and latitude in [degrees](Unit::Degree), and returns whether they
@@ -31,7 +31,7 @@ impl PointCloud {
             return None;
         }
         let middle = beside.map_or_else(
-            || middle(self.len(), |i| self.world_position(i) * STEPS) / STEPS,
+            || middle(self.len(), |i| self.world_position(i) * STEPS_PER_DEGREE) / STEPS_PER_DEGREE,
             |LocalMetres { middle, .. }| *middle,
         );
         Some(LocalMetres::at(middle, self.crs.vertical_unit.and_then(Unit::metres).unwrap_or(1.0)))

@@ -10,10 +10,10 @@ use autosplats::{AdapterSummary, Camera};
 use eframe::egui;
 
 use crate::commands::Tool;
-use crate::document::{History, LayerId, Shown};
-use crate::editing::Counted;
-use crate::glance::Glance;
-use crate::kept::Kept;
+use crate::document::{History, LayerId, ShownCloud};
+use crate::editing::CachedCounts;
+use crate::glance::FirstLook;
+use crate::kept::StoredInput;
 use crate::loading::{Appearance, Input, JobId, Loader, Watch};
 use crate::look::Look;
 use crate::messages::Messages;
@@ -22,14 +22,14 @@ use crate::panels::Panels;
 use crate::playing::Playing;
 use crate::rate::Rate;
 use crate::recording::Recording;
-use crate::render::{Answer, Outcome, Picture, Purpose, RenderThread, Task, Wish};
+use crate::render::{Answer, Outcome, Picture, Purpose, RenderRequest, RenderThread, Task};
 use crate::state::State;
 use crate::tools::Tools;
 use crate::turns::Turns;
 use crate::{Options, keys, output, panels, storage, viewport};
 
 /// Seconds from the last movement until the whole picture is rendered.
-const REST: f64 = 0.12;
+const REST_DELAY_S: f64 = 0.12;
 
 /// The state of the viewer.
 pub(crate) struct App {
@@ -56,7 +56,7 @@ pub(crate) struct App {
     /// The picture's rectangle in the window, screen points.
     pub(crate) view_rect: egui::Rect,
     /// Recently opened inputs, newest first.
-    pub(crate) recent: Vec<Kept>,
+    pub(crate) recent: Vec<StoredInput>,
     /// File of the session, written on exit.
     pub(crate) state: Option<PathBuf>,
     /// Whether files are read again when they change.
@@ -70,15 +70,15 @@ pub(crate) struct App {
     pub(crate) reloads: HashMap<JobId, LayerId>,
     pub(crate) guessed_axes: Option<Axes>,
     /// What the reading thread found about the only open input, and the document version that this holds for.
-    pub(crate) glance: Option<(u64, Glance)>,
+    pub(crate) glance: Option<(u64, FirstLook)>,
     /// The camera that the program chose by itself, and the picture's width over height at the time. Until the user
     /// moves, a new camera is chosen when points arrive or the picture changes its shape.
     pub(crate) first_camera: Option<(Camera, f64)>,
     /// Version of the document; every change increases it.
     pub(crate) version: u64,
-    pub(crate) counted: Counted,
+    pub(crate) counted: CachedCounts,
     /// What the last requested picture shows.
-    wished: Option<WishKey>,
+    wished: Option<RequestKey>,
     /// Whether the last requested picture is still to come.
     awaited: bool,
     /// Whether a camera was given, so that the first input is not fitted into the picture.
@@ -86,7 +86,7 @@ pub(crate) struct App {
     /// Inputs that could not be read. A session keeps them.
     pub(crate) failed: Vec<(Input, Appearance)>,
     /// Whether a film preview has moved the view since the last window frame.
-    stirred: bool,
+    moved_by_preview: bool,
     /// Time of the last movement, seconds.
     moved: f64,
     pub(crate) quit: bool,
@@ -101,7 +101,7 @@ pub(crate) struct App {
 
 /// Everything that a picture depends on.
 #[derive(Clone, PartialEq)]
-struct WishKey {
+struct RequestKey {
     version: u64,
     camera: Camera,
     size: [u32; 2],
@@ -113,7 +113,7 @@ struct WishKey {
 
 impl App {
     /// Creates the application and starts to read the inputs of `options`. `context` belongs to the window.
-    pub(crate) fn new(options: Options, look: Look, recent: Vec<Kept>, context: &egui::Context) -> Self {
+    pub(crate) fn new(options: Options, look: Look, recent: Vec<StoredInput>, context: &egui::Context) -> Self {
         let mut app = Self {
             history: History::default(),
             loader: Loader::start(context.clone()),
@@ -143,12 +143,12 @@ impl App {
             glance: None,
             first_camera: None,
             version: 1,
-            counted: Counted::default(),
+            counted: CachedCounts::default(),
             wished: None,
             awaited: false,
             camera_given: false,
             failed: Vec::new(),
-            stirred: false,
+            moved_by_preview: false,
             moved: 0.0,
             quit: false,
             keys: Vec::new(),
@@ -164,8 +164,8 @@ impl App {
     }
 
     /// Notes that the view moves, so that pictures are rendered within the time limit.
-    pub(crate) fn stir(&mut self) {
-        self.stirred = true;
+    pub(crate) fn note_movement(&mut self) {
+        self.moved_by_preview = true;
     }
 
     /// The up axis: as chosen, else as guessed, else Z.
@@ -183,7 +183,7 @@ impl App {
     }
 
     /// The points of the last picture, if they still match the document.
-    pub(crate) fn shown(&self) -> Option<Arc<Shown>> {
+    pub(crate) fn shown(&self) -> Option<Arc<ShownCloud>> {
         let shown = &self.shot.as_ref()?.shown;
         shown.shows(self.document()).then(|| Arc::clone(shown))
     }
@@ -241,8 +241,8 @@ impl App {
     }
 
     /// The render request for the present view.
-    pub(crate) fn wish(&self, size: [u32; 2], moving: bool) -> Wish {
-        Wish {
+    pub(crate) fn wish(&self, size: [u32; 2], moving: bool) -> RenderRequest {
+        RenderRequest {
             document: self.document().clone(),
             camera: self.navigation.camera(),
             size,
@@ -251,14 +251,14 @@ impl App {
             backend: self.look.backend,
             // A playing input keeps one up axis; a guess per frame could change from frame to frame.
             axes: self.up_axis.or(self.guessed_axes.filter(|_| !self.playing.is_empty())),
-            budget_ms: self
-                .both_ms(moving)
-                .map(|both_ms| self.turns.as_ref().map_or(both_ms, |turns| turns.budget_ms(both_ms))),
+            budget_ms: self.shared_budget_ms(moving).map(|shared_budget_ms| {
+                self.turns.as_ref().map_or(shared_budget_ms, |turns| turns.budget_ms(shared_budget_ms))
+            }),
         }
     }
 
     /// Milliseconds for a picture and a window frame together, while the view moves or an input plays; `None` at rest.
-    fn both_ms(&self, moving: bool) -> Option<f64> {
+    fn shared_budget_ms(&self, moving: bool) -> Option<f64> {
         let least_ms = self.look.moving_ms;
         if moving { Some(least_ms) } else { self.playing.frame_ms(least_ms) }
     }
@@ -267,15 +267,15 @@ impl App {
     pub(crate) fn ask(&mut self, context: &egui::Context, size: [u32; 2], busy: bool) {
         let (now, seconds) = context.input(|input| (input.time, f64::from(input.stable_dt)));
         let flight = if context.egui_wants_keyboard_input() { Flight::default() } else { flight(context) };
-        let busy = busy || std::mem::take(&mut self.stirred);
+        let busy = busy || std::mem::take(&mut self.moved_by_preview);
         self.loader.frame.set(self.frame());
         if self.navigation.advance(seconds, flight) || busy {
             self.moved = now;
         }
-        if self.first_camera.is_some_and(|(_, aspect)| aspect != self.aspect) && self.stands_by_itself() {
+        if self.first_camera.is_some_and(|(_, aspect)| aspect != self.aspect) && self.is_first_view() {
             self.first_view();
         }
-        let moving = now - self.moved < REST;
+        let moving = now - self.moved < REST_DELAY_S;
         if moving {
             context.request_repaint();
         }
@@ -292,15 +292,15 @@ impl App {
         look.settings.shading.legend = false;
         // Without averaging, noise would differ from picture to picture.
         look.settings.reconstruction.steady = moving;
-        if self.both_ms(false).is_none() {
+        if self.shared_budget_ms(false).is_none() {
             // A picture at rest shows its own points only, without the coarser pictures before it.
             look.settings.reconstruction.frames_averaged = 1;
         }
         let (version, camera, axes) = (self.version, self.navigation.camera(), self.axes());
-        let hurried = self.both_ms(moving).is_some();
-        let key = WishKey { version, camera, size, look, axes, hurried };
+        let hurried = self.shared_budget_ms(moving).is_some();
+        let key = RequestKey { version, camera, size, look, axes, hurried };
         if self.wished.as_ref() != Some(&key) {
-            self.render.wish(Wish { settings: key.look.settings.clone(), ..self.wish(size, moving) });
+            self.render.wish(RenderRequest { settings: key.look.settings.clone(), ..self.wish(size, moving) });
             self.wished = Some(key);
             self.awaited = true;
         }
@@ -311,8 +311,9 @@ impl App {
         let Some(turns) = &mut self.turns else { return };
         turns.begin();
         let now = context.input(|input| input.time);
-        let both_ms = self.both_ms(now - self.moved < REST).filter(|_| self.awaited);
-        let longest = both_ms.and_then(|both_ms| Some(self.turns.as_ref()?.longest(both_ms)));
+        let shared_budget_ms = self.shared_budget_ms(now - self.moved < REST_DELAY_S).filter(|_| self.awaited);
+        let longest =
+            shared_budget_ms.and_then(|shared_budget_ms| Some(self.turns.as_ref()?.longest(shared_budget_ms)));
         if let Some(answer) = longest.and_then(|longest| self.render.answer_within(longest)) {
             self.take(answer, now);
         }

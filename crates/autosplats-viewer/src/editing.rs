@@ -10,7 +10,7 @@ use crate::document::{Counts, Document, LayerId, label};
 
 /// Counts that panels show, for one version of the document.
 #[derive(Default)]
-pub(crate) struct Counted {
+pub(crate) struct CachedCounts {
     version: u64,
     /// Points of all layers.
     pub(crate) all: Counts,
@@ -33,10 +33,10 @@ impl App {
     }
 
     /// Point counts of the document and of each layer. They are computed only after a change, and not during a drag.
-    pub(crate) fn counts(&mut self) -> &Counted {
+    pub(crate) fn counts(&mut self) -> &CachedCounts {
         if self.counted.version != self.version && !self.tools.gizmo.is_busy() {
             let document = self.document();
-            self.counted = Counted {
+            self.counted = CachedCounts {
                 version: self.version,
                 all: document.counts(),
                 layers: document.layers.iter().map(|layer| (layer.id, document.counts_of(layer))).collect(),

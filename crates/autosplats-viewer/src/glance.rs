@@ -15,7 +15,7 @@ pub(crate) const FOV_DEG: f64 = 40.0;
 
 /// What the first view depends on besides the points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Frame {
+pub(crate) struct ViewFrame {
     /// Width over height.
     pub(crate) aspect: f64,
     /// The up axis, if the user chose one.
@@ -24,28 +24,28 @@ pub(crate) struct Frame {
 
 /// The frame of the window's picture, shared with the threads that read.
 #[derive(Clone, Debug)]
-pub(crate) struct Known(Arc<Mutex<Frame>>);
+pub(crate) struct SharedViewFrame(Arc<Mutex<ViewFrame>>);
 
-impl Known {
+impl SharedViewFrame {
     /// Starts with `frame`, until the window is drawn.
-    pub(crate) fn new(frame: Frame) -> Self {
+    pub(crate) fn new(frame: ViewFrame) -> Self {
         Self(Arc::new(Mutex::new(frame)))
     }
 
     /// The current frame.
-    pub(crate) fn get(&self) -> Frame {
+    pub(crate) fn get(&self) -> ViewFrame {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Sets the current frame.
-    pub(crate) fn set(&self, frame: Frame) {
+    pub(crate) fn set(&self, frame: ViewFrame) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = frame;
     }
 }
 
 /// What a first look at an input finds.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Glance {
+pub(crate) struct FirstLook {
     /// Up axis, guessed from the points.
     pub(crate) axes: Axes,
     /// Box around most of the points, world coordinates.
@@ -53,12 +53,12 @@ pub(crate) struct Glance {
     /// Camera that shows the input alone; `None` if no camera can.
     pub(crate) camera: Option<Camera>,
     /// The frame that `camera` is for.
-    pub(crate) frame: Frame,
+    pub(crate) frame: ViewFrame,
 }
 
-impl Glance {
+impl FirstLook {
     /// Examines the points of an input.
-    pub(crate) fn of(input: &Input, cloud: &Arc<PointCloud>, frame: Frame) -> Self {
+    pub(crate) fn of(input: &Input, cloud: &Arc<PointCloud>, frame: ViewFrame) -> Self {
         let axes = guess_axes(cloud);
         let mut alone = Document::default();
         alone.add(Layer::new(&*input.name, None, Arc::clone(cloud)).opened_at(input.world_from_input));

@@ -13,7 +13,7 @@ use crate::loading::{Appearance, Input};
 /// An input as stored in a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Kept {
+pub(crate) struct StoredInput {
     /// Path of a file (relative to the session's folder unless absolute), name of a scene, or address of a stream.
     pub(crate) source: String,
     #[serde(default = "yes")]
@@ -23,16 +23,16 @@ pub(crate) struct Kept {
     /// From the input's own to world coordinates, by columns.
     #[serde(default)]
     pub(crate) pose: DMat4,
-    #[serde(default, skip_serializing_if = "Reading::is_usual")]
-    options: Reading,
-    #[serde(default, skip_serializing_if = "Play::is_usual")]
-    play: Play,
+    #[serde(default, skip_serializing_if = "StoredReadOptions::is_usual")]
+    options: StoredReadOptions,
+    #[serde(default, skip_serializing_if = "StoredPlayOptions::is_usual")]
+    play: StoredPlayOptions,
 }
 
 /// How an input is read, where this differs from the default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Reading {
+struct StoredReadOptions {
     #[serde(skip_serializing_if = "Option::is_none")]
     columns: Option<Vec<String>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,7 +44,7 @@ struct Reading {
 /// How an input is played, where this differs from the default. The names are those of the program's flags.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Play {
+struct StoredPlayOptions {
     /// Whether the input is played though its source may be static.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     played: bool,
@@ -69,17 +69,24 @@ struct Play {
     accumulate: bool,
 }
 
-impl Kept {
+impl StoredInput {
     /// Stores an input and its appearance.
     pub(crate) fn of(input: &Input, appearance: Appearance) -> Self {
         let Appearance { visible, tint } = appearance;
         let (source, pose) = (App::source_name(input), input.world_from_input);
-        Self { source, visible, tint, pose, options: Reading::of(&input.options), play: Play::of(input) }
+        Self {
+            source,
+            visible,
+            tint,
+            pose,
+            options: StoredReadOptions::of(&input.options),
+            play: StoredPlayOptions::of(input),
+        }
     }
 
     /// An input of which only the source is known.
     pub(crate) fn named(source: String) -> Self {
-        let (options, play) = (Reading::default(), Play::default());
+        let (options, play) = (StoredReadOptions::default(), StoredPlayOptions::default());
         Self { source, visible: true, tint: None, pose: DMat4::IDENTITY, options, play }
     }
 
@@ -115,7 +122,7 @@ impl Kept {
     }
 }
 
-impl Reading {
+impl StoredReadOptions {
     fn of(options: &ReadOptions) -> Self {
         let ReadOptions { keep_no_returns, columns, depth_camera, .. } = options.clone();
         Self { columns, depth_camera, keep_no_returns }
@@ -132,7 +139,7 @@ impl Reading {
     }
 }
 
-impl Play {
+impl StoredPlayOptions {
     fn of(input: &Input) -> Self {
         let PlayOptions { fps, topics, frame, sample, scanners, seed, watch, latest, all: _ } = input.play.clone();
         Self {
@@ -200,9 +207,9 @@ mod tests {
     #[test]
     fn all_that_was_told_comes_back() {
         let appearance = Appearance { visible: false, tint: Some([1, 2, 3]) };
-        let kept = Kept::of(&told(), appearance);
+        let kept = StoredInput::of(&told(), appearance);
         let text = serde_json::to_string(&kept).expect("it can be written");
-        let read: Kept = serde_json::from_str(&text).expect("and read");
+        let read: StoredInput = serde_json::from_str(&text).expect("and read");
         assert_eq!(read, kept, "as it was: {text}");
         assert_eq!(read.problem(), None, "nothing is wrong with it");
         let (input, seen) = read.open(Path::new("/elsewhere")).expect("it can be opened");
@@ -215,28 +222,28 @@ mod tests {
             "and read"
         );
         let all = PlayOptions { latest: LatestOptions { accumulate: true, ..LatestOptions::default() }, ..play };
-        let (all, _) = Kept::of(&Input { play: all, ..told() }, appearance).open(Path::new("")).expect("a file");
+        let (all, _) = StoredInput::of(&Input { play: all, ..told() }, appearance).open(Path::new("")).expect("a file");
         assert!(all.play.latest.accumulate && all.play.latest.decay.is_none(), "all that came is kept");
     }
 
     #[test]
     fn what_was_not_told_is_not_written() {
-        let usual = Kept::of(&Input::file("/a/b.ply".into()), Appearance::default());
+        let usual = StoredInput::of(&Input::file("/a/b.ply".into()), Appearance::default());
         let text = serde_json::to_string(&usual).expect("it can be written");
         assert!(!text.contains("options") && !text.contains("play"), "{text}");
-        assert_eq!(usual, Kept::named("/a/b.ply".into()), "nothing is known but its name");
+        assert_eq!(usual, StoredInput::named("/a/b.ply".into()), "nothing is known but its name");
         assert_eq!(usual.short_name(), "b.ply");
-        assert!(!usual.moves() && Kept::named("drive.mcap".into()).moves(), "recordings do");
-        let relative = Kept::named("b.ply".into()).open(Path::new("/a")).expect("a file");
+        assert!(!usual.moves() && StoredInput::named("drive.mcap".into()).moves(), "recordings do");
+        let relative = StoredInput::named("b.ply".into()).open(Path::new("/a")).expect("a file");
         assert_eq!(relative.0.source.path(), Some(Path::new("/a/b.ply")), "from the folder");
-        assert!(Kept::named("scene:nothing".into()).open(Path::new("/a")).is_err(), "there is no such scene");
+        assert!(StoredInput::named("scene:nothing".into()).open(Path::new("/a")).is_err(), "there is no such scene");
     }
 
     #[test]
     fn a_decay_that_is_no_time_is_told() {
         for decay in ["-1", "1e300"] {
             let text = format!(r#"{{"source": "drive.mcap", "play": {{"decay": {decay}}}}}"#);
-            let kept: Kept = serde_json::from_str(&text).expect("it can be read");
+            let kept: StoredInput = serde_json::from_str(&text).expect("it can be read");
             assert!(kept.problem().is_some_and(|problem| problem.contains("drive.mcap")), "{text}");
         }
     }

@@ -208,8 +208,8 @@ pub(crate) fn run(app: &mut App, context: &egui::Context, command: Command) {
         Command::Look => app.panels.look = !app.panels.look,
         Command::Statistics => app.panels.statistics = !app.panels.statistics,
         Command::Help => app.panels.help = !app.panels.help,
-        Command::NextPart => panels::go_on(app, context, false),
-        Command::PreviousPart => panels::go_on(app, context, true),
+        Command::NextPart => panels::focus_next_part(app, context, false),
+        Command::PreviousPart => panels::focus_next_part(app, context, true),
         Command::Tool(tool) => {
             app.tools.cancel();
             app.tool = tool;

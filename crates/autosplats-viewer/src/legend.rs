@@ -8,13 +8,13 @@ use crate::overlay::round;
 use crate::tools::ruler;
 
 /// Width of the colour bar, screen points.
-const BAR: f32 = 14.0;
+const BAR_WIDTH: f32 = 14.0;
 /// Smallest height between two values, screen points.
-const STEP: f32 = 26.0;
+const MIN_LABEL_STEP: f32 = 26.0;
 /// Margin around the legend, screen points.
 const MARGIN: f32 = 8.0;
 /// Segments of the colour bar.
-const PIECES: u16 = 64;
+const BAR_SEGMENTS: u16 = 64;
 
 /// Draws the legend at the right edge, if the last picture shows values.
 pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
@@ -22,7 +22,7 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
     let Some([low, high]) = app.shot.as_ref().and_then(|shot| shot.counts.value_range) else { return };
     let (true, Some(usual)) = (shading.legend, shading.color.usual_map()) else { return };
     let height = (0.5 * rect.height()).min(320.0);
-    if height < 3.0 * STEP {
+    if height < 3.0 * MIN_LABEL_STEP {
         return;
     }
     let painter = ui.painter_at(rect);
@@ -31,17 +31,19 @@ pub(crate) fn show(app: &App, ui: &egui::Ui, rect: Rect) {
     let title = text(title(&shading.color, app));
     let line = title.size().y;
     let bar_height = height - 3.0 * MARGIN - line;
-    let values = ticks(low, high, f64::from(bar_height / STEP).max(2.0));
+    let values = ticks(low, high, f64::from(bar_height / MIN_LABEL_STEP).max(2.0));
     let labels: Vec<_> = values.iter().map(|(value, label)| (*value, text(label.clone()))).collect();
     let widest = labels.iter().map(|(_, label)| label.size().x).fold(0.0, f32::max);
-    let width = (BAR + 10.0 + widest).max(title.size().x) + 2.0 * MARGIN;
+    let width = (BAR_WIDTH + 10.0 + widest).max(title.size().x) + 2.0 * MARGIN;
     let panel =
         Rect::from_min_size(pos2(rect.right() - width - 12.0, rect.center().y - 0.5 * height), vec2(width, height));
     painter.rect_filled(panel, 4.0, Color32::from_black_alpha(170));
     let inner = panel.shrink(MARGIN);
     painter.galley(inner.min, title, Color32::WHITE);
-    let bar =
-        Rect::from_min_max(pos2(inner.left(), inner.top() + line + MARGIN), pos2(inner.left() + BAR, inner.bottom()));
+    let bar = Rect::from_min_max(
+        pos2(inner.left(), inner.top() + line + MARGIN),
+        pos2(inner.left() + BAR_WIDTH, inner.bottom()),
+    );
     painter.add(colors(shading.color_map.unwrap_or(usual), bar));
     for (value, label) in labels {
         let part = if high > low { (value - low) / (high - low) } else { 0.5 };
@@ -64,8 +66,8 @@ fn title(color: &ColorMode, app: &App) -> String {
 /// Mesh of the colour bar.
 fn colors(map: ColorMap, bar: Rect) -> Mesh {
     let mut mesh = Mesh::default();
-    for piece in 0..=PIECES {
-        let part = f32::from(piece) / f32::from(PIECES);
+    for piece in 0..=BAR_SEGMENTS {
+        let part = f32::from(piece) / f32::from(BAR_SEGMENTS);
         let [r, g, b] = map.at(part);
         let y = egui::lerp(bar.bottom()..=bar.top(), part);
         for x in [bar.left(), bar.right()] {

@@ -10,13 +10,13 @@ use autosplats::cloud::glam::DMat4;
 use autosplats::cloud::{Error, PlayOptions, PointCloud, Progress, ReadOptions, Source};
 use eframe::egui;
 
-use crate::glance::{Frame, Glance, Known};
+use crate::glance::{FirstLook, SharedViewFrame, ViewFrame};
 use crate::threads::spawn;
 
 /// Largest number of points shown before a file is read to its end.
 const PREVIEW_POINTS: usize = 4_000_000;
 /// Time between two checks of a watched file. The file is read again when two successive checks see the same change.
-const WATCH: Duration = Duration::from_millis(400);
+const WATCH_INTERVAL: Duration = Duration::from_millis(400);
 
 /// Identifies a reading job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -84,11 +84,11 @@ impl Default for Appearance {
 }
 
 /// What happened to a job.
-pub(crate) enum News {
+pub(crate) enum JobNews {
     /// Part of the points, shown until all have arrived.
-    Preview(Arc<PointCloud>, Glance),
+    Preview(Arc<PointCloud>, FirstLook),
     /// All points, and the reader's notes.
-    Read(Arc<PointCloud>, Glance, Vec<String>),
+    Read(Arc<PointCloud>, FirstLook, Vec<String>),
     /// Why reading failed.
     Failed(String),
     /// The job was cancelled.
@@ -126,9 +126,9 @@ impl Job {
 pub(crate) struct Loader {
     context: egui::Context,
     /// The shape and the up axis of the window's picture.
-    pub(crate) frame: Known,
+    pub(crate) frame: SharedViewFrame,
     orders: Sender<Order>,
-    receiver: Receiver<(JobId, News)>,
+    receiver: Receiver<(JobId, JobNews)>,
     changes: (Sender<PathBuf>, Receiver<PathBuf>),
     jobs: Vec<Job>,
     next: u64,
@@ -146,7 +146,7 @@ impl Loader {
         let (orders, queue) = channel::<Order>();
         let (sender, receiver) = channel();
         let asked = context.clone();
-        let frame = Known::new(Frame { aspect: 1.5, up: None });
+        let frame = SharedViewFrame::new(ViewFrame { aspect: 1.5, up: None });
         let known = frame.clone();
         spawn("read", move || {
             for order in queue {
@@ -154,7 +154,7 @@ impl Loader {
                 let read = std::panic::catch_unwind(work);
                 // A panic in one file must not stop the following files.
                 let news = read.unwrap_or_else(|_| {
-                    News::Failed(format!("{}: reading failed, which is a bug in this program", order.input.name))
+                    JobNews::Failed(format!("{}: reading failed, which is a bug in this program", order.input.name))
                 });
                 let _ = sender.send((order.id, news));
                 asked.request_repaint();
@@ -191,20 +191,20 @@ impl Loader {
     }
 
     /// The news since the last call. Jobs that have ended are dropped, so each one's last news is returned once.
-    pub(crate) fn news(&mut self) -> Vec<(Input, JobId, News)> {
+    pub(crate) fn news(&mut self) -> Vec<(Input, JobId, JobNews)> {
         let news: Vec<_> = self.receiver.try_iter().collect();
         let mut told = Vec::new();
         for (id, news) in news {
             let Some(at) = self.jobs.iter().position(|job| job.id == id) else { continue };
             let input = self.jobs[at].input.clone();
             let cancelled = self.jobs[at].state.cancelled.load(Ordering::Relaxed);
-            if matches!(news, News::Read(..) | News::Failed(_) | News::Cancelled) {
+            if matches!(news, JobNews::Read(..) | JobNews::Failed(_) | JobNews::Cancelled) {
                 self.jobs.remove(at);
             }
             // A job that finished before the reader saw the cancellation counts as cancelled.
             match news {
-                News::Preview(..) if cancelled => {}
-                News::Read(..) if cancelled => told.push((input, id, News::Cancelled)),
+                JobNews::Preview(..) if cancelled => {}
+                JobNews::Read(..) if cancelled => told.push((input, id, JobNews::Cancelled)),
                 news => told.push((input, id, news)),
             }
         }
@@ -221,7 +221,7 @@ impl Loader {
             let mut known = stamp();
             let mut pending = None;
             while watched.upgrade().is_some() {
-                std::thread::sleep(WATCH);
+                std::thread::sleep(WATCH_INTERVAL);
                 let now = stamp();
                 if now == known || now.is_none() {
                     pending = None;
@@ -250,30 +250,30 @@ pub(crate) struct Watch {
     _alive: Arc<()>,
 }
 
-fn read(order: &Order, frame: &Known, sender: &Sender<(JobId, News)>, context: &egui::Context) -> News {
+fn read(order: &Order, frame: &SharedViewFrame, sender: &Sender<(JobId, JobNews)>, context: &egui::Context) -> JobNews {
     if order.state.cancelled.load(Ordering::Relaxed) {
-        return News::Cancelled;
+        return JobNews::Cancelled;
     }
     let follower = Follower { order, frame, sender, context, notes: Mutex::default(), preview: Mutex::default() };
     let options = ReadOptions { exact: true, ..order.input.options.clone() };
     match order.input.source.read(&options, &follower) {
-        Ok(cloud) if cloud.is_empty() => News::Failed(format!("{}: there are no points in it", order.input.name)),
+        Ok(cloud) if cloud.is_empty() => JobNews::Failed(format!("{}: there are no points in it", order.input.name)),
         Ok(cloud) => {
             let notes = follower.notes.into_inner().unwrap_or_else(PoisonError::into_inner);
             let cloud = Arc::new(cloud);
-            let glance = Glance::of(&order.input, &cloud, frame.get());
-            News::Read(cloud, glance, notes)
+            let glance = FirstLook::of(&order.input, &cloud, frame.get());
+            JobNews::Read(cloud, glance, notes)
         }
-        Err(Error::Cancelled) => News::Cancelled,
-        Err(error) => News::Failed(error.to_string()),
+        Err(Error::Cancelled) => JobNews::Cancelled,
+        Err(error) => JobNews::Failed(error.to_string()),
     }
 }
 
 /// Receives progress, notes and points from a reader.
 struct Follower<'a> {
     order: &'a Order,
-    frame: &'a Known,
-    sender: &'a Sender<(JobId, News)>,
+    frame: &'a SharedViewFrame,
+    sender: &'a Sender<(JobId, JobNews)>,
     context: &'a egui::Context,
     notes: Mutex<Vec<String>>,
     preview: Mutex<Preview>,
@@ -344,8 +344,8 @@ impl Progress for Follower<'_> {
         let mut preview = self.preview.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(cloud) = preview.add(points) {
             let cloud = Arc::new(cloud);
-            let glance = Glance::of(&self.order.input, &cloud, self.frame.get());
-            let _ = self.sender.send((self.order.id, News::Preview(cloud, glance)));
+            let glance = FirstLook::of(&self.order.input, &cloud, self.frame.get());
+            let _ = self.sender.send((self.order.id, JobNews::Preview(cloud, glance)));
             self.context.request_repaint();
         }
     }

@@ -5,27 +5,27 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use eframe::egui;
 
 /// Seconds that a note is shown.
-const NOTE: f64 = 8.0;
+const NOTE_S: f64 = 8.0;
 /// Number of messages kept; the oldest are dropped first.
-const KEPT: usize = 6;
+const MAX_MESSAGES: usize = 6;
 
 /// The messages that are shown.
 pub(crate) struct Messages {
     list: Vec<Message>,
     /// Messages from threads.
-    post: (Mail, Receiver<Result<String, String>>),
+    post: (MessageSender, Receiver<Result<String, String>>),
     /// Why the last picture could not be rendered.
     failure: Option<String>,
 }
 
 /// Sends messages from a thread: a note, or an error.
 #[derive(Clone)]
-pub(crate) struct Mail {
+pub(crate) struct MessageSender {
     sender: Sender<Result<String, String>>,
     context: egui::Context,
 }
 
-impl Mail {
+impl MessageSender {
     /// Sends the result of some work.
     pub(crate) fn send(&self, message: Result<String, String>) {
         let _ = self.sender.send(message);
@@ -44,11 +44,11 @@ impl Messages {
     /// No messages. `context` is asked for a repaint when a thread sends one.
     pub(crate) fn new(context: egui::Context) -> Self {
         let (sender, receiver) = channel();
-        Self { list: Vec::new(), post: (Mail { sender, context }, receiver), failure: None }
+        Self { list: Vec::new(), post: (MessageSender { sender, context }, receiver), failure: None }
     }
 
     /// A sender for a thread.
-    pub(crate) fn sender(&self) -> Mail {
+    pub(crate) fn sender(&self) -> MessageSender {
         self.post.0.clone()
     }
 
@@ -63,7 +63,7 @@ impl Messages {
     fn push(&mut self, text: String, error: bool) {
         self.list.retain(|message| message.text != text);
         self.list.push(Message { text, error, since: None });
-        let surplus = self.list.len().saturating_sub(KEPT);
+        let surplus = self.list.len().saturating_sub(MAX_MESSAGES);
         self.list.drain(..surplus);
     }
 
@@ -87,7 +87,7 @@ impl Messages {
             }
         }
         let now = context.input(|input| input.time);
-        self.list.retain(|message| message.error || message.since.is_none_or(|since| now - since < NOTE));
+        self.list.retain(|message| message.error || message.since.is_none_or(|since| now - since < NOTE_S));
         if self.list.is_empty() && self.failure.is_none() {
             return;
         }

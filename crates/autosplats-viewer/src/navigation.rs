@@ -9,21 +9,21 @@ use autosplats::cloud::glam::{DMat3, DQuat, DVec2, DVec3};
 use autosplats::{Camera, Projection};
 
 /// Time in which the camera covers 63 % of its way, seconds.
-const LAG: f64 = 0.06;
+const LAG_S: f64 = 0.06;
 /// Fraction of the distance, or radians, below which the camera has arrived: a twentieth of a pixel.
-const ARRIVED: f64 = 5e-5;
+const ARRIVAL_TOLERANCE: f64 = 5e-5;
 /// Default vertical field of view of the perspective camera, degrees.
 const FOV_DEG: f64 = 40.0;
 /// Radians turned by a drag over the picture's height.
-const TURN: f64 = std::f64::consts::PI;
+const DRAG_TURN_RAD: f64 = std::f64::consts::PI;
 /// Radians turned by the arrow keys per second.
-const KEY_TURN: f64 = 1.2;
+const KEY_TURN_RAD_PER_S: f64 = 1.2;
 /// Distances to the pivot that keys fly per second.
-const FLY: f64 = 0.8;
+const FLY_DISTANCES_PER_S: f64 = 0.8;
 /// Factor by which Shift flies faster.
-const FAST: f64 = 5.0;
+const FAST_FACTOR: f64 = 5.0;
 /// Smallest and largest distance from the pivot, in radii of the scene.
-const DISTANCES: [f64; 2] = [1e-6, 1e3];
+const DISTANCE_BOUNDS_RADII: [f64; 2] = [1e-6, 1e3];
 
 /// Place and direction of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,9 +90,9 @@ impl Pose {
     fn is_near(&self, other: &Self) -> bool {
         // Rounding of coordinates far from the origin.
         let coarse = 4.0 * f64::EPSILON * other.pivot.abs().max_element();
-        self.pivot.distance(other.pivot) < ARRIVED * other.distance + coarse
-            && (self.distance / other.distance).ln().abs() < ARRIVED
-            && self.world_from_view.angle_between(other.world_from_view) < ARRIVED
+        self.pivot.distance(other.pivot) < ARRIVAL_TOLERANCE * other.distance + coarse
+            && (self.distance / other.distance).ln().abs() < ARRIVAL_TOLERANCE
+            && self.world_from_view.angle_between(other.world_from_view) < ARRIVAL_TOLERANCE
     }
 
     /// The pose a fraction `part`, 0 to 1, of the way to `goal`.
@@ -199,17 +199,17 @@ impl Navigation {
     pub(crate) fn advance(&mut self, seconds: f64, flight: Flight) -> bool {
         let seconds = seconds.clamp(0.0, 0.25);
         if !flight.still() {
-            let step = seconds * FLY * self.goal.distance * if flight.fast { FAST } else { 1.0 };
+            let step = seconds * FLY_DISTANCES_PER_S * self.goal.distance * if flight.fast { FAST_FACTOR } else { 1.0 };
             let [right, forward] = [DVec3::X, DVec3::Z].map(|axis| self.goal.axis(axis));
             self.goal.pivot += (right * flight.right + forward * flight.forward + self.up * flight.up) * step;
             let eye = self.goal.eye();
-            self.turn(DVec2::new(flight.turn_right, -flight.turn_up) * (seconds * KEY_TURN / TURN));
+            self.turn(DVec2::new(flight.turn_right, -flight.turn_up) * (seconds * KEY_TURN_RAD_PER_S / DRAG_TURN_RAD));
             self.goal.pivot = eye + self.goal.forward() * self.goal.distance;
         }
         if self.shown == self.goal {
             return false;
         }
-        let next = self.shown.toward(&self.goal, 1.0 - (-seconds / LAG).exp());
+        let next = self.shown.toward(&self.goal, 1.0 - (-seconds / LAG_S).exp());
         self.shown = if next.is_near(&self.goal) { self.goal } else { next };
         true
     }
@@ -229,7 +229,7 @@ impl Navigation {
     pub(crate) fn look(&mut self, drag: DVec2) {
         let eye = self.goal.eye();
         // The drag pulls the world: opposite to an orbit, by the angle that the dragged pixels cover.
-        let scale = self.fov_deg.to_radians() / TURN;
+        let scale = self.fov_deg.to_radians() / DRAG_TURN_RAD;
         self.turn(-drag * scale.min(1.0));
         self.goal.pivot = eye + self.goal.forward() * self.goal.distance;
     }
@@ -238,7 +238,7 @@ impl Navigation {
         if !drag.is_finite() {
             return;
         }
-        let turn = drag * TURN;
+        let turn = drag * DRAG_TURN_RAD;
         // Both components, so that a step beyond the pole is detected and undone.
         let pitch = self.goal.forward().dot(self.up).atan2(self.goal.axis(DVec3::NEG_Y).dot(self.up));
         // A drag down raises the eye, which then looks further down.
@@ -262,7 +262,7 @@ impl Navigation {
     /// Divides the distance by `factor`: above 1 moves closer. `target` stays where it is in the picture.
     pub(crate) fn zoom(&mut self, factor: f64, target: Option<DVec3>) {
         let scale = 1.0 / factor;
-        let [least, most] = DISTANCES.map(|part| part * self.scene.1);
+        let [least, most] = DISTANCE_BOUNDS_RADII.map(|part| part * self.scene.1);
         let distance = (self.goal.distance * scale).clamp(least, most);
         let scale = distance / self.goal.distance;
         if !(scale > 0.0 && scale.is_finite()) {

@@ -8,12 +8,12 @@ use autosplats::{Camera, Projection, ViewDirection};
 
 use crate::app::App;
 use crate::document::{Layer, LayerId};
-use crate::glance::{FOV_DEG, Frame, Glance};
-use crate::kept::Kept;
-use crate::loading::{Appearance, Input, JobId, News};
+use crate::glance::{FOV_DEG, FirstLook, ViewFrame};
+use crate::kept::StoredInput;
+use crate::loading::{Appearance, Input, JobId, JobNews};
 
 /// Number of recent inputs kept.
-const RECENT: usize = 12;
+const MAX_RECENT_INPUTS: usize = 12;
 
 impl App {
     /// Opens an input with the default appearance.
@@ -24,10 +24,10 @@ impl App {
     /// Opens an input with an appearance.
     pub(crate) fn open_as(&mut self, input: Input, appearance: Appearance) {
         if !matches!(input.source, Source::Scene(..) | Source::StandardInput) {
-            let kept = Kept::of(&input, Appearance::default());
+            let kept = StoredInput::of(&input, Appearance::default());
             self.recent.retain(|known| known.source != kept.source);
             self.recent.insert(0, kept);
-            self.recent.truncate(RECENT);
+            self.recent.truncate(MAX_RECENT_INPUTS);
         }
         if let Some(path) = input.source.path()
             && self.watch
@@ -46,7 +46,7 @@ impl App {
     }
 
     /// Opens a stored input, read and played as before.
-    pub(crate) fn open_again(&mut self, kept: Kept) {
+    pub(crate) fn open_again(&mut self, kept: StoredInput) {
         match kept.open(Path::new("")) {
             Ok((input, appearance)) => self.open_as(input, appearance),
             Err(error) => self.messages.error(error.to_string()),
@@ -69,11 +69,11 @@ impl App {
     pub(crate) fn follow_files(&mut self) {
         for (input, job, news) in self.loader.news() {
             match news {
-                News::Preview(cloud, glance) if !self.reloads.contains_key(&job) => {
+                JobNews::Preview(cloud, glance) if !self.reloads.contains_key(&job) => {
                     self.fill_layer(&input, job, &cloud, glance);
                 }
-                News::Preview(..) => {}
-                News::Read(cloud, glance, notes) => {
+                JobNews::Preview(..) => {}
+                JobNews::Read(cloud, glance, notes) => {
                     notes.into_iter().for_each(|note| self.messages.note(format!("{}: {note}", input.name)));
                     match self.reloads.remove(&job) {
                         Some(id) => self.read_again(&input, id, &cloud, glance),
@@ -85,7 +85,7 @@ impl App {
                         }
                     }
                 }
-                News::Failed(why) => {
+                JobNews::Failed(why) => {
                     self.messages.error(why);
                     let reloads = self.reloads.contains_key(&job);
                     let appearance = self.forget_job(job);
@@ -94,7 +94,7 @@ impl App {
                         self.fail(input, appearance);
                     }
                 }
-                News::Cancelled => {
+                JobNews::Cancelled => {
                     if !self.reloads.contains_key(&job) {
                         self.messages.note(format!("{}: reading was cancelled", input.name));
                     }
@@ -108,7 +108,7 @@ impl App {
 
     /// Puts the points of a job into its layer, which the first points create. Undo does not revert this. Returns the
     /// layer, or `None` if the user has removed it.
-    fn fill_layer(&mut self, input: &Input, job: JobId, cloud: &Arc<PointCloud>, glance: Glance) -> Option<LayerId> {
+    fn fill_layer(&mut self, input: &Input, job: JobId, cloud: &Arc<PointCloud>, glance: FirstLook) -> Option<LayerId> {
         let id = match self.loading.get(&job).copied() {
             Some(id) if self.document().layer(id).is_none() => {
                 self.loader.cancel(job);
@@ -117,7 +117,7 @@ impl App {
             }
             Some(id) => {
                 self.fill(id, cloud);
-                self.look_anew(id, glance, false);
+                self.update_view(id, glance, false);
                 id
             }
             None => {
@@ -135,7 +135,7 @@ impl App {
     }
 
     /// Adds the layer of an input. The camera moves to show the points if they are the first ones.
-    pub(crate) fn add_layer(&mut self, layer: Layer, input: &Input, glance: Glance) -> LayerId {
+    pub(crate) fn add_layer(&mut self, layer: Layer, input: &Input, glance: FirstLook) -> LayerId {
         let first = self.document().layers.is_empty();
         let id = layer.id;
         // Forgets the inputs of layers that undo can no longer bring back.
@@ -148,13 +148,13 @@ impl App {
             self.first_camera = None;
         }
         let fitted = first && !std::mem::take(&mut self.camera_given);
-        self.look_anew(id, glance, fitted);
+        self.update_view(id, glance, fitted);
         id
     }
 
     /// Updates the view after the points of a layer have changed. The camera moves if `fitted`, or if the user has not
     /// moved it yet.
-    fn look_anew(&mut self, id: LayerId, glance: Glance, fitted: bool) {
+    fn update_view(&mut self, id: LayerId, glance: FirstLook, fitted: bool) {
         if self.document().layers.first().is_some_and(|layer| layer.id == id) {
             self.guessed_axes = Some(glance.axes);
         }
@@ -165,7 +165,7 @@ impl App {
         };
         let whole = !document.clip.as_ref().is_some_and(|clip| clip.enabled);
         self.glance = Some((self.version, glance)).filter(|_| alone && whole);
-        if fitted || self.stands_by_itself() {
+        if fitted || self.is_first_view() {
             self.first_view();
         } else {
             self.measure_scene();
@@ -202,7 +202,7 @@ impl App {
     }
 
     /// Shows the new points of a file. Edits made meanwhile apply to the old points, so that the new ones are dropped.
-    fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: Glance) {
+    fn read_again(&mut self, input: &Input, id: LayerId, cloud: &Arc<PointCloud>, glance: FirstLook) {
         if self.history.is_unsaved(id) {
             self.messages.note(format!(
                 "{} has changed; its new points are not shown, because it has unsaved edits",
@@ -211,7 +211,7 @@ impl App {
         } else if self.document().layer(id).is_some() {
             self.fill(id, cloud);
             self.messages.note(format!("{} was read again", input.name));
-            self.look_anew(id, glance, false);
+            self.update_view(id, glance, false);
         }
     }
 
@@ -256,18 +256,18 @@ impl App {
     }
 
     /// Places the camera; the first input then does not move it.
-    pub(crate) fn stand_at(&mut self, camera: &Camera) {
+    pub(crate) fn set_camera(&mut self, camera: &Camera) {
         self.navigation.go_to(camera, true);
         self.camera_given = true;
     }
 
     /// What the first view depends on besides the points.
-    pub(crate) fn frame(&self) -> Frame {
-        Frame { aspect: self.aspect, up: self.up_axis }
+    pub(crate) fn frame(&self) -> ViewFrame {
+        ViewFrame { aspect: self.aspect, up: self.up_axis }
     }
 
     /// The first look at the only input, if the document has not changed since.
-    fn glance(&self) -> Option<&Glance> {
+    fn glance(&self) -> Option<&FirstLook> {
         self.glance.as_ref().filter(|(version, _)| *version == self.version).map(|(_, glance)| glance)
     }
 
@@ -281,7 +281,7 @@ impl App {
     }
 
     /// Whether the user has not moved since the program chose the camera.
-    pub(crate) fn stands_by_itself(&self) -> bool {
+    pub(crate) fn is_first_view(&self) -> bool {
         self.first_camera.is_some_and(|(camera, _)| camera == self.navigation.goal_camera())
     }
 

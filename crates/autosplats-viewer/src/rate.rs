@@ -14,7 +14,7 @@ pub(crate) struct Rate {
 
 impl Rate {
     /// Number of pictures in the plot.
-    const KEPT: usize = 120;
+    const PLOT_PICTURE_COUNT: usize = 120;
 
     /// Counts a picture at time `now`, seconds.
     pub(crate) fn count(&mut self, now: f64, picture: &Picture) {
@@ -28,7 +28,7 @@ impl Rate {
             }
         }
         self.last = Some(now);
-        if self.timings.len() == Self::KEPT {
+        if self.timings.len() == Self::PLOT_PICTURE_COUNT {
             self.timings.pop_front();
         }
         self.timings.push_back(picture.timings);

@@ -14,11 +14,11 @@ use eframe::egui;
 
 use crate::files;
 use crate::playing::Reel;
-use crate::render::Wish;
+use crate::render::RenderRequest;
 use crate::threads::spawn;
 
 /// Pictures that may wait for the writer.
-const QUEUE: usize = 3;
+const MAX_WAITING_PICTURES: usize = 3;
 
 /// Number of recordings started so far.
 static RECORDINGS: AtomicU64 = AtomicU64::new(0);
@@ -28,7 +28,7 @@ pub(crate) struct Recording {
     /// Unique number of the recording.
     pub(crate) number: u64,
     /// The request for the last picture; the next one differs by camera and moving points only.
-    wish: Wish,
+    wish: RenderRequest,
     /// One camera per picture.
     cameras: Vec<Camera>,
     /// Source of the moving points, where time runs.
@@ -48,7 +48,7 @@ impl Recording {
     /// Starts a film of the scene in `wish`, with one picture per camera, at `rate` pictures per second, into `target`.
     /// With a `reel`, time runs.
     pub(crate) fn start(
-        wish: Wish,
+        wish: RenderRequest,
         cameras: Vec<Camera>,
         reel: Option<Reel>,
         rate: u32,
@@ -56,7 +56,7 @@ impl Recording {
         context: &egui::Context,
     ) -> Self {
         let size = wish.size;
-        let (pictures, queue) = sync_channel::<Image>(QUEUE);
+        let (pictures, queue) = sync_channel::<Image>(MAX_WAITING_PICTURES);
         let (sender, result) = sync_channel(1);
         let context = context.clone();
         let total = cameras.len();
@@ -83,7 +83,7 @@ impl Recording {
     ///
     /// # Errors
     /// Why there are no more pictures.
-    pub(crate) fn wanted(&mut self) -> Result<Option<Wish>, String> {
+    pub(crate) fn wanted(&mut self) -> Result<Option<RenderRequest>, String> {
         if let Some(image) = self.waiting.take() {
             self.hand_over(image);
         }
@@ -191,7 +191,16 @@ mod tests {
     fn recording(pictures: usize, target: &Target) -> Recording {
         let camera = Navigation::new().camera();
         let (document, settings, backend) = (Document::default(), Settings::default(), Backend::Cpu);
-        let wish = Wish { document, camera, size: [2, 1], settings, dots: None, backend, axes: None, budget_ms: None };
+        let wish = RenderRequest {
+            document,
+            camera,
+            size: [2, 1],
+            settings,
+            dots: None,
+            backend,
+            axes: None,
+            budget_ms: None,
+        };
         Recording::start(wish, vec![camera; pictures], None, 25, target.clone(), &egui::Context::default())
     }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::app::App;
 use crate::document::ClipBox;
 use crate::files;
-use crate::kept::Kept;
+use crate::kept::StoredInput;
 use crate::loading::Appearance;
 use crate::look::Look;
 use crate::playing::Clock;
@@ -18,7 +18,7 @@ use crate::playing::Clock;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct State {
-    inputs: Vec<Kept>,
+    inputs: Vec<StoredInput>,
     camera: Option<Camera>,
     up: Option<Up>,
     look: Look,
@@ -47,7 +47,7 @@ impl State {
     pub(crate) fn of(app: &App) -> Self {
         let layers = app.document().layers.iter().filter_map(|layer| {
             let appearance = Appearance { visible: layer.visible, tint: layer.tint };
-            let mut kept = Kept::of(app.inputs.get(&layer.id)?, appearance);
+            let mut kept = StoredInput::of(app.inputs.get(&layer.id)?, appearance);
             kept.pose = layer.pose;
             Some(kept)
         });
@@ -57,10 +57,10 @@ impl State {
         let read = read.map(|job| (&job.input, app.appearances.get(&job.id).copied().unwrap_or_default()));
         let waiting = app.playing.waiting().map(|waiting| (waiting.input, waiting.appearance));
         let failed = app.failed.iter().map(|(input, appearance)| (input, *appearance));
-        let absent = read.chain(waiting).chain(failed).map(|(input, appearance)| Kept::of(input, appearance));
+        let absent = read.chain(waiting).chain(failed).map(|(input, appearance)| StoredInput::of(input, appearance));
         // Points from a pipe cannot be read again.
-        let again = |kept: &Kept| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
-        let inputs: Vec<Kept> = layers.chain(absent).filter(again).collect();
+        let again = |kept: &StoredInput| !matches!(Source::parse(&kept.source), Ok(Source::StandardInput));
+        let inputs: Vec<StoredInput> = layers.chain(absent).filter(again).collect();
         let up = app.up_axis.map(|axes| match axes {
             Axes::ZUp => Up::Z,
             Axes::YUp => Up::Y,
@@ -68,7 +68,7 @@ impl State {
         });
         Self {
             camera: (!inputs.is_empty()).then(|| app.navigation.goal_camera()),
-            clock: inputs.iter().any(Kept::moves).then(|| app.playing.clock.clone()),
+            clock: inputs.iter().any(StoredInput::moves).then(|| app.playing.clock.clone()),
             inputs,
             up,
             look: app.look.clone(),
@@ -94,7 +94,7 @@ impl State {
         if state.clip.as_ref().is_some_and(|clip| !clip.is_box()) {
             return Err(format!("{}: the clipping box is invalid", path.display()));
         }
-        if let Some(problem) = state.inputs.iter().find_map(Kept::problem) {
+        if let Some(problem) = state.inputs.iter().find_map(StoredInput::problem) {
             return Err(format!("{}: {problem}", path.display()));
         }
         if state.clock.as_ref().is_some_and(|clock| !clock.is_clock()) {
@@ -146,7 +146,7 @@ impl State {
             }
         }
         if let Some(camera) = camera {
-            app.stand_at(&camera);
+            app.set_camera(&camera);
         }
     }
 }
@@ -168,7 +168,7 @@ mod tests {
     fn states_come_back() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("state.json");
-        let inputs = ["a.ply", "b.mcap"].map(|name| Kept::named(name.into())).to_vec();
+        let inputs = ["a.ply", "b.mcap"].map(|name| StoredInput::named(name.into())).to_vec();
         let clip = ClipBox { rotation: DQuat::from_rotation_z(0.7), ..ClipBox::new(DVec3::ZERO, DVec3::ONE) };
         let mut clock = Clock::default();
         (clock.speed, clock.looped) = (0.25, false);
@@ -179,7 +179,7 @@ mod tests {
         std::fs::write(&path, older).expect("written");
         let read = State::read(&path).expect("a file from before there were boxes, options and clocks");
         assert_eq!((read.clip, read.clock), (None, None), "none were told");
-        assert_eq!(read.inputs, [Kept::named("a.ply".into())], "nothing but the name");
+        assert_eq!(read.inputs, [StoredInput::named("a.ply".into())], "nothing but the name");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::app::App;
-use crate::kept::Kept;
+use crate::kept::StoredInput;
 use crate::look::Look;
 
 const LOOK: &str = "look";
@@ -20,13 +20,13 @@ pub(crate) fn save(app: &App, storage: &mut dyn eframe::Storage) {
 }
 
 /// Loads what was stored. Values that this version does not understand become defaults.
-pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> (Look, Vec<Kept>) {
+pub(crate) fn load(storage: Option<&dyn eframe::Storage>) -> (Look, Vec<StoredInput>) {
     let Some(storage) = storage else { return (Look::default(), Vec::new()) };
     let look: Look = eframe::get_value(storage, LOOK).unwrap_or_default();
     let look = if look.settings.check().is_ok() { look } else { Look::default() };
     // Older versions stored paths only.
     let paths = || eframe::get_value::<Vec<PathBuf>>(storage, RECENT).unwrap_or_default();
     let recent = eframe::get_value(storage, RECENT)
-        .unwrap_or_else(|| paths().iter().map(|path| Kept::named(path.display().to_string())).collect());
+        .unwrap_or_else(|| paths().iter().map(|path| StoredInput::named(path.display().to_string())).collect());
     (look, recent)
 }

@@ -7,11 +7,11 @@ use crate::commands::Tool;
 use crate::document::{PickedPoint, Region, SelectMode};
 use crate::gizmo::Gizmo;
 use crate::measure::{Ruler, angle_text};
-use crate::render::{Purpose, Seen, Task};
+use crate::render::{PickHit, Purpose, Task};
 use autosplats::cloud::glam::DVec3;
 
 /// Initial radius of the brush, screen points.
-const BRUSH: f32 = 24.0;
+const INITIAL_BRUSH_RADIUS: f32 = 24.0;
 
 /// State of the tools.
 pub(crate) struct Tools {
@@ -36,7 +36,7 @@ impl Default for Tools {
         Self {
             way: Vec::new(),
             given_up: false,
-            brush: BRUSH,
+            brush: INITIAL_BRUSH_RADIUS,
             through: false,
             inspected: None,
             measured: Vec::new(),
@@ -114,7 +114,7 @@ pub(crate) fn drag(app: &mut App, response: &egui::Response, size: [u32; 2]) {
 
 impl App {
     /// Receives the point under a click.
-    pub(crate) fn picked(&mut self, purpose: Purpose, point: Option<Seen>) {
+    pub(crate) fn picked(&mut self, purpose: Purpose, point: Option<PickHit>) {
         let Some(seen) = point else {
             if purpose == Purpose::Inspect {
                 self.tools.inspected = None;

@@ -19,11 +19,11 @@ impl Turns {
     /// A turn longer than this is a pause, milliseconds.
     const PAUSE_MS: f64 = 200.0;
     /// Smallest share of the time that is left to pictures.
-    const LEAST: f64 = 0.4;
+    const MIN_PICTURE_SHARE: f64 = 0.4;
 
     /// Milliseconds for a picture, given the time for window and picture together.
     pub(crate) fn budget_ms(&self, both_ms: f64) -> f64 {
-        (both_ms - self.window_ms).max(Self::LEAST * both_ms)
+        (both_ms - self.window_ms).max(Self::MIN_PICTURE_SHARE * both_ms)
     }
 
     /// Ends the window's turn and starts the picture's.

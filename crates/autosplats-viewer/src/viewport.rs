@@ -13,7 +13,7 @@ use crate::screen::OnScreen;
 use crate::{gizmo, legend, overlay, tools};
 
 /// Zoom per point scrolled: natural logarithm of the factor.
-const WHEEL: f64 = 0.0024;
+const ZOOM_PER_SCROLL: f64 = 0.0024;
 
 /// Shows the picture and handles the mouse.
 pub(crate) fn show(app: &mut App, ui: &mut egui::Ui) {
@@ -153,7 +153,7 @@ fn handle(app: &mut App, response: &egui::Response, size: [u32; 2]) -> bool {
                 let depth = context.pointer_hover_pos().and_then(|place| under(app, rect, place));
                 app.navigation.pan(way, depth.map(|(_, depth)| depth));
             }
-            _ => factor *= (f64::from(scroll.y) * WHEEL).exp(),
+            _ => factor *= (f64::from(scroll.y) * ZOOM_PER_SCROLL).exp(),
         }
         if factor != 1.0 {
             let target = context.pointer_hover_pos().and_then(|place| zoom_target(app, context, rect, place));
@@ -182,11 +182,14 @@ pub(crate) struct Zoomed {
 /// pointer stays. Pictures rendered meanwhile lag behind, and a GPU's moving pictures have no depths.
 fn zoom_target(app: &mut App, context: &egui::Context, rect: egui::Rect, place: egui::Pos2) -> Option<DVec3> {
     /// Longest pause between clicks of one turn, seconds.
-    const PAUSE: f64 = 0.4;
+    const MAX_WHEEL_PAUSE_S: f64 = 0.4;
     /// Largest movement of the pointer that counts as staying, screen points.
-    const TREMBLE: f32 = 3.0;
+    const MAX_TREMBLE_POINTS: f32 = 3.0;
     let time = context.input(|input| input.time);
-    let last = app.panels.zoomed.filter(|last| time - last.time < PAUSE && last.place.distance(place) < TREMBLE);
+    let last = app
+        .panels
+        .zoomed
+        .filter(|last| time - last.time < MAX_WHEEL_PAUSE_S && last.place.distance(place) < MAX_TREMBLE_POINTS);
     let world = last.map(|last| last.world).or_else(|| under(app, rect, place).map(|(world, _)| world));
     app.panels.zoomed = world.map(|world| Zoomed { time, place, world });
     world

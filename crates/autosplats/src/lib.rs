@@ -23,8 +23,8 @@
 //! # Ok::<(), autosplats::Error>(())
 //! ```
 //!
-//! [`estimate_normals`] computes normal, curvature and density radius of all points of a cloud, visible or not. It uses the
-//! exact nearest neighbours in space.
+//! [`estimate_normals`] computes normal, curvature and density radius of all points of a cloud, visible or not. It uses
+//! the exact nearest neighbours in space.
 
 mod adapt;
 mod camera;

@@ -22,13 +22,20 @@ pub(super) fn given(job: &Job<'_>) -> Result<Option<Vec<Option<String>>>, Error>
 }
 
 /// Largest number of columns that a note lists.
-const LISTED: usize = 24;
+const MAX_NOTED_COLUMNS: usize = 24;
 
 /// Note that tells which names the columns got.
 pub(super) fn taken_for(names: &[Option<String>]) -> String {
     let shown = names.iter().map(|name| name.as_deref().map_or("-".into(), |name| shown(name.as_bytes())));
-    let more = if names.len() > LISTED { format!(" and {} more", names.len() - LISTED) } else { String::new() };
-    format!("columns taken for {}{more}; --columns overrides", shown.take(LISTED).collect::<Vec<_>>().join(" "))
+    let more = if names.len() > MAX_NOTED_COLUMNS {
+        format!(" and {} more", names.len() - MAX_NOTED_COLUMNS)
+    } else {
+        String::new()
+    };
+    format!(
+        "columns taken for {}{more}; --columns overrides",
+        shown.take(MAX_NOTED_COLUMNS).collect::<Vec<_>>().join(" ")
+    )
 }
 
 /// Names of x, y and z, the likeliest first.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Job, table::Part, text};
+use super::{Job, table::ProgressRange, text};
 use crate::Error;
 
 /// Bytes of text that one thread parses at a time. The number of threads does not change where the cuts are.
@@ -15,7 +15,7 @@ const PIECE: usize = 1 << 19;
 pub(super) fn in_pieces<T: Send>(
     job: &Job<'_>,
     range: Range<usize>,
-    part: Part,
+    part: ProgressRange,
     parse: impl Fn(Range<usize>) -> T + Sync + Send,
     mut take: impl FnMut(T) -> Result<(), Error>,
 ) -> Result<(), Error> {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::{
     Job,
-    table::{Column, Part, Scalar, Table, collect, reserve},
+    table::{Column, ProgressRange, Scalar, Table, collect, reserve},
 };
 use crate::{Error, FieldValues, PointCloud};
 
@@ -135,7 +135,7 @@ pub(super) fn with_colors(
     mut cloud: PointCloud,
     color: impl Fn(usize) -> [f32; 3] + Sync + Send,
 ) -> Result<PointCloud, Error> {
-    let part = Part { start: 1.0, len: 0.0 };
+    let part = ProgressRange { start: 1.0, len: 0.0 };
     let count = cloud.len();
     let colors = collect("colours", count, job, part, |i| color(i).map(|value| (value * 255.0 + 0.5) as u8))?;
     let lost = |i: usize| (0..3).any(|c| (f32::from(colors[i][c]) / 255.0 - color(i)[c]).abs() > 1e-6);
@@ -161,7 +161,7 @@ pub(super) struct Welded {
 pub(super) fn weld<K: Hash + Eq + Send>(
     job: &Job<'_>,
     count: usize,
-    part: Part,
+    part: ProgressRange,
     key: impl Fn(usize) -> K + Sync + Send,
 ) -> Result<Welded, Error> {
     if u32::try_from(count).is_err() {
@@ -171,7 +171,7 @@ pub(super) fn weld<K: Hash + Eq + Send>(
     let mut first: Vec<AtomicU32> = Vec::new();
     reserve(&mut first, count, what)?;
     first.resize_with(count, Default::default);
-    let hash = Folded::new();
+    let hash = SecretHasher::new();
     let shards = rayon::current_num_threads().next_power_of_two().min(64);
     (0..shards as u64).into_par_iter().try_for_each(|shard| {
         let mut seen = std::collections::HashMap::with_hasher(hash);
@@ -221,19 +221,19 @@ pub(super) fn bits(value: f64) -> u64 {
 
 /// A fast hash with a secret, so that nobody can craft a file whose points all collide.
 #[derive(Clone, Copy)]
-struct Folded {
+struct SecretHasher {
     state: u64,
     secret: u64,
 }
 
-impl Folded {
+impl SecretHasher {
     fn new() -> Self {
         let random = RandomState::new();
         Self { state: random.hash_one(1_u64), secret: random.hash_one(2_u64) | 1 }
     }
 }
 
-impl BuildHasher for Folded {
+impl BuildHasher for SecretHasher {
     type Hasher = Self;
 
     fn build_hasher(&self) -> Self {
@@ -241,7 +241,7 @@ impl BuildHasher for Folded {
     }
 }
 
-impl Hasher for Folded {
+impl Hasher for SecretHasher {
     fn write(&mut self, bytes: &[u8]) {
         for chunk in bytes.chunks(8) {
             let mut word = [0; 8];

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::{
     Attribute, Contents, Description, Format, Job, lines,
     mesh::{self, Faces},
-    table::{Part, reserve},
+    table::{ProgressRange, reserve},
     text,
 };
 use crate::Error;
@@ -14,17 +14,17 @@ use crate::Error;
 pub(super) const FORMAT: Format =
     Format { name: "OBJ", extensions: &["obj"], recognised: |_| false, sensor_frame: false, describe, read };
 
-const PARSING: Part = Part { start: 0.0, len: 0.8 };
+const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
 /// Colour of vertices without a colour, if others have one.
 const WHITE: [f32; 3] = [1.0; 3];
 
 /// Largest file, in bytes, that a description counts through; counting then takes milliseconds.
-const COUNTED: usize = 4 << 20;
+const MAX_COUNTED_BYTES: usize = 4 << 20;
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
     check_text(job)?;
-    let range = 0..job.bytes.len().min(COUNTED);
+    let range = 0..job.bytes.len().min(MAX_COUNTED_BYTES);
     let (mut points, mut faces, mut width) = (0, 0, 0);
     for (_, line) in lines::lines(job.bytes, &range) {
         match split(line) {

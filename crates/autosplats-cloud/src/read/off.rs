@@ -6,7 +6,7 @@ use super::{
     Attribute, Contents, Description, Format, Job, lines,
     mesh::Faces,
     shown,
-    table::{Column, Part, Scalar, Table},
+    table::{Column, ProgressRange, Scalar, Table},
     text::{self, Rows, Token},
 };
 use crate::Error;
@@ -24,10 +24,10 @@ pub(super) const FORMAT: Format = Format {
     read,
 };
 
-const PARSING: Part = Part { start: 0.0, len: 0.8 };
+const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
 /// Rows sampled to find out what the numbers are.
-const SAMPLE: usize = 1000;
+const SAMPLED_ROWS: usize = 1000;
 
 /// What a vertex has besides its position, according to the first word of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -132,7 +132,7 @@ impl Header {
     fn tokens(&self, job: &Job<'_>) -> Result<Vec<(&'static str, Token)>, Error> {
         let rest = self.end..job.bytes.len();
         let mut tokens = ["x", "y", "z"].map(|axis| (axis, Token::Store(Scalar::F64))).to_vec();
-        let mut rows = lines::lines(job.bytes, &rest).take(self.vertices.min(SAMPLE)).peekable();
+        let mut rows = lines::lines(job.bytes, &rest).take(self.vertices.min(SAMPLED_ROWS)).peekable();
         let Some(&(at, first)) = rows.peek() else { return Ok(tokens) };
         let width = text::values(first).count();
         let Kind { texture, color, normal, .. } = self.kind;
@@ -222,7 +222,7 @@ fn read_rows(job: &Job<'_>, header: &Header) -> Result<Contents, Error> {
 }
 
 fn triangles(job: &Job<'_>, header: &Header) -> Result<Vec<[u32; 3]>, Error> {
-    let part = Part { start: 1.0, len: 0.0 };
+    let part = ProgressRange { start: 1.0, len: 0.0 };
     let start = lines::skip_lines(job, header.end, header.vertices)?.unwrap_or(job.bytes.len());
     let Some(end) = lines::skip_lines(job, start, header.faces)? else {
         let complete = lines::lines(job.bytes, &(start..job.bytes.len())).count();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     Job,
-    table::{Part, SMALL, middle, reserve},
+    table::{ProgressRange, SMALL, middle, reserve},
 };
 use crate::{Error, PointCloud, merge::residual};
 
@@ -17,7 +17,7 @@ pub(super) fn fill<T, V>(
     job: &Job<'_>,
     what: &str,
     lens: &[usize],
-    part: Part,
+    part: ProgressRange,
     run: impl Fn(usize) -> V,
 ) -> Result<Vec<T>, Error>
 where
@@ -41,7 +41,7 @@ where
 pub(super) fn place<V: Fn(usize) -> DVec3 + Sync + Send>(
     job: &Job<'_>,
     lens: &[usize],
-    part: Part,
+    part: ProgressRange,
     run: impl Fn(usize) -> V,
 ) -> Result<PointCloud, Error> {
     let mut starts = vec![0];
@@ -63,7 +63,7 @@ pub(super) fn place<V: Fn(usize) -> DVec3 + Sync + Send>(
     if !job.options.exact {
         return Ok(cloud);
     }
-    let part = Part { start: part.start + part.len, len: 0.0 };
+    let part = ProgressRange { start: part.start + part.len, len: 0.0 };
     let residuals: Vec<[f32; 3]> = fill(job, "residuals", lens, part, |index| {
         let world = run(index);
         move |i| residual(world(i) - origin)

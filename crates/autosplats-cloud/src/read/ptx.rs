@@ -12,7 +12,7 @@ use super::{
     Attribute, Contents, Description, Format, Job,
     placed::{fill, place},
     shown,
-    table::{Part, Scalar},
+    table::{ProgressRange, Scalar},
     text::{self, Rows, Token},
 };
 use crate::{Axes, Error, FieldValues, PointCloud, Scan};
@@ -27,7 +27,7 @@ const HEADER: [usize; 10] = [1, 1, 3, 3, 3, 3, 4, 4, 4, 4];
 const MIN_LINE: usize = 6;
 
 /// Largest file, in bytes, of which all scans are described; of larger files only the first.
-const WALKED: usize = 1 << 24;
+const MAX_WALKED_BYTES: usize = 1 << 24;
 
 /// Points of a preview chunk.
 const CHUNK: usize = 1 << 20;
@@ -53,7 +53,7 @@ struct Header {
 }
 
 /// A scan found in the file: its header, the byte range of its points, and the number of values per line.
-struct Walked {
+struct FoundScan {
     header: Header,
     count: usize,
     points: Range<usize>,
@@ -112,7 +112,7 @@ fn rigid(map: DMat4) -> DMat4 {
 }
 
 /// Finds the scans and the layout of their lines. With `only_first`, lines are not counted.
-fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<Walked>, Error> {
+fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<FoundScan>, Error> {
     let bytes = job.bytes;
     if bytes.is_empty() {
         return Err(job.malformed("byte 0", "the file is empty; copy it again"));
@@ -154,7 +154,7 @@ fn walk(job: &Job<'_>, only_first: bool) -> Result<Vec<Walked>, Error> {
             ));
         }
         at = end;
-        scans.push(Walked { points: header.start..end, header, count, width });
+        scans.push(FoundScan { points: header.start..end, header, count, width });
     }
 }
 
@@ -195,7 +195,7 @@ struct Records {
 }
 
 impl Records {
-    fn parse(job: &Job<'_>, scan: &Walked, part: Part) -> Result<Self, Error> {
+    fn parse(job: &Job<'_>, scan: &FoundScan, part: ProgressRange) -> Result<Self, Error> {
         let (has_intensity, has_color) = (matches!(scan.width, 4 | 7), scan.width >= 6);
         let mut tokens = vec![Token::Store(Scalar::F64); 3];
         tokens.extend(has_intensity.then_some(Token::Store(Scalar::F32)));
@@ -272,7 +272,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     let mut records = Vec::new();
     for scan in &scans {
         let share = |bytes: usize| PARSING * bytes as f32 / job.bytes.len() as f32;
-        let part = Part { start: share(scan.points.start), len: share(scan.points.len()) };
+        let part = ProgressRange { start: share(scan.points.start), len: share(scan.points.len()) };
         let parsed = Records::parse(job, scan, part)?;
         if job.progress.wants_chunks() {
             preview(job, &parsed)?;
@@ -286,7 +286,10 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         job.note(format!("{} of {total} points are at (0, 0, 0), where nothing came back; dropped", total - kept));
     }
     job.check_memory(kept, 12 + 3 + 4 + if job.options.exact { 12 } else { 0 })?;
-    let part = |step: u8| Part { start: PARSING + (1.0 - PARSING) * f32::from(step) / 3.0, len: (1.0 - PARSING) / 3.0 };
+    let part = |step: u8| ProgressRange {
+        start: PARSING + (1.0 - PARSING) * f32::from(step) / 3.0,
+        len: (1.0 - PARSING) / 3.0,
+    };
     let mut cloud = cloud(job, &records, &lens, part)?;
     if records.iter().any(|records| records.intensity.is_some()) {
         if records.iter().any(|records| records.intensity.is_none() && records.len() > 0) {
@@ -309,7 +312,12 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 }
 
 /// Positions and colours of all scans.
-fn cloud(job: &Job<'_>, records: &[Records], lens: &[usize], part: impl Fn(u8) -> Part) -> Result<PointCloud, Error> {
+fn cloud(
+    job: &Job<'_>,
+    records: &[Records],
+    lens: &[usize],
+    part: impl Fn(u8) -> ProgressRange,
+) -> Result<PointCloud, Error> {
     let cloud = place(job, lens, part(0), |scan| {
         let records = &records[scan];
         move |i| records.world(i)
@@ -327,7 +335,7 @@ fn cloud(job: &Job<'_>, records: &[Records], lens: &[usize], part: impl Fn(u8) -
 /// Passes the points of a scan to the caller as preview chunks.
 fn preview(job: &Job<'_>, records: &Records) -> Result<(), Error> {
     let quiet = Job { progress: &(), ..*job };
-    let nothing = Part { start: 0.0, len: 0.0 };
+    let nothing = ProgressRange { start: 0.0, len: 0.0 };
     for start in (0..records.len()).step_by(CHUNK) {
         let lens = [CHUNK.min(records.len() - start)];
         job.preview(|| {
@@ -342,7 +350,7 @@ fn preview(job: &Job<'_>, records: &Records) -> Result<(), Error> {
 }
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
-    let all = job.bytes.len() <= WALKED;
+    let all = job.bytes.len() <= MAX_WALKED_BYTES;
     let walked = walk(job, !all)?;
     let mut notes = Vec::new();
     if !all {
@@ -363,7 +371,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
         6 => &["x", "y", "z", "red", "green", "blue"],
         _ => &["x", "y", "z", "intensity", "red", "green", "blue"],
     };
-    let size = |scan: &Walked| format!("{} columns, {} rows", scan.header.columns, scan.header.rows);
+    let size = |scan: &FoundScan| format!("{} columns, {} rows", scan.header.columns, scan.header.rows);
     let details = walked.iter().take(100).enumerate().map(|(i, scan)| (format!("scan {}", i + 1), size(scan)));
     Ok(Description {
         format: "PTX, text".into(),

@@ -24,10 +24,10 @@ pub(super) const FORMAT: Format = Format {
 const SIZE: usize = 4;
 
 /// Records sampled.
-const SAMPLE: usize = 4096;
+const SAMPLED_RECORDS: usize = 4096;
 
 /// Bound of plausible coordinates, in metres; no sensor sees further.
-const RANGE: f32 = 1e4;
+const MAX_COORDINATE_M: f32 = 1e4;
 
 /// Meaning of the numbers of a point.
 struct Layout {
@@ -98,14 +98,14 @@ fn plausible(bytes: &[u8], names: &[&str]) -> bool {
         return false;
     }
     let count = bytes.len() / stride;
-    let step = count.div_ceil(SAMPLE);
+    let step = count.div_ceil(SAMPLED_RECORDS);
     let (mut odd, mut wide) = (0, [false; 2]);
     let records = (0..count).step_by(step).map(|index| &bytes[index * stride..][..stride]);
     let total = records.len();
     for record in records {
         let value = |column: usize| f32::from_le_bytes(std::array::from_fn(|byte| record[column * SIZE + byte]));
         let xyz = [0, 1, 2].map(value);
-        if xyz.iter().any(|value| value.is_finite() && value.abs() >= RANGE) {
+        if xyz.iter().any(|value| value.is_finite() && value.abs() >= MAX_COORDINATE_M) {
             return false;
         }
         // Integers read as floats are tiny. Sensors write NaN for missing returns.

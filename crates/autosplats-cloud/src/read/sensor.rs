@@ -6,13 +6,13 @@ use super::Job;
 use crate::{PointCloud, Scan};
 
 /// Largest distance of a sensor from the middle of its points, as a multiple of the diagonal of their bounding box.
-const FAR: f64 = 20.0;
+const MAX_DISTANCE_DIAGONALS: f64 = 20.0;
 
 /// Largest distance of a sensor from the cloud's origin along an axis. Computations with larger values would overflow.
-const FARTHEST: f64 = 1e18;
+const MAX_ORIGIN_DISTANCE: f64 = 1e18;
 
 /// Points sampled per scan to estimate its bounding box.
-const BOUNDED: usize = 1000;
+const MAX_SAMPLED_POINTS: usize = 1000;
 
 /// Drops scans whose sensor is too far away. Programs that move points into survey coordinates often leave out the
 /// pose, and the origin is then no sensor position.
@@ -26,10 +26,10 @@ pub(super) fn drop_far(job: &Job<'_>, cloud: &mut PointCloud) {
 }
 
 fn is_far(cloud: &PointCloud, scan: &Scan) -> bool {
-    if !((scan.position() - cloud.origin()).abs().max_element() <= FARTHEST) {
+    if !((scan.position() - cloud.origin()).abs().max_element() <= MAX_ORIGIN_DISTANCE) {
         return true;
     }
-    let step = scan.points.len().div_ceil(BOUNDED).max(1);
+    let step = scan.points.len().div_ceil(MAX_SAMPLED_POINTS).max(1);
     let sample = scan.points.clone().step_by(step).map(|i| cloud.world_position(i));
     let sample = sample.filter(|point| point.is_finite());
     let bounds = sample.fold(None, |bounds: Option<[DVec3; 2]>, point| {
@@ -37,6 +37,6 @@ fn is_far(cloud: &PointCloud, scan: &Scan) -> bool {
     });
     bounds.is_some_and(|[min, max]| {
         let size = min.distance(max);
-        size > 0.0 && scan.position().distance(0.5 * (min + max)) > FAR * size
+        size > 0.0 && scan.position().distance(0.5 * (min + max)) > MAX_DISTANCE_DIAGONALS * size
     })
 }

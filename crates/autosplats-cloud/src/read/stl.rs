@@ -6,7 +6,7 @@ use super::{
     Attribute, Contents, Description, Format, Job, lines,
     mesh::{self, Faces, Welded},
     shown,
-    table::{Part, collect, reserve},
+    table::{ProgressRange, collect, reserve},
     text,
 };
 use crate::Error;
@@ -27,11 +27,11 @@ const HEADER: usize = 84;
 const FACET: usize = 50;
 
 /// Shares of the work of parsing and of welding.
-const PARSING: Part = Part { start: 0.0, len: 0.4 };
-const WELDING: Part = Part { start: 0.4, len: 0.4 };
+const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.4 };
+const WELDING: ProgressRange = ProgressRange { start: 0.4, len: 0.4 };
 
 /// Largest file, in bytes, that a description counts through; counting then takes milliseconds.
-const COUNTED: usize = 4 << 20;
+const MAX_COUNTED_BYTES: usize = 4 << 20;
 
 /// The count of triangles in the header of a binary file.
 fn claimed(bytes: &[u8]) -> Option<usize> {
@@ -71,7 +71,7 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let loops = || lines::lines(job.bytes, &all).filter(|(_, line)| is(line, b"endloop")).count();
     Ok(Description {
         format: "STL, text".into(),
-        faces: (all.end <= COUNTED).then(|| loops() as u64),
+        faces: (all.end <= MAX_COUNTED_BYTES).then(|| loops() as u64),
         attributes: attributes("text"),
         ..Description::default()
     })
@@ -126,8 +126,8 @@ fn read_binary(job: &Job<'_>) -> Result<Contents, Error> {
         bytemuck::cast::<[u8; 12], [[u8; 4]; 3]>(raw).map(f32::from_le_bytes)
     };
     let key = |index| corner(index).map(|value| (value + 0.0).to_bits());
-    let Welded { firsts, points } = mesh::weld(job, 3 * count, Part { start: 0.0, len: 0.8 }, key)?;
-    let part = Part { start: 0.8, len: 0.1 };
+    let Welded { firsts, points } = mesh::weld(job, 3 * count, ProgressRange { start: 0.0, len: 0.8 }, key)?;
+    let part = ProgressRange { start: 0.8, len: 0.1 };
     let positions = collect("positions", firsts.len(), job, part, |i| corner(firsts[i] as usize))?;
     let cloud = mesh::cloud_f32(job, &positions, 0.9)?;
     let triangles = if job.triangles {
@@ -171,7 +171,7 @@ fn read_text(job: &Job<'_>) -> Result<Contents, Error> {
         job.note("the file does not end with 'endsolid'; it may be cut off");
     }
     let Welded { firsts, points } = mesh::weld(job, corners.len(), WELDING, |i| corners[i].map(mesh::bits))?;
-    let part = Part { start: 0.8, len: 0.1 };
+    let part = ProgressRange { start: 0.8, len: 0.1 };
     let positions = collect("positions", firsts.len(), job, part, |i| corners[firsts[i] as usize])?;
     let cloud = mesh::cloud(job, &positions, 0.9)?;
     let mut faces = Faces::new(cloud.len());

@@ -131,7 +131,7 @@ impl Table<'_> {
         let packed = packed.map(|index| self.columns.remove(index));
 
         let steps = 1 + usize::from(colors.is_some() || packed.is_some()) + self.columns.len();
-        let part = |step: usize| Part {
+        let part = |step: usize| ProgressRange {
             start: self.done + (1.0 - self.done) * step as f32 / steps as f32,
             len: (1.0 - self.done) / steps as f32,
         };
@@ -242,7 +242,12 @@ impl Table<'_> {
         }
     }
 
-    fn positions(&self, job: &Job<'_>, xyz: &[Column; 3], part: Part) -> Result<(DVec3, Vec<[f32; 3]>), Error> {
+    fn positions(
+        &self,
+        job: &Job<'_>,
+        xyz: &[Column; 3],
+        part: ProgressRange,
+    ) -> Result<(DVec3, Vec<[f32; 3]>), Error> {
         let world = |i| DVec3::from(xyz.each_ref().map(|column| self.value_f64(column, i)));
         let middle = middle(self.count, world);
         let origin = if middle.abs().max_element() < SMALL { DVec3::ZERO } else { middle };
@@ -282,7 +287,7 @@ impl Table<'_> {
         what: &str,
         column: &Column,
         job: &Job<'_>,
-        part: Part,
+        part: ProgressRange,
         value: impl Fn(&[u8]) -> T + Sync + Send,
     ) -> Result<Vec<T>, Error> {
         let mut values = Vec::new();
@@ -306,11 +311,11 @@ impl Table<'_> {
         if (0..self.count).into_par_iter().all(|i| lost(i) == [0.0; 3]) {
             return Ok(None);
         }
-        collect("residuals", self.count, job, Part { start: 1.0, len: 0.0 }, lost).map(Some)
+        collect("residuals", self.count, job, ProgressRange { start: 1.0, len: 0.0 }, lost).map(Some)
     }
 
     /// Colours of any number type as 8 bits, and whether 8 bits keep them exactly.
-    fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: Part) -> Result<(Vec<[u8; 3]>, bool), Error> {
+    fn colors(&self, job: &Job<'_>, rgb: &[Column; 3], part: ProgressRange) -> Result<(Vec<[u8; 3]>, bool), Error> {
         let rgb = rgb.each_ref();
         if rgb.iter().all(|column| column.scalar == Scalar::U8) {
             let colors = collect("colours", self.count, job, part, |i| rgb.map(|column| self.value::<u8>(column, i)))?;
@@ -331,7 +336,7 @@ impl Table<'_> {
         Ok((colors, exact))
     }
 
-    fn field(&self, job: &Job<'_>, column: &Column, part: Part) -> Result<FieldValues, Error> {
+    fn field(&self, job: &Job<'_>, column: &Column, part: ProgressRange) -> Result<FieldValues, Error> {
         macro_rules! typed {
             ($variant:ident) => {
                 FieldValues::$variant(
@@ -386,7 +391,7 @@ impl ColorScale {
 
 /// The range of the progress bar that a step covers: start and length, as fractions of the whole.
 #[derive(Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct ProgressRange {
     pub(super) start: f32,
     pub(super) len: f32,
 }
@@ -396,7 +401,7 @@ pub(super) fn collect<T: Send>(
     what: &str,
     count: usize,
     job: &Job<'_>,
-    part: Part,
+    part: ProgressRange,
     value: impl Fn(usize) -> T + Sync + Send,
 ) -> Result<Vec<T>, Error> {
     let mut values = Vec::new();

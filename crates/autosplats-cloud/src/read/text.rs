@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Job, shown,
-    table::{CHUNK, Part, Scalar, reserve},
+    table::{CHUNK, ProgressRange, Scalar, reserve},
 };
 use crate::Error;
 
@@ -64,7 +64,7 @@ struct Piece {
 
 impl Rows<'_> {
     /// Parses rows from byte `start` on. Returns the records and their number.
-    pub(super) fn parse(&self, job: &Job<'_>, start: usize, part: Part) -> Result<(Vec<u8>, usize), Error> {
+    pub(super) fn parse(&self, job: &Job<'_>, start: usize, part: ProgressRange) -> Result<(Vec<u8>, usize), Error> {
         self.parse_and_show(job, start, part, |_, _| Ok(()))
     }
 
@@ -74,7 +74,7 @@ impl Rows<'_> {
         &self,
         job: &Job<'_>,
         start: usize,
-        part: Part,
+        part: ProgressRange,
         show: impl Fn(&[u8], usize) -> Result<(), Error>,
     ) -> Result<(Vec<u8>, usize), Error> {
         let len = self.record_len();

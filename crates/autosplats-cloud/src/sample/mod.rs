@@ -18,7 +18,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::strewn::Place;
-pub(crate) use self::strewn::Strewn;
+pub(crate) use self::strewn::SurfaceSamples;
 use crate::{Contents, Error, Field, PointCloud, Progress, memory::check_memory, progress, random::Random};
 
 /// Points computed between two checks for cancellation.
@@ -32,10 +32,10 @@ const JITTER: f64 = 0.3;
 
 /// Share of a patch that must lie in one triangle for the point to be at that part's own middle. Otherwise the point is
 /// at the place nearest to the patch's middle. That place is on an edge, where points of other patches may lie too.
-const LARGE: f64 = 0.3;
+const MIN_OWN_MIDDLE_SHARE: f64 = 0.3;
 
 /// Halvings beyond those that make a piece as small as a patch.
-const FINER: i32 = 6;
+const EXTRA_HALVINGS: i32 = 6;
 
 /// Samples exactly `count` points on the triangles of `mesh`, evenly by area. Every point has a patch of the same area.
 ///
@@ -46,12 +46,12 @@ const FINER: i32 = 6;
 /// # Errors
 /// [`Error::NoSurface`] if no triangle has an area, [`Error::OutOfMemory`], [`Error::Cancelled`] if `progress` says so.
 pub fn sample_surface(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<PointCloud, Error> {
-    let sampled = Strewn::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
+    let sampled = SurfaceSamples::new(mesh, count, seed, progress)?.on(&mesh.cloud, progress)?;
     progress::tick(progress, 1.0)?;
     Ok(sampled)
 }
 
-impl Strewn {
+impl SurfaceSamples {
     /// Computes places for `count` points on `mesh`.
     pub(crate) fn new(mesh: &Contents, count: usize, seed: u64, progress: &dyn Progress) -> Result<Self, Error> {
         progress::tick(progress, 0.0)?;
@@ -299,7 +299,7 @@ impl<'a> Surface<'a> {
         }
         let parts = (first..=after).map(|index| (self.part(index, start, end, patch), index));
         let largest = parts.max_by(|a, b| a.0.0.total_cmp(&b.0.0));
-        if let Some(((_, weights), index)) = largest.filter(|((area, _), _)| *area >= LARGE * patch) {
+        if let Some(((_, weights), index)) = largest.filter(|((area, _), _)| *area >= MIN_OWN_MIDDLE_SHARE * patch) {
             return self.jittered(index, weights, start, end, patch, random);
         }
         let goal = sum / total;
@@ -350,7 +350,7 @@ impl<'a> Surface<'a> {
 
 /// Number of halvings of a triangle until its pieces are much smaller than a patch.
 fn depth(area: f64, patch: f64) -> i32 {
-    (FINER + (area / patch).log2().ceil().clamp(0.0, 40.0) as i32).min(46)
+    (EXTRA_HALVINGS + (area / patch).log2().ceil().clamp(0.0, 40.0) as i32).min(46)
 }
 
 /// Bits per axis of the Hilbert curve.

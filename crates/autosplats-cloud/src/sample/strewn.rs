@@ -7,7 +7,7 @@ use super::Triangle;
 use crate::{Error, Field, FieldValues, PointCloud, Progress, progress};
 
 /// Places of points on the triangles of a mesh. The points follow the vertices if these move.
-pub(crate) struct Strewn {
+pub(crate) struct SurfaceSamples {
     /// Number of vertices of the mesh.
     pub(super) vertices: usize,
     /// Corners of the triangles that have an area, in the curve's order.
@@ -15,7 +15,7 @@ pub(crate) struct Strewn {
     pub(super) places: Vec<Place>,
 }
 
-impl Strewn {
+impl SurfaceSamples {
     /// Whether the places were computed on a mesh with this number of vertices.
     pub(crate) fn fits(&self, vertices: usize) -> bool {
         self.vertices == vertices
@@ -74,7 +74,7 @@ impl Strewn {
     }
 }
 
-/// A place on the surface: an index into `Strewn::triangles`, and the weights of the second and third corner.
+/// A place on the surface: an index into `SurfaceSamples::triangles`, and the weights of the second and third corner.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) triangle: u32,

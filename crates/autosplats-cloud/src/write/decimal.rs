@@ -6,14 +6,14 @@ use std::io::Write as _;
 const TENS: [f64; 16] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
 
 /// 2⁵³: beyond it, not every integer is an `f64`.
-const WHOLE: f64 = 9_007_199_254_740_992.0;
+const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
 /// Appends `value` with as few decimals as `same` allows, which is called with the number that a reader would get.
 pub(super) fn push(text: &mut Vec<u8>, value: f64, same: impl Fn(f64) -> bool) {
     if value.is_finite() {
         for (decimals, ten) in TENS.iter().enumerate() {
             let digits = (value * ten).round();
-            if digits.abs() >= WHOLE {
+            if digits.abs() >= MAX_EXACT_INTEGER {
                 break;
             }
             // A division is correctly rounded, so the result is what a reader gets.

@@ -19,7 +19,7 @@ use crate::{Axes, Error, Field, FieldValues, PointCloud, cloud::each_type};
 pub(super) const FORMAT: Format = Format { name: "PLY", extensions: &["ply"], write };
 
 /// Largest integer up to which `f64` holds all integers.
-const WHOLE: u64 = 1 << 53;
+const MAX_EXACT_INTEGER: u64 = 1 << 53;
 
 /// Writes positions as 32-bit floats if the cloud has neither an origin nor residuals, otherwise world coordinates as
 /// 64-bit floats. Blanks in field names become underscores.
@@ -35,8 +35,8 @@ fn note_losses(job: &Job<'_>) {
     note_left_out(job, "PLY", &[]);
     for field in job.cloud.fields() {
         let beyond = match &field.values {
-            FieldValues::U64(values) => values.par_iter().any(|&value| value > WHOLE),
-            FieldValues::I64(values) => values.par_iter().any(|&value| value.unsigned_abs() > WHOLE),
+            FieldValues::U64(values) => values.par_iter().any(|&value| value > MAX_EXACT_INTEGER),
+            FieldValues::I64(values) => values.par_iter().any(|&value| value.unsigned_abs() > MAX_EXACT_INTEGER),
             _ => false,
         };
         if beyond {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 /// Smallest number of words per parallel task.
-const LEAST: usize = 1 << 10;
+const MIN_WORDS_PER_TASK: usize = 1 << 10;
 
 /// A set of points of one cloud, by index. Clones share their memory; the empty set has none.
 #[derive(Clone, Debug, Default)]
@@ -22,7 +22,8 @@ impl Bits {
 
     /// A set of points below `len` by its words. A word holds 64 points, the first in the lowest bit.
     pub(super) fn from_words(len: usize, word: impl Fn(usize) -> u64 + Sync) -> Self {
-        let words: Vec<u64> = (0..len.div_ceil(64)).into_par_iter().with_min_len(LEAST).map(&word).collect();
+        let words: Vec<u64> =
+            (0..len.div_ceil(64)).into_par_iter().with_min_len(MIN_WORDS_PER_TASK).map(&word).collect();
         if words.iter().all(|&word| word == 0) { Self(None) } else { Self(Some(words.into())) }
     }
 
@@ -42,7 +43,7 @@ impl Bits {
     }
 
     pub(crate) fn count(&self) -> usize {
-        self.words().par_iter().with_min_len(LEAST).map(|word| word.count_ones() as usize).sum()
+        self.words().par_iter().with_min_len(MIN_WORDS_PER_TASK).map(|word| word.count_ones() as usize).sum()
     }
 
     pub(crate) fn is_empty(&self) -> bool {

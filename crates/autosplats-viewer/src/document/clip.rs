@@ -3,7 +3,7 @@
 use autosplats::cloud::glam::{DQuat, DVec3};
 
 /// Smallest side of a box, as a share of its longest side. A face pushed through the opposite face stops there.
-const LEAST_SIDE: f64 = 1e-4;
+const MIN_SIDE_SHARE: f64 = 1e-4;
 
 /// A box in world coordinates. Points outside are not shown, so that no edit reaches them; they stay unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -55,7 +55,7 @@ impl ClipBox {
             return *self;
         }
         let size = self.max - self.min;
-        let least = LEAST_SIDE * size.max_element();
+        let least = MIN_SIDE_SHARE * size.max_element();
         let way = if high { way.max(least - size[axis]) } else { way.min(size[axis] - least) };
         if self.rotation == DQuat::IDENTITY {
             // A direct change keeps all digits of the other faces.

@@ -11,7 +11,7 @@ use super::{Document, Layer, LayerId, shown::points_where};
 
 /// Which points to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum What {
+pub(crate) enum ExportScope {
     /// The visible points.
     Shown,
     /// The selected points that are visible.
@@ -90,7 +90,7 @@ impl From<Error> for ExportError {
 /// [`ExportError`]; nothing was written.
 pub(crate) fn export(
     document: &Document,
-    what: What,
+    what: ExportScope,
     path: &Path,
     replace: Replace,
     progress: &dyn Progress,
@@ -98,9 +98,9 @@ pub(crate) fn export(
     check_writable(path)?;
     let target = check_target(document, path, replace)?;
     let layers = document.layers.iter().filter(|layer| match what {
-        What::Shown | What::Selected => layer.visible,
-        What::Layer(id) => layer.id == id,
-        What::All => true,
+        ExportScope::Shown | ExportScope::Selected => layer.visible,
+        ExportScope::Layer(id) => layer.id == id,
+        ExportScope::All => true,
     });
     let layers = layers.map(|layer| (layer, chosen(document, layer, what)));
     let layers = layers.filter(|(layer, points)| points.as_ref().map_or(layer.cloud.len(), Vec::len) > 0);
@@ -130,15 +130,15 @@ pub(crate) fn export(
 }
 
 /// The points of a layer to write; `None` for all.
-fn chosen(document: &Document, layer: &Layer, what: What) -> Option<Vec<u32>> {
+fn chosen(document: &Document, layer: &Layer, what: ExportScope) -> Option<Vec<u32>> {
     let len = layer.cloud.len();
     match what {
-        What::Shown => document.seen(layer),
-        What::Selected => {
+        ExportScope::Shown => document.seen(layer),
+        ExportScope::Selected => {
             let reached = document.reached(layer);
             points_where(len, |point| reached.get(point))
         }
-        What::Layer(_) | What::All => points_where(len, |point| !layer.edits.deleted.get(point)),
+        ExportScope::Layer(_) | ExportScope::All => points_where(len, |point| !layer.edits.deleted.get(point)),
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use autosplats::cloud::PointCloud;
 
-use super::{Document, LayerId, layer::Changes};
+use super::{Document, LayerId, layer::LayerChanges};
 
 /// A document with its past and its undone versions, the nearest last in each list.
 ///
@@ -17,7 +17,7 @@ pub(crate) struct History {
     past: VecDeque<Step>,
     future: VecDeque<Step>,
     /// The changes of each layer when it was last saved. A layer without an entry compares with how it was opened.
-    saved: HashMap<LayerId, Changes>,
+    saved: HashMap<LayerId, LayerChanges>,
     most_steps: usize,
     most_bytes: usize,
 }

@@ -60,7 +60,7 @@ pub(crate) struct Edits {
 
 /// The changes to a layer that its file does not have.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Changes {
+pub(super) struct LayerChanges {
     pose: DMat4,
     deleted: Bits,
     moves: Vec<(Bits, DMat4)>,
@@ -139,18 +139,18 @@ impl Layer {
     }
 
     /// The changes that the layer's file does not have.
-    pub(super) fn changes(&self) -> Changes {
+    pub(super) fn changes(&self) -> LayerChanges {
         let Edits { deleted, moves, .. } = &self.edits;
-        Changes { pose: self.pose, deleted: deleted.clone(), moves: moves.clone() }
+        LayerChanges { pose: self.pose, deleted: deleted.clone(), moves: moves.clone() }
     }
 
     /// The changes of a layer in the state in which it was opened.
-    pub(super) fn no_changes(&self) -> Changes {
-        Changes { pose: self.opened_at, deleted: Bits::default(), moves: Vec::new() }
+    pub(super) fn no_changes(&self) -> LayerChanges {
+        LayerChanges { pose: self.opened_at, deleted: Bits::default(), moves: Vec::new() }
     }
 
     /// Whether both layers show the same points at the same places in the same colours.
-    pub(super) fn looks_like(&self, other: &Self) -> bool {
+    pub(super) fn shows_same(&self, other: &Self) -> bool {
         let Self { id, cloud, tint, pose, edits, local, .. } = self;
         *id == other.id
             && Arc::ptr_eq(cloud, &other.cloud)

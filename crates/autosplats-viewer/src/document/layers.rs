@@ -10,7 +10,7 @@ use autosplats::cloud::{
 use super::{Counts, Document, Layer, LayerId, layer::Edits};
 
 /// Largest number of points of an overview: enough to find the size of a scene.
-const OVERVIEW: usize = 100_000;
+const OVERVIEW_POINT_COUNT: usize = 100_000;
 
 impl Document {
     /// Appends a layer. A layer in degrees shares the metric map of the layers in degrees before it.
@@ -97,7 +97,7 @@ impl Document {
     fn part_of(&self, has: impl Fn(&Layer, usize) -> bool) -> PointCloud {
         let visible = || self.layers.iter().filter(|layer| layer.visible);
         let total: usize = visible().map(|layer| layer.cloud.len()).sum();
-        let step = total.div_ceil(OVERVIEW).max(1);
+        let step = total.div_ceil(OVERVIEW_POINT_COUNT).max(1);
         let clip = self.clip.as_ref().filter(|clip| clip.enabled);
         let mut places = Vec::new();
         for layer in visible() {

@@ -6,9 +6,9 @@
 //! points and a list of moves. All large parts are shared, so that a clone of a document costs next to nothing. An edit
 //! makes a new document; [`History`] keeps the old ones, and undo restores them.
 //!
-//! [`Document::shown`] makes the one cloud that is rendered. The cloud has to be made again only when [`Shown::shows`]
-//! returns false; the selection is not part of it. Renderer and pointer identify points by their index in this cloud.
-//! [`Shown`] maps the index to a layer and its point.
+//! [`Document::shown`] makes the one cloud that is rendered. The cloud has to be made again only when
+//! [`ShownCloud::shows`] returns false; the selection is not part of it. Renderer and pointer identify points by their
+//! index in this cloud. [`ShownCloud`] maps the index to a layer and its point.
 //!
 //! An edit changes visible points only. Points that are hidden, outside the clipping box or in an invisible layer do
 //! not change, even if they are selected.
@@ -34,14 +34,14 @@ pub(crate) use self::{
     bits::Bits,
     clip::ClipBox,
     edit::{Grip, about},
-    export::{ExportError, Exported, Replace, What, export},
+    export::{ExportError, ExportScope, Exported, Replace, export},
     history::{History, grouped, label},
     layer::{Counts, Layer, LayerId},
     layers::bounds_of,
     pick::{PickedPoint, shortest},
     region::Region,
     select::SelectMode,
-    shown::Shown,
+    shown::ShownCloud,
 };
 
 /// The open layers and the clipping box. Clones share all large parts.

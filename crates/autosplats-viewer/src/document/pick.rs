@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use autosplats::cloud::{FieldValues, PointCloud, glam::DVec3};
 
-use super::{Document, LayerId, Shown};
+use super::{Document, LayerId, ShownCloud};
 
 /// A picked point.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +31,7 @@ pub(crate) struct PickedPoint {
 
 impl Document {
     /// Information on the shown point `index`; `None` if the point no longer exists.
-    pub(crate) fn describe(&self, shown: &Shown, index: usize) -> Option<PickedPoint> {
+    pub(crate) fn describe(&self, shown: &ShownCloud, index: usize) -> Option<PickedPoint> {
         let (id, point) = shown.point(index)?;
         let layer = self.layer(id).filter(|layer| point < layer.cloud.len())?;
         let cloud = &layer.cloud;
@@ -60,9 +60,9 @@ fn value_text(values: &FieldValues, point: usize) -> String {
 }
 
 /// Number of points tested to find out how many digits a file has.
-const SAMPLES: usize = 1000;
+const DIGIT_SAMPLE_COUNT: usize = 1000;
 /// Largest number of significant digits that a coordinate may have been rounded to.
-const DIGITS: usize = 13;
+const MAX_SIGNIFICANT_DIGITS: usize = 13;
 
 /// Coordinates with the digits of the file: those of its resolution, or the fewest that identify the number.
 pub(super) fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
@@ -81,7 +81,7 @@ pub(super) fn file_text(cloud: &PointCloud, point: usize) -> [String; 3] {
 /// Whether all coordinates fit into `f32`, judged by a sample of points. Most decimal numbers of a double-precision
 /// file do not fit.
 fn is_single(cloud: &PointCloud) -> bool {
-    let step = cloud.len().div_ceil(SAMPLES).max(1);
+    let step = cloud.len().div_ceil(DIGIT_SAMPLE_COUNT).max(1);
     let same = |value: f64| f64::from(value as f32) == value || value.is_nan();
     (0..cloud.len()).step_by(step).all(|point| cloud.world_position(point).to_array().into_iter().all(same))
 }
@@ -94,10 +94,10 @@ fn file_digits(value: f64, lost: f32) -> String {
     if error < 0.25 * step { value.to_string() } else { shortest(value, error + step) }
 }
 
-/// The shortest decimal within `error` of a number. If that takes more than `DIGITS` digits, nobody has rounded the
-/// number, and all digits are kept.
+/// The shortest decimal within `error` of a number. If that takes more than `MAX_SIGNIFICANT_DIGITS` digits, nobody has
+/// rounded the number, and all digits are kept.
 pub(crate) fn shortest(value: f64, error: f64) -> String {
-    let digits = (0..DIGITS).find_map(|digits| {
+    let digits = (0..MAX_SIGNIFICANT_DIGITS).find_map(|digits| {
         let short: f64 = format!("{value:.digits$e}").parse().ok()?;
         ((short - value).abs() <= error).then_some(short)
     });

@@ -1,6 +1,6 @@
 //! The selection: the points that the next edit changes.
 
-use super::{Bits, Document, Shown};
+use super::{Bits, Document, ShownCloud};
 
 /// How new hits change the selection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub(crate) enum SelectMode {
 
 impl Document {
     /// Changes the selection by the shown points whose index `hits` accepts. Points that are not shown are not hit.
-    pub(crate) fn select(&mut self, shown: &Shown, hits: impl Fn(usize) -> bool + Sync, mode: SelectMode) {
+    pub(crate) fn select(&mut self, shown: &ShownCloud, hits: impl Fn(usize) -> bool + Sync, mode: SelectMode) {
         for layer in &mut self.layers {
             let part = shown.part(layer.id).filter(|_| !layer.incomplete);
             let hit = part.map(|part| part.bits(layer.cloud.len(), &hits)).unwrap_or_default();
@@ -33,7 +33,7 @@ impl Document {
     }
 
     /// Selects exactly the shown points.
-    pub(crate) fn select_all(&mut self, shown: &Shown) {
+    pub(crate) fn select_all(&mut self, shown: &ShownCloud) {
         self.select(shown, |_| true, SelectMode::Replace);
     }
 
@@ -44,7 +44,7 @@ impl Document {
     }
 
     /// Selects exactly the shown points that are not selected.
-    pub(crate) fn select_inverse(&mut self, shown: &Shown) {
+    pub(crate) fn select_inverse(&mut self, shown: &ShownCloud) {
         let selected = shown.selected(self);
         self.select(shown, |index| !selected.get(index), SelectMode::Replace);
     }

@@ -12,18 +12,18 @@ use super::{Bits, ClipBox, Document, Layer, LayerId};
 
 /// The visible points of a document as one cloud, with the layer of each point. Clones share all large parts.
 #[derive(Clone, Debug)]
-pub(crate) struct Shown {
+pub(crate) struct ShownCloud {
     /// The points in world coordinates and in the colours shown. Positions have the precision of `f32` about the
     /// cloud's origin; [`Document::describe`] has all digits.
     pub(crate) cloud: Arc<PointCloud>,
     /// The document that the cloud was made from.
     of: Document,
-    parts: Vec<Part>,
+    parts: Vec<LayerPart>,
 }
 
 /// The points of one layer, which are contiguous in the cloud.
 #[derive(Clone, Debug)]
-pub(super) struct Part {
+pub(super) struct LayerPart {
     pub(super) layer: LayerId,
     /// Index of the first point in the shown cloud.
     pub(super) start: usize,
@@ -32,7 +32,7 @@ pub(super) struct Part {
     points: Option<Arc<[u32]>>,
 }
 
-impl Part {
+impl LayerPart {
     /// Index in the layer of the point at `index` of this part.
     fn point(&self, index: usize) -> usize {
         self.points.as_ref().map_or(index, |points| points[index] as usize)
@@ -120,7 +120,7 @@ impl Document {
     ///
     /// Attributes and coordinate system are kept as [merging](PointCloud::merge) keeps them; degrees become metres. A
     /// single unedited layer is shared, not copied.
-    pub(crate) fn shown(&self) -> Shown {
+    pub(crate) fn shown(&self) -> ShownCloud {
         let mut parts = Vec::new();
         let mut clouds: Vec<(&Layer, Cow<'_, PointCloud>)> = Vec::new();
         let mut start = 0;
@@ -129,7 +129,7 @@ impl Document {
             let len = points.as_ref().map_or(layer.cloud.len(), Vec::len);
             if len > 0 {
                 clouds.push((layer, layer.look(points.as_deref())));
-                parts.push(Part { layer: layer.id, start, len, points: points.map(Arc::from) });
+                parts.push(LayerPart { layer: layer.id, start, len, points: points.map(Arc::from) });
                 start += len;
             }
         }
@@ -143,7 +143,7 @@ impl Document {
                 Arc::new(PointCloud::merged(&posed))
             }
         };
-        Shown { cloud, of: self.clone(), parts }
+        ShownCloud { cloud, of: self.clone(), parts }
     }
 }
 
@@ -192,13 +192,13 @@ pub(super) fn points_where(len: usize, has: impl Fn(usize) -> bool + Sync) -> Op
     (points.len() < len).then_some(points)
 }
 
-impl Shown {
+impl ShownCloud {
     /// Whether [`Document::shown`] would make the same cloud of `document`. Names and the selection do not matter.
     pub(crate) fn shows(&self, document: &Document) -> bool {
         let layers = |document: &Document| document.visible().count();
         self.of.clips() == document.clips()
             && layers(&self.of) == layers(document)
-            && self.of.visible().zip(document.visible()).all(|(own, other)| own.looks_like(other))
+            && self.of.visible().zip(document.visible()).all(|(own, other)| own.shows_same(other))
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -212,14 +212,14 @@ impl Shown {
         (within < part.len).then(|| (part.layer, part.point(within)))
     }
 
-    pub(super) fn part(&self, layer: LayerId) -> Option<&Part> {
+    pub(super) fn part(&self, layer: LayerId) -> Option<&LayerPart> {
         self.parts.iter().find(|part| part.layer == layer)
     }
 
     /// The shown points that are selected in `document`.
     pub(crate) fn selected(&self, document: &Document) -> Bits {
         let parts: Vec<_> = self.parts.iter().map(|part| (part, document.layer(part.layer))).collect();
-        if let [(Part { points: None, .. }, Some(layer))] = parts[..] {
+        if let [(LayerPart { points: None, .. }, Some(layer))] = parts[..] {
             return layer.edits.selected.clone();
         }
         if parts.iter().all(|(_, layer)| layer.is_none_or(|layer| layer.edits.selected.is_empty())) {

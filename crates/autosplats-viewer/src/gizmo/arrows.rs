@@ -12,14 +12,14 @@ use crate::measure::angle_text;
 use crate::tools::ruler;
 
 /// Start and end of an arrow, screen points from the middle.
-const ARROW: [f64; 2] = [16.0, 78.0];
+const ARROW_ENDS_POINTS: [f64; 2] = [16.0, 78.0];
 /// Radius of the rings, screen points.
-const RING: f64 = 96.0;
+const RING_RADIUS_POINTS: f64 = 96.0;
 /// Corners of a ring's polygon.
-const CORNERS: usize = 72;
+const RING_CORNER_COUNT: usize = 72;
 /// Step of a stepped rotation, degrees.
 const STEP_DEG: f64 = 15.0;
-const TAKEN: Color32 = Color32::from_rgb(255, 205, 60);
+const GRABBED_COLOR: Color32 = Color32::from_rgb(255, 205, 60);
 /// Red, green and blue of the axes, as in the corner of the picture.
 const COLORS: [Color32; 3] =
     [Color32::from_rgb(235, 95, 85), Color32::from_rgb(150, 205, 90), Color32::from_rgb(95, 150, 255)];
@@ -140,17 +140,17 @@ fn arrow(middle: DVec3, axis: usize, view: &View) -> Option<[Pos2; 2]> {
     let unit = view.unit(middle)?;
     let axis = DVec3::AXES[axis];
     along(middle, axis, view.ray(view.place(middle)?))?;
-    let [from, to] = ARROW.map(|points| view.place(middle + axis * (points * unit)));
+    let [from, to] = ARROW_ENDS_POINTS.map(|points| view.place(middle + axis * (points * unit)));
     Some([from?, to?])
 }
 
 /// Corners of a ring; `None` if it is seen edge on.
 fn ring(middle: DVec3, axis: usize, view: &View) -> Option<Vec<Pos2>> {
-    let radius = RING * view.unit(middle)?;
+    let radius = RING_RADIUS_POINTS * view.unit(middle)?;
     let [across, along] = [1, 2].map(|next| DVec3::AXES[(axis + next) % 3] * radius);
     on_plane(middle, DVec3::AXES[axis], view.ray(view.place(middle)?))?;
-    let corners = (0..CORNERS).map(|corner| {
-        let (sin, cos) = (corner as f64 / CORNERS as f64 * std::f64::consts::TAU).sin_cos();
+    let corners = (0..RING_CORNER_COUNT).map(|corner| {
+        let (sin, cos) = (corner as f64 / RING_CORNER_COUNT as f64 * std::f64::consts::TAU).sin_cos();
         view.place(middle + across * cos + along * sin)
     });
     corners.collect()
@@ -178,7 +178,7 @@ pub(super) fn show(middle: DVec3, view: &View, painter: &Painter, taken: Option<
             Handle::Arrow(axis) | Handle::Ring(axis) => COLORS[axis],
             _ => Color32::WHITE,
         };
-        let color = if is_taken { TAKEN } else { own };
+        let color = if is_taken { GRABBED_COLOR } else { own };
         match shape {
             Shape::Dot(place) => {
                 painter.circle(place, 6.0, color, Stroke::new(1.5, Color32::from_black_alpha(200)));

@@ -10,13 +10,13 @@ use crate::document::ClipBox;
 use crate::tools::ruler;
 
 /// Segments of an edge, each drawn faint where it is hidden.
-const PIECES: usize = 48;
+const EDGE_SEGMENTS: usize = 48;
 /// Radius of a handle, screen points.
-const RADIUS: f32 = 6.0;
+const HANDLE_RADIUS_POINTS: f32 = 6.0;
 const EDGE: Color32 = Color32::from_rgb(120, 205, 255);
-const TAKEN: Color32 = Color32::from_rgb(255, 205, 60);
+const GRABBED_COLOR: Color32 = Color32::from_rgb(255, 205, 60);
 /// Opacity of hidden edges.
-const FAINT: f32 = 0.28;
+const HIDDEN_OPACITY: f32 = 0.28;
 
 /// A drag of a face.
 pub(super) struct Drag {
@@ -137,11 +137,12 @@ pub(super) fn show(app: &App, view: &View, painter: &Painter, taken: Option<Hand
         let (Handle::Face { axis, high }, Shape::Dot(place)) = (handle, shape) else { continue };
         let is_taken = taken == Some(handle);
         let front = faces_eye(&clip, view, axis, high);
-        let color = if is_taken { TAKEN } else { EDGE }.gamma_multiply(if front || is_taken { 1.0 } else { 0.55 });
+        let color =
+            if is_taken { GRABBED_COLOR } else { EDGE }.gamma_multiply(if front || is_taken { 1.0 } else { 0.55 });
         if is_taken {
             arrow(&clip, view, painter, axis, high);
         }
-        painter.circle(place, RADIUS, color, Stroke::new(1.5, Color32::from_black_alpha(200)));
+        painter.circle(place, HANDLE_RADIUS_POINTS, color, Stroke::new(1.5, Color32::from_black_alpha(200)));
     }
 }
 
@@ -151,7 +152,7 @@ fn arrow(clip: &ClipBox, view: &View, painter: &Painter, axis: usize, high: bool
     let Some(unit) = view.unit(middle) else { return };
     let ends = [-26.0, 26.0].map(|points| view.place(middle + clip.axis(axis) * (points * unit)));
     if let [Some(from), Some(to)] = ends {
-        line(painter, [from, to], 2.0, TAKEN);
+        line(painter, [from, to], 2.0, GRABBED_COLOR);
     }
 }
 
@@ -172,11 +173,11 @@ fn edge(app: &App, clip: &ClipBox, view: &View, painter: &Painter, ends: [DVec3;
         surface.and_then(|surface| view.seen(surface)).is_some_and(|(_, before)| before < depth)
     };
     let mut before: Option<(Pos2, f64)> = None;
-    for piece in 0..=PIECES {
-        let here = view.seen(ends[0].lerp(ends[1], piece as f64 / PIECES as f64));
+    for piece in 0..=EDGE_SEGMENTS {
+        let here = view.seen(ends[0].lerp(ends[1], piece as f64 / EDGE_SEGMENTS as f64));
         if let (Some((from, _)), Some((to, depth))) = (before, here) {
             let faint = behind_box || covered(from + (to - from) * 0.5, depth);
-            let color = EDGE.gamma_multiply(if faint { FAINT } else { 0.9 });
+            let color = EDGE.gamma_multiply(if faint { HIDDEN_OPACITY } else { 0.9 });
             painter.line_segment([from, to], Stroke::new(1.3, color));
         }
         before = here;

@@ -5,14 +5,14 @@ use autosplats::{Camera, Lens};
 use eframe::egui::{Pos2, Rect, vec2};
 
 /// Largest distance from the pointer to a handle that takes it, screen points.
-const REACH: f32 = 9.0;
+const REACH_POINTS: f32 = 9.0;
 /// Advantage of a dot over a line in the choice of the nearest handle, screen points.
-const DOTS_FIRST: f32 = 4.0;
+const DOT_ADVANTAGE_POINTS: f32 = 4.0;
 /// Squared sine of the angle between a line of sight and an axis, below which a drag along the axis is ambiguous: 4
 /// degrees.
-const END_ON: f64 = 5e-3;
+const END_ON_SINE_2: f64 = 5e-3;
 /// Sine of the angle between a line of sight and a plane, below which the plane is seen edge on: 4 degrees.
-const EDGE_ON: f64 = 0.07;
+const EDGE_ON_SINE: f64 = 0.07;
 
 /// A line of sight: origin and unit direction, world space.
 pub(super) type Ray = (DVec3, DVec3);
@@ -88,7 +88,7 @@ pub(super) enum Shape {
 impl Shape {
     fn distance(&self, place: Pos2) -> f32 {
         match self {
-            Self::Dot(dot) => dot.distance(place) - DOTS_FIRST,
+            Self::Dot(dot) => dot.distance(place) - DOT_ADVANTAGE_POINTS,
             Self::Line(from, to) => distance(*from, *to, place),
             Self::Loop(places) => {
                 let next = places.iter().cycle().skip(1);
@@ -110,7 +110,7 @@ fn distance(from: Pos2, to: Pos2, place: Pos2) -> f32 {
 /// The handle under the pointer: the nearest one within reach.
 pub(super) fn nearest<T: Copy>(handles: &[(T, Shape)], place: Pos2) -> Option<T> {
     let distances = handles.iter().map(|(handle, shape)| (*handle, shape.distance(place)));
-    let near = distances.filter(|(_, distance)| *distance < REACH);
+    let near = distances.filter(|(_, distance)| *distance < REACH_POINTS);
     near.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(handle, _)| handle)
 }
 
@@ -121,14 +121,14 @@ pub(super) fn along(origin: DVec3, axis: DVec3, (eye, sight): Ray) -> Option<f64
     let cosine = axis.dot(sight);
     let sine_2 = 1.0 - cosine * cosine;
     let way = (cosine * sight.dot(between) - axis.dot(between)) / sine_2;
-    (sine_2 > END_ON && way.is_finite()).then_some(way)
+    (sine_2 > END_ON_SINE_2 && way.is_finite()).then_some(way)
 }
 
 /// Intersection of a line of sight with a plane. `None` if the plane is seen edge on.
 pub(super) fn on_plane(origin: DVec3, normal: DVec3, (eye, sight): Ray) -> Option<DVec3> {
     let sine = normal.dot(sight);
     let place = eye + sight * (normal.dot(origin - eye) / sine);
-    (sine.abs() > EDGE_ON && place.is_finite()).then_some(place)
+    (sine.abs() > EDGE_ON_SINE && place.is_finite()).then_some(place)
 }
 
 /// Angle about an axis from one direction to another, radians, -π to π.

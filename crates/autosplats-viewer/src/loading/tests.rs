@@ -18,8 +18,8 @@ fn wait<T>(mut ask: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-fn last_news(loader: &mut Loader) -> News {
-    wait(|| loader.news().pop().map(|(_, _, news)| news).filter(|news| !matches!(news, News::Preview(..))))
+fn last_news(loader: &mut Loader) -> JobNews {
+    wait(|| loader.news().pop().map(|(_, _, news)| news).filter(|news| !matches!(news, JobNews::Preview(..))))
 }
 
 fn rows(count: usize) -> String {
@@ -33,11 +33,11 @@ fn files_are_read_and_failures_told() {
     std::fs::write(&path, rows(1000)).expect("written");
     let mut loader = Loader::start(egui::Context::default());
     loader.read(Input::file(path));
-    let News::Read(cloud, ..) = last_news(&mut loader) else { panic!("it can be read") };
+    let JobNews::Read(cloud, ..) = last_news(&mut loader) else { panic!("it can be read") };
     assert_eq!(cloud.len(), 1000, "all points");
     assert!(loader.jobs().is_empty(), "the job is done");
     loader.read(Input::file(folder.path().join("none.ply")));
-    let News::Failed(why) = last_news(&mut loader) else { panic!("there is no such file") };
+    let JobNews::Failed(why) = last_news(&mut loader) else { panic!("there is no such file") };
     assert!(why.contains("none.ply"), "names the file: {why}");
 }
 
@@ -53,7 +53,7 @@ fn what_waits_can_be_cancelled() {
         ended.extend(loader.news().into_iter().map(|(_, _, news)| news));
         (ended.len() == 2).then_some(())
     });
-    assert!(ended.iter().all(|news| matches!(news, News::Cancelled)), "neither is wanted");
+    assert!(ended.iter().all(|news| matches!(news, JobNews::Cancelled)), "neither is wanted");
 }
 
 #[test]
@@ -77,10 +77,10 @@ fn changes_of_a_file_are_noticed_once() {
     let loader = Loader::start(egui::Context::default());
     let watch = loader.watch(path.clone());
     // The first check records the state that changes are compared with.
-    std::thread::sleep(WATCH * 2);
+    std::thread::sleep(WATCH_INTERVAL * 2);
     std::fs::write(&path, rows(20)).expect("written again");
     assert_eq!(wait(|| loader.changed().next()), path, "it has changed");
-    std::thread::sleep(WATCH * 3);
+    std::thread::sleep(WATCH_INTERVAL * 3);
     assert!(loader.changed().next().is_none(), "once");
     drop(watch);
 }

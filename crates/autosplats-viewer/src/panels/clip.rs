@@ -8,7 +8,7 @@ use crate::document::ClipBox;
 use crate::gizmo;
 
 /// Change of a number per screen point dragged, as a share of the box's longest side.
-const SPEED: f64 = 0.002;
+const DRAG_SPEED_SHARE: f64 = 0.002;
 
 pub(super) fn show(app: &mut App, context: &egui::Context) {
     if !app.panels.clip {
@@ -44,7 +44,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 fn numbers(app: &App, ui: &mut egui::Ui, clip: &mut ClipBox) -> bool {
     let mut busy = false;
     ui.checkbox(&mut clip.enabled, "Clips").on_hover_text("If off, all points are shown and the box is kept");
-    let speed = SPEED * (clip.max - clip.min).max_element().max(1e-9);
+    let speed = DRAG_SPEED_SHARE * (clip.max - clip.min).max_element().max(1e-9);
     egui::Grid::new("clip").num_columns(3).show(ui, |ui| {
         ui.label("");
         ui.weak("from");

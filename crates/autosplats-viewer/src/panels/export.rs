@@ -8,25 +8,25 @@ use std::sync::{Arc, Mutex, PoisonError};
 use autosplats::cloud::{Progress, written_formats};
 use eframe::egui;
 
-use super::target_file::{TargetFile, Words, Write};
+use super::target_file::{DialogTexts, TargetFile, Write};
 use crate::app::App;
-use crate::document::{Document, ExportError, Exported, LayerId, Replace, What, export, grouped};
+use crate::document::{Document, ExportError, ExportScope, Exported, LayerId, Replace, export, grouped};
 use crate::threads::spawn;
 
 /// State of the dialog and of the export.
 pub(crate) struct Export {
     pub(crate) open: bool,
-    what: What,
+    what: ExportScope,
     target: TargetFile,
     /// The files that the last refused export would replace.
     replace: Replace,
-    work: Option<Work>,
+    work: Option<ExportJob>,
 }
 
 impl Default for Export {
     fn default() -> Self {
         let target = TargetFile::new("");
-        Self { open: false, what: What::Shown, target, replace: Replace::Nothing, work: None }
+        Self { open: false, what: ExportScope::Shown, target, replace: Replace::Nothing, work: None }
     }
 }
 
@@ -43,10 +43,10 @@ pub(crate) fn open(app: &mut App) {
 }
 
 /// An export in progress.
-struct Work {
+struct ExportJob {
     /// The document when the export began.
     document: Document,
-    what: What,
+    what: ExportScope,
     path: PathBuf,
     listener: Arc<Listener>,
     result: Receiver<Result<Exported, ExportError>>,
@@ -84,7 +84,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let mut write = None;
     let choices = choices(app);
     if !choices.iter().any(|(_, what, _)| *what == app.panels.export.what) {
-        app.panels.export.what = What::Shown;
+        app.panels.export.what = ExportScope::Shown;
         app.panels.export.target.forget();
     }
     let window = egui::Window::new("Export points").open(&mut open).collapsible(false).resizable(false);
@@ -107,7 +107,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         ui.add_space(6.0);
         let formats: Vec<_> = written_formats().flat_map(|(_, extensions)| extensions.iter().copied()).collect();
         ui.small(format!("The extension of the name sets the format: .{}", formats.join(" .")));
-        let words = Words { title: "Export points", name: "points.ply", verb: "Export" };
+        let words = DialogTexts { title: "Export points", name: "points.ply", verb: "Export" };
         write = export.target.show(ui, &words, &mut app.panels.entered, None);
     });
     app.panels.export.open = open;
@@ -122,16 +122,17 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
 }
 
 /// The choices of an export: label, scope, and whether it holds any points.
-fn choices(app: &mut App) -> Vec<(String, What, bool)> {
+fn choices(app: &mut App) -> Vec<(String, ExportScope, bool)> {
     let counts = app.counts().all;
     let document = app.document();
     let mut choices = vec![
-        ("Visible points".into(), What::Shown, counts.points > 0),
-        (format!("Selected points ({})", grouped(counts.selected)), What::Selected, counts.selected > 0),
-        ("All points, including hidden ones".into(), What::All, counts.points > 0),
+        ("Visible points".into(), ExportScope::Shown, counts.points > 0),
+        (format!("Selected points ({})", grouped(counts.selected)), ExportScope::Selected, counts.selected > 0),
+        ("All points, including hidden ones".into(), ExportScope::All, counts.points > 0),
     ];
     if document.layers.len() > 1 {
-        let layer = |layer: &crate::document::Layer| (format!("All of {}", layer.name), What::Layer(layer.id), true);
+        let layer =
+            |layer: &crate::document::Layer| (format!("All of {}", layer.name), ExportScope::Layer(layer.id), true);
         choices.extend(document.layers.iter().map(layer));
     }
     choices
@@ -153,13 +154,13 @@ fn start(app: &mut App, context: &egui::Context, path: PathBuf, replace: Replace
         theirs.context.request_repaint();
     });
     app.panels.export.target.forget();
-    app.panels.export.work = Some(Work { document, what, path, listener, result });
+    app.panels.export.work = Some(ExportJob { document, what, path, listener, result });
 }
 
 /// Receives the result of the export.
 fn finish(app: &mut App) {
     let Some(result) = app.panels.export.work.as_ref().and_then(|work| work.result.try_recv().ok()) else { return };
-    let Some(Work { document, what, path, listener, .. }) = app.panels.export.work.take() else { return };
+    let Some(ExportJob { document, what, path, listener, .. }) = app.panels.export.work.take() else { return };
     let notes = std::mem::take(&mut *listener.notes.lock().unwrap_or_else(PoisonError::into_inner));
     notes.into_iter().for_each(|note| app.messages.note(note));
     match result {
@@ -185,14 +186,14 @@ fn finish(app: &mut App) {
 }
 
 /// The layers that are saved by an export, as all their remaining points are in the file.
-fn saved_layers(document: &Document, what: What) -> Vec<LayerId> {
+fn saved_layers(document: &Document, what: ExportScope) -> Vec<LayerId> {
     let complete = |layer: &&crate::document::Layer| match what {
-        What::All => true,
-        What::Layer(id) => layer.id == id,
-        What::Shown => {
+        ExportScope::All => true,
+        ExportScope::Layer(id) => layer.id == id,
+        ExportScope::Shown => {
             layer.visible && layer.edits.hidden.is_empty() && !document.clip.as_ref().is_some_and(|clip| clip.enabled)
         }
-        What::Selected => false,
+        ExportScope::Selected => false,
     };
     document.layers.iter().filter(complete).map(|layer| layer.id).collect()
 }

@@ -6,7 +6,7 @@ use autosplats::{Camera, MAX_SIDE};
 use autosplats_film::{Error, Target, has_ffmpeg};
 use eframe::egui;
 
-use super::target_file::{TargetFile, Words};
+use super::target_file::{DialogTexts, TargetFile};
 use crate::animation::{path, turntable};
 use crate::app::App;
 use crate::output;
@@ -15,7 +15,7 @@ use crate::recording::Recording;
 use crate::threads::spawn;
 
 /// Largest number of pictures of a film.
-const MOST: f64 = 1e6;
+const MAX_PICTURES: f64 = 1e6;
 
 /// State of the dialog and of the preview.
 pub(crate) struct Film {
@@ -33,7 +33,7 @@ pub(crate) struct Film {
     /// Whether ffmpeg is installed; `None` until somebody asks, unset until the answer is known.
     ffmpeg: Option<Arc<OnceLock<bool>>>,
     /// Moments of the preview, and the window time when it began, seconds.
-    played: Option<(Vec<Moment>, f64)>,
+    played: Option<(Vec<FilmPicture>, f64)>,
 }
 
 /// How time runs in a film.
@@ -50,7 +50,7 @@ enum Time {
 
 /// Camera and time of one picture.
 #[derive(Clone, Copy, Debug)]
-struct Moment {
+struct FilmPicture {
     camera: Camera,
     /// Clock position, where time runs.
     place: Option<f64>,
@@ -70,7 +70,7 @@ impl Film {
 
     /// Number of pictures; `clock` is that of the playing inputs.
     fn pictures(&self, clock: Option<&Clock>) -> usize {
-        (self.seconds(clock) * f64::from(self.rate)).round().clamp(1.0, MOST) as usize
+        (self.seconds(clock) * f64::from(self.rate)).round().clamp(1.0, MAX_PICTURES) as usize
     }
 
     /// Stops the preview.
@@ -142,7 +142,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         way(app, ui);
         time(app, ui);
         ui.separator();
-        let ready = has_way(app);
+        let ready = has_cameras(app);
         ui.horizontal(|ui| {
             let given = clock(app).map(|clock| app.panels.film.seconds(Some(clock)));
             let film = &mut app.panels.film;
@@ -247,7 +247,7 @@ fn clock(app: &App) -> Option<&Clock> {
 }
 
 /// Whether the film has cameras.
-fn has_way(app: &App) -> bool {
+fn has_cameras(app: &App) -> bool {
     !app.document().layers.is_empty() && (!app.panels.film.keyed || !app.keys.is_empty())
 }
 
@@ -255,8 +255,10 @@ fn has_way(app: &App) -> bool {
 fn problem(app: &App) -> Option<String> {
     let clock = clock(app)?;
     let pictures = app.panels.film.seconds(Some(clock)) * f64::from(app.panels.film.rate);
-    if pictures > MOST {
-        return Some(format!("The film has {pictures:.0} pictures, more than {MOST:.0}; play a part, or faster"));
+    if pictures > MAX_PICTURES {
+        return Some(format!(
+            "The film has {pictures:.0} pictures, more than {MAX_PICTURES:.0}; play a part, or faster"
+        ));
     }
     if let Some(waiting) = app.playing.waiting().next() {
         return Some(format!("{} has no points yet: {}", waiting.input.name, waiting.why));
@@ -266,7 +268,7 @@ fn problem(app: &App) -> Option<String> {
 }
 
 /// The cameras of the film and their times, a million at most.
-fn moments(app: &App) -> Vec<Moment> {
+fn moments(app: &App) -> Vec<FilmPicture> {
     let (film, clock) = (&app.panels.film, clock(app));
     let pictures = film.pictures(clock);
     let cameras = if app.document().layers.is_empty() {
@@ -277,7 +279,7 @@ fn moments(app: &App) -> Vec<Moment> {
         turntable(&app.navigation.goal_camera(), app.up(), film.degrees, pictures)
     };
     let place = |picture: usize| clock.map(|clock| clock.place_after(picture as f64 / f64::from(film.rate)));
-    cameras.into_iter().enumerate().map(|(picture, camera)| Moment { camera, place: place(picture) }).collect()
+    cameras.into_iter().enumerate().map(|(picture, camera)| FilmPicture { camera, place: place(picture) }).collect()
 }
 
 /// The output file. `ready` says whether the film has cameras.
@@ -305,7 +307,7 @@ fn target(app: &mut App, ui: &mut egui::Ui, ready: bool) {
         Ok(_) if !ready => Some("There is no camera path yet".into()),
         Ok(_) => unready,
     };
-    let words = Words { title: "Save film", name: "film.mp4", verb: "Write" };
+    let words = DialogTexts { title: "Save film", name: "film.mp4", verb: "Write" };
     let Some(write) = film.target.show(ui, &words, &mut app.panels.entered, problem) else { return };
     let Ok(target) = Target::new(&write.path) else { return };
     // The system's dialog has asked about one name only, but a film of pictures has many.
@@ -332,13 +334,13 @@ fn play(app: &mut App, context: &egui::Context) {
     let Some((moments, began)) = &app.panels.film.played else { return };
     let picture = (context.input(|input| input.time) - began) * f64::from(app.panels.film.rate);
     match moments.get(picture as usize) {
-        Some(&Moment { camera, place }) => {
+        Some(&FilmPicture { camera, place }) => {
             app.navigation.go_to(&camera, true);
             if let Some(place) = place {
                 app.playing.clock.playing = false;
                 app.playing.clock.seek(place);
             }
-            app.stir();
+            app.note_movement();
             context.request_repaint();
         }
         None => app.panels.film.played = None,

@@ -30,12 +30,12 @@ impl Focus {
 
 /// A part of the window, other than the picture.
 #[derive(Clone, Copy, PartialEq)]
-enum Part {
+enum WindowPart {
     Panel(Rect),
     Window(LayerId),
 }
 
-impl Part {
+impl WindowPart {
     fn holds(self, layer: LayerId, rect: Rect) -> bool {
         match self {
             Self::Panel(panel) => layer.order == egui::Order::Background && panel.contains(rect.center()),
@@ -58,17 +58,18 @@ fn controls(context: &Context) -> Vec<(Id, LayerId, Rect)> {
 }
 
 /// Moves the focus to the next part of the window, or to the previous one.
-pub(crate) fn go_on(app: &mut App, context: &Context, back: bool) {
+pub(crate) fn focus_next_part(app: &mut App, context: &Context, back: bool) {
     let controls = controls(context);
     let mut windows: Vec<LayerId> = controls.iter().map(|(_, layer, _)| *layer).collect();
     windows.retain(|layer| layer.order == egui::Order::Middle);
     windows.dedup();
     let picture = app.view_rect;
     let panels = app.panels.focus.panels.iter().filter(|panel| !picture.contains(panel.center()));
-    let mut parts: Vec<Part> = panels.map(|panel| Part::Panel(*panel)).collect();
-    parts.extend(windows.into_iter().map(Part::Window));
-    let first = |part: Part| controls.iter().find(|(_, layer, rect)| part.holds(*layer, *rect)).map(|(id, ..)| *id);
-    let stops: Vec<(Part, Id)> = parts.into_iter().filter_map(|part| Some((part, first(part)?))).collect();
+    let mut parts: Vec<WindowPart> = panels.map(|panel| WindowPart::Panel(*panel)).collect();
+    parts.extend(windows.into_iter().map(WindowPart::Window));
+    let first =
+        |part: WindowPart| controls.iter().find(|(_, layer, rect)| part.holds(*layer, *rect)).map(|(id, ..)| *id);
+    let stops: Vec<(WindowPart, Id)> = parts.into_iter().filter_map(|part| Some((part, first(part)?))).collect();
     let focused = context.memory(|memory| memory.focused());
     let here = focused.and_then(|focused| {
         let (_, layer, rect) = controls.iter().find(|(id, ..)| *id == focused)?;

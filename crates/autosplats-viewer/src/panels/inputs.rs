@@ -5,7 +5,7 @@ use eframe::egui;
 
 use crate::app::App;
 use crate::document::{Document, LayerId, grouped, shortest};
-use crate::playing::Waiting;
+use crate::playing::WaitingInput;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     let panel = egui::Panel::left("inputs").default_size(210.0).size_range(150.0..=420.0);
@@ -52,7 +52,7 @@ fn loading(app: &App, ui: &mut egui::Ui) {
 /// The playing inputs that have no points yet, and why.
 fn waiting(app: &mut App, ui: &mut egui::Ui) {
     let mut given_up = None;
-    for Waiting { number, input, why, read, .. } in app.playing.waiting() {
+    for WaitingInput { number, input, why, read, .. } in app.playing.waiting() {
         ui.horizontal(|ui| {
             if ui.small_button("×").on_hover_text("Do not open it").clicked() {
                 given_up = Some(number);

@@ -25,7 +25,7 @@ use eframe::egui;
 
 pub(crate) use self::export::open as ask_for_export;
 pub(crate) use self::film::toggle as toggle_film;
-pub(crate) use self::focus::go_on;
+pub(crate) use self::focus::focus_next_part;
 pub(crate) use self::inputs::close_all;
 pub(crate) use self::picture::open as ask_for_picture;
 pub(crate) use self::session::open as ask_for_session;
@@ -41,7 +41,7 @@ pub(crate) struct Panels {
     pub(crate) help: bool,
     /// Whether the numbers and the handles of the clipping box are shown.
     pub(crate) clip: bool,
-    pub(crate) moving: moving::Numbers,
+    pub(crate) moving: moving::MoveNumbers,
     pub(crate) pose: Option<pose::Pose>,
     pub(crate) naming: Option<layer::Naming>,
     pub(crate) dialogs: open::Dialogs,
@@ -79,7 +79,7 @@ impl Default for Panels {
             statistics: false,
             help: false,
             clip: false,
-            moving: moving::Numbers::default(),
+            moving: moving::MoveNumbers::default(),
             pose: None,
             naming: None,
             dialogs: open::Dialogs::default(),

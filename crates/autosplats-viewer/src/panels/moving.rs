@@ -8,7 +8,7 @@ use crate::commands::Tool;
 
 /// The numbers that are being entered.
 #[derive(Default)]
-pub(crate) struct Numbers {
+pub(crate) struct MoveNumbers {
     way: DVec3,
     degrees: f64,
     /// World axis of the rotation; `None` is the up axis.

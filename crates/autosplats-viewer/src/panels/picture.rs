@@ -9,10 +9,10 @@ use autosplats::{BYTES_PER_PIXEL, MAX_SIDE};
 use eframe::egui;
 
 use super::export::has_extension;
-use super::target_file::{TargetFile, Words, Write};
+use super::target_file::{DialogTexts, TargetFile, Write};
 use crate::app::App;
 use crate::output::Goal;
-use crate::render::{Task, Wish};
+use crate::render::{RenderRequest, Task};
 
 pub(crate) struct PictureDialog {
     pub(crate) open: bool,
@@ -68,7 +68,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         } else {
             check_memory("this picture", bytes).err().map(|error| error.to_string())
         };
-        let words = Words { title: "Save picture", name: "picture.png", verb: "Save" };
+        let words = DialogTexts { title: "Save picture", name: "picture.png", verb: "Save" };
         write = dialog.target.show(ui, &words, &mut app.panels.entered, problem);
     });
     app.panels.picture.open = open;
@@ -87,7 +87,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
         dialog.expected = Some((receiver, path));
     } else {
         let size = dialog.size;
-        let wish: Wish = app.wish(size, false);
+        let wish: RenderRequest = app.wish(size, false);
         app.render.task(Task::Photograph { wish: Box::new(wish), goal: Goal::File(path) });
     }
 }

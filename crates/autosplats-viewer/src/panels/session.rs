@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::target_file::{TargetFile, Words};
+use super::target_file::{DialogTexts, TargetFile};
 use crate::app::App;
 use crate::state::State;
 
@@ -33,7 +33,7 @@ pub(super) fn show(app: &mut App, context: &egui::Context) {
     let window = egui::Window::new("Save session").open(&mut open).collapsible(false).resizable(false);
     window.default_pos(app.view_rect.center() - egui::vec2(220.0, 60.0)).show(context, |ui| {
         ui.set_width(420.0);
-        let words = Words { title: "Save session", name: "autosplats.json", verb: "Save" };
+        let words = DialogTexts { title: "Save session", name: "autosplats.json", verb: "Save" };
         let (target, entered) = (&mut app.panels.session.target, &mut app.panels.entered);
         let folder = target.path().is_dir().then(|| "This is a folder".into());
         write = target.show(ui, &words, entered, folder);

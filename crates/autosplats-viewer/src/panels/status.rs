@@ -4,12 +4,12 @@ use eframe::egui;
 
 use crate::app::App;
 use crate::document::grouped;
-use crate::editing::Counted;
+use crate::editing::CachedCounts;
 
 pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
     let shown = egui::Panel::bottom("status").show(ui, |ui| {
         ui.horizontal(|ui| {
-            let &Counted { all: counts, bytes, old_bytes, .. } = app.counts();
+            let &CachedCounts { all: counts, bytes, old_bytes, .. } = app.counts();
             ui.label(format!("{} points", grouped(counts.points)));
             if counts.selected > 0 {
                 ui.separator();

@@ -30,7 +30,7 @@ struct Refusal {
 }
 
 /// The texts of a file dialog.
-pub(super) struct Words<'a> {
+pub(super) struct DialogTexts<'a> {
     /// Title of the system's dialog.
     pub(super) title: &'a str,
     /// Example of a file name.
@@ -98,7 +98,7 @@ impl TargetFile {
     pub(super) fn show(
         &mut self,
         ui: &mut egui::Ui,
-        words: &Words<'_>,
+        words: &DialogTexts<'_>,
         entered: &mut bool,
         problem: Option<String>,
     ) -> Option<Write> {

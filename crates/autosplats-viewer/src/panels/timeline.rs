@@ -15,12 +15,12 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
         ui.horizontal(|ui| {
             let timeline = app.playing.has_timeline();
             if timeline {
-                button(app, ui, Command::StepBack, Sign::Back);
+                button(app, ui, Command::StepBack, ButtonSymbol::Back);
             }
-            let sign = if app.playing.clock.playing { Sign::Pause } else { Sign::Play };
+            let sign = if app.playing.clock.playing { ButtonSymbol::Pause } else { ButtonSymbol::Play };
             button(app, ui, Command::Play, sign);
             if timeline {
-                button(app, ui, Command::StepForward, Sign::Forward);
+                button(app, ui, Command::StepForward, ButtonSymbol::Forward);
             }
             // From the right: the small controls, then the time slider in the remaining space.
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -38,14 +38,14 @@ pub(super) fn show(app: &mut App, ui: &mut egui::Ui) {
 
 /// A symbol drawn on a button, since the fonts have no such glyphs.
 #[derive(Clone, Copy)]
-enum Sign {
+enum ButtonSymbol {
     Play,
     Pause,
     Back,
     Forward,
 }
 
-impl Sign {
+impl ButtonSymbol {
     /// Draws the symbol about the middle of a button.
     fn draw(self, painter: &egui::Painter, middle: egui::Pos2, color: egui::Color32) {
         let bar = |x: f32| {
@@ -72,7 +72,7 @@ impl Sign {
     }
 }
 
-fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: Sign) {
+fn button(app: &mut App, ui: &mut egui::Ui, command: Command, sign: ButtonSymbol) {
     let tip = format!("{} ({})", command.tooltip(), command.key(ui.ctx()));
     let response = ui.add(egui::Button::new("").min_size(egui::vec2(30.0, 0.0))).on_hover_text(tip);
     sign.draw(ui.painter(), response.rect.center(), ui.style().interact(&response).fg_stroke.color);

@@ -6,17 +6,17 @@ use autosplats::cloud::{PointCloud, Source};
 use eframe::egui;
 
 use super::thread::StreamThread;
-use super::{Moving, Removed};
+use super::{PlayingInput, RemovedInput};
 use crate::app::App;
 use crate::document::{Layer, LayerId};
-use crate::glance::Glance;
+use crate::glance::FirstLook;
 use crate::loading::{Appearance, Input};
 
 impl App {
     /// Starts to play an input.
     pub(crate) fn play(&mut self, input: Input, appearance: Appearance, context: &egui::Context) {
         let thread = StreamThread::start(input.clone(), self.loader.frame.clone(), context.clone());
-        self.playing.streams.push(Moving::new(input, thread, appearance));
+        self.playing.streams.push(PlayingInput::new(input, thread, appearance));
     }
 
     /// Opens the source of a layer again and plays it from the clock's position.
@@ -30,8 +30,8 @@ impl App {
         match self.playing.streams.iter_mut().find(|moving| moving.layer == Some(id)) {
             Some(moving) => (moving.thread, moving.frame) = (thread, None),
             None => {
-                let moving = Moving::new(input, thread, Appearance::default());
-                self.playing.streams.push(Moving { layer: Some(id), ..moving });
+                let moving = PlayingInput::new(input, thread, Appearance::default());
+                self.playing.streams.push(PlayingInput { layer: Some(id), ..moving });
             }
         }
         self.playing.clock.hold();
@@ -85,8 +85,8 @@ impl App {
             match moving.layer.filter(|id| !open.contains(id)) {
                 None => index += 1,
                 Some(layer) => {
-                    let Moving { input, frame, .. } = self.playing.streams.remove(index);
-                    self.playing.removed.push(Removed { input, layer, frame, position });
+                    let PlayingInput { input, frame, .. } = self.playing.streams.remove(index);
+                    self.playing.removed.push(RemovedInput { input, layer, frame, position });
                 }
             }
         }
@@ -97,7 +97,7 @@ impl App {
         let (back, gone): (Vec<_>, Vec<_>) = removed.into_iter().partition(|removed| open.contains(&removed.layer));
         self.playing.removed = gone;
         self.playing.removed.retain(|removed| self.history.holds(removed.layer));
-        for Removed { input, layer, frame, position } in back {
+        for RemovedInput { input, layer, frame, position } in back {
             // A pipe cannot be read again.
             if matches!(input.source, Source::StandardInput) {
                 self.messages.note(format!("{} was closed; its last points are shown", input.name));
@@ -107,8 +107,8 @@ impl App {
                 self.playing.edited_at.get_or_insert(position);
             }
             let thread = StreamThread::go_on(input.clone(), frame, self.loader.frame.clone(), context.clone());
-            let moving = Moving::new(input, thread, Appearance::default());
-            self.playing.streams.push(Moving { layer: Some(layer), frame, ..moving });
+            let moving = PlayingInput::new(input, thread, Appearance::default());
+            self.playing.streams.push(PlayingInput { layer: Some(layer), frame, ..moving });
             self.playing.clock.hold();
         }
     }
@@ -165,7 +165,7 @@ impl App {
     }
 
     /// Shows the points of a stream.
-    fn show_frame(&mut self, number: usize, frame: Option<usize>, cloud: &Arc<PointCloud>, glance: Option<Glance>) {
+    fn show_frame(&mut self, number: usize, frame: Option<usize>, cloud: &Arc<PointCloud>, glance: Option<FirstLook>) {
         let moving = &self.playing.streams[number];
         match moving.layer {
             // These points were requested before the edit.
@@ -173,9 +173,9 @@ impl App {
             Some(id) => self.fill(id, cloud),
             None if cloud.is_empty() => return,
             None => {
-                let known = || Glance::of(&moving.input, cloud, self.frame());
+                let known = || FirstLook::of(&moving.input, cloud, self.frame());
                 let glance = glance.unwrap_or_else(known);
-                let Moving { input, appearance, .. } = moving;
+                let PlayingInput { input, appearance, .. } = moving;
                 let (input, appearance) = (input.clone(), *appearance);
                 let path = input.source.path().map(std::path::Path::to_path_buf);
                 let mut layer = Layer::new(&*input.name, path, Arc::clone(cloud)).opened_at(input.world_from_input);

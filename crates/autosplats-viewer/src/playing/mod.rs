@@ -26,15 +26,15 @@ const LIVE_MS: f64 = 100.0;
 /// picture, and both must end before the next update.
 const LIVE_SHARE: f64 = 0.6;
 /// Seconds over which live updates are counted.
-const COUNTED: f64 = 1.0;
+const COUNTING_PERIOD_S: f64 = 1.0;
 
 /// All playing inputs.
 #[derive(Default)]
 pub(crate) struct Playing {
     pub(crate) clock: Clock,
-    streams: Vec<Moving>,
+    streams: Vec<PlayingInput>,
     /// The removed inputs that undo would bring back.
-    removed: Vec<Removed>,
+    removed: Vec<RemovedInput>,
     /// Window time when the clock was last advanced, seconds.
     time: Option<f64>,
     /// Clock position of the points with unsaved edits, seconds.
@@ -42,7 +42,7 @@ pub(crate) struct Playing {
 }
 
 /// A playing input.
-struct Moving {
+struct PlayingInput {
     input: Input,
     thread: StreamThread,
     /// The layer that shows the points, once there are some.
@@ -52,23 +52,23 @@ struct Moving {
     /// Start on the clock, if the stamps of several inputs share a clock; `None` starts at 0.
     begins: Option<Duration>,
     appearance: Appearance,
-    heard: Heard,
+    heard: UpdateRate,
 }
 
 /// Measures how often a live input sends updates.
 #[derive(Default)]
-struct Heard {
+struct UpdateRate {
     /// Window time in seconds, and number of updates, when counting started.
     since: Option<(f64, u64)>,
     /// Milliseconds between updates, once known.
     period_ms: Option<f64>,
 }
 
-impl Heard {
+impl UpdateRate {
     /// Notes the number of updates so far.
     fn count(&mut self, now: f64, updates: u64) {
         let (since, before) = *self.since.get_or_insert((now, updates));
-        if now - since >= COUNTED {
+        if now - since >= COUNTING_PERIOD_S {
             let came = updates.saturating_sub(before);
             self.period_ms = (came > 0).then(|| 1e3 * (now - since) / came as f64);
             self.since = Some((now, updates));
@@ -82,7 +82,7 @@ impl Heard {
 }
 
 /// A removed input.
-struct Removed {
+struct RemovedInput {
     input: Input,
     layer: LayerId,
     frame: Option<usize>,
@@ -91,7 +91,7 @@ struct Removed {
 }
 
 /// An input that has no points yet.
-pub(crate) struct Waiting<'a> {
+pub(crate) struct WaitingInput<'a> {
     /// Index among the playing inputs.
     pub(crate) number: usize,
     pub(crate) input: &'a Input,
@@ -102,10 +102,10 @@ pub(crate) struct Waiting<'a> {
     pub(crate) read: f32,
 }
 
-impl Moving {
+impl PlayingInput {
     /// An input without points.
     fn new(input: Input, thread: StreamThread, appearance: Appearance) -> Self {
-        Self { input, thread, layer: None, frame: None, begins: None, appearance, heard: Heard::default() }
+        Self { input, thread, layer: None, frame: None, begins: None, appearance, heard: UpdateRate::default() }
     }
 
     /// The input's timeline, if it has one and is open.
@@ -164,11 +164,11 @@ impl Playing {
     }
 
     /// The inputs that are open but have no points yet.
-    pub(crate) fn waiting(&self) -> impl Iterator<Item = Waiting<'_>> {
+    pub(crate) fn waiting(&self) -> impl Iterator<Item = WaitingInput<'_>> {
         let waiting = self.streams.iter().enumerate().filter(|(_, moving)| moving.layer.is_none());
         waiting.map(|(number, moving)| {
-            let Moving { input, appearance, thread, .. } = moving;
-            Waiting { number, input, appearance: *appearance, why: moving.why(), read: thread.read() }
+            let PlayingInput { input, appearance, thread, .. } = moving;
+            WaitingInput { number, input, appearance: *appearance, why: moving.why(), read: thread.read() }
         })
     }
 
@@ -197,7 +197,7 @@ impl Playing {
             .filter(|(timeline, _)| runs && timeline.len() > 1)
             .map(|(timeline, _)| 1e3 * timeline.duration().as_secs_f64() / (timeline.len() as f64 * self.clock.speed));
         let each = each.map(|frame_ms| frame_ms.max(least_ms));
-        let is_live = |moving: &&Moving| self.clock.playing && matches!(moving.thread.timeline(), Some(None));
+        let is_live = |moving: &&PlayingInput| self.clock.playing && matches!(moving.thread.timeline(), Some(None));
         let live = self.streams.iter().filter(is_live).map(|moving| moving.heard.live_ms());
         each.chain(live).reduce(f64::min).map(|frame_ms| frame_ms.min(LIVE_MS))
     }
@@ -262,7 +262,7 @@ impl Playing {
     /// The frames at some clock positions, for each input that has a timeline and points.
     pub(crate) fn tracks(&self, places: &[f64]) -> Vec<Track> {
         let shown = self.streams.iter().filter_map(|moving| Some((moving, moving.layer?, moving.timeline()?)));
-        let track = |(moving, layer, timeline): (&Moving, LayerId, Arc<Timeline>)| {
+        let track = |(moving, layer, timeline): (&PlayingInput, LayerId, Arc<Timeline>)| {
             let frame = |&place: &f64| moving.frame_at(&timeline, duration(place));
             Track { layer, input: moving.input.clone(), frames: places.iter().map(frame).collect() }
         };
@@ -280,7 +280,7 @@ impl Playing {
     /// Computes when each input begins, from the inputs that are open. Unless the clock is held, its position moves so
     /// that the first shown input keeps its frame.
     fn align(&mut self) {
-        let span = |moving: &Moving| moving.input.source.clock_span(&*moving.timeline()?);
+        let span = |moving: &PlayingInput| moving.input.source.clock_span(&*moving.timeline()?);
         let spans: Vec<_> = self.streams.iter().map(span).collect();
         let mut shift = None;
         for (moving, begins) in self.streams.iter_mut().zip(beginnings(&spans)) {

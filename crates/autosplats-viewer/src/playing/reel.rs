@@ -12,7 +12,7 @@ use eframe::egui;
 
 use crate::document::LayerId;
 use crate::loading::Input;
-use crate::messages::Mail;
+use crate::messages::MessageSender;
 
 /// Pictures whose points are read ahead, besides the one in work.
 const AHEAD: usize = 1;
@@ -25,17 +25,17 @@ pub(crate) struct Track {
 }
 
 /// The layers that change from one picture to the next, and their new points.
-pub(crate) type Changes = Vec<(LayerId, Arc<PointCloud>)>;
+pub(crate) type PictureChanges = Vec<(LayerId, Arc<PointCloud>)>;
 
 /// Reads the points of a film, picture by picture.
 pub(crate) struct Reel {
-    changes: Receiver<Result<Changes, String>>,
+    changes: Receiver<Result<PictureChanges, String>>,
     cancelled: Arc<AtomicBool>,
 }
 
 impl Reel {
     /// Starts to read. Notes go to `mail`; `context` is asked for a repaint when points are ready for a picture.
-    pub(crate) fn start(tracks: Vec<Track>, mail: Mail, context: egui::Context) -> Self {
+    pub(crate) fn start(tracks: Vec<Track>, mail: MessageSender, context: egui::Context) -> Self {
         let (sender, changes) = sync_channel(AHEAD);
         let cancelled = Arc::new(AtomicBool::new(false));
         let theirs = Arc::clone(&cancelled);
@@ -64,7 +64,7 @@ impl Reel {
     ///
     /// # Errors
     /// Why there are no more pictures.
-    pub(crate) fn next(&self) -> Result<Option<Changes>, String> {
+    pub(crate) fn next(&self) -> Result<Option<PictureChanges>, String> {
         match self.changes.try_recv() {
             Ok(changes) => changes.map(Some),
             Err(TryRecvError::Empty) => Ok(None),
@@ -83,7 +83,7 @@ impl Drop for Reel {
 /// Receives progress and notes from a reader.
 struct Follower<'a> {
     input: &'a Input,
-    mail: &'a Mail,
+    mail: &'a MessageSender,
     cancelled: &'a AtomicBool,
 }
 
@@ -100,7 +100,12 @@ impl Progress for Follower<'_> {
 }
 
 /// Reads all frames in order and passes them to `send`, which returns whether more are wanted.
-fn read(tracks: &[Track], mail: &Mail, cancelled: &AtomicBool, send: &dyn Fn(Changes) -> bool) -> Result<(), Error> {
+fn read(
+    tracks: &[Track],
+    mail: &MessageSender,
+    cancelled: &AtomicBool,
+    send: &dyn Fn(PictureChanges) -> bool,
+) -> Result<(), Error> {
     let followers: Vec<_> = tracks.iter().map(|track| Follower { input: &track.input, mail, cancelled }).collect();
     let open = |follower: &Follower<'_>| {
         let Input { source, play, options, .. } = follower.input;
@@ -109,7 +114,7 @@ fn read(tracks: &[Track], mail: &Mail, cancelled: &AtomicBool, send: &dyn Fn(Cha
     let mut players = followers.iter().map(open).collect::<Result<Vec<Player>, Error>>()?;
     let pictures = tracks.iter().map(|track| track.frames.len()).max().unwrap_or_default();
     for picture in 0..pictures {
-        let mut changes = Changes::new();
+        let mut changes = PictureChanges::new();
         for ((track, player), follower) in tracks.iter().zip(&mut players).zip(&followers) {
             let frame = track.frames.get(picture).copied();
             let before = picture.checked_sub(1).and_then(|before| track.frames.get(before).copied());

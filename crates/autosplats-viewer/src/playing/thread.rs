@@ -6,22 +6,22 @@ use std::time::Duration;
 use autosplats::cloud::{Error, PointCloud, Progress, ReadOptions, Statistics, Timeline};
 use eframe::egui;
 
-use crate::glance::{Glance, Known};
+use crate::glance::{FirstLook, SharedViewFrame};
 use crate::loading::Input;
 
 /// Longest silence of a live stream before the thread checks whether the stream is still wanted.
-const PATIENCE: Duration = Duration::from_millis(100);
+const SILENCE_LIMIT: Duration = Duration::from_millis(100);
 
 /// Largest number of notes that may wait for the window.
 const MOST_NOTES: usize = 20;
 
 /// The news since the last call.
 #[derive(Default)]
-pub(crate) struct News {
+pub(crate) struct StreamNews {
     /// The newest points, and their frame if there is a timeline. Older points that nobody took are dropped.
     pub(crate) cloud: Option<(Option<usize>, Arc<PointCloud>)>,
     /// The first look at the first points.
-    pub(crate) glance: Option<Glance>,
+    pub(crate) glance: Option<FirstLook>,
     /// Notes for the user.
     pub(crate) notes: Vec<String>,
     /// The end of the stream, with an error if it failed.
@@ -30,8 +30,8 @@ pub(crate) struct News {
 
 /// State shared by the window and the thread.
 #[derive(Default)]
-struct Post {
-    news: News,
+struct Mailbox {
+    news: StreamNews,
     /// `None` until the input is open; then its timeline, or `Some(None)` if it is live.
     timeline: Option<Option<Arc<Timeline>>>,
     statistics: Statistics,
@@ -46,12 +46,12 @@ struct Post {
 }
 
 struct Shared {
-    post: Mutex<Post>,
+    post: Mutex<Mailbox>,
     changed: Condvar,
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Post> {
+    fn lock(&self) -> MutexGuard<'_, Mailbox> {
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -63,17 +63,17 @@ pub(crate) struct StreamThread {
 
 impl StreamThread {
     /// Starts to open an input. `context` is asked for a repaint with each piece of news.
-    pub(crate) fn start(input: Input, view: Known, context: egui::Context) -> Self {
-        Self::begin(input, None, view, Post::default(), context)
+    pub(crate) fn start(input: Input, view: SharedViewFrame, context: egui::Context) -> Self {
+        Self::begin(input, None, view, Mailbox::default(), context)
     }
 
     /// Starts to open an input whose points are shown already, as those of `frame` if there is a timeline. The points
     /// stay until another frame is wanted.
-    pub(crate) fn go_on(input: Input, frame: Option<usize>, view: Known, context: egui::Context) -> Self {
-        Self::begin(input, frame, view, Post { begun: true, ..Post::default() }, context)
+    pub(crate) fn go_on(input: Input, frame: Option<usize>, view: SharedViewFrame, context: egui::Context) -> Self {
+        Self::begin(input, frame, view, Mailbox { begun: true, ..Mailbox::default() }, context)
     }
 
-    fn begin(input: Input, shown: Option<usize>, view: Known, post: Post, context: egui::Context) -> Self {
+    fn begin(input: Input, shown: Option<usize>, view: SharedViewFrame, post: Mailbox, context: egui::Context) -> Self {
         let shared = Arc::new(Shared { post: Mutex::new(post), changed: Condvar::new() });
         let theirs = Arc::clone(&shared);
         crate::threads::spawn("play", move || {
@@ -121,7 +121,7 @@ impl StreamThread {
     }
 
     /// The news since the last call.
-    pub(crate) fn news(&self) -> News {
+    pub(crate) fn news(&self) -> StreamNews {
         std::mem::take(&mut self.shared.lock().news)
     }
 }
@@ -170,7 +170,7 @@ impl Progress for Follower<'_> {
 fn run(
     input: &Input,
     mut shown: Option<usize>,
-    view: &Known,
+    view: &SharedViewFrame,
     shared: &Shared,
     context: &egui::Context,
 ) -> Result<(), Error> {
@@ -201,13 +201,13 @@ fn run(
                 shown = wanted;
                 Some(player.frame(frame, &follower)?)
             }
-            None => match player.next(PATIENCE, &follower) {
+            None => match player.next(SILENCE_LIMIT, &follower) {
                 Err(Error::NoFrames { .. }) if shared.lock().begun => return Ok(()),
                 next => next?,
             },
         };
         let first = cloud.as_ref().filter(|cloud| !cloud.is_empty() && !shared.lock().begun);
-        let glance = first.map(|cloud| Glance::of(input, cloud, view.get()));
+        let glance = first.map(|cloud| FirstLook::of(input, cloud, view.get()));
         let mut post = shared.lock();
         let news = cloud.filter(|_| wanted.is_some() || !post.paused || !post.begun);
         let statistics = player.stream().statistics();

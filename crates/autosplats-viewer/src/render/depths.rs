@@ -4,7 +4,7 @@ use autosplats::cloud::glam::{DVec2, DVec3};
 use autosplats::{Camera, GBuffer};
 
 /// Stride of the kept pixels, in both directions.
-const STEP: usize = 4;
+const PIXEL_STRIDE: usize = 4;
 
 /// Depths of every fourth pixel of a picture, in both directions.
 #[derive(Clone, Debug, Default)]
@@ -23,8 +23,9 @@ impl Depths {
         if layers.depth.is_empty() {
             return Self::default();
         }
-        let [columns, rows] = size.map(|side| (side as usize).div_ceil(STEP));
-        let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column * STEP, row * STEP)));
+        let [columns, rows] = size.map(|side| (side as usize).div_ceil(PIXEL_STRIDE));
+        let pixels =
+            (0..rows).flat_map(|row| (0..columns).map(move |column| (column * PIXEL_STRIDE, row * PIXEL_STRIDE)));
         let depths = pixels.map(|(x, y)| layers.depth[layers.index(x, y)]).collect();
         Self { size, columns, rows, depths }
     }
@@ -33,7 +34,7 @@ impl Depths {
     /// sides, 0 to 1. If the pixel is empty, its eight kept neighbours are tried; `None` if all are empty.
     pub(crate) fn world(&self, camera: &Camera, place: DVec2) -> Option<DVec3> {
         let pixel = place * DVec2::new(self.size[0].into(), self.size[1].into());
-        let [column, row] = [pixel.x, pixel.y].map(|pixel| (pixel / STEP as f64).floor() as isize);
+        let [column, row] = [pixel.x, pixel.y].map(|pixel| (pixel / PIXEL_STRIDE as f64).floor() as isize);
         let near = [(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)];
         let depth = near.into_iter().find_map(|(dx, dy)| {
             let column = usize::try_from(column + dx).ok().filter(|&column| column < self.columns)?;

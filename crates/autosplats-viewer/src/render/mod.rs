@@ -24,12 +24,12 @@ use autosplats::{AdapterSummary, Backend, Camera, Counts, Image, Settings, Timin
 use eframe::egui;
 
 pub(crate) use self::depths::Depths;
-pub(crate) use self::task::{Outcome, Purpose, Seen, Task};
-use crate::document::{Document, Shown};
+pub(crate) use self::task::{Outcome, PickHit, Purpose, Task};
+use crate::document::{Document, ShownCloud};
 
 /// A request for a picture.
 #[derive(Clone)]
-pub(crate) struct Wish {
+pub(crate) struct RenderRequest {
     pub(crate) document: Document,
     pub(crate) camera: Camera,
     /// Size of the window's picture, pixels.
@@ -62,7 +62,7 @@ pub(crate) struct Picture {
     pub(crate) milliseconds: f64,
     /// Coarse depths. A GPU's pictures have them only at rest.
     pub(crate) depths: Depths,
-    pub(crate) shown: Arc<Shown>,
+    pub(crate) shown: Arc<ShownCloud>,
 }
 
 /// A message from the thread.
@@ -82,8 +82,8 @@ pub(crate) enum Answer {
 
 /// State shared by the window and the thread.
 #[derive(Default)]
-struct Post {
-    wish: Option<Wish>,
+struct Mailbox {
+    wish: Option<RenderRequest>,
     tasks: VecDeque<Task>,
     /// Whether the thread is working on something.
     working: bool,
@@ -91,19 +91,19 @@ struct Post {
 }
 
 struct Shared {
-    post: Mutex<Post>,
+    post: Mutex<Mailbox>,
     news: Condvar,
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, Post> {
+    fn lock(&self) -> MutexGuard<'_, Mailbox> {
         self.post.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the picture in work, requested by `wish`, should be given up: the window has closed, or a picture at
     /// rest is in work and the view moves again. A picture with a time limit is always finished, or none would appear
     /// while the view moves.
-    fn is_in_haste(&self, wish: &Wish) -> bool {
+    fn should_give_up(&self, wish: &RenderRequest) -> bool {
         let post = self.lock();
         let moves = || post.wish.as_ref().is_some_and(|newer| newer.budget_ms.is_some());
         post.closed || wish.budget_ms.is_none() && moves()
@@ -134,7 +134,7 @@ impl RenderThread {
     }
 
     /// Replaces the request for a picture.
-    pub(crate) fn wish(&self, wish: Wish) {
+    pub(crate) fn wish(&self, wish: RenderRequest) {
         self.shared.lock().wish = Some(wish);
         self.shared.news.notify_one();
     }

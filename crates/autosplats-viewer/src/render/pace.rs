@@ -3,22 +3,22 @@
 /// Smallest scale of a picture with a time limit, by its sides.
 const LEAST_SCALE: f64 = 0.25;
 /// Share of the time limit that projecting all points may take before points are left out.
-const PROJECT: f64 = 0.4;
+const MAX_PROJECT_SHARE: f64 = 0.4;
 /// Margin, in halvings, before more points are used again.
-const EASE: f64 = 0.6;
+const HALVING_MARGIN: f64 = 0.6;
 /// Smallest change of the scale's logarithm that is applied, so that the picture's size does not flicker.
-const STEP: f64 = 0.08;
+const MIN_SCALE_CHANGE: f64 = 0.08;
 
 /// Scale and share of points of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pace {
+pub(super) struct Reduction {
     /// Sides relative to the window's picture, 0.25 to 1.
     pub(super) scale: f64,
     /// Number of times the points are halved.
     pub(super) halvings: u32,
 }
 
-impl Pace {
+impl Reduction {
     pub(super) const WHOLE: Self = Self { scale: 1.0, halvings: 0 };
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Costs {
     points: f64,
     /// Milliseconds per million pixels; 0 while unknown.
     pixels: f64,
-    last: Option<Pace>,
+    last: Option<Reduction>,
 }
 
 impl Costs {
@@ -41,14 +41,14 @@ impl Costs {
     }
 
     /// The scale and share of points at which a picture of all `points` and `pixels` should take `budget_ms`.
-    pub(super) fn pace(&mut self, points: usize, pixels: usize, budget_ms: f64) -> Pace {
+    pub(super) fn pace(&mut self, points: usize, pixels: usize, budget_ms: f64) -> Reduction {
         let all_points = self.points * points as f64 * 1e-6;
         let all_pixels = self.pixels * pixels as f64 * 1e-6;
-        let needed = (all_points / (PROJECT * budget_ms)).log2();
+        let needed = (all_points / (MAX_PROJECT_SHARE * budget_ms)).log2();
         let mut halvings = needed.ceil().clamp(0.0, 16.0) as u32;
         if let Some(last) = self.last
             && halvings < last.halvings
-            && needed > f64::from(last.halvings) - 1.0 - EASE
+            && needed > f64::from(last.halvings) - 1.0 - HALVING_MARGIN
         {
             // A new subset has to be picked from all points, which must be worth its cost.
             halvings = last.halvings;
@@ -56,11 +56,11 @@ impl Costs {
         let left = budget_ms - all_points / f64::from(1 << halvings);
         let mut scale = (left / all_pixels.max(1e-9)).sqrt().clamp(LEAST_SCALE, 1.0);
         if let Some(last) = self.last
-            && (last.scale / scale).ln().abs() < STEP
+            && (last.scale / scale).ln().abs() < MIN_SCALE_CHANGE
         {
             scale = last.scale;
         }
-        let pace = Pace { scale, halvings };
+        let pace = Reduction { scale, halvings };
         self.last = Some(pace);
         pace
     }
@@ -74,7 +74,7 @@ mod tests {
     fn pictures_that_are_fast_enough_stay_whole() {
         let mut costs = Costs::default();
         costs.learn(100_000, 1_000_000, 2.0, 10.0);
-        assert_eq!(costs.pace(100_000, 1_000_000, 33.0), Pace::WHOLE, "12 of 33 ms");
+        assert_eq!(costs.pace(100_000, 1_000_000, 33.0), Reduction::WHOLE, "12 of 33 ms");
     }
 
     #[test]

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use autosplats::Image;
 use autosplats::cloud::glam::DVec3;
 
-use super::Wish;
-use crate::document::{Region, SelectMode, Shown};
+use super::RenderRequest;
+use crate::document::{Region, SelectMode, ShownCloud};
 use crate::output::Goal;
 
-impl Wish {
+impl RenderRequest {
     /// The same request, for finding points: splats instead of dots. Where dots are shown, all points are visible; so
     /// outlier removal and adaptation, which would leave points out, are switched off.
     pub(crate) fn of_points(mut self) -> Self {
@@ -46,11 +46,11 @@ pub(super) fn enlarge(image: &Image, [width, height]: [u32; 2]) -> Image {
 /// A task, done as soon as the picture in work is finished.
 pub(crate) enum Task {
     /// Finds the point seen at a pixel of the requested picture.
-    Pick { wish: Box<Wish>, pixel: [f32; 2], purpose: Purpose },
+    Pick { wish: Box<RenderRequest>, pixel: [f32; 2], purpose: Purpose },
     /// Finds the points in a region of the requested picture: the visible ones, or with `through` all.
-    Select { wish: Box<Wish>, region: Region, through: bool, mode: SelectMode },
+    Select { wish: Box<RenderRequest>, region: Region, through: bool, mode: SelectMode },
     /// Renders a picture of any size and hands it over.
-    Photograph { wish: Box<Wish>, goal: Goal },
+    Photograph { wish: Box<RenderRequest>, goal: Goal },
 }
 
 /// What a point is picked for.
@@ -67,19 +67,19 @@ pub(crate) enum Purpose {
 /// Result of a task.
 pub(crate) enum Outcome {
     /// The point under the cursor, if there is one.
-    Picked { purpose: Purpose, point: Option<Seen> },
+    Picked { purpose: Purpose, point: Option<PickHit> },
     /// For each shown point, whether it is in the region.
-    Selected { shown: Arc<Shown>, hits: Vec<bool>, mode: SelectMode },
+    Selected { shown: Arc<ShownCloud>, hits: Vec<bool>, mode: SelectMode },
     /// A picture of the requested size, and the value range of its colours.
     Photographed { image: Box<Image>, range: Option<[f64; 2]>, goal: Goal },
 }
 
 /// A point seen at a pixel.
 #[derive(Clone)]
-pub(crate) struct Seen {
+pub(crate) struct PickHit {
     /// Index among the shown points.
     pub(crate) index: usize,
-    pub(crate) shown: Arc<Shown>,
+    pub(crate) shown: Arc<ShownCloud>,
     /// World position where the line of sight meets the surface; the point itself may lie beside it.
     pub(crate) surface: DVec3,
 }

@@ -11,19 +11,19 @@ use autosplats::{
 };
 use rayon::prelude::*;
 
-use super::pace::{Costs, Pace};
-use super::task::{Outcome, Seen, enlarge};
-use super::{Answer, Depths, Outbox, Picture, Shared, Task, Wish};
-use crate::document::{Document, LayerId, Shown};
+use super::pace::{Costs, Reduction};
+use super::task::{Outcome, PickHit, enlarge};
+use super::{Answer, Depths, Outbox, Picture, RenderRequest, Shared, Task};
+use crate::document::{Document, LayerId, ShownCloud};
 use crate::output::Goal;
 
 /// Colour that selected points are mixed with, sRGB.
-const SELECTED: [u16; 3] = [255, 140, 20];
+const SELECTION_COLOR: [u16; 3] = [255, 140, 20];
 /// Largest depth behind the surface at which a point still counts as seen, in splat radii.
-const SEEN: f32 = 2.0;
+const SEEN_DEPTH_RADII: f32 = 2.0;
 
 pub(super) fn run(shared: &Shared, outbox: &Outbox) {
-    let mut studio = Studio::default();
+    let mut studio = RenderState::default();
     loop {
         let work = {
             let mut post = shared.lock();
@@ -33,26 +33,26 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
                 }
                 post.working = !post.tasks.is_empty() || post.wish.is_some() || studio.finer.is_some();
                 if let Some(task) = post.tasks.pop_front() {
-                    break Work::Task(task);
+                    break RenderJob::Task(task);
                 }
                 if let Some(wish) = post.wish.take() {
-                    break Work::Wish(wish);
+                    break RenderJob::RenderRequest(wish);
                 }
                 if let Some(finer) = studio.finer.take() {
-                    break Work::Finer(finer);
+                    break RenderJob::Finer(finer);
                 }
                 post = shared.news.wait(post).unwrap_or_else(PoisonError::into_inner);
             }
         };
-        let finer = if let Work::Finer(finer) = &work { Some(finer.clone()) } else { None };
+        let finer = if let RenderJob::Finer(finer) = &work { Some(finer.clone()) } else { None };
         let work = std::panic::AssertUnwindSafe(|| match work {
-            Work::Task(task) => studio.perform(task, outbox).map(Answer::Done).map(Some),
-            Work::Wish(wish) => studio.draw(&wish, outbox, &|| !shared.is_in_haste(&wish)).map(Some),
-            Work::Finer(finer) => studio.refine(&finer, &|| !shared.has_news()),
+            RenderJob::Task(task) => studio.perform(task, outbox).map(Answer::Done).map(Some),
+            RenderJob::RenderRequest(wish) => studio.draw(&wish, outbox, &|| !shared.should_give_up(&wish)).map(Some),
+            RenderJob::Finer(finer) => studio.refine(&finer, &|| !shared.has_news()),
         });
         // A panic in one picture must not end all pictures, as the window may hold unsaved edits.
         let Ok(answer) = std::panic::catch_unwind(work) else {
-            studio = Studio::default();
+            studio = RenderState::default();
             outbox.send(Answer::Failed("this picture failed, which is a bug in this program".into()));
             continue;
         };
@@ -72,28 +72,28 @@ pub(super) fn run(shared: &Shared, outbox: &Outbox) {
 }
 
 /// The next piece of work.
-enum Work {
+enum RenderJob {
     Task(Task),
-    Wish(Wish),
+    RenderRequest(RenderRequest),
     Finer(Finer),
 }
 
 /// A request for the supersampled version of a finished picture at rest.
 #[derive(Clone)]
 struct Finer {
-    wish: Wish,
+    wish: RenderRequest,
     settings: Settings,
 }
 
 /// State kept from picture to picture.
 #[derive(Default)]
-struct Studio {
+struct RenderState {
     /// The job for when nothing is requested.
     finer: Option<Finer>,
     renderer: Option<(Backend, Renderer)>,
     costs: Costs,
-    shown: Option<(Option<Axes>, Arc<Shown>)>,
-    sparse: Option<Sparse>,
+    shown: Option<(Option<Axes>, Arc<ShownCloud>)>,
+    sparse: Option<PointSubset>,
     exposure: Exposure,
 }
 
@@ -122,7 +122,7 @@ impl Exposure {
 }
 
 /// A random subset of the points, for pictures with a time limit.
-struct Sparse {
+struct PointSubset {
     /// Identity of the full cloud.
     identity: u64,
     halvings: u32,
@@ -131,7 +131,7 @@ struct Sparse {
     indices: Vec<u32>,
 }
 
-impl Sparse {
+impl PointSubset {
     /// Picks points by a hash of their index, so that the choice is always the same.
     fn new(cloud: &PointCloud, halvings: u32) -> Self {
         let kept = |index: usize| {
@@ -144,9 +144,9 @@ impl Sparse {
     }
 }
 
-impl Studio {
+impl RenderState {
     /// The points that a wish shows; cached until they change.
-    fn shown(&mut self, wish: &Wish) -> Result<Arc<Shown>, Error> {
+    fn shown(&mut self, wish: &RenderRequest) -> Result<Arc<ShownCloud>, Error> {
         if let Some((axes, shown)) = &self.shown
             && *axes == wish.axes
             && shown.shows(&wish.document)
@@ -179,13 +179,13 @@ impl Studio {
 
     /// Frees the renderer when there is nothing to draw, since its buffers are as large as the largest picture and
     /// cloud so far. A renderer on a GPU stays, as it takes long to create.
-    fn let_go(&mut self) {
+    fn free_renderer(&mut self) {
         self.renderer.take_if(|(_, renderer)| renderer.adapter().is_none());
         self.sparse = None;
     }
 
     /// Renderer settings for a task.
-    fn settings(&mut self, wish: &Wish, shown: &Shown, outbox: &Outbox) -> Result<Settings, Error> {
+    fn settings(&mut self, wish: &RenderRequest, shown: &ShownCloud, outbox: &Outbox) -> Result<Settings, Error> {
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
         let mut settings = settings(wish, &shown.cloud, gpu).0;
         let exposure = self.exposure.of(&wish.document, &shown.cloud);
@@ -197,23 +197,23 @@ impl Studio {
     }
 
     /// Renders a picture. `go_on` returns false once another one is more urgent.
-    fn draw(&mut self, wish: &Wish, outbox: &Outbox, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
+    fn draw(&mut self, wish: &RenderRequest, outbox: &Outbox, go_on: &dyn Fn() -> bool) -> Result<Answer, Error> {
         let started = Instant::now();
         self.finer = None;
         let shown = self.shown(wish)?;
         if shown.cloud.is_empty() {
-            self.let_go();
+            self.free_renderer();
             return Ok(Answer::Empty);
         }
         let pixels = wish.size[0] as usize * wish.size[1] as usize;
         let pace = match wish.budget_ms {
             Some(budget) => self.costs.pace(shown.cloud.len(), pixels, budget),
-            None => Pace::WHOLE,
+            None => Reduction::WHOLE,
         };
         let gpu = self.renderer(wish.backend, outbox)?.adapter().is_some();
-        let fits = |sparse: &Sparse| (sparse.identity, sparse.halvings) == (shown.cloud.identity(), pace.halvings);
+        let fits = |sparse: &PointSubset| (sparse.identity, sparse.halvings) == (shown.cloud.identity(), pace.halvings);
         if pace.halvings > 0 && !self.sparse.as_ref().is_some_and(fits) {
-            self.sparse = Some(Sparse::new(&shown.cloud, pace.halvings));
+            self.sparse = Some(PointSubset::new(&shown.cloud, pace.halvings));
         }
         let exposure = self.exposure.of(&wish.document, &shown.cloud);
         let Self { renderer: Some((_, renderer)), sparse, costs, finer, .. } = self else { return Ok(Answer::Empty) };
@@ -248,7 +248,7 @@ impl Studio {
             image: Arc::new(image),
             camera: wish.camera,
             size: wish.size,
-            whole: pace == Pace::WHOLE,
+            whole: pace == Reduction::WHOLE,
             dots: wish.dots.is_some(),
             counts,
             timings,
@@ -309,7 +309,7 @@ impl Studio {
                     let depth = f64::from(layers.depth[at]);
                     let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
                     let surface = wish.camera.unproject(pixel, depth, wish.size).ok()?;
-                    Some(Seen { index: layers.point[at] as usize, shown: Arc::clone(&shown), surface })
+                    Some(PickHit { index: layers.point[at] as usize, shown: Arc::clone(&shown), surface })
                 });
                 Ok(Outcome::Picked { purpose, point })
             }
@@ -336,7 +336,7 @@ impl Studio {
                     inside
                         && layers.is_none_or(|layers| {
                             let at = layers.index(pixel[0] as usize, pixel[1] as usize);
-                            let margin = SEEN * layers.radius.get(at).copied().unwrap_or(0.0);
+                            let margin = SEEN_DEPTH_RADII * layers.radius.get(at).copied().unwrap_or(0.0);
                             layers.weight[at] > 0.0 && depth as f32 <= layers.depth[at] + margin
                         })
                 };
@@ -378,7 +378,7 @@ fn tint(image: &mut Image, layers: &GBuffer, is_selected: impl Fn(u32) -> bool) 
         for (x, pixel) in row.iter_mut().enumerate() {
             let point = layers.point[layers.index(x, y)];
             if point != u32::MAX && is_selected(point) {
-                let mixed = |i: usize| ((2 * u16::from(pixel[i]) + 3 * SELECTED[i]) / 5) as u8;
+                let mixed = |i: usize| ((2 * u16::from(pixel[i]) + 3 * SELECTION_COLOR[i]) / 5) as u8;
                 *pixel = [mixed(0), mixed(1), mixed(2), u8::MAX];
             }
         }
@@ -387,7 +387,7 @@ fn tint(image: &mut Image, layers: &GBuffer, is_selected: impl Fn(u32) -> bool) 
 
 /// The renderer settings for a wish, and a remark on what was replaced. Settings that these points or this device do
 /// not support are replaced, since a look is kept from file to file.
-fn settings(wish: &Wish, cloud: &PointCloud, gpu: bool) -> (Settings, Option<String>) {
+fn settings(wish: &RenderRequest, cloud: &PointCloud, gpu: bool) -> (Settings, Option<String>) {
     let mut settings = wish.settings.clone();
     let mut remark = None;
     let missing = match &settings.shading.color {
@@ -452,7 +452,7 @@ mod tests {
         assert_eq!(exposure.of(&document, &bright), 1.0, "another file");
     }
 
-    fn wish(color: ColorMode, engine: SearchEngine) -> Wish {
+    fn wish(color: ColorMode, engine: SearchEngine) -> RenderRequest {
         let projection = Projection::PerspectiveFovDeg(40.0);
         let camera = Camera { eye: DVec3::NEG_Y, look_at: DVec3::ZERO, up: DVec3::Z, projection };
         let mut settings = Settings::default();
@@ -460,24 +460,24 @@ mod tests {
         settings.reconstruction.engine = engine;
         let document = Document::default();
         let backend = Backend::Cpu;
-        Wish { document, camera, size: [8, 8], settings, dots: None, backend, axes: None, budget_ms: None }
+        RenderRequest { document, camera, size: [8, 8], settings, dots: None, backend, axes: None, budget_ms: None }
     }
 
     #[test]
     fn a_whole_picture_is_given_up_when_the_view_moves() {
         let whole = wish(ColorMode::Auto, SearchEngine::ScreenGrid);
-        let moving = Wish { budget_ms: Some(30.0), ..whole.clone() };
+        let moving = RenderRequest { budget_ms: Some(30.0), ..whole.clone() };
         let shared = Shared { post: Mutex::default(), news: Condvar::new() };
-        let post = |wish: Option<&Wish>| shared.lock().wish = wish.cloned();
-        assert!(!shared.is_in_haste(&whole), "nothing is asked for");
+        let post = |wish: Option<&RenderRequest>| shared.lock().wish = wish.cloned();
+        assert!(!shared.should_give_up(&whole), "nothing is asked for");
         post(Some(&whole));
-        assert!(!shared.is_in_haste(&whole), "another whole picture can wait");
+        assert!(!shared.should_give_up(&whole), "another whole picture can wait");
         post(Some(&moving));
-        assert!(shared.is_in_haste(&whole), "it moves");
-        assert!(!shared.is_in_haste(&moving), "or nothing would be seen while it moves");
+        assert!(shared.should_give_up(&whole), "it moves");
+        assert!(!shared.should_give_up(&moving), "or nothing would be seen while it moves");
         post(None);
         shared.lock().closed = true;
-        assert!(shared.is_in_haste(&moving), "nobody looks any more");
+        assert!(shared.should_give_up(&moving), "nobody looks any more");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use autosplats::Camera;
 
 use super::*;
-use crate::kept::Kept;
+use crate::kept::StoredInput;
 use crate::storage;
 
 #[test]
@@ -124,7 +124,7 @@ fn settings_are_kept_between_starts() {
     let mut window = Window::new(&[]);
     window.harness.state_mut().look.dot_size = 6;
     window.harness.state_mut().look.two_fingers = crate::look::TwoFingers::Pan;
-    window.harness.state_mut().recent = vec![Kept::of(&played(), crate::loading::Appearance::default())];
+    window.harness.state_mut().recent = vec![StoredInput::of(&played(), crate::loading::Appearance::default())];
     let mut memory = Memory::default();
     storage::save(window.app(), &mut memory);
     let (look, recent) = storage::load(Some(&memory));
@@ -136,7 +136,11 @@ fn settings_are_kept_between_starts() {
     assert_eq!(storage::load(Some(&Memory(broken))), (Look::default(), Vec::new()), "what is broken is left behind");
     let paths: Vec<PathBuf> = vec!["/some/where.ply".into()];
     eframe::set_value(&mut memory, "recent", &paths);
-    assert_eq!(storage::load(Some(&memory)).1, [Kept::named("/some/where.ply".into())], "an older version's paths");
+    assert_eq!(
+        storage::load(Some(&memory)).1,
+        [StoredInput::named("/some/where.ply".into())],
+        "an older version's paths"
+    );
     assert_eq!(storage::load(None).0, Look::default(), "nothing was kept");
     // Values that the renderer rejects become defaults too.
     window.harness.state_mut().look.settings.reconstruction.k = 100_000;

@@ -22,7 +22,7 @@ fn app(context: &egui::Context, tool: Tool) -> App {
         up: DVec3::Z,
         projection: autosplats::Projection::PerspectiveFovDeg(40.0),
     };
-    app.stand_at(&camera);
+    app.set_camera(&camera);
     app.tool = tool;
     // Selecting visible points only would need a picture.
     app.tools.through = true;
@@ -137,7 +137,7 @@ fn a_double_click_measures_one_corner() {
     let mut app = app(&context, Tool::Measure);
     let shown = Arc::new(app.document().shown());
     for index in [0, 0, 1, 1, 0] {
-        let seen = Seen { index, shown: Arc::clone(&shown), surface: DVec3::ZERO };
+        let seen = PickHit { index, shown: Arc::clone(&shown), surface: DVec3::ZERO };
         app.picked(Purpose::Measure, Some(seen));
     }
     let [one, other] = [DVec3::ZERO, DVec3::new(0.5, 0.0, 0.0)];

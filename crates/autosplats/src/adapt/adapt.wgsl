@@ -26,11 +26,11 @@
 
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-override THICKEST_FIRST: f32;
-override WIDEST: f32;
-override STRAY_OFFSET: f32;
-override STRAY_OFFSET_KNOWN: f32;
-override GRAZING: f32;
+override MAX_NOISE_K_RADII: f32;
+override MAX_K_RADIUS_FIRST_RADII: f32;
+override OUTLIER_OFFSET_NOISES: f32;
+override OUTLIER_OFFSET_KNOWN_NOISES: f32;
+override GRAZING_COSINE: f32;
 override FARTHEST_ALONG: f32;
 override LONGEST_SHADOW: f32;
 
@@ -56,7 +56,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
     let at = to_pixel(center) * (1.0 / f32(level.side_px)) - 0.5;
     let low = vec2u(max(floor(at), vec2f(0.0)));
     let high = min(vec2u(max(at + 1.0, vec2f(0.0))), vec2u(level.columns, level.rows) - 1u);
-    let per_farthest = 1.0 / (FARTHEST * noise);
+    let per_farthest = 1.0 / (MAX_MOVE_NOISES * noise);
     var disagrees = false;
     for (var row = low.y; row <= high.y; row++) {
         for (var column = low.x; column <= high.x; column++) {
@@ -77,7 +77,7 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
                 let normal = sheet_normal(sheet, over);
                 let across = cross(normal, first.xyz);
                 // The smallest of a sheet's balls has not been held against any normal.
-                let agrees = dot(across, across) <= AGREE * AGREE * (sheet.error * sheet.error + first.w * first.w);
+                let agrees = dot(across, across) <= AGREE_ERRORS * AGREE_ERRORS * (sheet.error * sheet.error + first.w * first.w);
                 if first.w >= 0.0 && !(agrees && sheet.scatter <= scatter) {
                     disagrees = true;
                     continue;
@@ -106,12 +106,12 @@ fn blend(center: vec3f, first: vec4f, noise: f32, scatter: f32) -> Surface {
 
 // Replaces a move by `offset` onto the plane with a `normal` by a move along the ray. Where the ray nearly lies in the
 // plane, the move stays along the normal.
-fn offset_along(known: Known, normal: vec3f, offset: vec3f) -> vec3f {
+fn offset_along(known: KnownNoise, normal: vec3f, offset: vec3f) -> vec3f {
     let distance = dot(offset, normal);
     let slope = dot(known.ray, normal);
-    let inverse = 1.0 / (slope * slope + GRAZING * GRAZING);
+    let inverse = 1.0 / (slope * slope + GRAZING_COSINE * GRAZING_COSINE);
     let along = distance * slope * inverse;
-    let rest = distance * GRAZING * GRAZING * inverse;
+    let rest = distance * GRAZING_COSINE * GRAZING_COSINE * inverse;
     let limit = FARTHEST_ALONG * known.noise;
     let part = select(1.0, limit / abs(along), abs(along) > limit);
     return (known.ray * along + normal * rest) * part;
@@ -119,9 +119,9 @@ fn offset_along(known: Known, normal: vec3f, offset: vec3f) -> vec3f {
 
 // The shadow that a disc with the normal `before` casts along the ray onto a plane with the normal `after`: major axis
 // and ratio. Returns `otherwise` if the shadow is no longer than the disc.
-fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> vec4f {
+fn shadow_along(known: KnownNoise, before: vec3f, after: vec3f, otherwise: vec4f) -> vec4f {
     let slope = dot(known.ray, after);
-    let ratio = min(abs(dot(known.ray, before)) / max(abs(slope), GRAZING), LONGEST_SHADOW);
+    let ratio = min(abs(dot(known.ray, before)) / max(abs(slope), GRAZING_COSINE), LONGEST_SHADOW);
     let major = known.ray - after * slope;
     let length_squared = dot(major, major);
     if ratio > 1.0 && length_squared > 0.0 {
@@ -132,7 +132,7 @@ fn shadow_along(known: Known, before: vec3f, after: vec3f, otherwise: vec4f) -> 
 
 // Turns and moves a surfel onto a surface, along the sensor's ray where the noise is known. The surfel becomes a dot
 // where `noise` does not explain its distance from the surface.
-fn moved_onto(surfel: Surfel, surface: Surface, noise: f32, known: Known) -> Surfel {
+fn moved_onto(surfel: Surfel, surface: Surface, noise: f32, known: KnownNoise) -> Surfel {
     var offset = surface.offset;
     if known.noise > 0.0 {
         offset = offset_along(known, surface.normal, offset);
@@ -141,7 +141,7 @@ fn moved_onto(surfel: Surfel, surface: Surface, noise: f32, known: Known) -> Sur
     let normal = turned_to_eye(surface.normal, center);
     var out = surfel;
     out.normal = normal;
-    let is_stray = length(surface.offset) > select(STRAY_OFFSET, STRAY_OFFSET_KNOWN, known.noise > 0.0) * noise;
+    let is_stray = length(surface.offset) > select(OUTLIER_OFFSET_NOISES, OUTLIER_OFFSET_KNOWN_NOISES, known.noise > 0.0) * noise;
     var shadow = vec4f(any_orthonormal(normal), 1.0);
     if known.noise > 0.0 && !is_stray {
         shadow = shadow_along(known, surfel.normal, normal, shadow);
@@ -177,12 +177,12 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     // Read before the surfel moves, possibly to an empty place.
     let own_radius = initial_radius(surfel, cell_px, cell_columns);
     // A line has no width to draw.
-    surfel.major_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MOST);
+    surfel.major_ratio = select(1.0, min(surfel.major_ratio, frame.longest), surfel.major_ratio < MAX_F32);
     let enough = good_enough(noise, surfel.k_radius, surfel.center.z);
     let is_noisy = calls(surfel, noise, enough);
     var surface = Surface();
     if is_noisy {
-        let is_reliable = noise < THICKEST_FIRST * surfel.k_radius;
+        let is_reliable = noise < MAX_NOISE_K_RADII * surfel.k_radius;
         let first = vec4f(surfel.normal, select(-1.0, noise / surfel.k_radius, is_reliable));
         let scatter = most_scatter(noise, known.noise > 0.0);
         surface = blend(surfel.center, first, noise, scatter);
@@ -197,7 +197,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     if surface.weight > 0.0 {
         if known.noise > 0.0 {
             // Between two surfaces the k-radius is the distance to one of them.
-            surfel.radius *= min(WIDEST * own_radius / surfel.k_radius, 1.0);
+            surfel.radius *= min(MAX_K_RADIUS_FIRST_RADII * own_radius / surfel.k_radius, 1.0);
         }
         surfel = moved_onto(surfel, surface, noise, known);
     } else if surfel.radius > 0.0 {
@@ -206,7 +206,7 @@ fn adapt(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
             atomicAdd(&counters[OUTLIERS], 1u);
         }
     }
-    if surfel.k_radius > DENSER * own_radius {
+    if surfel.k_radius > MIN_TESTED_FIRST_RADII * own_radius {
         surfel.radius = opened(surfel, select(0.0, noise, is_noisy));
     }
     surfels[place] = surfel;

@@ -19,7 +19,7 @@ override MOST_FINEST: u32;
 override MOST_SAMPLED: u32;
 // The finest level whose cells may have sheets, and the number of cells per workgroup that fits them.
 override FINE_SHEETS: u32;
-override FEW: u32;
+override ITEMS_PER_GROUP: u32;
 
 // Columns and rows of cells in a picture.
 fn cells_across(side_px: u32) -> vec2u {
@@ -50,7 +50,7 @@ fn arrange() {
         levels[index] = level;
         put_work(index, cells, 64u);
         if index == FINE_SHEETS {
-            put_work(MOST_LEVELS, cells, FEW);
+            put_work(MOST_LEVELS, cells, ITEMS_PER_GROUP);
         }
         level.side_px *= 2u;
         level.columns = (level.columns + 1u) / 2u;

@@ -22,8 +22,8 @@
 
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-override PARTS: f32;
-override MOST_PX: f32;
+override K_RADIUS_PARTS_PER_PX: f32;
+override MAX_SUMMED_K_RADIUS_PX: f32;
 
 @compute @workgroup_size(64)
 fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -41,7 +41,7 @@ fn ask(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index)
         let cell = divide(at.y, level.side_px).x * level.columns + divide(at.x, level.side_px).x;
         let k_radius_px = surfel.k_radius / pixel_size(surfel.center.z);
         atomicAdd(&asked[3u * cell], 1u);
-        atomicAdd(&asked[3u * cell + 1u], u32(min(k_radius_px, MOST_PX) * PARTS));
+        atomicAdd(&asked[3u * cell + 1u], u32(min(k_radius_px, MAX_SUMMED_K_RADIUS_PX) * K_RADIUS_PARTS_PER_PX));
         atomicMin(&asked[3u * cell + 2u], surfel.source);
     }
 }

@@ -16,7 +16,7 @@ pub(crate) const MOST_FINEST: usize = 1_500_000;
 /// Most levels of cells. No ball needs coarser ones.
 pub(super) const MOST_LEVELS: usize = 9;
 /// Padding after the last value of a row of cells. Values are copied in runs of this length.
-pub(super) const AFTER: usize = 8;
+pub(super) const COPY_PADDING: usize = 8;
 
 /// The mean (view space) and the number of some neighbouring screen points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub(crate) struct Cluster {
 pub(crate) struct CellRow {
     /// First cluster of each cell, then the number of all.
     starts: Vec<u32>,
-    /// X, y and z of the means, and the counts; each followed by [`AFTER`] zeros.
+    /// X, y and z of the means, and the counts; each followed by [`COPY_PADDING`] zeros.
     values: [Vec<f32>; 4],
 }
 
@@ -57,7 +57,7 @@ impl CellRow {
         self.starts.push(0);
         self.values.iter_mut().for_each(Vec::clear);
         cells(self);
-        self.values.iter_mut().for_each(|values| values.extend([0.0; AFTER]));
+        self.values.iter_mut().for_each(|values| values.extend([0.0; COPY_PADDING]));
     }
 
     #[inline(always)]
@@ -79,14 +79,14 @@ impl CellRow {
         self.starts[columns.start] as usize..self.starts[columns.end] as usize
     }
 
-    /// Copies a run of each array to `into`, from `at` on. Writes less than [`AFTER`] values beyond the end.
+    /// Copies a run of each array to `into`, from `at` on. Writes less than [`COPY_PADDING`] values beyond the end.
     #[inline(always)]
     pub(super) fn copy(&self, run: Range<usize>, into: &mut [Vec<f32>; 4], at: usize) {
         for (into, from) in into.iter_mut().zip(&self.values) {
-            for offset in (0..run.len()).step_by(AFTER) {
+            for offset in (0..run.len()).step_by(COPY_PADDING) {
                 // A fixed length compiles to one load and one store.
-                let from = &from[run.start + offset..][..AFTER];
-                into[at + offset..][..AFTER].copy_from_slice(from);
+                let from = &from[run.start + offset..][..COPY_PADDING];
+                into[at + offset..][..COPY_PADDING].copy_from_slice(from);
             }
         }
     }
@@ -128,7 +128,7 @@ pub(crate) struct Cells {
 
 /// A cell being filled. Its slabs are as thin as their number allows, whatever the order of points.
 #[derive(Clone, Copy, Debug)]
-struct Filling {
+struct CellInProgress {
     sum: [[f32; 3]; SLABS],
     count: [f32; SLABS],
     /// Slab of each cluster, in slabs of the cell's current thickness.
@@ -138,7 +138,7 @@ struct Filling {
     doubled: u32,
 }
 
-impl Filling {
+impl CellInProgress {
     const EMPTY: Self = Self { sum: [[0.0; 3]; SLABS], count: [0.0; SLABS], slab: [0; SLABS], used: 0, doubled: 0 };
 
     /// Adds `count` points with this mean.
@@ -263,7 +263,7 @@ fn fill_finest(screen: &ScreenPoints, view: &View, level: &mut Level) {
     let strip_px = screen.cells.strip_px;
     let last_x = screen.cells.columns - 1;
     level.rows.par_iter_mut().enumerate().for_each_init(
-        || vec![Filling::EMPTY; columns],
+        || vec![CellInProgress::EMPTY; columns],
         |filling, (row, out)| {
             let [y0, y1] = [row * side_px, ((row + 1) * side_px).min(view.height as usize) - 1];
             for strip in y0 / strip_px..=y1 / strip_px {
@@ -284,7 +284,7 @@ fn merge(below: &Level, view: &View, level: &mut Level) {
     let slabs = Slabs::new(level.side_px, view);
     let columns = level.columns;
     level.rows.par_iter_mut().zip(below.rows.par_chunks(2)).for_each(|(out, below_rows)| {
-        let mut filling = Filling::EMPTY;
+        let mut filling = CellInProgress::EMPTY;
         out.fill(|out| {
             for column in 0..columns {
                 for row in below_rows {

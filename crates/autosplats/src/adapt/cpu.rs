@@ -5,13 +5,13 @@ use pulp::Simd;
 use rayon::prelude::*;
 
 use super::cells::Cells;
-use super::depth::{DepthNoise, Known};
-use super::noise::{Noise, Usual, measure};
+use super::depth::{DepthNoise, KnownNoise};
+use super::noise::{FrameStatistics, Noise, measure};
 use super::quadric::{EVEN_WEIGHT, Gathered, LEAST_CLUSTERS, LEAST_OF_PLANE, Quadric};
 use super::rows::{is_row, turn};
-use super::sheets::{Around, Blend, Sheets, Surface};
-use super::through::{DENSER, open};
-use super::{LEAST_REACH, SCALES, STEP};
+use super::sheets::{Blend, NearbySheets, Sheets, Surface};
+use super::through::{MIN_TESTED_FIRST_RADII, shrink_to_share};
+use super::{MIN_BASE_FIRST_RADII, SCALES, STEP};
 use crate::camera::View;
 use crate::fit::Surfel;
 use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
@@ -19,7 +19,7 @@ use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
 /// Surfels per task.
 const TASK: usize = 256;
 /// Standard error of a normal, in radians, that is good enough where the noise is many pixels.
-pub(super) const ENOUGH: f32 = 0.025;
+pub(super) const GOOD_NORMAL_ERROR_RAD: f32 = 0.025;
 /// Noise level, in pixels, below which noise may be detail finer than pixels. Less noise allows a larger error.
 pub(super) const TINY_PX: f32 = 0.5;
 /// Allowed error of a normal, in radians per pixel of noise below [`TINY_PX`], for k-radii of [`TINY_REACH_PX`].
@@ -30,53 +30,55 @@ pub(super) const TINY_REACH_PX: f32 = 2.0;
 /// Largest factor by which dense points raise the allowed error. In far views all detail looks like noise.
 pub(super) const MOST_TINY: f32 = 3.0;
 /// Largest standard error of a normal, in radians, with which the normal is held against others.
-pub(super) const RELIABLE: f32 = 0.12;
+pub(super) const MAX_RELIABLE_ERROR_RAD: f32 = 0.12;
 /// Largest noise level, in ball radii, at which the points of a ball are a surface at all.
-pub(super) const THICKEST: f32 = 0.3;
+pub(super) const MAX_NOISE_BALL_RADII: f32 = 0.3;
 /// Largest noise level, in k-radii, at which the first neighbours' normal is reliable; their plane states no error.
-pub(super) const THICKEST_FIRST: f32 = 0.085;
+pub(super) const MAX_NOISE_K_RADII: f32 = 0.085;
 /// Smallest trace times weight, in radii, under the root of [`Quadric::error`]: that of an evenly filled round ball.
 /// Where even this trace gives no reliable error, the fit is skipped, which saves most first balls.
 pub(super) const LEAST_TRACE: f32 = 8.0;
 /// Largest scatter of a larger ball's points about their quadric, in noise levels.
-pub(super) const SCATTER: f32 = 1.9;
-/// [`SCATTER`] for known noise of depth cameras; lower, as that level is raised to account for equal errors of
-/// neighbours.
-pub(super) const SCATTER_KNOWN: f32 = 0.8;
+pub(super) const MAX_SCATTER_NOISES: f32 = 1.9;
+/// [`MAX_SCATTER_NOISES`] for known noise of depth cameras; lower, as that level is raised to account for equal errors
+/// of neighbours.
+pub(super) const MAX_SCATTER_KNOWN_NOISES: f32 = 0.8;
 /// Largest difference of agreeing normals, in standard errors. Agreement falls from 1 for equal normals to 0 there.
-pub(super) const AGREE: f32 = 3.0;
+pub(super) const AGREE_ERRORS: f32 = 3.0;
 
 /// Largest k-radius, in first search radii, that the splat radius of a depth camera's point may follow. The k-radius of
 /// a point between two surfaces is its distance to one of them.
-pub(super) const WIDEST: f32 = 3.0;
+pub(super) const MAX_K_RADIUS_FIRST_RADII: f32 = 3.0;
 /// Largest move of a surfel, in noise levels. A quadric further away is another surface.
-pub(super) const FARTHEST: f32 = 9.0;
+pub(super) const MAX_MOVE_NOISES: f32 = 9.0;
 /// Distance from its surface, in noise levels, beyond which a surfel is an outlier and drawn as a dot. Moved there at
 /// full size, the wide disc would hide the surfels that belong to the surface.
-pub(super) const STRAY_OFFSET: f32 = 3.0;
-/// [`STRAY_OFFSET`] of depth cameras. A pixel on two surfaces lies anywhere between, nearly always this far from both.
-pub(super) const STRAY_OFFSET_KNOWN: f32 = 2.0;
+pub(super) const OUTLIER_OFFSET_NOISES: f32 = 3.0;
+/// [`OUTLIER_OFFSET_NOISES`] of depth cameras. A pixel on two surfaces lies anywhere between, nearly always this far
+/// from both.
+pub(super) const OUTLIER_OFFSET_KNOWN_NOISES: f32 = 2.0;
 /// Least surface variation, times the squared ratio of k-radius to median k-radius, of a point drawn as a dot. Surface
 /// variation is up to 0.15 at edges and corners, which therefore stay where points are up to four times sparser than
 /// usual. In a cloud that fills space the mean is 0.2, and much less for some points.
-pub(super) const STRAY_DOT: f32 = 2.5;
-/// Outlier score, as defined for [`STRAY_DOT`], above which a point is dropped.
-pub(super) const STRAY_DROPPED: f32 = 5.0;
+pub(super) const DOT_OUTLIER_SCORE: f32 = 2.5;
+/// Outlier score, as defined for [`DOT_OUTLIER_SCORE`], above which a point is dropped.
+pub(super) const DROPPED_OUTLIER_SCORE: f32 = 5.0;
 /// K-radius, in median k-radii, beyond which a wider ball is checked: few neighbours lie flat by chance or are cut off.
-pub(super) const SPARSE: f32 = 2.5;
+pub(super) const SPARSE_MEDIAN_K_RADII: f32 = 2.5;
 /// Surface variation, times the squared k-radius in first search radii, beyond which a wider ball is checked. A point
 /// before a surface is sparser than its surroundings, and its neighbours are hardly flat.
-pub(super) const LONE: f32 = 0.5;
+pub(super) const ISOLATED_SCORE: f32 = 0.5;
 /// Radius of the wider ball, in k-radii. A sparse point is no surface if this ball weighs less than k points.
-pub(super) const AROUND_SPARSE: f32 = 2.0;
+pub(super) const WIDER_BALL_K_RADII: f32 = 2.0;
 /// Distance from the wider ball's plane, in k-radii, beyond which a point is an outlier if the ball is over- or
 /// under-populated. Its disc would hide the neighbours. Ridges and corners reach this distance with normal populations.
-pub(super) const ASIDE: f32 = 0.4;
+pub(super) const MAX_PLANE_DISTANCE_K_RADII: f32 = 0.4;
 /// Distance from the wider ball's mean, in k-radii, beyond which a point is an outlier if the ball is over-populated.
 /// Such a point lies beside a border. Straight borders have 0.75 and square corners 1.05, with normal populations.
-pub(super) const OFF_MIDDLE: f32 = 1.0;
+pub(super) const MAX_MEAN_DISTANCE_K_RADII: f32 = 1.0;
 /// Weight of an over-populated ball per neighbour: 1.4 times that of even points. See docs/decisions/0010-outliers.md.
-pub(super) const CROWD: f32 = 1.4 * AROUND_SPARSE * AROUND_SPARSE * EVEN_WEIGHT / std::f32::consts::PI;
+pub(super) const CROWD_WEIGHT_PER_NEIGHBOR: f32 =
+    1.4 * WIDER_BALL_K_RADII * WIDER_BALL_K_RADII * EVEN_WEIGHT / std::f32::consts::PI;
 /// Radius of a dot, in pixels.
 pub(super) const DOT_PX: f32 = 1.0;
 
@@ -98,7 +100,7 @@ struct Task<'a> {
     density: &'a DensityGrid,
     view: &'a View,
     rules: &'a AdaptRules,
-    usual: Usual,
+    usual: FrameStatistics,
     /// The known noise of depth cameras, in view space.
     known: &'a DepthNoise,
 }
@@ -109,7 +111,7 @@ pub(crate) struct Adapter {
     cells: Cells,
     sheets: Sheets,
     /// Measured from the first surfels of a frame.
-    usual: Option<Usual>,
+    usual: Option<FrameStatistics>,
 }
 
 impl Adapter {
@@ -140,7 +142,7 @@ impl Adapter {
         sheets.level = usual.sheet_level;
         let known = &known.seen_by(view);
         let task = Task { cells, density, view, rules, usual, known };
-        let asks = |surfel: &&Surfel| matches!(task.call(surfel), Call::Noise(_));
+        let asks = |surfel: &&Surfel| matches!(task.call(surfel), RefitReason::Noise(_));
         let ask_all = |surfels: &[Surfel]| {
             let mut is_any = false;
             for surfel in surfels.iter().filter(asks) {
@@ -167,23 +169,23 @@ impl Adapter {
 /// Base radius of the balls around a surfel, world units.
 #[inline(always)]
 pub(super) fn first_radius(surfel: &Surfel, density: &DensityGrid, view: &View, k: u32) -> f32 {
-    surfel.k_radius.max(LEAST_REACH * initial_radius(surfel, density, view, k))
+    surfel.k_radius.max(MIN_BASE_FIRST_RADII * initial_radius(surfel, density, view, k))
 }
 
 /// Why the first neighbours of a surfel do not suffice.
 #[derive(Clone, Copy)]
-enum Call {
+enum RefitReason {
     Nothing,
-    Noise(Noisy),
+    Noise(NoiseRefit),
     /// The neighbours form a scan line.
     Row,
 }
 
 #[derive(Clone, Copy)]
-struct Noisy {
+struct NoiseRefit {
     goal: Goal,
     /// Set if the noise is the known noise of a depth camera.
-    known: Option<Known>,
+    known: Option<KnownNoise>,
 }
 
 /// The accuracy that a fit has to reach.
@@ -201,7 +203,7 @@ impl Goal {
     /// Goal for points with this k-radius and depth. `known` says that the noise is the known noise of a depth camera.
     #[inline(always)]
     pub(super) fn new(noise: f32, known: bool, k_radius: f32, depth: f32, view: &View) -> Self {
-        let scatter = if known { SCATTER_KNOWN } else { SCATTER };
+        let scatter = if known { MAX_SCATTER_KNOWN_NOISES } else { MAX_SCATTER_NOISES };
         Self { noise, enough: good_enough(noise, k_radius, depth, view), scatter: scatter * noise }
     }
 }
@@ -209,26 +211,26 @@ impl Goal {
 impl Task<'_> {
     /// Noise level at `place` in view space for the cloud's point `point`: the larger of measured and known noise.
     #[inline(always)]
-    fn noise(&self, place: Vec3, k_radius: f32, point: u32) -> (f32, Option<Known>) {
+    fn noise(&self, place: Vec3, k_radius: f32, point: u32) -> (f32, Option<KnownNoise>) {
         let measured = self.usual.noise.at(k_radius);
         let known = self.known.at(place, point).filter(|known| known.noise > measured);
         (known.map_or(measured, |known| known.noise), known)
     }
 
     #[inline(always)]
-    fn call(&self, surfel: &Surfel) -> Call {
+    fn call(&self, surfel: &Surfel) -> RefitReason {
         // The standard error of the first plane is about noise over k-radius.
         let (noise, known) = self.noise(surfel.center.into(), surfel.k_radius, surfel.source);
         let goal = Goal::new(noise, known.is_some(), surfel.k_radius, surfel.center[2], self.view);
         if surfel.radius == 0.0 {
-            Call::Nothing
+            RefitReason::Nothing
         } else if is_row(surfel) && known.is_none() {
             // The depth steps of a depth camera form lines too, but the surface does not run along them.
-            Call::Row
+            RefitReason::Row
         } else if noise > goal.enough * surfel.k_radius {
-            Call::Noise(Noisy { goal, known })
+            RefitReason::Noise(NoiseRefit { goal, known })
         } else {
-            Call::Nothing
+            RefitReason::Nothing
         }
     }
 }
@@ -241,28 +243,28 @@ fn adapt_all_with<'a, S: Simd>(
     task: &'a Task<'a>,
     sheets: &'a Sheets,
     gathered: &'a mut Gathered,
-    around: &'a mut [Around; 2],
+    around: &'a mut [NearbySheets; 2],
 ) {
     let Task { cells, density, view, rules: &AdaptRules { k, longest, .. }, .. } = *task;
     for surfel in surfels {
         let call = task.call(surfel);
         // K-radius in first search radii.
         let sparser = surfel.k_radius / initial_radius(surfel, density, view, k);
-        if !matches!(call, Call::Row) {
+        if !matches!(call, RefitReason::Row) {
             // A line has no width to draw.
             let is_line = surfel.major_ratio == f32::MAX;
             surfel.major_ratio = if is_line { 1.0 } else { surfel.major_ratio.min(longest) };
         }
         match call {
-            Call::Nothing => shrink(simd, surfel, sparser, task, gathered),
-            Call::Row => {
+            RefitReason::Nothing => shrink(simd, surfel, sparser, task, gathered),
+            RefitReason::Row => {
                 let radius = first_radius(surfel, density, view, k);
                 if !turn(surfel, (radius, k), (cells, view), gathered) {
                     shrink(simd, surfel, sparser, task, gathered);
                 }
             }
-            Call::Noise(Noisy { goal, known }) => {
-                let is_reliable = goal.noise < THICKEST_FIRST * surfel.k_radius;
+            RefitReason::Noise(NoiseRefit { goal, known }) => {
+                let is_reliable = goal.noise < MAX_NOISE_K_RADII * surfel.k_radius;
                 let first = is_reliable.then(|| (surfel.normal.into(), goal.noise / surfel.k_radius));
                 let mut alone = || {
                     let radius = first_radius(surfel, density, view, k);
@@ -280,7 +282,7 @@ fn adapt_all_with<'a, S: Simd>(
                     Some(surface) => {
                         if known.is_some() {
                             // Between two surfaces the k-radius is the distance to one of them.
-                            surfel.radius *= (WIDEST / sparser).min(1.0);
+                            surfel.radius *= (MAX_K_RADIUS_FIRST_RADII / sparser).min(1.0);
                         }
                         place(surfel, &surface, goal.noise, known.as_ref(), view);
                     }
@@ -288,9 +290,9 @@ fn adapt_all_with<'a, S: Simd>(
                 }
             }
         }
-        if sparser > DENSER {
-            let noise = if let Call::Noise(Noisy { goal, .. }) = call { goal.noise } else { 0.0 };
-            open(simd, surfel, noise, (cells, view), gathered);
+        if sparser > MIN_TESTED_FIRST_RADII {
+            let noise = if let RefitReason::Noise(NoiseRefit { goal, .. }) = call { goal.noise } else { 0.0 };
+            shrink_to_share(simd, surfel, noise, (cells, view), gathered);
         }
     }
 }
@@ -300,7 +302,7 @@ fn adapt_all_with<'a, S: Simd>(
 pub(super) fn good_enough(noise: f32, k_radius: f32, depth: f32, view: &View) -> f32 {
     let pixel = view.pixel_size(depth);
     let dense = TINY_REACH_PX * pixel / k_radius;
-    ENOUGH + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
+    GOOD_NORMAL_ERROR_RAD + TINY_SLOPE * (dense * dense).min(MOST_TINY) * (TINY_PX - noise / pixel).max(0.0)
 }
 
 /// The upright quadric around `center`, from balls that grow until the error is small enough. Ball radii are powers of
@@ -330,7 +332,7 @@ pub(super) fn choose<S: Simd>(
     for scale in 0..SCALES {
         radius *= STEP;
         // Points of a ball that the noise fills are no surface; the largest ball is taken if there is no better one.
-        let thin = noise < THICKEST * radius;
+        let thin = noise < MAX_NOISE_BALL_RADII * radius;
         if !thin & (scale + 1 < SCALES) {
             continue;
         }
@@ -338,7 +340,7 @@ pub(super) fn choose<S: Simd>(
             continue;
         }
         if axis.is_none() && scale + 1 < SCALES {
-            let least = noise * (1.0 / (RELIABLE * radius));
+            let least = noise * (1.0 / (MAX_RELIABLE_ERROR_RAD * radius));
             if gathered.weight() < LEAST_TRACE * least * least {
                 continue;
             }
@@ -349,7 +351,7 @@ pub(super) fn choose<S: Simd>(
         });
         let quadric = gathered.quadric(simd, radius, along, curvature);
         let error = quadric.error * noise;
-        if !(thin & (error < RELIABLE)) {
+        if !(thin & (error < MAX_RELIABLE_ERROR_RAD)) {
             if fallback.is_none_or(|other| quadric.error < other.error) {
                 fallback = Some(quadric);
             }
@@ -358,7 +360,7 @@ pub(super) fn choose<S: Simd>(
         let mut share = 1.0;
         if let Some((normal, other)) = reliable {
             let across = quadric.normal.cross(normal).length_squared();
-            share = 1.0 - across / (AGREE * AGREE * (error * error + other * other));
+            share = 1.0 - across / (AGREE_ERRORS * AGREE_ERRORS * (error * error + other * other));
             if !((share > 0.0) & (quadric.scatter <= scatter)) {
                 break;
             }
@@ -373,7 +375,7 @@ pub(super) fn choose<S: Simd>(
         }
     }
     let quadric = if reliable.is_none() { fallback.map(|quadric| quadric.upright()) } else { best };
-    quadric.filter(|quadric| quadric.height.abs() <= FARTHEST * noise)
+    quadric.filter(|quadric| quadric.height.abs() <= MAX_MOVE_NOISES * noise)
 }
 
 /// First search radius of a surfel's point, world units.
@@ -392,9 +394,9 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gath
     }
     let ratio = surfel.k_radius / task.usual.k_radius;
     let mut stray = surfel.curvature * ratio * ratio;
-    let is_sparse = ratio > SPARSE;
-    if is_sparse | (surfel.curvature * sparser * sparser > LONE) {
-        let len = gathered.read(simd, task.cells, surfel.center, AROUND_SPARSE * surfel.k_radius, task.view);
+    let is_sparse = ratio > SPARSE_MEDIAN_K_RADII;
+    if is_sparse | (surfel.curvature * sparser * sparser > ISOLATED_SCORE) {
+        let len = gathered.read(simd, task.cells, surfel.center, WIDER_BALL_K_RADII * surfel.k_radius, task.view);
         let plane = (len >= LEAST_OF_PLANE).then(|| gathered.plane(simd));
         if let Some(plane) = plane
             && is_sparse
@@ -402,23 +404,23 @@ fn shrink<S: Simd>(simd: S, surfel: &mut Surfel, sparser: f32, task: &Task, gath
         {
             stray = stray.max(plane.curvature() * ratio * ratio);
         } else if is_sparse && gathered.weight() < task.rules.k as f32 {
-            stray = stray.max(STRAY_DOT);
+            stray = stray.max(DOT_OUTLIER_SCORE);
         }
         if let Some(plane) = plane {
-            let is_crowd = plane.weight > CROWD * task.rules.k as f32;
-            let is_aside = plane.axis.dot(plane.mean).abs() * AROUND_SPARSE > ASIDE;
-            let is_outside = plane.mean.length() * AROUND_SPARSE > OFF_MIDDLE;
+            let is_crowd = plane.weight > CROWD_WEIGHT_PER_NEIGHBOR * task.rules.k as f32;
+            let is_aside = plane.axis.dot(plane.mean).abs() * WIDER_BALL_K_RADII > MAX_PLANE_DISTANCE_K_RADII;
+            let is_outside = plane.mean.length() * WIDER_BALL_K_RADII > MAX_MEAN_DISTANCE_K_RADII;
             if is_crowd & (is_aside | is_outside) {
                 // Beside a surface a point is an outlier; beside a few points that is undecidable.
                 stray = f32::INFINITY;
             } else if (len < LEAST_CLUSTERS) & is_aside {
-                stray = stray.max(STRAY_DOT);
+                stray = stray.max(DOT_OUTLIER_SCORE);
             }
         }
     }
-    if stray > STRAY_DROPPED && !task.rules.keep_outliers {
+    if stray > DROPPED_OUTLIER_SCORE && !task.rules.keep_outliers {
         surfel.radius = 0.0;
-    } else if stray >= STRAY_DOT {
+    } else if stray >= DOT_OUTLIER_SCORE {
         make_dot(surfel, task.view);
     }
 }
@@ -432,9 +434,9 @@ fn make_dot(surfel: &mut Surfel, view: &View) {
 /// Turns and moves a surfel onto a surface, along the sensor's ray where the noise is known. The surfel becomes a dot
 /// where `noise` does not explain its distance from the surface.
 #[inline(always)]
-fn place(surfel: &mut Surfel, surface: &Surface, noise: f32, known: Option<&Known>, view: &View) {
+fn place(surfel: &mut Surfel, surface: &Surface, noise: f32, known: Option<&KnownNoise>, view: &View) {
     let &Surface { offset, normal, curvature } = surface;
-    let most = if known.is_some() { STRAY_OFFSET_KNOWN } else { STRAY_OFFSET };
+    let most = if known.is_some() { OUTLIER_OFFSET_KNOWN_NOISES } else { OUTLIER_OFFSET_NOISES };
     let is_stray = offset.length() > most * noise;
     let center = Vec3::from(surfel.center) + known.map_or(offset, |known| known.onto(normal, offset));
     let normal = view.turned_to_eye(normal, center);

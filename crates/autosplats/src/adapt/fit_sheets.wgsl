@@ -19,13 +19,13 @@
 @group(0) @binding(5) var<storage, read> depth_noise: array<DepthRun>;
 @group(0) @binding(6) var<storage, read_write> sheets: array<Sheet>;
 
-override PARTS: f32;
+override K_RADIUS_PARTS_PER_PX: f32;
 override COVERED: f32;
 override COVERED_REACH: f32;
 // Cells of a workgroup.
-override FEW: u32;
+override ITEMS_PER_GROUP: u32;
 
-struct Asked {
+struct SheetDemand {
     // Mean k-radius, pixels; 0 if no surfel asks.
     k_radius_px: f32,
     // Smallest point index.
@@ -33,7 +33,7 @@ struct Asked {
 }
 
 // Demand of the surfels that ask for a cell or a cell beside it, which may blend its sheets.
-fn asked_around(level: Level, cell: u32) -> Asked {
+fn asked_around(level: Level, cell: u32) -> SheetDemand {
     let at = divide(cell, level.columns).yx;
     let low = max(at, vec2u(1u)) - 1u;
     let high = min(at + 1u, vec2u(level.columns, level.rows) - 1u);
@@ -46,7 +46,7 @@ fn asked_around(level: Level, cell: u32) -> Asked {
             point = min(point, asked[at + 2u]);
         }
     }
-    return Asked(select(0.0, f32(sum.y) / (f32(sum.x) * PARTS), sum.x > 0u), point);
+    return SheetDemand(select(0.0, f32(sum.y) / (f32(sum.x) * K_RADIUS_PARTS_PER_PX), sum.x > 0u), point);
 }
 
 // Bit mask of the workgroup's cells that need sheets.
@@ -57,12 +57,12 @@ var<workgroup> shared_wanted: u32;
 fn fit_sheets(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     own_place = local;
     let level = levels[sheet_level()];
-    let first = group_index(workgroup) * FEW;
+    let first = group_index(workgroup) * ITEMS_PER_GROUP;
     if local == 0u {
         atomicStore(&found_wanted, 0u);
     }
     workgroupBarrier();
-    for (var index = local; index < FEW; index += TOGETHER) {
+    for (var index = local; index < ITEMS_PER_GROUP; index += TOGETHER) {
         let cell = first + index;
         if cell < level.columns * level.rows && sheets[cell * SHEETS].radius == UNKNOWN && asked_around(level, cell).k_radius_px > 0.0 {
             atomicOr(&found_wanted, 1u << index);

@@ -2,26 +2,33 @@
 
 use super::cells::{MOST_FINEST, MOST_LEVELS, SLABS, least_side_px};
 use super::cpu::{
-    AGREE, AROUND_SPARSE, ASIDE, CROWD, DOT_PX, ENOUGH, FARTHEST, LEAST_TRACE, LONE, MOST_TINY, OFF_MIDDLE, RELIABLE,
-    SCATTER, SCATTER_KNOWN, SPARSE, STRAY_DOT, STRAY_DROPPED, STRAY_OFFSET, STRAY_OFFSET_KNOWN, THICKEST,
-    THICKEST_FIRST, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDEST,
+    AGREE_ERRORS, CROWD_WEIGHT_PER_NEIGHBOR, DOT_OUTLIER_SCORE, DOT_PX, DROPPED_OUTLIER_SCORE, GOOD_NORMAL_ERROR_RAD,
+    ISOLATED_SCORE, LEAST_TRACE, MAX_K_RADIUS_FIRST_RADII, MAX_MEAN_DISTANCE_K_RADII, MAX_MOVE_NOISES,
+    MAX_NOISE_BALL_RADII, MAX_NOISE_K_RADII, MAX_PLANE_DISTANCE_K_RADII, MAX_RELIABLE_ERROR_RAD,
+    MAX_SCATTER_KNOWN_NOISES, MAX_SCATTER_NOISES, MOST_TINY, OUTLIER_OFFSET_KNOWN_NOISES, OUTLIER_OFFSET_NOISES,
+    SPARSE_MEDIAN_K_RADII, TINY_PX, TINY_REACH_PX, TINY_SLOPE, WIDER_BALL_K_RADII,
 };
-use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING, LONGEST_SHADOW};
+use super::depth::{DepthNoise, DepthRun, FARTHEST_ALONG, GRAZING_COSINE, LONGEST_SHADOW};
 use super::noise::{
-    APART, DIFFERS_SHARES, FAR_APART, GROWTH, GROWTH_SURE, LEAST_PAIRS, LEAST_SAMPLE, LEAST_SHARE, MOST_SAMPLED,
-    NOISE_SHARES, QUANTILE, QUANTILE_DIFFERS, RISE, ROUNDING, SAMPLE, STEADY, STEADY_SCALES, SURE_SHARES, THICK_NOISE,
-    THIN, THIN_SHARE,
+    CERTAIN_NOISE_SHARES, FULL_K_RADIUS_CONTRAST, GROWTH_POWER_RAMP, LEAST_PAIRS, LEAST_SAMPLE, MAX_STEADY_RATIO,
+    MAX_THIN_SHARE_RISE, MIN_BALL_SHARE_DIVISOR, MIN_K_RADIUS_CONTRAST, MOST_SAMPLED, NOISE_QUANTILE,
+    NOISE_SAMPLE_COUNT, NOISE_SHARES, ROUNDING_SCATTER_RADII, STEADY_SCALES, STRUCTURE_GROWTH_POWER, THICK_NOISE,
+    THIN_SCATTER_RADII, THIN_SHARE, UNEVEN_NOISE_QUANTILE, UNEVEN_NOISE_SHARES,
 };
-use super::quadric::{CELLS_PER_RADIUS, EVEN_WEIGHT, FULL, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE};
+use super::quadric::{
+    CELLS_PER_RADIUS, EVEN_WEIGHT, FULL_WEIGHT_SQUARED_RADII, LEAST_CLUSTERS, LEAST_OF_PLANE, LEAST_PIVOT, RIDGE,
+};
 use super::rows::{
-    AREA, AREA_NEAR, BESIDE, BEYOND, BEYOND_RADII, FARTHEST_REACH, FLAT, HALVES, OFF_AREA, OFF_ROW, REACH, ROW,
-    ROW_TILT, SEEN_THROUGH, THIN_ROW,
+    AREA_HALF_THICKNESS_RADII, BALL_OVER_SIDE_WEIGHT, BEYOND, BEYOND_RADII, MAX_AREA_HEIGHT_RATIO,
+    MAX_POINT_HEIGHT_RADII, MAX_SCAN_LINE_TILT_SINE, MAX_SEEN_THROUGH_SHARE, MAX_SEMI_AXIS_RADII, MIN_AREA_RATIO,
+    MIN_SCAN_LINE_ANISOTROPY, MIN_SIDE_AREA_RATIO, SEMI_AXIS_LINE_DISTANCES, SIDE_SLACK_RADII, THIN_LINE_ASPECT,
 };
-use super::sheets::{COVERED, COVERED_REACH, MOST_PX, PARTS, SHEET_LEVELS, SHEETS};
+use super::sheets::{COVERED, COVERED_REACH, K_RADIUS_PARTS_PER_PX, MAX_SUMMED_K_RADIUS_PX, SHEET_LEVELS, SHEETS};
 use super::through::{
-    ALL_AROUND, CELLS_TO_COUNT, DENSER, FLAT_AROUND, GOES_ON, LEAST_ON, ON_DISC, ON_DISC_NOISE, WIDE_AROUND,
+    CELLS_TO_COUNT, LEAST_ON, MAX_SURFACE_MEAN_RADII, MAX_SURFACE_VARIATION, MIN_SURFACE_WIDTH_RATIO,
+    MIN_TESTED_FIRST_RADII, ON_DISC, ON_DISC_NOISE, SURFACE_BALL_K_RADII,
 };
-use super::{LEAST_REACH, SCALES, STEP, noise};
+use super::{MIN_BASE_FIRST_RADII, SCALES, STEP, noise};
 use crate::Error;
 use crate::fit::{LONGEST, SUPPORT, SWEEPS};
 use crate::gpu::{Gpu, Groups, Pass, PassSource, Step};
@@ -205,80 +212,81 @@ impl AdaptPasses {
 
     fn with_form(gpu: &Gpu, together: u32) -> Result<Self, Error> {
         let together = ("TOGETHER", together.into());
-        let few = ("FEW", few(gpu).into());
+        let few = ("ITEMS_PER_GROUP", few(gpu).into());
         let quadric = [
             ("SWEEPS", SWEEPS as f64),
             ("MOST_LEVELS", MOST_LEVELS as f64),
             ("CELLS_PER_RADIUS", CELLS_PER_RADIUS.into()),
             ("LEAST_CLUSTERS", LEAST_CLUSTERS as f64),
             ("LEAST_OF_PLANE", LEAST_OF_PLANE as f64),
-            ("FULL", FULL.into()),
+            ("FULL_WEIGHT_SQUARED_RADII", FULL_WEIGHT_SQUARED_RADII.into()),
             ("RIDGE", RIDGE.into()),
             ("LEAST_PIVOT", LEAST_PIVOT.into()),
             ("STEP", STEP.into()),
         ];
-        let least_reach = ("LEAST_REACH", LEAST_REACH.into());
+        let least_reach = ("MIN_BASE_FIRST_RADII", MIN_BASE_FIRST_RADII.into());
         let calls = [
-            ("ENOUGH", ENOUGH.into()),
+            ("GOOD_NORMAL_ERROR_RAD", GOOD_NORMAL_ERROR_RAD.into()),
             ("TINY_PX", TINY_PX.into()),
             ("TINY_SLOPE", TINY_SLOPE.into()),
             ("TINY_REACH_PX", TINY_REACH_PX.into()),
             ("MOST_TINY", MOST_TINY.into()),
-            ("ROW", ROW.into()),
-            ("SCATTER", SCATTER.into()),
-            ("SCATTER_KNOWN", SCATTER_KNOWN.into()),
+            ("MIN_SCAN_LINE_ANISOTROPY", MIN_SCAN_LINE_ANISOTROPY.into()),
+            ("MAX_SCATTER_NOISES", MAX_SCATTER_NOISES.into()),
+            ("MAX_SCATTER_KNOWN_NOISES", MAX_SCATTER_KNOWN_NOISES.into()),
         ];
         let choose = [
-            ("RELIABLE", RELIABLE.into()),
+            ("MAX_RELIABLE_ERROR_RAD", MAX_RELIABLE_ERROR_RAD.into()),
             ("LEAST_TRACE", LEAST_TRACE.into()),
-            ("THICKEST", THICKEST.into()),
-            ("AGREE", AGREE.into()),
-            ("FARTHEST", FARTHEST.into()),
+            ("MAX_NOISE_BALL_RADII", MAX_NOISE_BALL_RADII.into()),
+            ("AGREE_ERRORS", AGREE_ERRORS.into()),
+            ("MAX_MOVE_NOISES", MAX_MOVE_NOISES.into()),
         ];
         let rows = [
-            ("AREA", AREA.into()),
-            ("AREA_NEAR", AREA_NEAR.into()),
+            ("MIN_AREA_RATIO", MIN_AREA_RATIO.into()),
+            ("MIN_SIDE_AREA_RATIO", MIN_SIDE_AREA_RATIO.into()),
             ("BEYOND", BEYOND.into()),
             ("LEAST_BEYOND", BEYOND_RADII[0].into()),
             ("MOST_BEYOND", BEYOND_RADII[1].into()),
-            ("BESIDE", BESIDE.into()),
-            ("HALVES", HALVES.into()),
-            ("FLAT", FLAT.into()),
-            ("ROW_TILT", ROW_TILT.into()),
-            ("OFF_AREA", OFF_AREA.into()),
-            ("SEEN_THROUGH", SEEN_THROUGH.into()),
-            ("OFF_ROW", OFF_ROW.into()),
+            ("SIDE_SLACK_RADII", SIDE_SLACK_RADII.into()),
+            ("BALL_OVER_SIDE_WEIGHT", BALL_OVER_SIDE_WEIGHT.into()),
+            ("MAX_AREA_HEIGHT_RATIO", MAX_AREA_HEIGHT_RATIO.into()),
+            ("MAX_SCAN_LINE_TILT_SINE", MAX_SCAN_LINE_TILT_SINE.into()),
+            ("AREA_HALF_THICKNESS_RADII", AREA_HALF_THICKNESS_RADII.into()),
+            ("MAX_SEEN_THROUGH_SHARE", MAX_SEEN_THROUGH_SHARE.into()),
+            ("MAX_POINT_HEIGHT_RADII", MAX_POINT_HEIGHT_RADII.into()),
             ("EVEN_WEIGHT", EVEN_WEIGHT.into()),
-            ("REACH", REACH.into()),
-            ("FARTHEST_REACH", FARTHEST_REACH.into()),
-            ("THIN_ROW", THIN_ROW.into()),
+            ("SEMI_AXIS_LINE_DISTANCES", SEMI_AXIS_LINE_DISTANCES.into()),
+            ("MAX_SEMI_AXIS_RADII", MAX_SEMI_AXIS_RADII.into()),
+            ("THIN_LINE_ASPECT", THIN_LINE_ASPECT.into()),
             ("LONGEST", LONGEST.into()),
         ];
-        let parts = ("PARTS", PARTS.into());
+        let parts = ("K_RADIUS_PARTS_PER_PX", K_RADIUS_PARTS_PER_PX.into());
         let ask = |round: Round| {
-            let own = [("ROUND", f64::from(round as u32)), parts, ("MOST_PX", MOST_PX.into())];
+            let own =
+                [("ROUND", f64::from(round as u32)), parts, ("MAX_SUMMED_K_RADIUS_PX", MAX_SUMMED_K_RADIUS_PX.into())];
             Pass::new(gpu, &ASK, &[&calls[..], &own].concat())
         };
         let most_sampled = ("MOST_SAMPLED", MOST_SAMPLED as f64);
         let scales = ("SCALES", SCALES as f64);
         let shrink = [
-            ("SPARSE", SPARSE.into()),
-            ("LONE", LONE.into()),
-            ("AROUND_SPARSE", AROUND_SPARSE.into()),
-            ("ASIDE", ASIDE.into()),
-            ("OFF_MIDDLE", OFF_MIDDLE.into()),
-            ("CROWD", CROWD.into()),
-            ("STRAY_DOT", STRAY_DOT.into()),
-            ("STRAY_DROPPED", STRAY_DROPPED.into()),
+            ("SPARSE_MEDIAN_K_RADII", SPARSE_MEDIAN_K_RADII.into()),
+            ("ISOLATED_SCORE", ISOLATED_SCORE.into()),
+            ("WIDER_BALL_K_RADII", WIDER_BALL_K_RADII.into()),
+            ("MAX_PLANE_DISTANCE_K_RADII", MAX_PLANE_DISTANCE_K_RADII.into()),
+            ("MAX_MEAN_DISTANCE_K_RADII", MAX_MEAN_DISTANCE_K_RADII.into()),
+            ("CROWD_WEIGHT_PER_NEIGHBOR", CROWD_WEIGHT_PER_NEIGHBOR.into()),
+            ("DOT_OUTLIER_SCORE", DOT_OUTLIER_SCORE.into()),
+            ("DROPPED_OUTLIER_SCORE", DROPPED_OUTLIER_SCORE.into()),
             ("DOT_PX", DOT_PX.into()),
             ("LEAST_ON", LEAST_ON.into()),
             ("ON_DISC", ON_DISC.into()),
             ("ON_DISC_NOISE", ON_DISC_NOISE.into()),
-            ("DENSER", DENSER.into()),
-            ("GOES_ON", GOES_ON.into()),
-            ("FLAT_AROUND", FLAT_AROUND.into()),
-            ("WIDE_AROUND", WIDE_AROUND.into()),
-            ("ALL_AROUND", ALL_AROUND.into()),
+            ("MIN_TESTED_FIRST_RADII", MIN_TESTED_FIRST_RADII.into()),
+            ("SURFACE_BALL_K_RADII", SURFACE_BALL_K_RADII.into()),
+            ("MAX_SURFACE_VARIATION", MAX_SURFACE_VARIATION.into()),
+            ("MIN_SURFACE_WIDTH_RATIO", MIN_SURFACE_WIDTH_RATIO.into()),
+            ("MAX_SURFACE_MEAN_RADII", MAX_SURFACE_MEAN_RADII.into()),
             ("CELLS_TO_COUNT", CELLS_TO_COUNT.into()),
             ("SUPPORT", SUPPORT.into()),
             least_reach,
@@ -286,11 +294,11 @@ impl AdaptPasses {
         let adapt = |round: Round| {
             let own = [
                 ("ROUND", f64::from(round as u32)),
-                ("THICKEST_FIRST", THICKEST_FIRST.into()),
-                ("WIDEST", WIDEST.into()),
-                ("STRAY_OFFSET", STRAY_OFFSET.into()),
-                ("STRAY_OFFSET_KNOWN", STRAY_OFFSET_KNOWN.into()),
-                ("GRAZING", GRAZING.into()),
+                ("MAX_NOISE_K_RADII", MAX_NOISE_K_RADII.into()),
+                ("MAX_K_RADIUS_FIRST_RADII", MAX_K_RADIUS_FIRST_RADII.into()),
+                ("OUTLIER_OFFSET_NOISES", OUTLIER_OFFSET_NOISES.into()),
+                ("OUTLIER_OFFSET_KNOWN_NOISES", OUTLIER_OFFSET_KNOWN_NOISES.into()),
+                ("GRAZING_COSINE", GRAZING_COSINE.into()),
                 ("FARTHEST_ALONG", FARTHEST_ALONG.into()),
                 ("LONGEST_SHADOW", LONGEST_SHADOW.into()),
             ];
@@ -311,16 +319,16 @@ impl AdaptPasses {
             scales,
             most_sampled,
             ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
-            ("LEAST_SHARE", LEAST_SHARE as f64),
+            ("MIN_BALL_SHARE_DIVISOR", MIN_BALL_SHARE_DIVISOR as f64),
             ("THIN_SHARE", THIN_SHARE.into()),
-            ("RISE", RISE.into()),
-            ("QUANTILE", QUANTILE.into()),
-            ("STEADY", STEADY.into()),
+            ("MAX_THIN_SHARE_RISE", MAX_THIN_SHARE_RISE.into()),
+            ("NOISE_QUANTILE", NOISE_QUANTILE.into()),
+            ("MAX_STEADY_RATIO", MAX_STEADY_RATIO.into()),
             ("NOISE_FROM", NOISE_SHARES[0].into()),
             ("NOISE_TO", NOISE_SHARES[1].into()),
-            ("DIFFERS_FROM", DIFFERS_SHARES[0].into()),
-            ("DIFFERS_TO", DIFFERS_SHARES[1].into()),
-            ("QUANTILE_DIFFERS", QUANTILE_DIFFERS.into()),
+            ("DIFFERS_FROM", UNEVEN_NOISE_SHARES[0].into()),
+            ("DIFFERS_TO", UNEVEN_NOISE_SHARES[1].into()),
+            ("UNEVEN_NOISE_QUANTILE", UNEVEN_NOISE_QUANTILE.into()),
             ("STEADY_SCALES", STEADY_SCALES as f64),
             ("LEAST_PAIRS", LEAST_PAIRS as f64),
         ];
@@ -339,14 +347,20 @@ impl AdaptPasses {
             fill: Pass::new(gpu, &FILL, &[])?,
             merge: Pass::new(gpu, &MERGE, &[])?,
             which: (1..MOST_LEVELS).map(which).collect::<Result<_, _>>()?,
-            pick: Pass::new(gpu, &PICK, &[("SAMPLE", SAMPLE as f64), most_sampled])?,
+            pick: Pass::new(gpu, &PICK, &[("NOISE_SAMPLE_COUNT", NOISE_SAMPLE_COUNT as f64), most_sampled])?,
             sample: Pass::new(gpu, &SAMPLE_PASS, &[most_sampled])?,
             scatter: Pass::new(
                 gpu,
                 &SCATTERS,
                 &[
                     &quadric[..],
-                    &[together, most_sampled, least_reach, ("THIN", THIN.into()), ("ROUNDING", ROUNDING.into())],
+                    &[
+                        together,
+                        most_sampled,
+                        least_reach,
+                        ("THIN_SCATTER_RADII", THIN_SCATTER_RADII.into()),
+                        ("ROUNDING_SCATTER_RADII", ROUNDING_SCATTER_RADII.into()),
+                    ],
                 ]
                 .concat(),
             )?,
@@ -358,16 +372,16 @@ impl AdaptPasses {
                     scales,
                     most_sampled,
                     ("LEAST_SAMPLE", LEAST_SAMPLE as f64),
-                    ("APART", APART.into()),
-                    ("FAR_APART", FAR_APART.into()),
-                    ("GROWTH", GROWTH.into()),
-                    ("GROWTH_SURE", GROWTH_SURE.into()),
+                    ("MIN_K_RADIUS_CONTRAST", MIN_K_RADIUS_CONTRAST.into()),
+                    ("FULL_K_RADIUS_CONTRAST", FULL_K_RADIUS_CONTRAST.into()),
+                    ("STRUCTURE_GROWTH_POWER", STRUCTURE_GROWTH_POWER.into()),
+                    ("GROWTH_POWER_RAMP", GROWTH_POWER_RAMP.into()),
                     ("BEYOND", noise::BEYOND as f64),
                     ("THICK_NOISE", THICK_NOISE.into()),
                     fine_sheets,
                     ("COARSE_SHEETS", SHEET_LEVELS[1] as f64),
-                    ("SURE_FROM", SURE_SHARES[0].into()),
-                    ("SURE_TO", SURE_SHARES[1].into()),
+                    ("SURE_FROM", CERTAIN_NOISE_SHARES[0].into()),
+                    ("SURE_TO", CERTAIN_NOISE_SHARES[1].into()),
                     ("STEADY_SCALES", STEADY_SCALES as f64),
                 ],
             )?,

@@ -59,4 +59,4 @@ pub(crate) const SCALES: usize = 6;
 /// Radius of a ball over that of the ball before; of the first ball over the base radius.
 pub(crate) const STEP: f32 = 1.6;
 /// Least base radius of a surfel's balls, in first search radii; k-radii are too small at gaps and borders.
-pub(crate) const LEAST_REACH: f32 = 0.8;
+pub(crate) const MIN_BASE_FIRST_RADII: f32 = 0.8;

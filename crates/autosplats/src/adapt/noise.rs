@@ -13,18 +13,18 @@ use crate::fit::Surfel;
 use crate::project::DensityGrid;
 
 /// Expected number of sampled surfels; with no more surfels than this, nearly all are sampled.
-pub(crate) const SAMPLE: usize = 1024;
+pub(crate) const NOISE_SAMPLE_COUNT: usize = 1024;
 /// Largest number of sampled surfels. The number varies by chance, by about thirty.
-pub(crate) const MOST_SAMPLED: usize = SAMPLE + SAMPLE / 2;
+pub(crate) const MOST_SAMPLED: usize = NOISE_SAMPLE_COUNT + NOISE_SAMPLE_COUNT / 2;
 /// Least ratio of the median k-radius of the sample's sparsest third to that of its densest third at which growth of
 /// noise is estimated. Growth counts more the larger the ratio. Random points reach 1.2 by chance, very noisy ones 1.7.
-pub(super) const APART: f32 = 1.7;
-/// Multiple of [`APART`] from which growth counts in full.
-pub(super) const FAR_APART: f32 = 1.3;
+pub(super) const MIN_K_RADIUS_CONTRAST: f32 = 1.7;
+/// Multiple of [`MIN_K_RADIUS_CONTRAST`] from which growth counts in full.
+pub(super) const FULL_K_RADIUS_CONTRAST: f32 = 1.3;
 /// Power of the k-radius up to which growth is that of structure.
-pub(super) const GROWTH: f32 = 0.8;
-/// Range of powers above [`GROWTH`] over which growth goes from structure to noise alone.
-pub(super) const GROWTH_SURE: f32 = 0.4;
+pub(super) const STRUCTURE_GROWTH_POWER: f32 = 0.8;
+/// Range of powers above [`STRUCTURE_GROWTH_POWER`] over which growth goes from structure to noise alone.
+pub(super) const GROWTH_POWER_RAMP: f32 = 0.4;
 /// Noise grows up to twice the k-radius that one in this many sampled points exceeds; outliers may be further apart.
 pub(super) const BEYOND: usize = 8;
 /// Surfels per task when scatter is measured.
@@ -34,34 +34,35 @@ const PICK_TASK: usize = 4096;
 /// Fewest balls of a scale, with enough points to fit, that give an estimate.
 pub(super) const LEAST_SAMPLE: usize = 64;
 /// One in this many sampled points has to find a ball with enough points, or the scale gives no estimate.
-pub(super) const LEAST_SHARE: usize = 5;
+pub(super) const MIN_BALL_SHARE_DIVISOR: usize = 5;
 /// Scatter, in ball radii, below which a ball is thin. Points that fill a ball scatter by 0.4.
-pub(super) const THIN: f32 = 0.15;
+pub(super) const THIN_SCATTER_RADII: f32 = 0.15;
 /// Scatter, in ball radii, below which scatter is rounding and counts as 0; which ball has more is chance.
-pub(super) const ROUNDING: f32 = 1e-3;
+pub(super) const ROUNDING_SCATTER_RADII: f32 = 1e-3;
 /// Least share of thin balls at which a scale gives the noise level. Other balls may hold structure finer than the
 /// ball.
 pub(super) const THIN_SHARE: f32 = 0.3;
 /// Largest rise of the thin share at the next scale. With a larger rise, noise fills the other balls and the thin ones
 /// are thin by chance. The rule does not apply to the last scale, nor to shares that cannot rise by so much.
-pub(super) const RISE: f32 = 0.27;
+pub(super) const MAX_THIN_SHARE_RISE: f32 = 0.27;
 /// Quantile of thin balls' scatter that is the noise level. Larger scatter is structure finer than the ball.
-pub(super) const QUANTILE: f32 = 0.33;
+pub(super) const NOISE_QUANTILE: f32 = 0.33;
 /// Ratio of scatter between successive scales below which a ball is *steady*: that of structure grows, noise's does
 /// not.
-pub(super) const STEADY: f32 = 1.3;
+pub(super) const MAX_STEADY_RATIO: f32 = 1.3;
 /// Fewest thin balls with a next ball that give a steady share.
 pub(super) const LEAST_PAIRS: usize = 32;
 /// Steady shares between which scatter goes from structure to noise. Applies to the first [`STEADY_SCALES`] scales.
 pub(super) const NOISE_SHARES: [f32; 2] = [0.1, 0.2];
-/// Steady shares between which the quantile goes from [`QUANTILE`] to [`QUANTILE_DIFFERS`]. Noise that differs from
-/// place to place is as steady, as with misaligned scans: their offset is across the surface here and along it there.
-pub(super) const DIFFERS_SHARES: [f32; 2] = [0.55, 0.7];
+/// Steady shares between which the quantile goes from [`NOISE_QUANTILE`] to [`UNEVEN_NOISE_QUANTILE`]. Noise that
+/// differs from place to place is as steady, as with misaligned scans: their offset is across the surface here and
+/// along it there.
+pub(super) const UNEVEN_NOISE_SHARES: [f32; 2] = [0.55, 0.7];
 /// Quantile where noise may differ from place to place. Uniform noise is as steady and is biased less low by this
 /// quantile.
-pub(super) const QUANTILE_DIFFERS: f32 = 0.67;
+pub(super) const UNEVEN_NOISE_QUANTILE: f32 = 0.67;
 /// Steady shares between which the estimate goes from possible structure to certain noise.
-pub(super) const SURE_SHARES: [f32; 2] = [0.3, 0.45];
+pub(super) const CERTAIN_NOISE_SHARES: [f32; 2] = [0.3, 0.45];
 /// Number of scales for which steadiness is checked. Larger balls are wide against cells: slabs cut the noise in some
 /// and not in others, so uniform noise has two scatters.
 pub(super) const STEADY_SCALES: usize = 2;
@@ -72,7 +73,7 @@ pub(super) const THICK_NOISE: f32 = 0.4;
 
 /// Statistics of a frame's surfels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Usual {
+pub(crate) struct FrameStatistics {
     pub(crate) noise: Noise,
     /// Median k-radius, world units; 0 if there are too few surfels.
     pub(crate) k_radius: f32,
@@ -111,22 +112,23 @@ impl Noise {
         // Of the whole sample, as the thirds may take their levels from different scales.
         let steady: [_; STEADY_SCALES] = std::array::from_fn(|scale| steady_share(sample, scale));
         // The share of the largest checked balls, as more of them are thin.
-        let told = (0..SCALES).find(|&scale| tells_noise(sample, scale));
+        let told = (0..SCALES).find(|&scale| gives_noise(sample, scale));
         let share =
             told.and_then(|scale| steady[..=scale.min(STEADY_SCALES - 1)].iter().rev().copied().flatten().next());
-        let sure = share.map_or(0.0, |share| between(SURE_SHARES, share));
+        let sure = share.map_or(0.0, |share| between(CERTAIN_NOISE_SHARES, share));
         let by_steady = if all > 0.0 { scatter_level(sample, Some(steady)) / all } else { 1.0 };
         let third = dense.len();
         if third > 0
             && let [small, large] = [dense, sparse].map(|part| part[third / 2].surfel.k_radius)
-            && large > APART * small
+            && large > MIN_K_RADIUS_CONTRAST * small
         {
             let [least, most] = [dense, sparse].map(|part| scatter_level(part, None));
             if least > 0.0 && most > least {
                 let growth = (most / least).ln() / (large / small).ln();
                 // Little growth is chance, or a different kind of object where points are sparse.
-                let much = ((growth - GROWTH) * (1.0 / GROWTH_SURE)).clamp(0.0, 1.0);
-                let apart = ((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0))).min(1.0);
+                let much = ((growth - STRUCTURE_GROWTH_POWER) * (1.0 / GROWTH_POWER_RAMP)).clamp(0.0, 1.0);
+                let apart =
+                    ((large / (MIN_K_RADIUS_CONTRAST * small) - 1.0) * (1.0 / (FULL_K_RADIUS_CONTRAST - 1.0))).min(1.0);
                 let grows = much * apart;
                 if grows > 0.0 {
                     let power = grows * growth.min(2.0);
@@ -145,14 +147,20 @@ impl Noise {
 }
 
 /// Measures a frame's statistics on a sample of `surfels`.
-pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, view: &View, k: u32) -> Usual {
+pub(crate) fn measure(
+    surfels: &[Surfel],
+    cells: &Cells,
+    density: &DensityGrid,
+    view: &View,
+    k: u32,
+) -> FrameStatistics {
     let of = |surfel: Surfel| {
         let radius = first_radius(&surfel, density, view, k);
         Sampled { surfel, radius, scatter: [None; SCALES] }
     };
     let below = picked_below(surfels.len());
     // A discarded point has no ball.
-    let is_picked = |surfel: &&Surfel| surfel.radius > 0.0 && scrambled(surfel.source) < below;
+    let is_picked = |surfel: &&Surfel| surfel.radius > 0.0 && hash_index(surfel.source) < below;
     let mut sample: Vec<Sampled> =
         surfels.par_iter().with_min_len(PICK_TASK).filter(is_picked).copied().map(of).collect();
     sample.truncate(MOST_SAMPLED);
@@ -163,7 +171,7 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
         });
         // A scale is judged with the next one. The loop ends when all parts have a level, mostly after two scales.
         let [dense, sparse] = ends(&sample);
-        if [dense, sparse, &sample].iter().all(|part| (0..scale).any(|scale| tells_noise(part, scale))) {
+        if [dense, sparse, &sample].iter().all(|part| (0..scale).any(|scale| gives_noise(part, scale))) {
             break;
         }
     }
@@ -171,17 +179,17 @@ pub(crate) fn measure(surfels: &[Surfel], cells: &Cells, density: &DensityGrid, 
     let middle = sample.get(sample.len() / 2).map_or(0.0, |middle| middle.surfel.k_radius);
     let k_radius = if sample.len() < LEAST_SAMPLE { 0.0 } else { middle };
     let sheet_level = SHEET_LEVELS[usize::from(noise.at(middle) > THICK_NOISE * k_radius)];
-    Usual { noise, k_radius, sheet_level }
+    FrameStatistics { noise, k_radius, sheet_level }
 }
 
-/// Limit of the [`scrambled`] point index below which a surfel is sampled, for a number of surfels. Choosing by point
+/// Limit of the [`hash_index`] point index below which a surfel is sampled, for a number of surfels. Choosing by point
 /// keeps the sample nearly the same from frame to frame. Choosing by place, one more surfel would change all of it.
 fn picked_below(surfels: usize) -> u32 {
-    (u32::MAX / surfels.max(SAMPLE) as u32).saturating_mul(SAMPLE as u32)
+    (u32::MAX / surfels.max(NOISE_SAMPLE_COUNT) as u32).saturating_mul(NOISE_SAMPLE_COUNT as u32)
 }
 
 /// Hashes a number to another one, one to one [finalizer of MurmurHash3].
-fn scrambled(number: u32) -> u32 {
+fn hash_index(number: u32) -> u32 {
     let number = (number ^ (number >> 16)).wrapping_mul(0x85eb_ca6b);
     let number = (number ^ (number >> 13)).wrapping_mul(0xc2b2_ae35);
     number ^ (number >> 16)
@@ -224,8 +232,8 @@ fn measure_scatter_with<'a, S: Simd>(
         if gathered.read(simd, task.cells, surfel.center, *radius, task.view) >= LEAST_CLUSTERS {
             let plane = gathered.plane(simd);
             let distance = gathered.quadric(simd, *radius, plane.axis, plane.curvature()).scatter;
-            let distance = if distance < ROUNDING * *radius { 0.0 } else { distance };
-            scatter[scale] = Some(Scatter { distance, thin: distance < THIN * *radius });
+            let distance = if distance < ROUNDING_SCATTER_RADII * *radius { 0.0 } else { distance };
+            scatter[scale] = Some(Scatter { distance, thin: distance < THIN_SCATTER_RADII * *radius });
         }
     }
 }
@@ -244,16 +252,16 @@ fn scatter_level(sample: &[Sampled], steady: Option<[Option<f32>; STEADY_SCALES]
     let mut before: Option<f32> = None;
     let (mut least_growth, mut plateau) = (f32::INFINITY, 0.0);
     for scale in 0..SCALES {
-        if tells_noise(sample, scale) {
+        if gives_noise(sample, scale) {
             let mut thin: Vec<f32> =
                 found(sample, scale).filter(|found| found.thin).map(|found| found.distance).collect();
-            let Some(steady) = steady else { return quantile(&mut thin, QUANTILE) };
+            let Some(steady) = steady else { return quantile(&mut thin, NOISE_QUANTILE) };
             // Where there is structure as well, noise is steady in the smaller balls.
             let most = steady.get(..=scale).and_then(|known| known.iter().flatten().copied().reduce(f32::max));
             let is_noise = most.map_or(1.0, |share| between(NOISE_SHARES, share));
             // At the second scale uniform noise has two scatters as well.
-            let differs = steady[0].filter(|_| scale == 0).map_or(0.0, |share| between(DIFFERS_SHARES, share));
-            return is_noise * quantile(&mut thin, QUANTILE + differs * (QUANTILE_DIFFERS - QUANTILE));
+            let differs = steady[0].filter(|_| scale == 0).map_or(0.0, |share| between(UNEVEN_NOISE_SHARES, share));
+            return is_noise * quantile(&mut thin, NOISE_QUANTILE + differs * (UNEVEN_NOISE_QUANTILE - NOISE_QUANTILE));
         }
         // No scale is thin. Where scatter grows least to the next scale it is noise; elsewhere points fill the ball or
         // are structure.
@@ -262,7 +270,7 @@ fn scatter_level(sample: &[Sampled], steady: Option<[Option<f32>; STEADY_SCALES]
             before = None;
             continue;
         }
-        let now = quantile(&mut all, QUANTILE);
+        let now = quantile(&mut all, NOISE_QUANTILE);
         if let Some(before) = before
             && now < least_growth * before
         {
@@ -279,19 +287,19 @@ fn found(sample: &[Sampled], scale: usize) -> impl Iterator<Item = Scatter> {
 }
 
 fn is_enough(found: usize, sample: &[Sampled]) -> bool {
-    found >= LEAST_SAMPLE.max(sample.len() / LEAST_SHARE)
+    found >= LEAST_SAMPLE.max(sample.len() / MIN_BALL_SHARE_DIVISOR)
 }
 
 /// Whether enough balls of a scale are thin for the scale to give the noise level.
-fn tells_noise(sample: &[Sampled], scale: usize) -> bool {
+fn gives_noise(sample: &[Sampled], scale: usize) -> bool {
     let thin_share = |scale: usize| {
         let count = found(sample, scale).count();
         let thin = found(sample, scale).filter(|found| found.thin).count();
         is_enough(count, sample).then(|| thin as f32 / count as f32)
     };
     let Some(own) = thin_share(scale) else { return false };
-    let rises = || scale + 1 < SCALES && thin_share(scale + 1).is_none_or(|next| next > own + RISE);
-    own >= THIN_SHARE && (own >= 1.0 - RISE || !rises())
+    let rises = || scale + 1 < SCALES && thin_share(scale + 1).is_none_or(|next| next > own + MAX_THIN_SHARE_RISE);
+    own >= THIN_SHARE && (own >= 1.0 - MAX_THIN_SHARE_RISE || !rises())
 }
 
 /// Share of a scale's thin balls that are steady; `None` if too few balls are thin.
@@ -303,7 +311,7 @@ fn steady_share(sample: &[Sampled], scale: usize) -> Option<f32> {
             && own.distance > 0.0
         {
             pairs += 1;
-            steady += usize::from(next.distance < STEADY * own.distance);
+            steady += usize::from(next.distance < MAX_STEADY_RATIO * own.distance);
         }
     }
     (pairs >= LEAST_PAIRS).then(|| steady as f32 / pairs as f32)

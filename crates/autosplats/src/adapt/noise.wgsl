@@ -15,10 +15,10 @@
 override SCALES: u32;
 override MOST_SAMPLED: u32;
 override LEAST_SAMPLE: u32;
-override APART: f32;
-override FAR_APART: f32;
-override GROWTH: f32;
-override GROWTH_SURE: f32;
+override MIN_K_RADIUS_CONTRAST: f32;
+override FULL_K_RADIUS_CONTRAST: f32;
+override STRUCTURE_GROWTH_POWER: f32;
+override GROWTH_POWER_RAMP: f32;
 override BEYOND: u32;
 override THICK_NOISE: f32;
 override FINE_SHEETS: u32;
@@ -36,25 +36,25 @@ fn scatter_level(part: u32) -> f32 {
     for (var scale = 0u; scale < SCALES; scale++) {
         let found = quantiles[part * SCALES + scale];
         let now = bitcast<f32>(found.y);
-        if found.x == THIN_TELL {
+        if found.x == OF_THIN_BALLS {
             return now;
         }
         // No scale is thin. Where scatter grows least to the next scale it is noise; elsewhere points fill the ball or
         // are structure.
-        if found.x == ALL_TELL && before >= 0.0 && now < least_growth * before {
+        if found.x == OF_ALL_BALLS && before >= 0.0 && now < least_growth * before {
             least_growth = now / before;
             plateau = before;
         }
-        before = select(-1.0, now, found.x == ALL_TELL);
+        before = select(-1.0, now, found.x == OF_ALL_BALLS);
     }
     return plateau;
 }
 
 // Certainty that the noise of the whole sample is noise, 0 to 1.
-fn sureness() -> f32 {
+fn noise_certainty() -> f32 {
     for (var scale = 0u; scale < SCALES; scale++) {
-        if quantiles[ALL * SCALES + scale].x == THIN_TELL {
-            let share = bitcast<f32>(quantiles[PARTS * SCALES + min(scale, STEADY_SCALES - 1u)].y);
+        if quantiles[ALL * SCALES + scale].x == OF_THIN_BALLS {
+            let share = bitcast<f32>(quantiles[SAMPLE_PARTS * SCALES + min(scale, STEADY_SCALES - 1u)].y);
             return saturate((share - SURE_FROM) * (1.0 / (SURE_TO - SURE_FROM)));
         }
     }
@@ -78,14 +78,14 @@ fn noise_of_sample() -> vec3f {
     }
     let small = k_radius(third / 2u);
     let large = k_radius(len - third + third / 2u);
-    if large > APART * small {
+    if large > MIN_K_RADIUS_CONTRAST * small {
         let least = scatter_level(DENSEST);
         let most = scatter_level(SPARSEST);
         if least > 0.0 && most > least {
             let growth = log(most / least) / log(large / small);
             // Little growth is chance, or a different kind of object where points are sparse.
-            let much = clamp((growth - GROWTH) * (1.0 / GROWTH_SURE), 0.0, 1.0);
-            let apart = min((large / (APART * small) - 1.0) * (1.0 / (FAR_APART - 1.0)), 1.0);
+            let much = clamp((growth - STRUCTURE_GROWTH_POWER) * (1.0 / GROWTH_POWER_RAMP), 0.0, 1.0);
+            let apart = min((large / (MIN_K_RADIUS_CONTRAST * small) - 1.0) * (1.0 / (FULL_K_RADIUS_CONTRAST - 1.0)), 1.0);
             let grows = much * apart;
             if grows > 0.0 {
                 let power = grows * min(growth, 2.0);
@@ -107,7 +107,7 @@ fn noise() {
     measured[0] = found.x;
     measured[1] = found.y;
     measured[4] = found.z;
-    measured[5] = sureness();
+    measured[5] = noise_certainty();
     let len = sampled[MOST_SAMPLED];
     var middle = 0.0;
     if len > 0u {

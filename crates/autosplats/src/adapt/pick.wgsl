@@ -10,10 +10,10 @@
 @group(0) @binding(1) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(2) var<storage, read_write> picked: array<atomic<u32>>;
 
-override SAMPLE: u32;
+override NOISE_SAMPLE_COUNT: u32;
 override MOST_SAMPLED: u32;
 
-fn scrambled(number: u32) -> u32 {
+fn hash_index(number: u32) -> u32 {
     let first = (number ^ (number >> 16u)) * 0x85ebca6bu;
     let second = (first ^ (first >> 13u)) * 0xc2b2ae35u;
     return second ^ (second >> 16u);
@@ -23,9 +23,9 @@ fn scrambled(number: u32) -> u32 {
 fn pick(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
     let place = group_index(workgroup) * 64u + local;
     let len = counters[ACTIVE];
-    let below = (0xffffffffu / max(len, SAMPLE)) * SAMPLE;
+    let below = (0xffffffffu / max(len, NOISE_SAMPLE_COUNT)) * NOISE_SAMPLE_COUNT;
     // A discarded point has no ball.
-    if place < len && scrambled(surfels[place].source) < below && surfels[place].radius > 0.0 {
+    if place < len && hash_index(surfels[place].source) < below && surfels[place].radius > 0.0 {
         let at = atomicAdd(&picked[MOST_SAMPLED], 1u);
         if at < MOST_SAMPLED {
             atomicStore(&picked[at], place);

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use glam::Vec3;
 use pulp::Simd;
 
-use super::cells::{AFTER, Cells, Cluster, Level};
+use super::cells::{COPY_PADDING, Cells, Cluster, Level};
 use crate::camera::View;
 use crate::fit::eigenvectors;
 use crate::search::{LANES, Lanes};
@@ -19,16 +19,16 @@ pub(super) const LEAST_CLUSTERS: usize = 12;
 pub(super) const LEAST_OF_PLANE: usize = 4;
 /// Squared distance, in squared radii, up to which a cluster counts in full. The weight falls to 0 at the radius, so
 /// that no cluster comes or goes at once.
-pub(super) const FULL: f32 = 0.5;
+pub(super) const FULL_WEIGHT_SQUARED_RADII: f32 = 0.5;
 /// Ridge weight that pulls curvatures to 0, as a share of all weight. One-sided balls hardly determine curvatures.
 pub(super) const RIDGE: f32 = 0.003;
 /// Smallest pivot of the elimination, as a share of all weight.
 pub(super) const LEAST_PIVOT: f32 = 1e-6;
 
-const _: () = assert!(AFTER <= LANES, "what is copied over the end of a run has room");
+const _: () = assert!(COPY_PADDING <= LANES, "what is copied over the end of a run has room");
 
 /// Weight of a ball evenly filled with one point per square of its radius.
-pub(super) const EVEN_WEIGHT: f32 = 0.5 * std::f32::consts::PI * (1.0 + FULL);
+pub(super) const EVEN_WEIGHT: f32 = 0.5 * std::f32::consts::PI * (1.0 + FULL_WEIGHT_SQUARED_RADII);
 
 /// The cells that may reach into a ball.
 pub(super) struct Window<'a> {
@@ -227,7 +227,8 @@ impl Gathered {
         // than it saves. Loops are used because the compiler does not inline all closures.
         let [cx, cy, cz] = [F32s::splat(simd, center[0]), F32s::splat(simd, center[1]), F32s::splat(simd, center[2])];
         let (zero, one) = (F32s::splat(simd, 0.0), F32s::splat(simd, 1.0));
-        let (per_radius, per_rest) = (F32s::splat(simd, per_radius), F32s::splat(simd, 1.0 / (1.0 - FULL)));
+        let (per_radius, per_rest) =
+            (F32s::splat(simd, per_radius), F32s::splat(simd, 1.0 / (1.0 - FULL_WEIGHT_SQUARED_RADII)));
         let lanes = &mut self.lanes[..groups];
         let [xs, ys, zs, counts] = &self.copied;
         let mut filled = 0;

@@ -15,16 +15,16 @@
 override SCALES: u32;
 override MOST_SAMPLED: u32;
 override LEAST_SAMPLE: u32;
-override LEAST_SHARE: u32;
+override MIN_BALL_SHARE_DIVISOR: u32;
 override THIN_SHARE: f32;
-override RISE: f32;
-override QUANTILE: f32;
-override STEADY: f32;
+override MAX_THIN_SHARE_RISE: f32;
+override NOISE_QUANTILE: f32;
+override MAX_STEADY_RATIO: f32;
 override NOISE_FROM: f32;
 override NOISE_TO: f32;
 override DIFFERS_FROM: f32;
 override DIFFERS_TO: f32;
-override QUANTILE_DIFFERS: f32;
+override UNEVEN_NOISE_QUANTILE: f32;
 override STEADY_SCALES: u32;
 override LEAST_PAIRS: u32;
 
@@ -79,7 +79,7 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
             if bits.x > 0u && bits.x < THICK && bits.y != TOO_FEW {
                 own_pairs += 1u;
                 let distance = bitcast<vec2f>(bits & vec2u(~THICK));
-                own_steady += select(0u, 1u, distance.y < STEADY * distance.x);
+                own_steady += select(0u, 1u, distance.y < MAX_STEADY_RATIO * distance.x);
             }
         }
         atomicAdd(&pairs[size], own_pairs);
@@ -90,14 +90,14 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         atomicAdd(&thin[size], own_thin[size]);
     }
     workgroupBarrier();
-    let least = max(LEAST_SAMPLE, len / LEAST_SHARE);
+    let least = max(LEAST_SAMPLE, len / MIN_BALL_SHARE_DIVISOR);
     let all_fitted = atomicLoad(&fitted[0]);
     let all_thin = atomicLoad(&thin[0]);
     let next_fitted = atomicLoad(&fitted[1]);
     let share = f32(all_thin) / f32(max(all_fitted, 1u));
     let next_share = f32(atomicLoad(&thin[1])) / f32(max(next_fitted, 1u));
-    let rises = scale + 1u < SCALES && !(next_fitted >= least && next_share <= share + RISE);
-    let is_thin = share >= THIN_SHARE && (share >= 1.0 - RISE || !rises);
+    let rises = scale + 1u < SCALES && !(next_fitted >= least && next_share <= share + MAX_THIN_SHARE_RISE);
+    let is_thin = share >= THIN_SHARE && (share >= 1.0 - MAX_THIN_SHARE_RISE || !rises);
     let first_steady = steady_share(0u);
     var most_steady = first_steady;
     for (var size = 1u; size < STEADY_SCALES && size <= scale; size++) {
@@ -105,8 +105,8 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
     }
     let is_asked = is_thin && part == STEADY_ALL;
     let differs = saturate((first_steady - DIFFERS_FROM) * (1.0 / (DIFFERS_TO - DIFFERS_FROM)));
-    let raised = select(0.0, differs * (QUANTILE_DIFFERS - QUANTILE), is_asked && scale == 0u);
-    let at = u32((QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
+    let raised = select(0.0, differs * (UNEVEN_NOISE_QUANTILE - NOISE_QUANTILE), is_asked && scale == 0u);
+    let at = u32((NOISE_QUANTILE + raised) * f32(select(all_fitted, all_thin, is_thin)));
     // The largest value with at most `at` values below it, found bit by bit.
     var found = 0u;
     for (var bit = 31u; bit > 0u; bit--) {
@@ -130,10 +130,10 @@ fn quantile(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_i
         for (var size = 1u; size <= scale; size++) {
             of_largest = select(of_largest, steady_share(size), steady_share(size) >= 0.0);
         }
-        quantiles[PARTS * SCALES + scale] = vec2u(NONE_TELL, bitcast<u32>(of_largest));
+        quantiles[SAMPLE_PARTS * SCALES + scale] = vec2u(TOO_FEW_BALLS, bitcast<u32>(of_largest));
     }
     if local == 0u {
-        let tells = select(ALL_TELL, THIN_TELL, is_thin);
-        quantiles[workgroup.x] = vec2u(select(NONE_TELL, tells, all_fitted >= least), found);
+        let tells = select(OF_ALL_BALLS, OF_THIN_BALLS, is_thin);
+        quantiles[workgroup.x] = vec2u(select(TOO_FEW_BALLS, tells, all_fitted >= least), found);
     }
 }

@@ -19,8 +19,8 @@
 @group(0) @binding(7) var<storage, read_write> scatters: array<u32>;
 
 override MOST_SAMPLED: u32;
-override THIN: f32;
-override ROUNDING: f32;
+override THIN_SCATTER_RADII: f32;
+override ROUNDING_SCATTER_RADII: f32;
 
 @compute @workgroup_size(TOGETHER)
 fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -41,8 +41,8 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     var found = TOO_FEW;
     if plane.len >= LEAST_CLUSTERS {
         let scatter = quadric_of(ball, plane.axis, curvature_of(plane)).scatter;
-        let distance = select(scatter, 0.0, scatter < ROUNDING * radius);
-        found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN * radius);
+        let distance = select(scatter, 0.0, scatter < ROUNDING_SCATTER_RADII * radius);
+        found = bitcast<u32>(distance) | select(THICK, 0u, distance < THIN_SCATTER_RADII * radius);
     }
     if local == 0u {
         scatters[index] = found;

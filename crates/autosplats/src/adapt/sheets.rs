@@ -7,8 +7,8 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use self::blend::Stack;
-pub(super) use self::blend::{Around, Blend, Surface};
+use self::blend::CellSheets;
+pub(super) use self::blend::{Blend, NearbySheets, Surface};
 use super::cells::{Cells, Cluster, Level, SLABS};
 use super::cpu::{Goal, choose};
 use super::quadric::{Gathered, Quadric, tangents};
@@ -30,9 +30,9 @@ pub(super) const COVERED_REACH: f32 = 0.12;
 /// Most sheets of a cell.
 pub(crate) const SHEETS: usize = 4;
 /// Parts of a pixel in which k-radii are summed up. Integer sums do not depend on their order.
-pub(super) const PARTS: f32 = 64.0;
+pub(super) const K_RADIUS_PARTS_PER_PX: f32 = 64.0;
 /// Cap of a summed k-radius, in pixels. Sums over nine cells of 32 pixels with two points per pixel stay below 2³².
-pub(super) const MOST_PX: f32 = 2048.0;
+pub(super) const MAX_SUMMED_K_RADIUS_PX: f32 = 2048.0;
 
 /// An upright quadric over the balls that it was fitted to.
 #[derive(Clone, Copy, Debug)]
@@ -101,14 +101,14 @@ type NoiseAt<'a> = dyn Fn(Vec3, f32, u32) -> (f32, bool) + Sync + 'a;
 
 /// Demand for the sheets of a cell.
 #[derive(Debug)]
-struct Asked {
+struct SheetDemand {
     /// Number of asking surfels in the upper half, sum of their k-radii in the lower half.
     k_radii: AtomicU64,
     /// Smallest point index of the asking surfels. Noise may depend on the scan that a point belongs to.
     point: AtomicU32,
 }
 
-impl Default for Asked {
+impl Default for SheetDemand {
     fn default() -> Self {
         Self { k_radii: AtomicU64::new(0), point: AtomicU32::new(u32::MAX) }
     }
@@ -119,21 +119,21 @@ impl Default for Asked {
 pub(super) struct Sheets {
     /// Level of the cells.
     pub(super) level: usize,
-    stacks: Vec<Stack>,
+    stacks: Vec<CellSheets>,
     /// Whether each stack is fitted for this frame.
     fitted: Vec<bool>,
-    asked: Vec<Asked>,
+    asked: Vec<SheetDemand>,
 }
 
 impl Sheets {
     /// Discards the sheets of the last frame.
     pub(super) fn clear(&mut self, cells: &Cells) {
         let len = cells.levels.get(SHEET_LEVELS[0]).map_or(0, |level| level.columns * level.rows.len());
-        self.stacks.resize(len, Stack::default());
+        self.stacks.resize(len, CellSheets::default());
         self.fitted.clear();
         self.fitted.resize(len, false);
         self.asked.clear();
-        self.asked.resize_with(len, Asked::default);
+        self.asked.resize_with(len, SheetDemand::default);
     }
 
     /// Asks for sheets where a surfel is.
@@ -143,7 +143,7 @@ impl Sheets {
         let [column, row] = surfel.pixel_xy().map(|at| at / level.side_px);
         let asked = &self.asked[row * level.columns + column];
         let k_radius_px = surfel.k_radius / view.pixel_size(surfel.center[2]);
-        let parts = (k_radius_px.min(MOST_PX) * PARTS) as u64;
+        let parts = (k_radius_px.min(MAX_SUMMED_K_RADIUS_PX) * K_RADIUS_PARTS_PER_PX) as u64;
         asked.k_radii.fetch_add(1 << 32 | parts, Ordering::Relaxed);
         asked.point.fetch_min(surfel.source, Ordering::Relaxed);
     }
@@ -169,7 +169,7 @@ impl Sheets {
 struct Task<'a> {
     cells: &'a Cells,
     level: &'a Level,
-    asked: &'a [Asked],
+    asked: &'a [SheetDemand],
     noise: &'a NoiseAt<'a>,
     view: &'a View,
 }
@@ -188,7 +188,7 @@ impl Task<'_> {
             }
         }
         let (count, parts) = (sum >> 32, sum & u64::from(u32::MAX));
-        (count > 0).then(|| (parts as f32 / (count as f32 * PARTS), point))
+        (count > 0).then(|| (parts as f32 / (count as f32 * K_RADIUS_PARTS_PER_PX), point))
     }
 }
 
@@ -197,7 +197,7 @@ impl Task<'_> {
 fn fit_row_with<'a, S: Simd>(
     simd: S,
     row: usize,
-    stacks: &'a mut [Stack],
+    stacks: &'a mut [CellSheets],
     fitted: &'a mut [bool],
     task: &'a Task<'a>,
     gathered: &'a mut Gathered,
@@ -219,7 +219,7 @@ fn fit_row_with<'a, S: Simd>(
 #[inline(always)]
 fn fit_cell<S: Simd>(
     simd: S,
-    stack: &mut Stack,
+    stack: &mut CellSheets,
     cell: [usize; 2],
     (k_radius_px, point): (f32, u32),
     task: &Task,
@@ -228,7 +228,7 @@ fn fit_cell<S: Simd>(
     let Task { cells, level, noise, view, .. } = *task;
     let mut left = [Cluster { mean: [0.0; 3], count: 0.0 }; SLABS];
     left.iter_mut().zip(level.clusters(cell)).for_each(|(left, cluster)| *left = cluster);
-    *stack = Stack::default();
+    *stack = CellSheets::default();
     let mut len = 0;
     while len < SHEETS {
         let mut largest = 0;

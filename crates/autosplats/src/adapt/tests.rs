@@ -11,7 +11,7 @@ use autosplats_cloud::{PointCloud, Scan};
 use glam::Vec3;
 
 use super::cells::Cells;
-use super::noise::{Noise, Usual, measure};
+use super::noise::{FrameStatistics, Noise, measure};
 use super::rows::is_row;
 use super::{AdaptRules, Adapter, DepthNoise};
 use crate::camera::{Camera, Projection, View};
@@ -129,7 +129,7 @@ impl Case {
         cells
     }
 
-    pub(crate) fn usual(&self) -> Usual {
+    pub(crate) fn usual(&self) -> FrameStatistics {
         measure(&self.fitted[0], &self.cells(), &self.screen.density, &self.view, K)
     }
 

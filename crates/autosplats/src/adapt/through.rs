@@ -23,16 +23,17 @@ pub(super) const ON_DISC: f32 = 0.3;
 /// Distance from the disc's plane, in noise levels, up to which points are on the disc, if larger than [`ON_DISC`].
 pub(super) const ON_DISC_NOISE: f32 = 3.0;
 /// K-radius, in first search radii, above which a disc is tested. With less, the surroundings are hardly denser.
-pub(super) const DENSER: f32 = 3.0;
+pub(super) const MIN_TESTED_FIRST_RADII: f32 = 3.0;
 /// Radius, in k-radii, to which a sparse surface must go on. Points measured between two surfaces do not.
-pub(super) const GOES_ON: f32 = 4.0;
-/// Largest surface variation of a surface in the ball of [`GOES_ON`].
-pub(super) const FLAT_AROUND: f32 = 0.005;
-/// Least variance across the ball of [`GOES_ON`], over that along, of a surface. Wires have less, a straight border
-/// 0.33.
-pub(super) const WIDE_AROUND: f32 = 0.25;
-/// Largest distance of the mean of the ball of [`GOES_ON`] from the point, in ball radii; borders have 0.37.
-pub(super) const ALL_AROUND: f32 = 0.3;
+pub(super) const SURFACE_BALL_K_RADII: f32 = 4.0;
+/// Largest surface variation of a surface in the ball of [`SURFACE_BALL_K_RADII`].
+pub(super) const MAX_SURFACE_VARIATION: f32 = 0.005;
+/// Least variance across the ball of [`SURFACE_BALL_K_RADII`], over that along, of a surface. Wires have less, a
+/// straight border 0.33.
+pub(super) const MIN_SURFACE_WIDTH_RATIO: f32 = 0.25;
+/// Largest distance of the mean of the ball of [`SURFACE_BALL_K_RADII`] from the point, in ball radii; borders have
+/// 0.37.
+pub(super) const MAX_SURFACE_MEAN_RADII: f32 = 0.3;
 /// Least radius of a disc in cells, where cells are that fine: enough cells to count.
 pub(super) const CELLS_TO_COUNT: f32 = 2.0;
 
@@ -49,7 +50,7 @@ pub(super) struct Disc {
 
 /// Counts of what is seen where a disc is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct SeenAtDisc {
     /// Cells that hold points on the disc, and other cells that hold points behind.
     pub(super) cells: [f32; 2],
     /// Points on the disc and behind, the latter as many as would fall there at the distance of the disc's plane.
@@ -57,10 +58,10 @@ pub(super) struct Seen {
 }
 
 /// Counts what is seen on a `disc` and through it, in cells with at least `cells_per_radius` to a radius.
-pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &View) -> Seen {
+pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &View) -> SeenAtDisc {
     let &Disc { center, axis, radius, half_thickness } = disc;
     let of_plane = axis.dot(center);
-    let mut seen = Seen::default();
+    let mut seen = SeenAtDisc::default();
     let Some(window) = Window::around(cells, center, radius, cells_per_radius, view) else { return seen };
     for clusters in window.clusters() {
         let mut points = [0.0; 2];
@@ -92,7 +93,7 @@ pub(super) fn seen(disc: &Disc, cells_per_radius: f32, cells: &Cells, view: &Vie
 /// Shrinks a surfel to its share of what is seen where it is, at least to a dot, unless it belongs to a surface.
 /// `noise` is the noise level, world units. For an ellipse the inner circle is tested and the whole ellipse shrinks.
 #[inline(always)]
-pub(super) fn open<S: Simd>(
+pub(super) fn shrink_to_share<S: Simd>(
     simd: S,
     surfel: &mut Surfel,
     noise: f32,
@@ -113,10 +114,12 @@ pub(super) fn open<S: Simd>(
     if !(share < LEAST_ON) {
         return;
     }
-    let len = gathered.read(simd, cells, surfel.center, GOES_ON * surfel.k_radius, view);
+    let len = gathered.read(simd, cells, surfel.center, SURFACE_BALL_K_RADII * surfel.k_radius, view);
     let is_surface = |plane: Plane| {
         let [_, across, along] = plane.variances;
-        (plane.curvature() < FLAT_AROUND) & (across > WIDE_AROUND * along) & (plane.mean.length() < ALL_AROUND)
+        (plane.curvature() < MAX_SURFACE_VARIATION)
+            & (across > MIN_SURFACE_WIDTH_RATIO * along)
+            & (plane.mean.length() < MAX_SURFACE_MEAN_RADII)
     };
     if len < LEAST_CLUSTERS || !is_surface(gathered.plane(simd)) {
         surfel.radius = (surfel.radius * (share / LEAST_ON)).max(dot);

@@ -25,7 +25,7 @@
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 // Surfels of a workgroup.
-override FEW: u32;
+override ITEMS_PER_GROUP: u32;
 
 // Bit mask of the workgroup's surfels on scan lines, and what all invocations need to know.
 var<workgroup> found_rows: atomic<u32>;
@@ -45,12 +45,12 @@ fn turn_rows(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     let active_points = atomicLoad(&counters[ACTIVE]);
     let first_of_round = select(0u, active_points, ROUND == 1u);
     let len = select(active_points, atomicLoad(&counters[RECOVERED]), ROUND == 1u);
-    let first = group_index(workgroup) * FEW;
+    let first = group_index(workgroup) * ITEMS_PER_GROUP;
     if local == 0u {
         atomicStore(&found_rows, 0u);
     }
     workgroupBarrier();
-    for (var index = local; index < FEW && first + index < len; index += TOGETHER) {
+    for (var index = local; index < ITEMS_PER_GROUP && first + index < len; index += TOGETHER) {
         let surfel = surfels[first_of_round + first + index];
         if is_row(surfel, known_beyond(noise_at(surfel.k_radius), surfel.center, surfel.source).noise) {
             atomicOr(&found_rows, 1u << index);
@@ -77,7 +77,7 @@ fn turn_rows(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
             out.radius = shrunk(out, own_radius);
         }
         let is_dropped = out.radius == 0.0;
-        if surfel.k_radius > DENSER * own_radius {
+        if surfel.k_radius > MIN_TESTED_FIRST_RADII * own_radius {
             out.radius = opened(out, 0.0);
         }
         if local == 0u {

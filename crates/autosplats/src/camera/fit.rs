@@ -7,55 +7,57 @@ use super::{Camera, Projection};
 use crate::Error;
 
 /// Points in the sample: enough for quantiles, few enough to cost nothing.
-const SAMPLES: usize = 100_000;
+const FIT_SAMPLES: usize = 100_000;
 /// Fraction of the points at each end of each axis that may be outliers.
-const TRIM: f64 = 0.005;
+const OUTLIER_SHARE: f64 = 0.005;
 /// Trimmed ends are kept if they reach no further than this fraction of the rest's extent.
-const KEEP: f64 = 0.2;
+const KEPT_EXTENT_SHARE: f64 = 0.2;
 /// Fraction of the picture left free at each side.
-const BORDER: f64 = 0.04;
+const FREE_PICTURE_SHARE: f64 = 0.04;
 
 /// Free space around the points, in mean distances between points. Discs at the rim of a sparse cloud then end within
 /// the picture; a disc cut by the edge looks like a surface that continues.
-const RIM: f64 = 2.5;
+const RIM_POINT_DISTANCES: f64 = 2.5;
 
 /// Least distance from the eye to the points, as a fraction of their extent. Nearer points would hide how large the
 /// rest is.
-const ROOM: f64 = 0.2;
+const MIN_EYE_DISTANCE_EXTENTS: f64 = 0.2;
 /// Iterations to find the middle of the picture, because the outermost points change with the middle.
 const MIDDLE_STEPS: usize = 8;
 
 /// A sensor stands among its points if the furthest are at least this many times as far, horizontally, as the median. A
 /// view of all points would make the densest part small.
-const FAR_REACH: f64 = 4.0;
+const MIN_RANGE_RATIO: f64 = 4.0;
 /// Position of an eye behind a sensor and above it, and of its target ahead. Unit: geometric mean of the median and the
 /// 0.9 quantile of the horizontal ranges.
-const BEHIND: f64 = 1.15;
-const ABOVE: f64 = 0.75;
-const AHEAD: f64 = 0.45;
+const EYE_BEHIND_RANGES: f64 = 1.15;
+const EYE_ABOVE_RANGES: f64 = 0.75;
+const TARGET_AHEAD_RANGES: f64 = 0.45;
 /// Rotation of the eye about the sensor, in degrees. Objects along the way hide each other less.
-const ASIDE_DEG: f64 = 20.0;
-/// Height of the picture over its distance from the eye at 40°. `BEHIND`, `ABOVE` and `AHEAD` are meant for this field
-/// of view.
-const UPRIGHT: f64 = 0.728;
+const EYE_TURN_DEG: f64 = 20.0;
+/// Height of the picture over its distance from the eye at 40°. `EYE_BEHIND_RANGES`, `EYE_ABOVE_RANGES` and
+/// `TARGET_AHEAD_RANGES` are meant for this field of view.
+const REFERENCE_HEIGHT_RATIO: f64 = 0.728;
 /// Least fraction of the way from the target to the eye that remains for wide fields of view. A nearer eye would pass
 /// the sensor.
-const NEAREST: f64 = 0.4;
-/// Distance from the line of sight within which points are in the way, as a fraction of the unit of `BEHIND`.
-const IN_THE_WAY: f64 = 0.15;
+const MIN_EYE_WAY_SHARE: f64 = 0.4;
+/// Distance from the line of sight within which points are in the way, as a fraction of the unit of
+/// `EYE_BEHIND_RANGES`.
+const MAX_OBSTACLE_RANGES: f64 = 0.15;
 /// Fewer than one point in this many do not count as being in the way.
-const A_FEW: usize = 500;
-/// Horizontal distance of a sensor from the middle of its points above which it sees one side, in the unit of `BEHIND`.
-const ONE_SIDE: f64 = 0.3;
+const POINTS_PER_OBSTACLE: usize = 500;
+/// Horizontal distance of a sensor from the middle of its points above which it sees one side, in the unit of
+/// `EYE_BEHIND_RANGES`.
+const MIN_ONE_SIDED_RANGES: f64 = 0.3;
 /// Points are seen from one side if the mean of the horizontal unit vectors towards their sensors is longer than this.
-const ONE_WAY: f64 = 0.6;
+const MIN_MEAN_DIRECTION: f64 = 0.6;
 /// Least ratio of the nearest points' horizontal range to the median for a side to exist. Points above or below a
 /// sensor have no side.
-const APART: f64 = 0.3;
+const MIN_NEAREST_RANGE_RATIO: f64 = 0.3;
 /// Quantile of the horizontal ranges that counts as nearest.
-const NEAREST_SHARE: f64 = 0.05;
+const NEAREST_QUANTILE: f64 = 0.05;
 /// Height of an eye on the seen side over its horizontal distance.
-const RAISED: f64 = 0.47;
+const EYE_HEIGHT_RATIO: f64 = 0.47;
 
 /// Position of the camera relative to the cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -132,7 +134,7 @@ impl Camera {
         let iso = front + 0.62 * right + 0.55 * up;
         let (to_viewer, picture_up) = match direction {
             ViewDirection::Auto if axes == Axes::Camera => (front, up),
-            ViewDirection::Auto => (seen_side(cloud, up).unwrap_or(iso), up),
+            ViewDirection::Auto => (direction_to_seen_side(cloud, up).unwrap_or(iso), up),
             ViewDirection::Iso => (iso, up),
             ViewDirection::Front => (front, up),
             ViewDirection::Back => (-front, up),
@@ -183,9 +185,9 @@ impl Camera {
         // Points in a single place still need a picture of some size.
         let least = (1e-6 * cloud.origin().abs().max_element()).max(1e-3);
         let extent = extent.map(|e| e.max(if extent == [0.0; 3] { least } else { 0.0 }));
-        let rim = RIM * (extent[0] * extent[1] / cloud.len() as f64).sqrt();
+        let rim = RIM_POINT_DISTANCES * (extent[0] * extent[1] / cloud.len() as f64).sqrt();
         let to_world = |p: [f64; 3]| cloud.origin() + axes[0] * p[0] + axes[1] * p[1] + axes[2] * p[2];
-        let half_room = 0.5 - BORDER;
+        let half_room = 0.5 - FREE_PICTURE_SHARE;
         camera.look_at = to_world(middle);
 
         if from_sensor && let Some(camera) = from_origin(&kept, axes, cloud.origin(), camera.up, aspect)? {
@@ -201,7 +203,7 @@ impl Camera {
             Projection::PerspectiveFovDeg(fov) => {
                 let slope = 2.0 * half_room * (0.5 * *fov).to_radians().tan();
                 let eye = eye_before(&kept, 0, slope * aspect, rim).min(eye_before(&kept, 1, slope, rim));
-                let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * ROOM;
+                let least = 0.5 * extent[2] + extent.iter().fold(0.0, |a: f64, &b| a.max(b)) * MIN_EYE_DISTANCE_EXTENTS;
                 let distance = (middle[2] - eye).max(least);
                 // Near points look wider than far points, so that the middle of the picture differs from the middle of
                 // the points.
@@ -274,14 +276,14 @@ fn from_origin(
         let p = world(slope);
         most.max((p.dot(down) / p.dot(forward)).abs()).max((p.dot(right) / p.dot(forward)).abs() / aspect)
     });
-    let fov = 2.0 * (slope / (1.0 - 2.0 * BORDER)).atan().to_degrees();
+    let fov = 2.0 * (slope / (1.0 - 2.0 * FREE_PICTURE_SHARE)).atan().to_degrees();
     camera.projection = Projection::PerspectiveFovDeg(fov.max(1.0));
     Ok((fov < 120.0).then_some(camera))
 }
 
 /// Direction towards an eye on the side of a cloud that its sensors saw; from the other side it would see backs. `None`
 /// if no sensor is known, or if the sensors saw all sides or stood among the points.
-fn seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
+fn direction_to_seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
     let sensor = middle_of(cloud.scans())? - cloud.origin();
     let samples = samples(cloud, [DVec3::X, DVec3::Y, DVec3::Z]);
     let ways: Vec<DVec3> = samples.iter().map(|&p| (sensor - p).reject_from(up)).collect();
@@ -289,9 +291,9 @@ fn seen_side(cloud: &PointCloud, up: DVec3) -> Option<DVec3> {
     let mut ranges: Vec<f64> = ways.iter().map(|way| way.length()).collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let range = |share: f64| ranges.get((share * ranges.len() as f64) as usize).copied();
-    let is_apart = range(NEAREST_SHARE)? >= APART * range(0.5)?;
-    let aside = DQuat::from_axis_angle(up, ASIDE_DEG.to_radians());
-    (is_apart && mean.length() > ONE_WAY).then(|| aside * mean.normalize() + RAISED * up)
+    let is_apart = range(NEAREST_QUANTILE)? >= MIN_NEAREST_RANGE_RATIO * range(0.5)?;
+    let aside = DQuat::from_axis_angle(up, EYE_TURN_DEG.to_radians());
+    (is_apart && mean.length() > MIN_MEAN_DIRECTION).then(|| aside * mean.normalize() + EYE_HEIGHT_RATIO * up)
 }
 
 /// Mean sensor position of some scans in world coordinates; `None` without scans.
@@ -312,11 +314,11 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     let mut ranges: Vec<f64> = points.iter().map(|p| p.truncate().length()).collect();
     ranges.sort_unstable_by(f64::total_cmp);
     let range = |share: f64| ranges.get((share * ranges.len() as f64) as usize).copied();
-    let [half, most, all] = [range(0.5)?, range(0.9)?, range(1.0 - 2.0 * TRIM)?];
+    let [half, most, all] = [range(0.5)?, range(0.9)?, range(1.0 - 2.0 * OUTLIER_SHARE)?];
     let distance = (half * most).sqrt();
     let [low, high] = robust_range(&points, 2);
     // Tall thin things would mostly be above the picture.
-    if !(half > 0.0 && all > FAR_REACH * half && high - low < all.min(FAR_REACH * distance)) {
+    if !(half > 0.0 && all > MIN_RANGE_RATIO * half && high - low < all.min(MIN_RANGE_RATIO * distance)) {
         return None;
     }
     let near = || points.iter().filter(|p| p.truncate().length() <= most);
@@ -324,7 +326,7 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     // A sensor that sees one side is seen from behind. Other sensors are seen along the direction in which points reach
     // furthest. The mean of doubled angles gives this direction without a sign; the sign favours +X and +Y, which are
     // ahead in most conventions.
-    let sees_one_side = middle.truncate().length() > ONE_SIDE * distance;
+    let sees_one_side = middle.truncate().length() > MIN_ONE_SIDED_RANGES * distance;
     let doubled = |p: &DVec3| DVec2::new(p.x * p.x - p.y * p.y, 2.0 * p.x * p.y) / p.truncate().length().max(distance);
     let forward = if sees_one_side {
         middle.truncate().normalize()
@@ -335,10 +337,10 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
     let upright_at_1 = 2.0 * (0.5 * fov).to_radians().tan() * aspect.min(1.0);
     let place = |(end, side): (f64, f64)| {
         let forward = forward * end;
-        let back = -DVec2::from_angle(side * ASIDE_DEG.to_radians()).rotate(forward);
-        let eye = 0.5 * middle + (back * BEHIND).extend(ABOVE) * distance;
-        let look_at = middle + (forward * AHEAD).extend(0.0) * distance;
-        [look_at + (eye - look_at) * (UPRIGHT / upright_at_1).max(NEAREST), look_at]
+        let back = -DVec2::from_angle(side * EYE_TURN_DEG.to_radians()).rotate(forward);
+        let eye = 0.5 * middle + (back * EYE_BEHIND_RANGES).extend(EYE_ABOVE_RANGES) * distance;
+        let look_at = middle + (forward * TARGET_AHEAD_RANGES).extend(0.0) * distance;
+        [look_at + (eye - look_at) * (REFERENCE_HEIGHT_RATIO / upright_at_1).max(MIN_EYE_WAY_SHARE), look_at]
     };
     // From either side and either end, the position with fewer points in the way; a few points are ignored.
     let places = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)].map(place);
@@ -346,9 +348,9 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
         let close = |p: &&DVec3| {
             // Without the points around the sensor.
             let along = (p.dot(*eye) / eye.length_squared()).clamp(0.4, 1.0);
-            p.distance(*eye * along) < IN_THE_WAY * distance
+            p.distance(*eye * along) < MAX_OBSTACLE_RANGES * distance
         };
-        points.iter().filter(close).count() * A_FEW / points.len()
+        points.iter().filter(close).count() * POINTS_PER_OBSTACLE / points.len()
     };
     let places = if sees_one_side { &places[..2] } else { &places };
     let best = places.iter().min_by_key(|place| in_the_way(place))?;
@@ -358,7 +360,7 @@ fn behind_sensor(cloud: &PointCloud, fov: f64, aspect: f64) -> Option<[DVec3; 2]
 /// Finite positions relative to the cloud's origin along `axes`, from evenly spaced indices.
 fn samples(cloud: &PointCloud, axes: [DVec3; 3]) -> Vec<DVec3> {
     let positions = cloud.positions();
-    let step = positions.len().div_ceil(SAMPLES).max(1);
+    let step = positions.len().div_ceil(FIT_SAMPLES).max(1);
     let finite = positions.iter().step_by(step).map(|&p| DVec3::from(p.map(f64::from))).filter(|p| p.is_finite());
     finite.map(|p| DVec3::from(axes.map(|axis| axis.dot(p)))).collect()
 }
@@ -368,9 +370,9 @@ fn robust_range(samples: &[DVec3], axis: usize) -> [f64; 2] {
     let mut values: Vec<f64> = samples.iter().map(|p| p[axis]).collect();
     values.sort_unstable_by(f64::total_cmp);
     let (Some(&first), Some(&last)) = (values.first(), values.last()) else { return [0.0; 2] };
-    let trim = (values.len() as f64 * TRIM) as usize;
+    let trim = (values.len() as f64 * OUTLIER_SHARE) as usize;
     let [low, high] = [values[trim], values[values.len() - 1 - trim]];
-    let margin = KEEP * (high - low);
+    let margin = KEPT_EXTENT_SHARE * (high - low);
     let nearest = |bound: f64| {
         let inside = values.partition_point(|&v| v < bound);
         values[inside.min(values.len() - 1)]

@@ -11,7 +11,7 @@ mod reproject;
 pub(crate) use fit::up;
 pub use fit::{ViewDirection, guess_axes};
 pub use lens::Lens;
-pub(crate) use reproject::{Reprojection, Seen};
+pub(crate) use reproject::{PlacedView, Reprojection};
 
 use glam::{DVec3, Mat3, Vec3};
 use serde::{Deserialize, Serialize};

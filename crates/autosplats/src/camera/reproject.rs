@@ -6,7 +6,7 @@ use super::View;
 
 /// View and origin of a frame's cloud, for later frames to look back.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct PlacedView {
     pub(crate) view: View,
     /// The cloud's origin, world coordinates.
     pub(crate) origin: DVec3,
@@ -24,7 +24,7 @@ pub(crate) struct Reprojection {
 
 impl Reprojection {
     /// Reprojection from the frame `now` into the frame `past`; `None` if only one of them is in perspective.
-    pub(crate) fn new(now: &Seen, past: &Seen) -> Option<Self> {
+    pub(crate) fn new(now: &PlacedView, past: &PlacedView) -> Option<Self> {
         if now.view.perspective != past.view.perspective {
             return None;
         }
@@ -67,9 +67,9 @@ mod tests {
     use super::*;
     use crate::camera::{Camera, Projection};
 
-    fn seen(eye: DVec3, origin: DVec3, projection: Projection) -> Seen {
+    fn seen(eye: DVec3, origin: DVec3, projection: Projection) -> PlacedView {
         let camera = Camera { eye, look_at: DVec3::new(1e6, 0.0, 0.0), up: DVec3::Z, projection };
-        Seen { view: camera.view(origin, [320, 200]).expect("a view"), origin }
+        PlacedView { view: camera.view(origin, [320, 200]).expect("a view"), origin }
     }
 
     #[test]

@@ -5,32 +5,32 @@
 /// Distance to the mean of the neighbours, in k-radii, above which a point is an outlier: the neighbours lie together
 /// on one side, on a surface elsewhere. The distance is 0.42 at a straight edge, 0.6 at a square corner, 0.55 at a
 /// line's end.
-pub(super) const LOPSIDED: f32 = 0.75;
-/// Like `LOPSIDED`, in k-radii, for a point that is far sparser than its surroundings on the screen.
-pub(super) const LOPSIDED_SPARSE: f32 = 0.66;
+pub(super) const MAX_MEAN_OFFSET_K_RADII: f32 = 0.75;
+/// Like `MAX_MEAN_OFFSET_K_RADII`, in k-radii, for a point that is far sparser than its surroundings on the screen.
+pub(super) const MAX_SPARSE_MEAN_OFFSET_K_RADII: f32 = 0.66;
 /// K-radius, in first search radii, above which a point is far sparser than its surroundings.
-pub(super) const FAR_SPARSER: f32 = 3.0;
+pub(super) const SPARSE_FIRST_RADII: f32 = 3.0;
 /// Fewest neighbours whose mean and plane are compared with the point: fewer are too often on one side by chance.
-pub(super) const LOPSIDED_COUNT: f32 = 6.0;
+pub(super) const MIN_COMPARED_NEIGHBORS: f32 = 6.0;
 
 /// Distance from the plane through the neighbours, in k-radii, above which a point stands beside a flat surface.
-pub(super) const BESIDE: f32 = 0.25;
+pub(super) const MAX_PLANE_OFFSET_K_RADII: f32 = 0.25;
 /// Least ratio of the squared distance from the plane to the neighbours' variance about the plane, for a surface to
 /// count as flat. The ratio is 8 at the tip of a cone and 7 at a cube's corner; few random samples of a tip exceed the
 /// limit. A single step of coordinates on a grid exceeds the limit too.
-pub(super) const FLAT: f32 = 50.0;
+pub(super) const MIN_FLAT_OFFSET_RATIO: f32 = 50.0;
 
 /// Number of neighbours before a gap below which a point is dropped if its surroundings are denser.
-pub(super) const FEW: f32 = 4.0;
+pub(super) const FEW_NEIGHBORS: f32 = 4.0;
 /// K-radius, in first search radii, above which the surroundings of a point with few neighbours are denser.
-pub(super) const SPARSER: f32 = 1.3;
+pub(super) const FEW_NEIGHBORS_FIRST_RADII: f32 = 1.3;
 
 /// Number of screen points below which there is nothing to compare with, and a cloud is no surface.
-pub(crate) const HANDFUL: usize = 64;
+pub(crate) const MIN_SURFACE_POINTS: usize = 64;
 
 /// The neighbours of a point, in units of the k-radius.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Around {
+pub(super) struct NeighborStatistics {
     pub(super) count: f32,
     /// Offset from the point to the mean of the neighbours.
     pub(super) mean: [f32; 3],
@@ -40,25 +40,29 @@ pub(super) struct Around {
     pub(super) variance: f32,
 }
 
-impl Around {
+impl NeighborStatistics {
     /// Whether the point is no part of its neighbours' surface, with `k` neighbours asked for. `sparser` computes the
     /// k-radius in first search radii, which few points need; `None` if there is nothing to compare with.
     #[inline(always)]
-    pub(super) fn is_alone(&self, sparser: Option<impl Fn() -> f32>, k: u32) -> bool {
+    pub(super) fn is_outlier(&self, sparser: Option<impl Fn() -> f32>, k: u32) -> bool {
         let &Self { count, mean, normal, variance } = self;
         let is_sparser = |than: f32| sparser.as_ref().is_some_and(|sparser| sparser() > than);
-        if count < LOPSIDED_COUNT {
-            return count < FEW.min(k as f32) && is_sparser(SPARSER);
+        if count < MIN_COMPARED_NEIGHBORS {
+            return count < FEW_NEIGHBORS.min(k as f32) && is_sparser(FEW_NEIGHBORS_FIRST_RADII);
         }
         let dot = |v: [f32; 3]| mean[0] * v[0] + mean[1] * v[1] + mean[2] * v[2];
         let off = dot(mean);
-        if off > LOPSIDED_SPARSE * LOPSIDED_SPARSE && (off > LOPSIDED * LOPSIDED || is_sparser(FAR_SPARSER)) {
+        if off > MAX_SPARSE_MEAN_OFFSET_K_RADII * MAX_SPARSE_MEAN_OFFSET_K_RADII
+            && (off > MAX_MEAN_OFFSET_K_RADII * MAX_MEAN_OFFSET_K_RADII || is_sparser(SPARSE_FIRST_RADII))
+        {
             return true;
         }
         let beside = dot(normal) * dot(normal);
         // Variance of the neighbours without the point itself.
         let all = count + 1.0;
         let scatter = (variance - count * beside / (all * all)) * (all / count);
-        sparser.is_some() && beside > BESIDE * BESIDE && beside > FLAT * scatter
+        sparser.is_some()
+            && beside > MAX_PLANE_OFFSET_K_RADII * MAX_PLANE_OFFSET_K_RADII
+            && beside > MIN_FLAT_OFFSET_RATIO * scatter
     }
 }

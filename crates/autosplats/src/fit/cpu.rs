@@ -4,7 +4,7 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use super::alone::{Around, HANDFUL};
+use super::alone::{MIN_SURFACE_POINTS, NeighborStatistics};
 use super::eigen::eigen;
 use super::{Surfel, Surfels};
 use crate::camera::View;
@@ -15,22 +15,22 @@ use crate::simd::F32s;
 /// Blocks per task.
 const TASK_BLOCKS: usize = 64;
 /// Ratio of the middle to the largest eigenvalue below which a neighbourhood is a line, not a plane.
-pub(super) const LINE: f32 = 1e-5;
+pub(super) const MAX_LINE_EIGENVALUE_RATIO: f32 = 1e-5;
 /// Sine of the angle between a line and the direction to the eye below which the line has no side towards the eye.
-pub(super) const LEAST_ACROSS: f32 = 1e-3;
+pub(super) const MIN_LINE_SINE: f32 = 1e-3;
 /// Default limit of an ellipse's semi-major over semi-minor axis.
 // Differs from the paper: without a limit, a nearly straight neighbourhood would draw a needle across the picture.
 pub(crate) const LONGEST: f32 = 4.0;
 /// Radius in pixels of the dot drawn for a kept point without neighbours.
-pub(super) const LONE_RADIUS_PX: f32 = 1.0;
+pub(super) const ISOLATED_DOT_RADIUS_PX: f32 = 1.0;
 
 /// Largest k-radius, in first search radii, that widens the splat of a point behind the culling plane of its cell.
 // Differs from the paper: such a point is seen past the edge of a nearer surface, and its neighbours are mostly
 // hidden. Its wide splat would stick out beyond the silhouette, where no depth map can hide it.
-pub(super) const WIDEST_BEHIND: f32 = 3.0;
+pub(super) const MAX_CULLED_FIRST_RADII: f32 = 3.0;
 
 /// Fewest neighbours that form a line of points; fewer are a line by chance.
-pub(super) const ROW_COUNT: f32 = 8.0;
+pub(super) const MIN_SCAN_LINE_NEIGHBORS: f32 = 8.0;
 
 /// Surface variation that marks a dot: the largest possible. A dot is no surface, and has no back.
 pub(super) const DOT_CURVATURE: f32 = 1.0 / 3.0;
@@ -80,7 +80,7 @@ fn fit_blocks_with<'a, S: Simd>(
     rules: &'a FitRules,
     out: &'a mut [Surfel],
 ) {
-    let compares = rules.adaptive && screen.points.len() >= HANDFUL;
+    let compares = rules.adaptive && screen.points.len() >= MIN_SURFACE_POINTS;
     for ((out, queries), block) in out.chunks_mut(LANES).zip(queries.chunks(LANES)).zip(blocks) {
         let mut fitted = Fitted::default();
         for vector in 0..LANES / S::F32_LANES {
@@ -92,7 +92,8 @@ fn fit_blocks_with<'a, S: Simd>(
             let usual_radius = compares.then_some(first_radius);
             *surfel = fitted.surfel(lane, block, point.position_view, usual_radius, view, rules);
             if screen.density.culls(point) {
-                surfel.radius = surfel.radius.min(splat_radius(WIDEST_BEHIND * first_radius(), rules.k as f32, rules));
+                surfel.radius =
+                    surfel.radius.min(splat_radius(MAX_CULLED_FIRST_RADII * first_radius(), rules.k as f32, rules));
             }
             if rules.dot_px > 0.0 {
                 let center = point.position_view.into();
@@ -150,7 +151,7 @@ impl Fitted {
     pub(crate) fn plane(&self, lane: usize, toward: [f32; 3]) -> Plane {
         let [least, middle, largest] = of_lane(&self.values, lane);
         let (mut normal, mut major_axis) = (of_lane(&self.normal, lane), of_lane(&self.major_axis, lane));
-        let plane = middle > LINE * largest;
+        let plane = middle > MAX_LINE_EIGENVALUE_RATIO * largest;
         if !plane {
             normal = facing(toward, major_axis, largest > 0.0);
             if !(largest > 0.0) {
@@ -187,10 +188,10 @@ impl Fitted {
         let [count, k_radius] = [block.count.0[lane], block.k_radius.0[lane]];
         let plane = self.plane(lane, view.to_eye(center.into()).to_array());
         let mean = of_lane(&block.offset, lane).map(|sum| sum / (count * k_radius.max(f32::MIN_POSITIVE)));
-        let around = Around { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
+        let around = NeighborStatistics { count, mean, normal: plane.normal, variance: self.values[0].0[lane] };
         let sparser = usual_radius.map(|usual| move || k_radius / usual());
-        let outlier = !rules.keep_outliers && around.is_alone(sparser, rules.k);
-        let major_ratio = if rules.adaptive && count >= ROW_COUNT {
+        let outlier = !rules.keep_outliers && around.is_outlier(sparser, rules.k);
+        let major_ratio = if rules.adaptive && count >= MIN_SCAN_LINE_NEIGHBORS {
             plane.major_ratio
         } else if plane.major_ratio < f32::MAX {
             plane.major_ratio.min(rules.longest)
@@ -198,7 +199,7 @@ impl Fitted {
             // A line has no width to draw.
             1.0
         };
-        let lone = if rules.keep_outliers { LONE_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
+        let lone = if rules.keep_outliers { ISOLATED_DOT_RADIUS_PX * view.pixel_size(center[2]) } else { 0.0 };
         Surfel {
             center,
             radius: if outlier {
@@ -260,7 +261,7 @@ fn facing(to_eye: [f32; 3], line: [f32; 3], has_line: bool) -> [f32; 3] {
     let line = Vec3::from(line);
     let across = to_eye - line * line.dot(to_eye);
     // For a line towards the eye, the rest across it is rounding.
-    let clear = across.length_squared() > LEAST_ACROSS * LEAST_ACROSS;
+    let clear = across.length_squared() > MIN_LINE_SINE * MIN_LINE_SINE;
     match (has_line, clear) {
         (false, _) => to_eye,
         (true, true) => across.normalize(),

@@ -22,21 +22,21 @@
 
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-override LINE: f32;
-override LEAST_ACROSS: f32;
-override ROW_COUNT: f32;
-override LONE_RADIUS_PX: f32;
+override MAX_LINE_EIGENVALUE_RATIO: f32;
+override MIN_LINE_SINE: f32;
+override MIN_SCAN_LINE_NEIGHBORS: f32;
+override ISOLATED_DOT_RADIUS_PX: f32;
 override DOT_CURVATURE: f32;
-override WIDEST_BEHIND: f32;
-override LOPSIDED: f32;
-override LOPSIDED_SPARSE: f32;
-override FAR_SPARSER: f32;
-override LOPSIDED_COUNT: f32;
-override BESIDE: f32;
-override FLAT: f32;
-override FEW: f32;
-override SPARSER: f32;
-override HANDFUL: u32;
+override MAX_CULLED_FIRST_RADII: f32;
+override MAX_MEAN_OFFSET_K_RADII: f32;
+override MAX_SPARSE_MEAN_OFFSET_K_RADII: f32;
+override SPARSE_FIRST_RADII: f32;
+override MIN_COMPARED_NEIGHBORS: f32;
+override MAX_PLANE_OFFSET_K_RADII: f32;
+override MIN_FLAT_OFFSET_RATIO: f32;
+override FEW_NEIGHBORS: f32;
+override FEW_NEIGHBORS_FIRST_RADII: f32;
+override MIN_SURFACE_POINTS: u32;
 
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
@@ -89,7 +89,7 @@ fn facing(eye: vec3f, line: vec3f, has_line: bool) -> vec3f {
     let across = toward - line * product(line, toward);
     let length_squared = product(across, across);
     // For a line towards the eye, the rest across it is rounding.
-    let is_clear = length_squared > LEAST_ACROSS * LEAST_ACROSS;
+    let is_clear = length_squared > MIN_LINE_SINE * MIN_LINE_SINE;
     let of_line = select(any_orthonormal(line), across * (1.0 / sqrt(max(length_squared, MIN_POSITIVE))), is_clear);
     return select(toward, of_line, has_line);
 }
@@ -103,11 +103,11 @@ fn plane(sums: Neighborhood, eye: vec3f) -> Plane {
     var normal = found.least;
     var major_axis = found.largest;
     var major_ratio = largest / middle;
-    if !(middle > LINE * largest) {
+    if !(middle > MAX_LINE_EIGENVALUE_RATIO * largest) {
         normal = facing(eye, major_axis, largest > 0.0);
         // A circle may have any tangent.
         major_axis = select(any_orthonormal(normal), major_axis, largest > 0.0);
-        major_ratio = select(1.0, MOST, largest > 0.0);
+        major_ratio = select(1.0, MAX_F32, largest > 0.0);
     }
     let least = max(found.values.x, 0.0);
     let sum = least + middle + largest;
@@ -122,10 +122,10 @@ fn splat_radius(k_radius: f32, count: f32) -> f32 {
 
 // Whether a point is no part of its neighbours' surface. `sparser` is the k-radius in first search radii, 0 if there
 // is nothing to compare with. See `alone.rs`.
-fn is_alone(sums: Neighborhood, face: Plane, sparser: f32) -> bool {
+fn is_outlier(sums: Neighborhood, face: Plane, sparser: f32) -> bool {
     let count = sums.count;
-    if count < LOPSIDED_COUNT {
-        return count < min(FEW, f32(frame.k)) && sparser > SPARSER;
+    if count < MIN_COMPARED_NEIGHBORS {
+        return count < min(FEW_NEIGHBORS, f32(frame.k)) && sparser > FEW_NEIGHBORS_FIRST_RADII;
     }
     let mean = sums.offset / (count * max(sums.k_radius, MIN_POSITIVE));
     let height = product(mean, face.normal);
@@ -133,8 +133,8 @@ fn is_alone(sums: Neighborhood, face: Plane, sparser: f32) -> bool {
     // Variance of the neighbours without the point itself.
     let all = count + 1.0;
     let scatter = (face.variance - count * beside / (all * all)) * (all / count);
-    let is_beside = beside > BESIDE * BESIDE && beside > FLAT * scatter && sparser > 0.0;
-    let lopsided = select(LOPSIDED, LOPSIDED_SPARSE, sparser > FAR_SPARSER);
+    let is_beside = beside > MAX_PLANE_OFFSET_K_RADII * MAX_PLANE_OFFSET_K_RADII && beside > MIN_FLAT_OFFSET_RATIO * scatter && sparser > 0.0;
+    let lopsided = select(MAX_MEAN_OFFSET_K_RADII, MAX_SPARSE_MEAN_OFFSET_K_RADII, sparser > SPARSE_FIRST_RADII);
     return product(mean, mean) > lopsided * lopsided || is_beside;
 }
 
@@ -149,14 +149,14 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
     if sums.count > 0.0 {
         radius = splat_radius(sums.k_radius, sums.count);
     } else if frame.keep_outliers == 1u {
-        radius = LONE_RADIUS_PX * pixel_size(center.z);
+        radius = ISOLATED_DOT_RADIUS_PX * pixel_size(center.z);
     }
-    let sparser = select(0.0, sums.k_radius / first, frame.adaptive == 1u && task.points >= HANDFUL);
-    if frame.keep_outliers == 0u && is_alone(sums, face, sparser) {
+    let sparser = select(0.0, sums.k_radius / first, frame.adaptive == 1u && task.points >= MIN_SURFACE_POINTS);
+    if frame.keep_outliers == 0u && is_outlier(sums, face, sparser) {
         radius = 0.0;
     }
     if center.z > culling_depth(bitcast<f32>(cell.y), task.cell_px) {
-        radius = min(radius, splat_radius(WIDEST_BEHIND * first, f32(frame.k)));
+        radius = min(radius, splat_radius(MAX_CULLED_FIRST_RADII * first, f32(frame.k)));
     }
     if frame.dot_px > 0.0 {
         let normal = normalized_or(to_eye(center), vec3f(0.0, 0.0, -1.0));
@@ -167,9 +167,9 @@ fn surfel(query: u32, sums: Neighborhood) -> Surfel {
         );
     }
     // A line has no width to draw.
-    let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MOST);
+    let drawn_ratio = select(1.0, min(face.major_ratio, frame.longest), face.major_ratio < MAX_F32);
     // Adaptation needs the full length.
-    let major_ratio = select(drawn_ratio, face.major_ratio, frame.adaptive == 1u && sums.count >= ROW_COUNT);
+    let major_ratio = select(drawn_ratio, face.major_ratio, frame.adaptive == 1u && sums.count >= MIN_SCAN_LINE_NEIGHBORS);
     return Surfel(
         center,
         radius,

@@ -1,8 +1,15 @@
 //! The fit on the GPU: one invocation per point.
 
 use super::Surfel;
-use super::alone::{BESIDE, FAR_SPARSER, FEW, FLAT, HANDFUL, LOPSIDED, LOPSIDED_COUNT, LOPSIDED_SPARSE, SPARSER};
-use super::cpu::{DOT_CURVATURE, LEAST_ACROSS, LINE, LONE_RADIUS_PX, ROW_COUNT, WIDEST_BEHIND};
+use super::alone::{
+    FEW_NEIGHBORS, FEW_NEIGHBORS_FIRST_RADII, MAX_MEAN_OFFSET_K_RADII, MAX_PLANE_OFFSET_K_RADII,
+    MAX_SPARSE_MEAN_OFFSET_K_RADII, MIN_COMPARED_NEIGHBORS, MIN_FLAT_OFFSET_RATIO, MIN_SURFACE_POINTS,
+    SPARSE_FIRST_RADII,
+};
+use super::cpu::{
+    DOT_CURVATURE, ISOLATED_DOT_RADIUS_PX, MAX_CULLED_FIRST_RADII, MAX_LINE_EIGENVALUE_RATIO, MIN_LINE_SINE,
+    MIN_SCAN_LINE_NEIGHBORS,
+};
 use super::eigen::SWEEPS;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -36,21 +43,21 @@ impl FitPasses {
             let constants = [
                 ("ROUND", f64::from(round as u32)),
                 ("SWEEPS", SWEEPS as f64),
-                ("LINE", LINE.into()),
-                ("LEAST_ACROSS", LEAST_ACROSS.into()),
-                ("ROW_COUNT", ROW_COUNT.into()),
-                ("LONE_RADIUS_PX", LONE_RADIUS_PX.into()),
+                ("MAX_LINE_EIGENVALUE_RATIO", MAX_LINE_EIGENVALUE_RATIO.into()),
+                ("MIN_LINE_SINE", MIN_LINE_SINE.into()),
+                ("MIN_SCAN_LINE_NEIGHBORS", MIN_SCAN_LINE_NEIGHBORS.into()),
+                ("ISOLATED_DOT_RADIUS_PX", ISOLATED_DOT_RADIUS_PX.into()),
                 ("DOT_CURVATURE", DOT_CURVATURE.into()),
-                ("WIDEST_BEHIND", WIDEST_BEHIND.into()),
-                ("LOPSIDED", LOPSIDED.into()),
-                ("LOPSIDED_SPARSE", LOPSIDED_SPARSE.into()),
-                ("FAR_SPARSER", FAR_SPARSER.into()),
-                ("LOPSIDED_COUNT", LOPSIDED_COUNT.into()),
-                ("BESIDE", BESIDE.into()),
-                ("FLAT", FLAT.into()),
-                ("FEW", FEW.into()),
-                ("SPARSER", SPARSER.into()),
-                ("HANDFUL", HANDFUL as f64),
+                ("MAX_CULLED_FIRST_RADII", MAX_CULLED_FIRST_RADII.into()),
+                ("MAX_MEAN_OFFSET_K_RADII", MAX_MEAN_OFFSET_K_RADII.into()),
+                ("MAX_SPARSE_MEAN_OFFSET_K_RADII", MAX_SPARSE_MEAN_OFFSET_K_RADII.into()),
+                ("SPARSE_FIRST_RADII", SPARSE_FIRST_RADII.into()),
+                ("MIN_COMPARED_NEIGHBORS", MIN_COMPARED_NEIGHBORS.into()),
+                ("MAX_PLANE_OFFSET_K_RADII", MAX_PLANE_OFFSET_K_RADII.into()),
+                ("MIN_FLAT_OFFSET_RATIO", MIN_FLAT_OFFSET_RATIO.into()),
+                ("FEW_NEIGHBORS", FEW_NEIGHBORS.into()),
+                ("FEW_NEIGHBORS_FIRST_RADII", FEW_NEIGHBORS_FIRST_RADII.into()),
+                ("MIN_SURFACE_POINTS", MIN_SURFACE_POINTS as f64),
             ];
             Pass::new(gpu, &FIT, &constants)
         };

@@ -17,7 +17,7 @@ pub(crate) mod orient;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub(crate) use alone::HANDFUL;
+pub(crate) use alone::MIN_SURFACE_POINTS;
 pub(crate) use cpu::{FitRules, Fitted, LONGEST, fit};
 pub(crate) use eigen::{SWEEPS, eigenvectors};
 pub(crate) use given::{GivenPlanes, place};

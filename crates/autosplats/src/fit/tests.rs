@@ -2,8 +2,11 @@
 
 use autosplats_cloud::glam::{DMat3, DVec3};
 
-use super::alone::{FAR_SPARSER, FEW, HANDFUL, LOPSIDED, LOPSIDED_COUNT, SPARSER};
-use super::cpu::{LONGEST, WIDEST_BEHIND};
+use super::alone::{
+    FEW_NEIGHBORS, FEW_NEIGHBORS_FIRST_RADII, MAX_MEAN_OFFSET_K_RADII, MIN_COMPARED_NEIGHBORS, MIN_SURFACE_POINTS,
+    SPARSE_FIRST_RADII,
+};
+use super::cpu::{LONGEST, MAX_CULLED_FIRST_RADII};
 use super::{FitRules, Surfel, Surfels, fit};
 use crate::camera::{Camera, Projection, View};
 use crate::project::{DensityGrid, ScreenPoint, ScreenPoints};
@@ -119,8 +122,8 @@ fn compare(n: &Neighborhood, surfel: &Surfel, view: &View, rules: &FitRules) -> 
 
     let near = |value: f32, expected: f64, tolerance: f64| (f64::from(value) - expected).abs() <= tolerance;
     let count = n.offsets.len() as f64;
-    let lopsided = (n.mean() * (count + 1.0) / count).length() > f64::from(LOPSIDED) * n.k_radius();
-    let lopsided = lopsided && count >= f64::from(LOPSIDED_COUNT);
+    let lopsided = (n.mean() * (count + 1.0) / count).length() > f64::from(MAX_MEAN_OFFSET_K_RADII) * n.k_radius();
+    let lopsided = lopsided && count >= f64::from(MIN_COMPARED_NEIGHBORS);
     // A neighbourhood cut short by a gap counts as k neighbours.
     let radius = f64::from(rules.splat_scale) * 2.0 * n.k_radius() / count.max(f64::from(rules.k)).sqrt();
     let radius = if lopsided && !rules.keep_outliers { 0.0 } else { radius };
@@ -245,7 +248,7 @@ fn splats_behind_the_culling_plane_are_limited() {
         let mut narrowed = 0;
         for (free, limited) in free.iter().zip(&limited) {
             let first_radius = first_radius(free.center[2].into(), &view) as f32;
-            let widest = 2.0 * WIDEST_BEHIND * first_radius / 10f32.sqrt();
+            let widest = 2.0 * MAX_CULLED_FIRST_RADII * first_radius / 10f32.sqrt();
             let expected = free.radius.min(widest);
             assert!((limited.radius - expected).abs() <= 1e-6 * expected, "{limited:?} is not {expected} wide");
             narrowed += usize::from(expected < free.radius);
@@ -330,26 +333,32 @@ fn points_much_sparser_than_their_surroundings_are_dropped() {
         let one = |step: usize| DVec3::new(1.0 - step as f64 * 0.58 / 9.0, 0.1 * f64::from(random.signed()), 0.0);
         (0..10).map(one).collect::<Vec<_>>()
     };
-    for (sparser, expected) in [(0.9 * FAR_SPARSER, 1.0), (1.1 * FAR_SPARSER, 0.0)] {
+    for (sparser, expected) in [(0.9 * SPARSE_FIRST_RADII, 1.0), (1.1 * SPARSE_FIRST_RADII, 0.0)] {
         assert_eq!(kept(10, sparser.into(), 1000, aside), expected, "{sparser} times as far apart");
     }
     // Border points of a sparse surface stay, and two in three corner points.
     let border = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x.abs(), y, 0.0));
     let corner = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x.abs(), y.abs(), 0.0));
     for (name, offsets, least) in [("border", &border as &dyn Fn(&mut Random) -> _, 0.98), ("corner", &corner, 0.6)] {
-        let share = kept(10, 1.1 * f64::from(FAR_SPARSER), 1000, offsets);
+        let share = kept(10, 1.1 * f64::from(SPARSE_FIRST_RADII), 1000, offsets);
         assert!(share > least, "{share} of the points at a {name} are kept");
     }
-    for count in [1, 2, 3, FEW as usize] {
+    for count in [1, 2, 3, FEW_NEIGHBORS as usize] {
         let few = |random: &mut Random| strewn(random, |x, y, _| DVec3::new(x, y, 0.0))[..count].to_vec();
-        let is_few = (count as f32) < FEW;
-        for (sparser, expected) in [(0.9 * SPARSER, 1.0), (1.1 * SPARSER, if is_few { 0.0 } else { 1.0 })] {
+        let is_few = (count as f32) < FEW_NEIGHBORS;
+        for (sparser, expected) in
+            [(0.9 * FEW_NEIGHBORS_FIRST_RADII, 1.0), (1.1 * FEW_NEIGHBORS_FIRST_RADII, if is_few { 0.0 } else { 1.0 })]
+        {
             assert_eq!(
                 kept(10, sparser.into(), 1000, few),
                 expected,
                 "{count} neighbours, {sparser} times as far apart"
             );
-            assert_eq!(kept(10, sparser.into(), HANDFUL - 1, few), 1.0, "a handful has nothing to compare with");
+            assert_eq!(
+                kept(10, sparser.into(), MIN_SURFACE_POINTS - 1, few),
+                1.0,
+                "a handful has nothing to compare with"
+            );
             assert_eq!(kept(count as u32, sparser.into(), 1000, few), 1.0, "{count} of {count} are not few");
         }
     }

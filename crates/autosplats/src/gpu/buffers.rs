@@ -6,7 +6,7 @@ use super::Gpu;
 use crate::Error;
 
 /// Alignment of the parts of a readback, bytes.
-const PART: u64 = 16;
+const PART_ALIGNMENT_BYTES: u64 = 16;
 /// Largest ratio of a readback's buffer to the needed size. A larger buffer is replaced.
 const MOST_WASTE: u64 = 4;
 
@@ -122,7 +122,7 @@ impl Readback {
     ) -> Result<(), Error> {
         self.parts.clear();
         self.parts.extend(from.iter().map(|buffer| buffer.size()));
-        let size = self.parts.iter().map(|part| part.next_multiple_of(PART)).sum();
+        let size = self.parts.iter().map(|part| part.next_multiple_of(PART_ALIGNMENT_BYTES)).sum();
         let most = gpu.device.limits().max_buffer_size;
         if size > most {
             return Err(Error::DeviceLimit { what: "reading the picture back", needed: size, allowed: most });
@@ -135,7 +135,7 @@ impl Readback {
         let mut at = 0;
         for part in from {
             encoder.copy_buffer_to_buffer(part, 0, &buffer, at, part.size());
-            at += part.size().next_multiple_of(PART);
+            at += part.size().next_multiple_of(PART_ALIGNMENT_BYTES);
         }
         self.buffer = Some(buffer);
         Ok(())
@@ -148,11 +148,11 @@ impl Readback {
     pub(crate) fn read<T>(&self, gpu: &Gpu, take: impl FnOnce(&[&[u8]]) -> T) -> Result<T, Error> {
         let lost = || Error::DeviceLost("there is nothing to read".into());
         let buffer = self.buffer.as_ref().ok_or_else(lost)?;
-        let size = self.parts.iter().map(|part| part.next_multiple_of(PART)).sum();
+        let size = self.parts.iter().map(|part| part.next_multiple_of(PART_ALIGNMENT_BYTES)).sum();
         map(gpu, buffer, size, |mut bytes| {
             let mut parts = Vec::with_capacity(self.parts.len());
             for &len in &self.parts {
-                let (part, rest) = bytes.split_at(len.next_multiple_of(PART) as usize);
+                let (part, rest) = bytes.split_at(len.next_multiple_of(PART_ALIGNMENT_BYTES) as usize);
                 parts.push(&part[..len as usize]);
                 bytes = rest;
             }

@@ -96,7 +96,8 @@ impl Gpu {
         Self::open(&adapter)
     }
 
-    /// The best device that is hardware, or `None`. A software device is never opened: its adapter already says what it is.
+    /// The best device that is hardware, or `None`. A software device is never opened: its adapter already says what it
+    /// is.
     ///
     /// # Errors
     /// [`Error::Device`] if the device does not start.
@@ -171,8 +172,8 @@ impl Gpu {
     }
 }
 
-/// The device to test on, opened once for all tests of the process. Without a device a test says that it checks nothing;
-/// where `CI` is set, it fails.
+/// The device to test on, opened once for all tests of the process. Without a device a test says that it checks
+/// nothing; where `CI` is set, it fails.
 #[cfg(test)]
 pub(crate) fn test_gpu() -> Option<Gpu> {
     static GPU: std::sync::LazyLock<Result<Gpu, Error>> = std::sync::LazyLock::new(Gpu::new);

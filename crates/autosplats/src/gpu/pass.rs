@@ -60,9 +60,9 @@ impl Pass {
     /// # Errors
     /// [`Error::Device`] if the device lacks a feature or refuses the shader.
     pub(crate) fn new(gpu: &Gpu, source: &PassSource, constants: &[(&str, f64)]) -> Result<Self, Error> {
-        let Linked { label, module, entries } = Linked::new(gpu, source, wgpu::ShaderStages::COMPUTE)?;
+        let LinkedSource { label, module, entries } = LinkedSource::new(gpu, source, wgpu::ShaderStages::COMPUTE)?;
         gpu.checked(|| {
-            let made = Made::new(gpu, &label, module, &entries);
+            let made = PipelineParts::new(gpu, &label, module, &entries);
             let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&label),
                 layout: Some(&made.pipeline_layout),
@@ -88,7 +88,7 @@ impl Pass {
         resources: &[wgpu::BindingResource<'_>],
         groups: impl Into<Groups>,
     ) -> Step {
-        let work = Work::Compute {
+        let work = StepWork::Compute {
             pipeline: self.pipeline.clone(),
             bindings: bind(gpu, &self.label, &self.layout, resources),
             groups: groups.into(),
@@ -98,13 +98,13 @@ impl Pass {
 }
 
 /// The source of a pass, ready for the device.
-pub(super) struct Linked {
+pub(super) struct LinkedSource {
     pub(super) label: String,
     pub(super) module: naga::Module,
     pub(super) entries: Vec<wgpu::BindGroupLayoutEntry>,
 }
 
-impl Linked {
+impl LinkedSource {
     /// # Errors
     /// [`Error::Device`] if the device lacks a feature.
     pub(super) fn new(gpu: &Gpu, source: &PassSource, stages: wgpu::ShaderStages) -> Result<Self, Error> {
@@ -120,13 +120,13 @@ impl Linked {
 }
 
 /// The common parts of compute and render pipelines.
-pub(super) struct Made {
+pub(super) struct PipelineParts {
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) shader: wgpu::ShaderModule,
     pub(super) pipeline_layout: wgpu::PipelineLayout,
 }
 
-impl Made {
+impl PipelineParts {
     pub(super) fn new(gpu: &Gpu, label: &str, module: naga::Module, entries: &[wgpu::BindGroupLayoutEntry]) -> Self {
         let device = &gpu.device;
         let label = Some(label);
@@ -183,12 +183,12 @@ impl From<u32> for Groups {
 pub(crate) struct Step {
     pub(super) path: &'static str,
     pub(super) label: String,
-    pub(super) work: Work,
+    pub(super) work: StepWork,
 }
 
 /// The work of a step.
 #[derive(Clone, Debug)]
-pub(super) enum Work {
+pub(super) enum StepWork {
     Compute { pipeline: wgpu::ComputePipeline, bindings: wgpu::BindGroup, groups: Groups },
     Raster(Raster),
 }

@@ -1,7 +1,7 @@
 //! Passes that draw: one WGSL file made into a render pipeline.
 
 use super::Gpu;
-use super::pass::{Linked, Made, PassSource, Step, Work, bind, compilation_options};
+use super::pass::{LinkedSource, PassSource, PipelineParts, Step, StepWork, bind, compilation_options};
 use crate::Error;
 
 /// Format of all colour targets: four numbers per pixel.
@@ -100,7 +100,8 @@ impl RasterPass {
         targets: &[Target],
         depth: DepthMask,
     ) -> Result<Self, Error> {
-        let Linked { label, module, entries } = Linked::new(gpu, source, wgpu::ShaderStages::VERTEX_FRAGMENT)?;
+        let LinkedSource { label, module, entries } =
+            LinkedSource::new(gpu, source, wgpu::ShaderStages::VERTEX_FRAGMENT)?;
         let targets: Vec<_> = targets
             .iter()
             .map(|target| {
@@ -110,7 +111,7 @@ impl RasterPass {
             .collect();
         let [vertex, fragment] = ["vertex", "fragment"].map(|stage| format!("{}_{stage}", source.entry_point()));
         gpu.checked(|| {
-            let made = Made::new(gpu, &label, module, &entries);
+            let made = PipelineParts::new(gpu, &label, module, &entries);
             let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(&label),
                 layout: Some(&made.pipeline_layout),
@@ -171,7 +172,7 @@ impl Targets {
     /// If there is nothing to draw.
     pub(crate) fn step(self, draws: Vec<Draw>) -> Step {
         let [.., last] = &draws[..] else { panic!("a step that draws nothing") };
-        Step { path: last.path, label: last.label.clone(), work: Work::Raster(Raster { targets: self, draws }) }
+        Step { path: last.path, label: last.label.clone(), work: StepWork::Raster(Raster { targets: self, draws }) }
     }
 }
 

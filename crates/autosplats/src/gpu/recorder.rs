@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::Gpu;
 use super::buffers::map;
-use super::pass::{Groups, Step, Work};
+use super::pass::{Groups, Step, StepWork};
 use crate::Error;
 
 /// Workgroups in a row of a dispatch. More than 65535 need a second dimension, which `shared/groups.wgsl` undoes.
@@ -121,7 +121,7 @@ impl<'a> Recorder<'a> {
 
     /// Runs a step.
     pub(crate) fn run(&mut self, step: &Step) {
-        if matches!(step.work, Work::Compute { groups: Groups::Number(0), .. }) {
+        if matches!(step.work, StepWork::Compute { groups: Groups::Number(0), .. }) {
             return;
         }
         let at = 2 * self.times.len() as u32;
@@ -131,7 +131,7 @@ impl<'a> Recorder<'a> {
         };
         let label = Some(step.label.as_str());
         match &step.work {
-            Work::Compute { pipeline, bindings, groups } => {
+            StepWork::Compute { pipeline, bindings, groups } => {
                 let timestamp_writes = timestamps.map(|(query_set, begin, end)| wgpu::ComputePassTimestampWrites {
                     query_set,
                     beginning_of_pass_write_index: begin,
@@ -148,7 +148,7 @@ impl<'a> Recorder<'a> {
                     Groups::Counted(arguments, at) => compute.dispatch_workgroups_indirect(arguments, *at),
                 }
             }
-            Work::Raster(raster) => {
+            StepWork::Raster(raster) => {
                 let timestamp_writes = timestamps.map(|(query_set, begin, end)| wgpu::RenderPassTimestampWrites {
                     query_set,
                     beginning_of_pass_write_index: begin,

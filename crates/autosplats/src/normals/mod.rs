@@ -48,11 +48,11 @@ const TASK_LEAVES: usize = 64;
 /// Tasks between two reports of progress, some ten milliseconds of one thread.
 const REPORT_TASKS: usize = 32;
 /// Largest absolute coordinate that counts as finite. Squared distances of larger ones would overflow.
-const FARTHEST: f32 = 1e18;
+const MAX_COORDINATE: f32 = 1e18;
 /// Progress, 0 to 1, when the points are listed.
-const LISTED: f32 = 0.02;
+const LISTED_PROGRESS: f32 = 0.02;
 /// Progress, 0 to 1, when the tree is built.
-const BUILT: f32 = 0.25;
+const BUILT_PROGRESS: f32 = 0.25;
 
 /// Settings of [`estimate_normals`].
 #[derive(Clone, Debug, PartialEq)]
@@ -149,8 +149,8 @@ fn estimate(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progre
     let ticker = Ticker::new(progress);
     ticker.tick(0.0)?;
     let points = finite_points(cloud);
-    ticker.tick(LISTED)?;
-    let tree = Tree::build(points, &|part| ticker.tick(LISTED + (BUILT - LISTED) * part))?;
+    ticker.tick(LISTED_PROGRESS)?;
+    let tree = Tree::build(points, &|part| ticker.tick(LISTED_PROGRESS + (BUILT_PROGRESS - LISTED_PROGRESS) * part))?;
     let sides = sides.about(tree.middle());
     let output = Output::new(cloud.len());
     let k = settings.k.min((tree.len as u32).saturating_sub(1));
@@ -161,7 +161,9 @@ fn estimate(cloud: &PointCloud, settings: &NormalSettings, progress: &dyn Progre
         let first = task * TASK_LEAVES;
         estimate_leaves(&job, first..tree.leaves.len().min(first + TASK_LEAVES), scratch);
         match done.fetch_add(1, Relaxed) + 1 {
-            done if done % REPORT_TASKS == 0 => ticker.tick(BUILT + (1.0 - BUILT) * done as f32 / tasks as f32),
+            done if done % REPORT_TASKS == 0 => {
+                ticker.tick(BUILT_PROGRESS + (1.0 - BUILT_PROGRESS) * done as f32 / tasks as f32)
+            }
             _ => Ok(()),
         }
     })?;
@@ -173,7 +175,7 @@ fn finite_points(cloud: &PointCloud) -> Vec<Point> {
     let mut points = Vec::with_capacity(cloud.len());
     let all = (0u32..).zip(cloud.positions());
     points.extend(
-        all.filter(|(_, position)| position.iter().all(|c| c.abs() <= FARTHEST))
+        all.filter(|(_, position)| position.iter().all(|c| c.abs() <= MAX_COORDINATE))
             .map(|(index, &position)| Point::new(position, index)),
     );
     points

@@ -19,9 +19,9 @@ const FIRST_REACH: f32 = 1.35;
 /// Mean k-radius expected at the start of a task, over [`suggested_radius`]: the mean of scanned surfaces.
 const START_REACH: f32 = 0.9;
 /// Least and largest expected k-radius, over [`suggested_radius`].
-const REACH: [f32; 2] = [0.3, 3.0];
+const EXPECTED_REACH_RANGE: [f32; 2] = [0.3, 3.0];
 /// Least and largest growth of a radius with too few candidates. Between them, growth assumes points on a line.
-const GROWTH: [f32; 2] = [2.0, 8.0];
+const LIST_GROWTH_RANGE: [f32; 2] = [2.0, 8.0];
 /// Largest growth of a radius with enough candidates for some points.
 const LAST_GROWTH: f32 = 1.6;
 /// Most lists for one leaf. The points left are searched for one by one.
@@ -81,7 +81,7 @@ pub(super) fn search_leaf<S: Simd>(
             continue;
         };
         if listed <= k as usize {
-            let [least, most] = GROWTH;
+            let [least, most] = LIST_GROWTH_RANGE;
             radius *= (k as f32 / listed.max(1) as f32).clamp(least, most);
             continue;
         }
@@ -111,7 +111,7 @@ pub(super) fn search_leaf<S: Simd>(
     }
     if lists > 0 {
         let mean = out.k_radius.0[..points].iter().sum::<f32>() / points as f32;
-        let [least, most] = REACH;
+        let [least, most] = EXPECTED_REACH_RANGE;
         scratch.reach = (mean / suggested).clamp(least, most);
     }
     out

@@ -3,7 +3,7 @@
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
 
-use super::{FARTHEST, Orientation, Viewpoint};
+use super::{MAX_COORDINATE, Orientation, Viewpoint};
 use crate::Error;
 
 /// Resolved orientation of normals.
@@ -32,7 +32,7 @@ impl Sides {
                     given.iter().filter(|viewpoint| !viewpoint.points.is_empty()).cloned().collect();
                 for Viewpoint { position, points } in &mut viewpoints {
                     *position -= cloud.origin();
-                    if !(position.abs().max_element() <= f64::from(FARTHEST)) {
+                    if !(position.abs().max_element() <= f64::from(MAX_COORDINATE)) {
                         return bad(position.to_string(), "viewpoints within 1e18 of the cloud's origin");
                     }
                     if points.end > cloud.len() {

@@ -15,7 +15,7 @@ fn estimate(positions: &[[f32; 3]], k: u32, orientation: Orientation) -> Normals
 }
 
 fn is_finite(position: &[f32; 3]) -> bool {
-    position.iter().all(|c| c.abs() <= FARTHEST)
+    position.iter().all(|c| c.abs() <= MAX_COORDINATE)
 }
 
 /// Clouds of many kinds with up to about a thousand points.

@@ -87,16 +87,16 @@ pub(super) struct Tree {
 }
 
 /// Receives progress, 0 to 1; an error stops the work.
-type Tick<'a> = dyn Fn(f32) -> Result<(), Error> + Sync + 'a;
+type OnProgress<'a> = dyn Fn(f32) -> Result<(), Error> + Sync + 'a;
 /// Receives the number of newly built leaves; an error stops the work.
-type Built<'a> = dyn Fn(usize) -> Result<(), Error> + Sync + 'a;
+type OnLeavesBuilt<'a> = dyn Fn(usize) -> Result<(), Error> + Sync + 'a;
 
 /// Level, 0 for leaves, and number in that level.
 pub(super) type Node = (usize, usize);
 
 impl Tree {
     /// Builds the tree; `tick` receives progress.
-    pub(super) fn build(mut points: Vec<Point>, tick: &Tick) -> Result<Self, Error> {
+    pub(super) fn build(mut points: Vec<Point>, tick: &OnProgress) -> Result<Self, Error> {
         let mut leaves = vec![Leaf::EMPTY; points.len().div_ceil(LANES)];
         if !points.is_empty() {
             let done = AtomicUsize::new(0);
@@ -145,7 +145,7 @@ impl Tree {
 }
 
 /// Sorts points into leaves; `built` receives the leaves done.
-fn split(points: &mut [Point], leaves: &mut [Leaf], built: &Built) -> Result<(), Error> {
+fn split(points: &mut [Point], leaves: &mut [Leaf], built: &OnLeavesBuilt) -> Result<(), Error> {
     let count = leaves.len();
     if count == 1 {
         leaves[0] = Leaf::of(points);

@@ -13,20 +13,20 @@ use super::{Dropped, ProjectRules, ScreenCells, ScreenPoint, ScreenPoints};
 use crate::camera::View;
 
 /// Points projected per task.
-const CHUNK: usize = 16 * 1024;
+const TASK_POINTS: usize = 16 * 1024;
 /// Points transformed at a time.
 const LANES: usize = 16;
 /// Key of a slot that no point falls into.
-const EMPTY: u64 = u64::MAX;
+const EMPTY_KEY: u64 = u64::MAX;
 /// Height of a strip in mean distances between screen points. Sixteen points of a strip then find their ten nearest
 /// neighbours among about a hundred candidates, in this strip and the ones above and below.
 pub(super) const STRIP_SPACINGS: f32 = 3.0;
 /// Largest depth, in widths of a pixel, of the second point of a pixel behind the first: a surface seen at 83° from
 /// its normal. A point further behind belongs to another surface, which is usually hidden.
 // Differs from the paper: the paper keeps the nearest point of each pixel only.
-pub(super) const GATE_PX: f32 = 8.0;
+pub(super) const MAX_SECOND_DEPTH_PX: f32 = 8.0;
 /// Side in pixels of the blocks that separate covered from empty screen when the density is measured.
-const OCCUPANCY_PX: usize = 16;
+const OCCUPANCY_BLOCK_PX: usize = 16;
 
 /// Projects clouds. All buffers but the two lists `active` and `passive` are reused from frame to frame.
 #[derive(Debug, Default)]
@@ -57,7 +57,7 @@ struct Keys<'a> {
     per_pixel: usize,
     /// Width of the screen in pixels.
     width: usize,
-    /// Points in each block of [`OCCUPANCY_PX`] × [`OCCUPANCY_PX`] pixels.
+    /// Points in each block of [`OCCUPANCY_BLOCK_PX`] × [`OCCUPANCY_BLOCK_PX`] pixels.
     occupied: Vec<u32>,
 }
 
@@ -66,13 +66,14 @@ impl<'a> Keys<'a> {
     fn settle(slots: &'a mut [AtomicU64], view: &View, halves: bool) -> Self {
         let per_pixel = 1 + usize::from(halves);
         let width = view.width as usize;
-        let mut occupied = vec![0; width.div_ceil(OCCUPANCY_PX) * (view.height as usize).div_ceil(OCCUPANCY_PX)];
-        let block_rows = slots.par_chunks_mut(OCCUPANCY_PX * width * per_pixel);
-        block_rows.zip(occupied.par_chunks_mut(width.div_ceil(OCCUPANCY_PX))).for_each(|(rows, occupied)| {
+        let mut occupied =
+            vec![0; width.div_ceil(OCCUPANCY_BLOCK_PX) * (view.height as usize).div_ceil(OCCUPANCY_BLOCK_PX)];
+        let block_rows = slots.par_chunks_mut(OCCUPANCY_BLOCK_PX * width * per_pixel);
+        block_rows.zip(occupied.par_chunks_mut(width.div_ceil(OCCUPANCY_BLOCK_PX))).for_each(|(rows, occupied)| {
             for row in rows.chunks_mut(width * per_pixel) {
-                for (block, count) in row.chunks_mut(OCCUPANCY_PX * per_pixel).zip(&mut *occupied) {
-                    let all = block.iter_mut().fold(EMPTY, |all, key| all & *key.get_mut());
-                    if all == EMPTY {
+                for (block, count) in row.chunks_mut(OCCUPANCY_BLOCK_PX * per_pixel).zip(&mut *occupied) {
+                    let all = block.iter_mut().fold(EMPTY_KEY, |all, key| all & *key.get_mut());
+                    if all == EMPTY_KEY {
                         continue;
                     }
                     if halves {
@@ -87,17 +88,17 @@ impl<'a> Keys<'a> {
 
     /// Blocks in a row of blocks.
     fn columns(&self) -> usize {
-        self.width.div_ceil(OCCUPANCY_PX)
+        self.width.div_ceil(OCCUPANCY_BLOCK_PX)
     }
 
     /// Whether the block in column `column` that contains pixel row `y` holds a point.
     fn is_occupied(&self, column: usize, y: usize) -> bool {
-        self.occupied[y / OCCUPANCY_PX * self.columns() + column] > 0
+        self.occupied[y / OCCUPANCY_BLOCK_PX * self.columns() + column] > 0
     }
 
     /// Pixel columns of a column of blocks.
     fn columns_px(&self, column: usize) -> Range<usize> {
-        column * OCCUPANCY_PX..((column + 1) * OCCUPANCY_PX).min(self.width)
+        column * OCCUPANCY_BLOCK_PX..((column + 1) * OCCUPANCY_BLOCK_PX).min(self.width)
     }
 
     /// The slots of pixel (x, y).
@@ -110,7 +111,7 @@ impl<'a> Keys<'a> {
     fn mean_spacing(&self) -> f32 {
         let blocks = self.occupied.iter().filter(|&&points| points > 0).count();
         let points = self.occupied.iter().sum::<u32>();
-        ((blocks * OCCUPANCY_PX * OCCUPANCY_PX) as f32 / points.max(1) as f32).sqrt()
+        ((blocks * OCCUPANCY_BLOCK_PX * OCCUPANCY_BLOCK_PX) as f32 / points.max(1) as f32).sqrt()
     }
 }
 
@@ -124,13 +125,13 @@ fn nearest_per_pixel(
 ) -> Dropped {
     let pixels = view.width as usize * view.height as usize;
     keys.resize_with(pixels << u32::from(halves), AtomicU64::default);
-    keys.par_chunks_mut(1 << 16).for_each(|keys| keys.iter_mut().for_each(|key| *key.get_mut() = EMPTY));
+    keys.par_chunks_mut(1 << 16).for_each(|keys| keys.iter_mut().for_each(|key| *key.get_mut() = EMPTY_KEY));
     let keys = keys.as_slice();
     sixteenths.clear(view);
     let sixteenths = &*sixteenths;
     let [not_finite, behind, outside] = [(); 3].map(|()| AtomicUsize::new(0));
-    positions.par_chunks(CHUNK).enumerate().for_each(|(chunk, positions)| {
-        let first = (chunk * CHUNK) as u32;
+    positions.par_chunks(TASK_POINTS).enumerate().for_each(|(chunk, positions)| {
+        let first = (chunk * TASK_POINTS) as u32;
         let dropped = project_chunk(positions, first, view, halves, keys, sixteenths);
         not_finite.fetch_add(dropped.not_finite, Ordering::Relaxed);
         behind.fetch_add(dropped.behind, Ordering::Relaxed);
@@ -145,7 +146,7 @@ const NOT_FINITE: u32 = u32::MAX;
 const BEHIND: u32 = u32::MAX - 1;
 const OUTSIDE: u32 = u32::MAX - 2;
 
-/// Projects up to [`CHUNK`] points. Compiled for the baseline processor: wider vectors make projection slower.
+/// Projects up to [`TASK_POINTS`] points. Compiled for the baseline processor: wider vectors make projection slower.
 fn project_chunk(
     positions: &[[f32; 3]],
     first: u32,
@@ -220,7 +221,7 @@ fn project_point(position: [f32; 3], view: &View, halves: bool) -> (u32, f32, u3
 }
 
 fn is_owned(key: &AtomicU64) -> bool {
-    key.load(Ordering::Relaxed) != EMPTY
+    key.load(Ordering::Relaxed) != EMPTY_KEY
 }
 
 /// Depth of a point from its key.
@@ -234,8 +235,8 @@ fn erase_far_second(pair: &mut [AtomicU64], view: &View) {
     let [one, other] = [0, 1].map(|half| *pair[half].get_mut());
     let [near, far] = [one.min(other), one.max(other)];
     let near = depth_of(near);
-    if far != EMPTY && depth_of(far) > near + GATE_PX * view.pixel_size(near) {
-        *pair[usize::from(other == far)].get_mut() = EMPTY;
+    if far != EMPTY_KEY && depth_of(far) > near + MAX_SECOND_DEPTH_PX * view.pixel_size(near) {
+        *pair[usize::from(other == far)].get_mut() = EMPTY_KEY;
     }
 }
 
@@ -290,12 +291,12 @@ fn compact(positions: &[[f32; 3]], view: &View, keys: &Keys, spacing_px: f32, sc
         let rows = strip_rows(strip);
         // Visit one pixel row per block that the strip meets: every sixteenth, and the last.
         let is_occupied = |&column: &usize| {
-            rows.clone().step_by(OCCUPANCY_PX).chain([rows.end - 1]).any(|y| keys.is_occupied(column, y))
+            rows.clone().step_by(OCCUPANCY_BLOCK_PX).chain([rows.end - 1]).any(|y| keys.is_occupied(column, y))
         };
         for x in (0..keys.columns()).filter(is_occupied).flat_map(|column| keys.columns_px(column)) {
             for (y, key) in rows.clone().flat_map(|y| keys.at(x, y).iter().map(move |key| (y, key))) {
                 let key = key.load(Ordering::Relaxed);
-                if key != EMPTY {
+                if key != EMPTY_KEY {
                     points[next].pixel = (y << 16 | x) as u32;
                     source[next] = key as u32;
                     next += 1;

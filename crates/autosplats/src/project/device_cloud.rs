@@ -8,11 +8,11 @@ use crate::Error;
 use crate::gpu::Gpu;
 
 /// Points uploaded at a time.
-const PIECE: usize = 1 << 18;
+const UPLOAD_PIECE_POINTS: usize = 1 << 18;
 /// Number of staging buffers, each of one piece of positions. The host fills one while others are in transit.
-const RING: usize = 8;
+const STAGING_BUFFER_COUNT: usize = 8;
 /// Buffers are reallocated when a cloud uses less than one in this many of their points.
-const LEAST_USED: usize = 4;
+const SHRINK_RATIO: usize = 4;
 
 /// Per-point values that splats carry.
 #[derive(Clone, Copy, Debug, Default)]
@@ -94,7 +94,7 @@ impl DeviceCloud {
 
     /// Whether `points` points can go into the present buffers: they fit and do not leave most of the room unused.
     pub(crate) fn fits(&self, points: usize) -> bool {
-        points <= self.capacity && points >= self.capacity / LEAST_USED
+        points <= self.capacity && points >= self.capacity / SHRINK_RATIO
     }
 
     /// Makes room for `points` points. Positions and values are lost unless the points [fit](Self::fits).
@@ -120,7 +120,7 @@ impl DeviceCloud {
             (self.capacity, self.chunks) = (grown, chunks);
         }
         self.points = points;
-        self.tell(gpu);
+        self.write_uniforms(gpu);
         Ok(())
     }
 
@@ -136,13 +136,13 @@ impl DeviceCloud {
                 chunk.values = gpu.storage::<u32>("values of points", chunk.capacity as usize * words)?;
             }
             self.words = words;
-            self.tell(gpu);
+            self.write_uniforms(gpu);
         }
         Ok(())
     }
 
     /// Writes the uniform of each chunk.
-    fn tell(&self, gpu: &Gpu) {
+    fn write_uniforms(&self, gpu: &Gpu) {
         let mut first = 0;
         for chunk in &self.chunks {
             let len = chunk.capacity.min((self.points - first) as u32);
@@ -191,11 +191,11 @@ impl Uploader {
         for chunk in &to.chunks {
             let (positions, after) = rest.split_at(rest.len().min(chunk.capacity as usize));
             rest = after;
-            for (piece, positions) in positions.chunks(PIECE).enumerate() {
-                let at = piece * PIECE * size_of::<[f32; 3]>();
+            for (piece, positions) in positions.chunks(UPLOAD_PIECE_POINTS).enumerate() {
+                let at = piece * UPLOAD_PIECE_POINTS * size_of::<[f32; 3]>();
                 self.write(gpu, &chunk.positions, at, bytemuck::cast_slice(positions))?;
                 done += positions.len();
-                go_on(report, done, to.points)?;
+                report_progress(report, done, to.points)?;
             }
         }
         gpu.check_lost()
@@ -215,14 +215,14 @@ impl Uploader {
         let mut first = 0;
         for chunk in to.chunks.iter().filter(|_| to.words > 0) {
             let len = (to.points - first).min(chunk.capacity as usize);
-            for piece in (0..len).step_by(PIECE) {
-                let points = PIECE.min(len - piece);
+            for piece in (0..len).step_by(UPLOAD_PIECE_POINTS) {
+                let points = UPLOAD_PIECE_POINTS.min(len - piece);
                 let mut packed = std::mem::take(&mut self.packed);
                 packed.resize(points * to.words, 0);
                 values.pack(first + piece, &mut packed);
                 self.write(gpu, &chunk.values, piece * to.words * 4, bytemuck::cast_slice(&packed))?;
                 self.packed = packed;
-                go_on(report, first + piece + points, to.points)?;
+                report_progress(report, first + piece + points, to.points)?;
             }
             first += len;
         }
@@ -232,14 +232,14 @@ impl Uploader {
     /// Copies up to a piece of bytes through the next staging buffer of the ring.
     fn write(&mut self, gpu: &Gpu, to: &wgpu::Buffer, at: usize, bytes: &[u8]) -> Result<(), Error> {
         let lost = || gpu.check_lost().err().unwrap_or_else(|| Error::DeviceLost("it takes no points".into()));
-        if self.ring.len() < RING {
+        if self.ring.len() < STAGING_BUFFER_COUNT {
             let usage = wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC;
-            let size = (PIECE * size_of::<[f32; 3]>()) as u64;
+            let size = (UPLOAD_PIECE_POINTS * size_of::<[f32; 3]>()) as u64;
             self.ring.push(Staging { buffer: gpu.buffer("staging", size, usage)?, submitted: None });
             self.next = self.ring.len() - 1;
         }
         let Staging { buffer, submitted } = &mut self.ring[self.next];
-        self.next = (self.next + 1) % RING;
+        self.next = (self.next + 1) % STAGING_BUFFER_COUNT;
         let size = bytes.len() as u64;
         // The next buffer is the oldest of the ring, so this waits only if the device is slower than the host.
         buffer.map_async(wgpu::MapMode::Write, 0..size, |_| {});
@@ -262,6 +262,6 @@ impl Uploader {
 ///
 /// # Errors
 /// [`Error::Cancelled`] if `report` returns false.
-fn go_on(report: &dyn Fn(f32) -> bool, done: usize, points: usize) -> Result<(), Error> {
+fn report_progress(report: &dyn Fn(f32) -> bool, done: usize, points: usize) -> Result<(), Error> {
     if report(done as f32 / points as f32) { Ok(()) } else { Err(Error::Cancelled) }
 }

@@ -1,6 +1,6 @@
 //! Projection on the GPU: the steps of the CPU form, one pass each.
 
-use super::cpu::{GATE_PX, STRIP_SPACINGS};
+use super::cpu::{MAX_SECOND_DEPTH_PX, STRIP_SPACINGS};
 use super::device_cloud::{Chunk, DeviceCloud};
 use super::{MARGIN_REACH, ScreenPoint};
 use crate::Error;
@@ -24,7 +24,7 @@ const SPLIT: PassSource = PassSource::new("project/split", include_str!("split.w
 const WORK: PassSource = PassSource::new("project/work", include_str!("work.wgsl"));
 
 /// Indirect dispatches whose number of workgroups depends on counters, in the order of `work.wgsl`. A variant names
-/// the items and how many a workgroup takes; `Blocks` are blocks of [`BLOCK`].
+/// the items and how many a workgroup takes; `Blocks` are blocks of [`RANK_BLOCK_FLAGS`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Work {
     Visible256,
@@ -82,12 +82,12 @@ pub(crate) fn few(gpu: &Gpu) -> u32 {
 /// Bytes of the arguments of an indirect dispatch.
 const WORK_BYTES: u64 = 12;
 /// Number of indirect dispatches.
-const WORKS: u64 = Work::RecoveredFew as u64 + 1;
+const WORK_COUNT: u64 = Work::RecoveredFew as u64 + 1;
 
 /// Invocations in a workgroup of most passes.
 const GROUP: u32 = 256;
 /// Flags that one workgroup ranks.
-pub(crate) const BLOCK: u32 = 2048;
+pub(crate) const RANK_BLOCK_FLAGS: u32 = 2048;
 
 /// Indices into [`ScreenBuffers::counters`], in the order of `shared/counters.wgsl`.
 #[derive(Clone, Copy, Debug)]
@@ -184,10 +184,10 @@ impl ScreenBuffers {
             queries: gpu.storage::<u32>("queries", capacity)?,
             passive: gpu.storage::<u32>("passive points", capacity)?,
             left: gpu.storage::<u32>("queries left", capacity)?,
-            block_sums: gpu.storage::<u32>("sums of blocks", slots.div_ceil(BLOCK as usize))?,
+            block_sums: gpu.storage::<u32>("sums of blocks", slots.div_ceil(RANK_BLOCK_FLAGS as usize))?,
             arguments: gpu.buffer(
                 "arguments",
-                WORKS * WORK_BYTES,
+                WORK_COUNT * WORK_BYTES,
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT,
             )?,
         })
@@ -212,7 +212,7 @@ impl WorkPass {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
-        Pass::new(gpu, &WORK, &[("FEW", few(gpu).into())]).map(Self)
+        Pass::new(gpu, &WORK, &[("ITEMS_PER_GROUP", few(gpu).into())]).map(Self)
     }
 
     /// The step to run after counters have changed.
@@ -298,7 +298,7 @@ impl ProjectPasses {
         Ok(Self {
             clear: pass(&CLEAR)?,
             nearest: NearestPass::new(gpu, int64)?,
-            occupancy: Pass::new(gpu, &OCCUPANCY, &[("GATE_PX", GATE_PX.into())])?,
+            occupancy: Pass::new(gpu, &OCCUPANCY, &[("MAX_SECOND_DEPTH_PX", MAX_SECOND_DEPTH_PX.into())])?,
             grid: Pass::new(gpu, &GRID, &[("STRIP_SPACINGS", STRIP_SPACINGS.into())])?,
             count: pass(&COUNT)?,
             scan_visible: scan_pass(gpu, Counter::Visible, None)?,
@@ -323,7 +323,7 @@ impl ProjectPasses {
         let ScreenBuffers { source, pixels, points, values, block_sums, .. } = screen;
         let [width, height] = screen.size;
         let slots = (width * height) << u32::from(screen.halves);
-        let slot_blocks = slots.div_ceil(BLOCK);
+        let slot_blocks = slots.div_ceil(RANK_BLOCK_FLAGS);
         let mut steps =
             vec![self.clear.step(gpu, &[frame, keys, density, counters, sixteenths], slots.div_ceil(GROUP))];
         steps.extend(self.nearest.steps(gpu, frame, cloud, screen));

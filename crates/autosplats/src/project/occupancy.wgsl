@@ -13,7 +13,7 @@
 @group(0) @binding(2) var<storage, read_write> counters: array<atomic<u32>>;
 
 // Largest depth, in widths of a pixel, of the second point of a pixel behind the first.
-override GATE_PX: f32;
+override MAX_SECOND_DEPTH_PX: f32;
 
 var<workgroup> owned: atomic<u32>;
 
@@ -48,7 +48,7 @@ fn occupancy(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
 fn erase_far(slot: u32) -> bool {
     let depth = vec2f(bitcast<f32>(keys[slot].y), bitcast<f32>(keys[slot + 1u].y));
     let near = min(depth.x, depth.y);
-    if max(depth.x, depth.y) <= near + GATE_PX * pixel_size(near) {
+    if max(depth.x, depth.y) <= near + MAX_SECOND_DEPTH_PX * pixel_size(near) {
         return false;
     }
     keys[slot + u32(depth.y > depth.x)] = vec2u(EMPTY_KEY);

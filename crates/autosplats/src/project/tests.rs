@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
-use super::cpu::GATE_PX;
+use super::cpu::MAX_SECOND_DEPTH_PX;
 use super::{Dropped, ProjectRules, Projector, ScreenPoint, ScreenPoints};
 use crate::camera::{Camera, Projection};
 use crate::test_clouds::{self, EYE, Positions, Random};
@@ -65,7 +65,7 @@ fn half([x, y]: [f64; 2]) -> usize {
 
 /// Depth beyond which the second point of a pixel does not count.
 fn gate(camera: &Camera, size: [u32; 2], near: f64) -> f64 {
-    near + f64::from(GATE_PX) * unit(camera, size, near)
+    near + f64::from(MAX_SECOND_DEPTH_PX) * unit(camera, size, near)
 }
 
 /// Size of a pixel in world units at a depth.
@@ -364,9 +364,13 @@ fn halves_keep_a_point_each_of_one_surface() {
     assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 6.0], [0.2, 0.8, 7.0]]), [0, 1], "the nearest of each half");
     assert_eq!(kept(&[[0.2, 0.2, 5.0], [0.8, 0.2, 4.0]]), [1], "halves lie one below the other here");
     assert_eq!(kept(&[[1.2, 0.2, 5.0], [1.8, 0.2, 4.0]]), [0, 1], "and side by side there");
-    assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 5.1 + GATE_PX]]), [0], "what is far behind is another surface");
-    assert_eq!(kept(&[[0.5, 0.2, 5.1 + GATE_PX], [0.5, 0.8, 5.0]]), [1], "in either half");
-    assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 4.9 + GATE_PX]]), [0, 1], "steep surfaces are one");
+    assert_eq!(
+        kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 5.1 + MAX_SECOND_DEPTH_PX]]),
+        [0],
+        "what is far behind is another surface"
+    );
+    assert_eq!(kept(&[[0.5, 0.2, 5.1 + MAX_SECOND_DEPTH_PX], [0.5, 0.8, 5.0]]), [1], "in either half");
+    assert_eq!(kept(&[[0.5, 0.2, 5.0], [0.5, 0.8, 4.9 + MAX_SECOND_DEPTH_PX]]), [0, 1], "steep surfaces are one");
 }
 
 /// Points in the margin serve as neighbours of points in the picture, and leave the picture's own points unchanged.

@@ -26,7 +26,7 @@ const ACTIVE_FEW = 11u;
 const RECOVERED_FEW = 12u;
 
 // Items that a workgroup processes together.
-override FEW: u32;
+override ITEMS_PER_GROUP: u32;
 
 @compute @workgroup_size(1)
 fn work() {
@@ -40,7 +40,7 @@ fn work() {
     put_work(LARGE_SPLATS, counters[LARGE], 1u);
     put_work(LEFT_ACTIVE64, counters[LEFT_ACTIVE], 64u);
     put_work(LEFT_RECOVERED64, counters[LEFT_RECOVERED], 64u);
-    put_work(ACTIVE_FEW, counters[ACTIVE], FEW);
-    put_work(RECOVERED_FEW, counters[RECOVERED], FEW);
+    put_work(ACTIVE_FEW, counters[ACTIVE], ITEMS_PER_GROUP);
+    put_work(RECOVERED_FEW, counters[RECOVERED], ITEMS_PER_GROUP);
     put_work(QUERIES256, counters[ACTIVE] + counters[RECOVERED], 256u);
 }

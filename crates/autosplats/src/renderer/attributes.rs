@@ -19,7 +19,7 @@ pub(super) enum ColorSource {
 
 /// Attributes that splats carry besides their normals.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Wanted {
+pub(super) struct SplatAttributes {
     pub(super) colors: Option<ColorSource>,
     /// Name of a scalar field.
     pub(super) scalar: Option<String>,
@@ -29,7 +29,7 @@ pub(super) struct Wanted {
     pub(super) backs: bool,
 }
 
-impl Wanted {
+impl SplatAttributes {
     /// Attributes that `settings` need.
     ///
     /// # Errors

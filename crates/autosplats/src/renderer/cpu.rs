@@ -6,14 +6,14 @@ use std::time::Instant;
 use autosplats_cloud::PointCloud;
 use rayon::prelude::*;
 
-use super::attributes::Wanted;
+use super::attributes::SplatAttributes;
 use super::exposure::Exposure;
 use super::surfels::point_surfels;
 use super::upward::Upward;
 use super::{Counts, Frame, PointSurfel, Reconstruction, Settings, Timings, check};
 use crate::Error;
 use crate::adapt::{AdaptRules, Adapter, DepthNoise, Noise};
-use crate::camera::{Camera, Seen, View};
+use crate::camera::{Camera, PlacedView, View};
 use crate::fit::orient::Sensors;
 use crate::fit::{FitRules, GivenPlanes, Surfels, fit, place};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
@@ -32,7 +32,7 @@ pub(super) struct CpuRenderer {
     surfels: Surfels,
     adapter: Adapter,
     /// Identity of the cloud that `sensors` and `depth_noise` belong to.
-    known: Option<u64>,
+    cloud_identity: Option<u64>,
     sensors: Sensors,
     upward: Upward,
     exposure: Exposure,
@@ -57,7 +57,7 @@ impl Default for CpuRenderer {
             neighborhoods: Neighborhoods::default(),
             surfels: Surfels::default(),
             adapter: Adapter::default(),
-            known: None,
+            cloud_identity: None,
             sensors: Sensors::default(),
             upward: Upward::default(),
             exposure: Exposure::default(),
@@ -105,7 +105,7 @@ impl CpuRenderer {
         let picture = check(cloud, camera, size, settings)?;
         let (settings, dot_px) = match given {
             Some(_) => (Cow::Borrowed(settings), 0.0),
-            None => settings.of_cloud(cloud, size),
+            None => settings.for_cloud(cloud, size),
         };
         let settings = &*settings;
         let margin = if given.is_none() { settings.reconstruction.margin(size) } else { 0 };
@@ -113,7 +113,7 @@ impl CpuRenderer {
         if given.is_none() {
             check_engine(settings.reconstruction.engine)?;
         }
-        let wanted = Wanted::new(cloud, settings)?;
+        let wanted = SplatAttributes::new(cloud, settings)?;
         // From here on, only cancelling stops the frame; then there are no surfels.
         self.view = None;
         let colors = wanted.colors(cloud);
@@ -130,7 +130,7 @@ impl CpuRenderer {
             neighborhoods,
             surfels,
             adapter,
-            known,
+            cloud_identity,
             sensors,
             upward,
             exposure,
@@ -144,7 +144,7 @@ impl CpuRenderer {
             ..
         } = self;
         let mut clock = Clock::start(go_on);
-        if known.replace(cloud.identity()) != Some(cloud.identity()) {
+        if cloud_identity.replace(cloud.identity()) != Some(cloud.identity()) {
             *sensors = Sensors::new(cloud);
             *depth_noise = None;
             clock.lap(|timings| &mut timings.fit)?;
@@ -163,8 +163,8 @@ impl CpuRenderer {
             adapter.begin(screen, &view, settings_splat.k);
             clock.lap(|timings| &mut timings.adapt)?;
         }
-        let now = Seen { view, origin: cloud.origin() };
-        if settings_splat.remembers() && given.is_none() {
+        let now = PlacedView { view, origin: cloud.origin() };
+        if settings_splat.starts_from_past() && given.is_none() {
             past.begin(now, settings_splat.k);
         } else {
             past.forget();
@@ -181,7 +181,7 @@ impl CpuRenderer {
             over_time.forget();
             last_picture.forget();
         }
-        let seen = Seen { view: picture, origin: cloud.origin() };
+        let seen = PlacedView { view: picture, origin: cloud.origin() };
         let following = smooths.then(|| last_picture.begin(seen, cloud.identity(), settings));
         let reconstruct = Reconstruct { screen, view: &view, dot_px, settings, past, sensors, depth_noise, given };
         let mut buffers = Buffers { neighborhoods, surfels, adapter, over_time, splatter };

@@ -5,29 +5,29 @@ use autosplats_cloud::PointCloud;
 use crate::shade::{Shading, linear_steps};
 
 /// Number of points in the sample.
-const SAMPLES: usize = 1 << 12;
+const COLOR_SAMPLES: usize = 1 << 12;
 /// Target of the brightest channel of the brightest colours, in linear light. Well exposed scans reach at least this
 /// without help.
-const BRIGHT: f32 = 0.4;
+const TARGET_BRIGHTNESS: f32 = 0.4;
 /// Quantile of the colours that counts as brightest. Brighter colours, such as lamps and highlights, are ignored.
-const DARKER: f32 = 0.95;
+const BRIGHT_QUANTILE: f32 = 0.95;
 /// Largest exposure. Still darker colours are noise.
-const MOST: f32 = 8.0;
+const MAX_EXPOSURE: f32 = 8.0;
 
 /// Factor on a cloud's own colours if [`Shading::exposure`] is `None`. The factor is 1, or up to 8 if all colours are
 /// dark, as in a cellar scanned without a flash. Black points and clouds without colours are ignored.
 #[must_use]
 pub fn usual_exposure(cloud: &PointCloud) -> f32 {
     let Some(colors) = cloud.colors() else { return 1.0 };
-    let step = colors.len().div_ceil(SAMPLES).max(1);
+    let step = colors.len().div_ceil(COLOR_SAMPLES).max(1);
     let sample = colors.iter().step_by(step).map(|color| color.iter().copied().max().unwrap_or(0));
     let mut brightest: Vec<u8> = sample.filter(|&channel| channel > 0).collect();
     if brightest.is_empty() {
         return 1.0;
     }
-    let at = (brightest.len() as f32 * DARKER) as usize;
+    let at = (brightest.len() as f32 * BRIGHT_QUANTILE) as usize;
     let (_, &mut channel, _) = brightest.select_nth_unstable(at);
-    (BRIGHT / linear_steps()[usize::from(channel)]).clamp(1.0, MOST)
+    (TARGET_BRIGHTNESS / linear_steps()[usize::from(channel)]).clamp(1.0, MAX_EXPOSURE)
 }
 
 /// Cache of the last cloud's exposure, because estimation reads thousands of points.
@@ -68,7 +68,7 @@ mod tests {
         assert_eq!(usual_exposure(&gray(0)), 1.0, "black");
         assert_eq!(usual_exposure(&gray(200)), 1.0, "bright");
         assert_eq!(usual_exposure(&cloud(vec![[0, 0, 255]; 500])), 1.0, "blue is dark, and as bright as it gets");
-        assert_eq!(usual_exposure(&gray(1)), MOST, "next to nothing");
+        assert_eq!(usual_exposure(&gray(1)), MAX_EXPOSURE, "next to nothing");
         let dark = usual_exposure(&gray(80));
         assert!((4.0..6.0).contains(&dark), "{dark}");
         let lamps = [vec![[80; 3]; 480], vec![[255; 3]; 20]].concat();

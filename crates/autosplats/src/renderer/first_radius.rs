@@ -9,11 +9,11 @@ use crate::normals::exact_k_radii;
 use crate::search::SearchEngine;
 
 /// Largest number of trials. Each radius is √2 times the one of the trial before.
-const TRIALS: usize = 24;
+const MAX_TRIALS: usize = 24;
 /// Frames timed per radius.
-const FRAMES: usize = 2;
+const FRAMES_PER_TRIAL: usize = 2;
 /// Relative difference up to which k-radii count as equal.
-const ALIKE: f32 = 1e-4;
+const K_RADIUS_TOLERANCE: f32 = 1e-4;
 
 /// Result of one first radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,9 +68,11 @@ pub fn best_first_radius(
     let mut first_radius = common;
     // Number of successive trials without an improvement.
     let mut worse = 0;
-    for _ in 0..TRIALS {
-        let (search_ms, surfels) = run(first_radius, FRAMES)?;
-        let alike = |surfel: &&PointSurfel| (surfel.k_radius - radius_of(surfel)).abs() <= ALIKE * radius_of(surfel);
+    for _ in 0..MAX_TRIALS {
+        let (search_ms, surfels) = run(first_radius, FRAMES_PER_TRIAL)?;
+        let alike = |surfel: &&PointSurfel| {
+            (surfel.k_radius - radius_of(surfel)).abs() <= K_RADIUS_TOLERANCE * radius_of(surfel)
+        };
         let share = surfels.iter().filter(alike).count() as f64 / surfels.len().max(1) as f64;
         let trial = RadiusTrial { first_radius, search_ms, accuracy: share };
         let is_better = best.is_none_or(|best| match [best, trial].map(|trial| trial.accuracy >= accuracy) {

@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use autosplats_cloud::PointCloud;
 
-use self::prepared::{OnDevice, Passes, Prepared, Shape};
-use super::attributes::{ColorSource, Wanted};
+use self::prepared::{Passes, Prepared, ResidentBuffers, Shape};
+use super::attributes::{ColorSource, SplatAttributes};
 use super::exposure::Exposure;
 use super::surfels::point_surfels;
 use super::upward::Upward;
@@ -17,7 +17,7 @@ use super::{Counts, Frame, PointSurfel, Settings, Timings, check, check_count};
 use crate::Error;
 use crate::adapt::DepthNoise;
 use crate::adapt::gpu::DepthNoiseBuffer;
-use crate::camera::{Camera, Seen, View};
+use crate::camera::{Camera, PlacedView, View};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensors;
 use crate::fit::orient::gpu::{sensor_buffer, write_sensors};
@@ -110,7 +110,7 @@ impl GpuRenderer {
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
         check_count(cloud)?;
-        let wanted = Wanted::new(cloud, settings)?;
+        let wanted = SplatAttributes::new(cloud, settings)?;
         self.gpu.clone().checked(|| self.make_resident(cloud, &wanted, report))?
     }
 
@@ -118,7 +118,7 @@ impl GpuRenderer {
     fn make_resident(
         &mut self,
         cloud: &PointCloud,
-        wanted: &Wanted,
+        wanted: &SplatAttributes,
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
         self.gpu.check_lost()?;
@@ -222,9 +222,9 @@ impl GpuRenderer {
         settings: &Settings,
         go_on: &dyn Fn() -> bool,
     ) -> Result<Frame<'_>, Error> {
-        let (settings, dot_px) = settings.of_cloud(cloud, size);
+        let (settings, dot_px) = settings.for_cloud(cloud, size);
         let settings = &*settings;
-        let wanted = Wanted::new(cloud, settings)?;
+        let wanted = SplatAttributes::new(cloud, settings)?;
         let started = Instant::now();
         self.make_resident(cloud, &wanted, &|_| go_on())?;
         let upload = started.elapsed().as_secs_f64() * 1e3;
@@ -236,8 +236,8 @@ impl GpuRenderer {
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (Seen { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
-        prepared.tell(gpu, frame, now, dot_px, settings, &uniform);
+        let now = (PlacedView { view: *screen, origin: cloud.origin() }, cloud.identity(), None);
+        prepared.write_uniforms(gpu, frame, now, dot_px, settings, &uniform);
 
         let waited = Instant::now();
         let mut recorder = Recorder::new(gpu, clock);
@@ -307,9 +307,9 @@ impl GpuRenderer {
         settings: &Settings,
     ) -> Result<(), Error> {
         let size = [texture.width(), texture.height()];
-        let (settings, dot_px) = settings.of_cloud(cloud, size);
+        let (settings, dot_px) = settings.for_cloud(cloud, size);
         let settings = &*settings;
-        let wanted = Wanted::new(cloud, settings)?;
+        let wanted = SplatAttributes::new(cloud, settings)?;
         self.make_resident(cloud, &wanted, &|_| true)?;
         let screen = view.with_margin(self.prepare(size, &wanted, settings)?);
         let Self { gpu, prepared, upward, exposure, view: last_view, frame, .. } = self;
@@ -317,8 +317,8 @@ impl GpuRenderer {
         let exposure = exposure.of(cloud, &settings.shading);
         let scene = Scene { view, up: upward.of(cloud), origin: cloud.origin(), exposure };
         let uniform = ShadeUniform::new(&scene, &settings.shading, &prepared.layers, settings.all_layers);
-        let now = (Seen { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
-        prepared.tell(gpu, frame, now, dot_px, settings, &uniform.into_format(texture.format()));
+        let now = (PlacedView { view: screen, origin: cloud.origin() }, cloud.identity(), Some(texture.format()));
+        prepared.write_uniforms(gpu, frame, now, dot_px, settings, &uniform.into_format(texture.format()));
         let mut recorder = Recorder::new(gpu, &Clock::Off);
         prepared.steps.iter().for_each(|step| recorder.run(step));
         prepared.picture.copy_to_texture(&mut recorder.encoder, texture)?;
@@ -330,7 +330,7 @@ impl GpuRenderer {
 
     /// Makes buffers and steps for a frame, unless those of the last frame fit. Returns the width in pixels of the
     /// margin around the picture.
-    fn prepare(&mut self, size: [u32; 2], wanted: &Wanted, settings: &Settings) -> Result<u32, Error> {
+    fn prepare(&mut self, size: [u32; 2], wanted: &SplatAttributes, settings: &Settings) -> Result<u32, Error> {
         // A surfel is the largest record per screen point.
         let has_room = |margin: u32, halves| {
             let screen = size.map(|side| side + 2 * margin);
@@ -349,7 +349,8 @@ impl GpuRenderer {
             // The old buffers go before the new ones come.
             self.prepared = None;
             let Self { gpu, cloud, sensors, depth_noise, frame, passes, .. } = self;
-            let resident = OnDevice { cloud, sensors: sensors.as_ref().map(|(buffer, _)| buffer), depth_noise, frame };
+            let resident =
+                ResidentBuffers { cloud, sensors: sensors.as_ref().map(|(buffer, _)| buffer), depth_noise, frame };
             self.prepared = Some(Prepared::new(gpu, shape, passes, resident, settings)?);
         }
         Ok(margin)

@@ -103,11 +103,11 @@ pub enum Backend {
 /// Renders clouds into pictures. A renderer keeps its buffers, so that frames after the first allocate very little.
 #[derive(Debug)]
 pub struct Renderer {
-    form: Form,
+    form: BackendRenderer,
 }
 
 #[derive(Debug)]
-enum Form {
+enum BackendRenderer {
     Cpu(Box<CpuRenderer>),
     Gpu(Box<GpuRenderer>),
 }
@@ -137,7 +137,7 @@ impl Default for Renderer {
 impl Renderer {
     /// Creates a renderer that runs on the CPU, in the current rayon thread pool.
     pub fn new() -> Self {
-        Self { form: Form::Cpu(Box::default()) }
+        Self { form: BackendRenderer::Cpu(Box::default()) }
     }
 
     /// Creates a renderer that runs on `backend`, on a device of its own.
@@ -146,7 +146,7 @@ impl Renderer {
     /// [`Error::Device`] if [`Backend::Gpu`] is requested and there is no GPU or it does not start;
     /// [`Error::DeviceMemory`].
     pub fn with_backend(backend: Backend) -> Result<Self, Error> {
-        let on = |gpu: Gpu| Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(gpu)?)) });
+        let on = |gpu: Gpu| Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(gpu)?)) });
         match backend {
             Backend::Cpu => Ok(Self::new()),
             Backend::Gpu => Gpu::new().and_then(on),
@@ -166,14 +166,14 @@ impl Renderer {
     /// # Errors
     /// [`Error::Device`] if the device lacks what every WebGPU device has; [`Error::DeviceMemory`].
     pub fn with_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
-        Ok(Self { form: Form::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
+        Ok(Self { form: BackendRenderer::Gpu(Box::new(GpuRenderer::new(Gpu::from_parts(device, queue))?)) })
     }
 
     /// The device that renders; `None` on the CPU.
     pub fn adapter(&self) -> Option<AdapterSummary> {
         match &self.form {
-            Form::Cpu(_) => None,
-            Form::Gpu(renderer) => Some(renderer.adapter()),
+            BackendRenderer::Cpu(_) => None,
+            BackendRenderer::Gpu(renderer) => Some(renderer.adapter()),
         }
     }
 
@@ -185,8 +185,8 @@ impl Renderer {
     pub fn check(&self, settings: &Settings) -> Result<(), Error> {
         settings.check()?;
         match &self.form {
-            Form::Cpu(_) => check_engine(settings.reconstruction.engine),
-            Form::Gpu(renderer) => renderer.check_engine(settings.reconstruction.engine),
+            BackendRenderer::Cpu(_) => check_engine(settings.reconstruction.engine),
+            BackendRenderer::Gpu(renderer) => renderer.check_engine(settings.reconstruction.engine),
         }
     }
 
@@ -226,8 +226,8 @@ impl Renderer {
             return Err(Error::Cancelled);
         }
         match &mut self.form {
-            Form::Cpu(renderer) => renderer.render(cloud, camera, size, settings, None, go_on),
-            Form::Gpu(renderer) => renderer.render(cloud, camera, size, settings, go_on),
+            BackendRenderer::Cpu(renderer) => renderer.render(cloud, camera, size, settings, None, go_on),
+            BackendRenderer::Gpu(renderer) => renderer.render(cloud, camera, size, settings, go_on),
         }
     }
 
@@ -258,11 +258,11 @@ impl Renderer {
             return Err(Error::Normals { what, given, points });
         }
         match &mut self.form {
-            Form::Cpu(renderer) => {
+            BackendRenderer::Cpu(renderer) => {
                 let planes = GivenPlanes { normals, curvature, radius };
                 renderer.render(cloud, camera, size, settings, Some(planes), &|| true)
             }
-            Form::Gpu(_) => Err(Error::Device("precomputed normals are rendered on the CPU only".into())),
+            BackendRenderer::Gpu(_) => Err(Error::Device("precomputed normals are rendered on the CPU only".into())),
         }
     }
 
@@ -274,8 +274,8 @@ impl Renderer {
     /// read back.
     pub fn surfels(&mut self) -> Result<Vec<PointSurfel>, Error> {
         match &mut self.form {
-            Form::Cpu(renderer) => Ok(renderer.surfels()),
-            Form::Gpu(renderer) => renderer.surfels(),
+            BackendRenderer::Cpu(renderer) => Ok(renderer.surfels()),
+            BackendRenderer::Gpu(renderer) => renderer.surfels(),
         }
     }
 
@@ -287,8 +287,8 @@ impl Renderer {
     /// [`Error::DeviceMemory`], [`Error::DeviceLost`].
     pub fn convergence(&mut self) -> Result<Vec<u32>, Error> {
         match &mut self.form {
-            Form::Cpu(_) => Ok(Vec::new()),
-            Form::Gpu(renderer) => renderer.convergence(),
+            BackendRenderer::Cpu(_) => Ok(Vec::new()),
+            BackendRenderer::Gpu(renderer) => renderer.convergence(),
         }
     }
 
@@ -306,8 +306,8 @@ impl Renderer {
         report: &dyn Fn(f32) -> bool,
     ) -> Result<(), Error> {
         match &mut self.form {
-            Form::Cpu(_) => Ok(()),
-            Form::Gpu(renderer) => renderer.upload(cloud, settings, report),
+            BackendRenderer::Cpu(_) => Ok(()),
+            BackendRenderer::Gpu(renderer) => renderer.upload(cloud, settings, report),
         }
     }
 
@@ -325,8 +325,8 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<(), Error> {
         match &mut self.form {
-            Form::Cpu(_) => Err(Error::Device("a texture can only be rendered into on a GPU".into())),
-            Form::Gpu(renderer) => renderer.render_to_texture(cloud, camera, texture, settings),
+            BackendRenderer::Cpu(_) => Err(Error::Device("a texture can only be rendered into on a GPU".into())),
+            BackendRenderer::Gpu(renderer) => renderer.render_to_texture(cloud, camera, texture, settings),
         }
     }
 }

@@ -5,16 +5,16 @@ use std::borrow::Cow;
 use autosplats_cloud::PointCloud;
 
 use crate::Error;
-use crate::fit::{HANDFUL, LONGEST};
+use crate::fit::{LONGEST, MIN_SURFACE_POINTS};
 use crate::search::SearchEngine;
 use crate::shade::Shading;
 use crate::splat::STEADY_FRAMES;
 
 /// Shorter side of the picture over the width of its margin.
-const MARGIN_PART: u32 = 12;
+const PICTURE_SIDE_PER_MARGIN: u32 = 12;
 /// Splat radius of the points of a very small cloud, as a fraction of the picture's shorter side. The drawn dots are
 /// 1.4 times as wide.
-const HANDFUL_DOT: f32 = 0.0045;
+const DOT_RADIUS_PER_PICTURE_SIDE: f32 = 0.0045;
 
 /// Settings of a picture: everything except the cloud, the camera and the size.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -161,11 +161,11 @@ impl Reconstruction {
     /// beside a picture hide much of it. See docs/decisions/0004-margin.md.
     pub(super) fn margin(&self, size: [u32; 2]) -> u32 {
         let wants = self.adaptive && self.engine != SearchEngine::SplatCommunication;
-        if wants { size[0].min(size[1]).div_ceil(MARGIN_PART) } else { 0 }
+        if wants { size[0].min(size[1]).div_ceil(PICTURE_SIDE_PER_MARGIN) } else { 0 }
     }
 
     /// Whether the search of a frame starts from the radii of the last frame.
-    pub(super) fn remembers(&self) -> bool {
+    pub(super) fn starts_from_past(&self) -> bool {
         self.coherent && self.engine == SearchEngine::ScreenGrid
     }
 
@@ -180,15 +180,15 @@ impl Settings {
     /// dots. The radius is 0 if the points are drawn as a surface. Dots are neither adapted, trimmed nor smoothed.
     // Differs from the paper: a handful of points defines no surface. Discs as wide as their distances would hide each
     // other and hide that the points are few. See docs/decisions/0025-handful-as-dots.md.
-    pub(super) fn of_cloud(&self, cloud: &PointCloud, size: [u32; 2]) -> (Cow<'_, Self>, f32) {
+    pub(super) fn for_cloud(&self, cloud: &PointCloud, size: [u32; 2]) -> (Cow<'_, Self>, f32) {
         let finite = cloud.positions().iter().filter(|position| position.iter().all(|along| along.is_finite()));
         let Reconstruction { adaptive, splat_scale, .. } = self.reconstruction;
-        if !adaptive || finite.take(HANDFUL).count() == HANDFUL {
+        if !adaptive || finite.take(MIN_SURFACE_POINTS).count() == MIN_SURFACE_POINTS {
             return (Cow::Borrowed(self), 0.0);
         }
         let reconstruction =
             Reconstruction { adaptive: false, trim: false, steady: false, frames_averaged: 1, ..self.reconstruction };
-        let dot_px = splat_scale * HANDFUL_DOT * size[0].min(size[1]) as f32;
+        let dot_px = splat_scale * DOT_RADIUS_PER_PICTURE_SIDE * size[0].min(size[1]) as f32;
         (Cow::Owned(Self { reconstruction, ..self.clone() }), dot_px)
     }
 

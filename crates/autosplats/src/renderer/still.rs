@@ -8,7 +8,7 @@ use super::MAX_SIDE;
 pub const BYTES_PER_PIXEL: u64 = 100;
 /// Most pixels of a still that is supersampled. In larger pictures details are larger too, and the rendered pictures
 /// stay within common screen sizes.
-const MOST_PIXELS: u64 = 1920 * 1080;
+const MAX_SUPERSAMPLED_PIXELS: u64 = 1920 * 1080;
 
 /// Factor on both sides of a still picture of `size` pixels at which it is best rendered, then [averaged
 /// down](crate::Image::averaged). The factor is 2 for up to 1920x1080 pixels if memory suffices, else 1.
@@ -17,7 +17,7 @@ const MOST_PIXELS: u64 = 1920 * 1080;
 #[must_use]
 pub fn still_supersample(size: [u32; 2]) -> u32 {
     let [width, height] = size.map(|side| 2 * u64::from(side));
-    let fits = width.max(height) <= u64::from(MAX_SIDE) && width * height <= 4 * MOST_PIXELS;
+    let fits = width.max(height) <= u64::from(MAX_SIDE) && width * height <= 4 * MAX_SUPERSAMPLED_PIXELS;
     if fits && check_memory("a picture", width * height * BYTES_PER_PIXEL).is_ok() { 2 } else { 1 }
 }
 

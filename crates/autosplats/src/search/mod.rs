@@ -7,7 +7,7 @@
 //! For a point P let r̃₀ be the first search radius (§5.1) and d₁ ≤ d₂ ≤ … the distances to the other screen points:
 //!
 //! - *Outlier* (§5.3): P is discarded if d₁ > r̃₀·√max(k, 10)^e0, the radius after e0 expansions without a neighbour.
-//!   With adaptive rules P is discarded if d₁ is more than [`STEEP`] times that radius, or if d₁ exceeds
+//!   With adaptive rules P is discarded if d₁ is more than [`OUTLIER_RADIUS_SLACK`] times that radius, or if d₁ exceeds
 //!   that radius and a gap ends the neighbourhood.
 //! - *Gap* (§5.3): the first j with d₍ⱼ₊₁₎ > √λ·max(dⱼ, r̃₀) ends the neighbourhood. The area of the circle has then
 //!   grown by λ, from r̃₀ on, without a new neighbour. P is *clamped* to κ = j neighbours, and its k-radius is dⱼ.
@@ -16,8 +16,8 @@
 //! - *Bound*: a search ends at the largest radius r̃₀·1.25ⁱ, for whole i, whose sphere projects to a rectangle with at
 //!   most [`MAX_CANDIDATES`] screen points. If no rule ends the neighbourhood and the k-th neighbour lies beyond, P
 //!   keeps the neighbours within that radius and counts as *bounded*. The bound limits the time per point, even in a
-//!   cloud of outliers only. An engine may skip the bound where it reads fewer than [`CROWDED`] points. Splat
-//!   communication has no such bound; its number of iterations is limited instead.
+//!   cloud of outliers only. An engine may skip the bound where it reads fewer than [`MIN_CROWDED_CANDIDATES`] points.
+//!   Splat communication has no such bound; its number of iterations is limited instead.
 
 pub(crate) mod gpu;
 pub(crate) mod kd_tree;
@@ -57,7 +57,7 @@ pub(crate) const MARGIN_PX: f32 = 0.02;
 /// Most screen points in the projection of the largest sphere that is searched.
 pub(crate) const MAX_CANDIDATES: usize = 4096;
 /// Screen points in a window from which on its points may meet the bound: density does not rise eightfold in a step.
-pub(crate) const CROWDED: usize = MAX_CANDIDATES / 8;
+pub(crate) const MIN_CROWDED_CANDIDATES: usize = MAX_CANDIDATES / 8;
 /// Ratio of successive radii among which the bound is chosen.
 pub(crate) const BOUND_STEP: f32 = 1.25;
 
@@ -123,7 +123,7 @@ impl std::ops::Add for SearchCounts {
 /// Factor on the outlier radius up to which adaptive rules keep a point that has k neighbours without a gap. On a
 /// steep surface, or in front of another surface, density is overestimated and first search radii are too short. With
 /// noise, such a surface would lose most of its points. Outliers have gaps around them.
-pub(crate) const STEEP: f32 = 1.2;
+pub(crate) const OUTLIER_RADIUS_SLACK: f32 = 1.2;
 
 /// Rules that define the neighbourhoods; an engine implements them.
 #[derive(Clone, Copy, Debug)]
@@ -133,8 +133,8 @@ pub(crate) struct SearchRules {
     pub(crate) outlier_expansions: Option<u32>,
     /// Gap factor λ; `None` bridges any gap.
     pub(crate) gap_factor: Option<f32>,
-    /// Whether a gap after one neighbour must be wider, and whether [`STEEP`] applies. Random samples then have that
-    /// gap no more often than a gap after two neighbours.
+    /// Whether a gap after one neighbour must be wider, and whether [`OUTLIER_RADIUS_SLACK`] applies. Random samples
+    /// then have that gap no more often than a gap after two neighbours.
     pub(crate) adaptive: bool,
 }
 
@@ -148,7 +148,7 @@ pub(crate) enum EarlyEnd {
 }
 
 impl SearchRules {
-    /// Outlier radius in world units: a point needs a neighbour within, apart from [`STEEP`].
+    /// Outlier radius in world units: a point needs a neighbour within, apart from [`OUTLIER_RADIUS_SLACK`].
     #[inline(always)]
     pub(crate) fn outlier_radius(&self, initial_radius: f32) -> f32 {
         // Differs from the paper: an expansion by √k is none at k = 1, and would discard surfaces below the usual k.
@@ -170,7 +170,7 @@ impl SearchRules {
         let nearest = squared.first().map_or(known, |d| d.sqrt());
         let outlier_radius = self.outlier_radius(initial_radius);
         let is_lone = nearest > outlier_radius;
-        if is_lone && (!self.adaptive || nearest > STEEP * outlier_radius) {
+        if is_lone && (!self.adaptive || nearest > OUTLIER_RADIUS_SLACK * outlier_radius) {
             return Some(EarlyEnd::Outlier);
         }
         let gap_factor = self.gap_factor?;

@@ -6,13 +6,13 @@ use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
 
 /// Candidates counted at a time, each into its own sum: additions to one sum would wait for each other.
-pub(crate) const GROUP: usize = 4;
+pub(crate) const CANDIDATE_GROUP: usize = 4;
 /// Most candidates beyond the k-th below an accepted threshold. The k-th is then found in a list of the largest
 /// distances below the threshold.
-const SURPLUS: usize = 3;
+const MAX_SURPLUS_CANDIDATES: usize = 3;
 /// Most moves of a threshold; then the interval's upper end is taken. Every other move halves the interval of floats,
 /// so that this number always suffices.
-const MOST_MOVES: usize = 80;
+const MAX_THRESHOLD_MOVES: usize = 80;
 
 /// Number of SIMD vectors in sixteen lanes.
 pub(crate) const fn vectors<S: Simd>() -> usize {
@@ -32,7 +32,7 @@ pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &
     let mut at = *threshold;
     let mut open = *group;
     let mut surplus = [0; LANES];
-    for step in 0..MOST_MOVES {
+    for step in 0..MAX_THRESHOLD_MOVES {
         let count = count_below(simd, squared, &at);
         let mut any_open = false;
         for lane in 0..LANES {
@@ -40,7 +40,7 @@ pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &
                 continue;
             }
             let [t, n] = [at.0[lane], count.0[lane]];
-            if (n >= target) & (n <= target + SURPLUS as f32) {
+            if (n >= target) & (n <= target + MAX_SURPLUS_CANDIDATES as f32) {
                 open[lane] = false;
                 surplus[lane] = (n - target) as usize;
                 continue;
@@ -76,7 +76,7 @@ pub(crate) fn kth_smallest<S: Simd>(simd: S, squared: &[Lanes], k: u32, group: &
             break;
         }
     }
-    let largest: [Lanes; SURPLUS + 1] = largest_below(simd, squared, &at);
+    let largest: [Lanes; MAX_SURPLUS_CANDIDATES + 1] = largest_below(simd, squared, &at);
     for lane in (0..LANES).filter(|&lane| group[lane]) {
         threshold.0[lane] = largest[surplus[lane]].0[lane];
     }
@@ -89,8 +89,8 @@ fn count_below<S: Simd>(simd: S, squared: &[Lanes], threshold: &Lanes) -> Lanes 
     let one = F32s::splat(simd, 1.0);
     for vector in 0..vectors::<S>() {
         let threshold = F32s::load(simd, &threshold.0, vector);
-        let mut sums = [F32s::splat(simd, 0.0); GROUP];
-        for group in squared.chunks_exact(GROUP) {
+        let mut sums = [F32s::splat(simd, 0.0); CANDIDATE_GROUP];
+        for group in squared.chunks_exact(CANDIDATE_GROUP) {
             for (sum, candidate) in sums.iter_mut().zip(group) {
                 *sum += F32s::load(simd, &candidate.0, vector).at_most(threshold).keep(one);
             }

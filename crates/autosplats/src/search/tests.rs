@@ -4,7 +4,10 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::{DVec3, Vec3};
 
 use super::past::Past;
-use super::{LANES, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, STEEP, SearchCounts, SearchRules, screen_grid};
+use super::{
+    LANES, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, OUTLIER_RADIUS_SLACK, SearchCounts, SearchRules,
+    screen_grid,
+};
 use crate::camera::{Camera, Projection, View};
 use crate::project::{ProjectRules, Projector, ScreenPoints};
 use crate::test_clouds::{self, EYE, Positions};
@@ -92,7 +95,7 @@ impl Oracle {
             rules.outlier_expansions.is_some_and(|e0| exceeds(distance(1), radius(e0)))
         };
         let is_lone = beyond(1.0);
-        let is_alone = is_lone && (!rules.adaptive || beyond(f64::from(STEEP)));
+        let is_alone = is_lone && (!rules.adaptive || beyond(f64::from(OUTLIER_RADIUS_SLACK)));
         if is_alone || self.others[point].is_empty() {
             return Expected { fate: Fate::Outlier, count: 0, radius: 0.0, unsure };
         }

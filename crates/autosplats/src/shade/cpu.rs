@@ -7,10 +7,10 @@ use rayon::prelude::*;
 
 use super::color_map::Scale;
 use super::depths::{Depths, LANES};
-use super::edges::{Edges, INWARD, LESS_TILTED, SEARCH};
+use super::edges::{EDGE_SEARCH_PX, Edges, INNER_NORMAL_PX, MIN_TILT_LOSS};
 use super::light::{CLAY, SCANNED_LIGHT, light, tone};
 use super::occlusion::{DARKENING, PAIR_COUNT, Pair, light_left, pairs, reach};
-use super::over_time::Following;
+use super::over_time::PictureInProgress;
 use super::{Background, ColorMode, Image, Shading, legend, linear, linear_steps, srgb};
 use crate::camera::View;
 use crate::splat::GBuffer;
@@ -24,7 +24,7 @@ pub(super) const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 /// than one of the 255.
 pub(super) const ENCODE_STEPS: usize = 1 << 13;
 /// Least rows that a thread shades at a time; occlusion that reaches further raises the number.
-const BAND: usize = 32;
+const BAND_ROWS: usize = 32;
 /// Largest number of pixels sampled to find the usual range of values.
 const RANGE_SAMPLES: usize = 50_000;
 
@@ -67,7 +67,7 @@ pub(crate) fn shade(
     scene: &Scene<'_>,
     shading: &Shading,
     keep_linear: bool,
-    following: Option<Following<'_>>,
+    following: Option<PictureInProgress<'_>>,
     image: &mut Image,
 ) -> Option<[f64; 2]> {
     let [width, height] = [layers.width as usize, layers.height as usize];
@@ -77,8 +77,8 @@ pub(crate) fn shade(
     image.linear.clear();
     image.linear.resize(if keep_linear { width * height } else { 0 }, [0.0; 3]);
     let shader = Shader::new(layers, scene, shading);
-    let inks = &Inks { table: encode_table(), linear: linear_steps() };
-    let rows = BAND.max(reach(&shader.pairs));
+    let inks = &SrgbTables { table: encode_table(), linear: linear_steps() };
+    let rows = BAND_ROWS.max(reach(&shader.pairs));
     let bands = image.pixels.par_chunks_mut(width * rows).enumerate();
     if keep_linear {
         bands.zip(image.linear.par_chunks_mut(width * rows)).for_each_init(
@@ -101,12 +101,12 @@ pub(crate) fn shade(
 }
 
 /// Tables from linear light to 8-bit sRGB and back.
-struct Inks {
+struct SrgbTables {
     table: &'static [u8],
     linear: [f32; 256],
 }
 
-impl Inks {
+impl SrgbTables {
     fn encode(&self, color: [f32; 3]) -> [u8; 4] {
         let [r, g, b] = color.map(|channel| encode(self.table, channel));
         [r, g, b, 255]
@@ -142,7 +142,7 @@ impl Band {
     fn shade(
         &mut self,
         shader: &Shader<'_>,
-        inks: &Inks,
+        inks: &SrgbTables,
         first: usize,
         pixels: &mut [[u8; 4]],
         linear: &mut [[f32; 3]],
@@ -151,7 +151,7 @@ impl Band {
         let layers = shader.layers;
         let [width, height] = [layers.width as usize, layers.height as usize];
         let rows = pixels.len() / width;
-        depths.fill(layers, first, rows, reach(&shader.pairs).max(SEARCH as usize) + 1);
+        depths.fill(layers, first, rows, reach(&shader.pairs).max(EDGE_SEARCH_PX as usize) + 1);
         let stride = width.next_multiple_of(LANES);
         left.clear();
         left.resize(stride * (rows + 2), 1.0);
@@ -252,13 +252,13 @@ impl<'a> Shader<'a> {
         let normal = Vec3::from(self.layers.normal[index]);
         let size = [self.layers.width as usize, self.layers.height as usize];
         let [out_x, out_y] = self.edges.outward(depths, size, x, y);
-        let [inner_x, inner_y] = [x as isize - INWARD * out_x, y as isize - INWARD * out_y];
+        let [inner_x, inner_y] = [x as isize - INNER_NORMAL_PX * out_x, y as isize - INNER_NORMAL_PX * out_y];
         if !(depths.at(inner_x, inner_y) < self.layers.depth[index]) {
             return normal;
         }
         let inner = Vec3::from(self.layers.normal[self.layers.index(inner_x as usize, inner_y as usize)]);
         let tilt = |normal: Vec3| normal.x * out_x as f32 + normal.y * out_y as f32;
-        if tilt(normal) < tilt(inner) - LESS_TILTED { inner } else { normal }
+        if tilt(normal) < tilt(inner) - MIN_TILT_LOSS { inner } else { normal }
     }
 
     fn base_color(&self, x: usize, y: usize, index: usize) -> [f32; 3] {

@@ -12,15 +12,15 @@ use super::depths::Depths;
 use crate::camera::View;
 
 /// Slope, as depth by distance across the line of sight, from which neighbouring pixels belong to different surfaces.
-const STEEPEST: f32 = 4.0;
+const MAX_SURFACE_SLOPE: f32 = 4.0;
 /// Length of the search for the ends of a row of edges, in pixels to either side.
-pub(super) const SEARCH: isize = 12;
+pub(super) const EDGE_SEARCH_PX: isize = 12;
 /// Distance from a border, in pixels, at which the inner depth and normal are read. The splats of the border itself may
 /// be tilted otherwise.
-pub(super) const INWARD: isize = 3;
+pub(super) const INNER_NORMAL_PX: isize = 3;
 /// A border's normal is replaced if its component towards the border is smaller than the inner normal's by more than
 /// this. At a corner of pixels the component is the sum of both axes.
-pub(super) const LESS_TILTED: f32 = 0.3;
+pub(super) const MIN_TILT_LOSS: f32 = 0.3;
 /// Sides of a pixel.
 const SIDES: [[isize; 2]; 4] = [[0, -1], [0, 1], [-1, 0], [1, 0]];
 
@@ -51,7 +51,7 @@ enum Turn {
 impl Edges {
     /// Thresholds for this view.
     pub(super) fn new(view: &View) -> Self {
-        let step = STEEPEST / view.focal_px;
+        let step = MAX_SURFACE_SLOPE / view.focal_px;
         if view.perspective { Self { factor: 1.0 + step, offset: 0.0 } } else { Self { factor: 1.0, offset: step } }
     }
 
@@ -112,7 +112,7 @@ impl Edges {
         }
         let end = |along: isize| {
             let mut last = [depths.at(x, y), depths.at(x + dx, y + dy)];
-            for distance in 1..=SEARCH {
+            for distance in 1..=EDGE_SEARCH_PX {
                 let [x, y] = [x + dy * along * distance, y + dx * along * distance];
                 if !is_inside(size, x, y) {
                     // Beyond the picture the edge goes on.
@@ -126,7 +126,7 @@ impl Edges {
                 }
                 last = next;
             }
-            (SEARCH, Turn::Elsewhere)
+            (EDGE_SEARCH_PX, Turn::Elsewhere)
         };
         let ends = [end(-1), end(1)];
         let length = (ends[0].0 + ends[1].0 - 1) as f32;
@@ -175,7 +175,7 @@ mod tests {
             layers.depth[at] = of(x as f32 + 0.5, y as f32 + 0.5);
         }
         let mut depths = Depths::default();
-        depths.fill(&layers, 0, SIZE, SEARCH as usize + 1);
+        depths.fill(&layers, 0, SIZE, EDGE_SEARCH_PX as usize + 1);
         depths
     }
 

@@ -6,11 +6,11 @@ mod uniform;
 
 pub(crate) use finish::{ReadPicture, finish};
 pub(crate) use texture::check_texture;
-pub(crate) use uniform::{ShadeUniform, Shown, finds_range};
+pub(crate) use uniform::{ShadeUniform, ShownQuantity, finds_range};
 
 use super::color_map::{self, table};
 use super::cpu::{BACK_COLOR, BACK_LIGHT, ENCODE_STEPS, background, encode_table, sample_step};
-use super::edges::INWARD;
+use super::edges::INNER_NORMAL_PX;
 use super::{Background, ColorMap, Shading};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
@@ -109,7 +109,7 @@ impl ShadeBuffers {
 #[derive(Debug)]
 pub(crate) struct ShadePasses {
     range: Pass,
-    /// By [`Shown`], each without and with toned backs.
+    /// By [`ShownQuantity`], each without and with toned backs.
     coloring: Vec<Option<ColoringPasses>>,
 }
 
@@ -121,14 +121,14 @@ struct ColoringPasses {
 }
 
 impl ColoringPasses {
-    fn new(gpu: &Gpu, shown: Shown, backs: bool) -> Result<Self, Error> {
+    fn new(gpu: &Gpu, shown: ShownQuantity, backs: bool) -> Result<Self, Error> {
         let shown = ("SHOWN", f64::from(shown as u32));
         let shade = [
             shown,
             ("BACKS", backs.into()),
             ("BACK_LIGHT", BACK_LIGHT.into()),
             ("BACK_COLOR", BACK_COLOR.into()),
-            ("INWARD", INWARD as f64),
+            ("INNER_NORMAL_PX", INNER_NORMAL_PX as f64),
         ];
         Ok(Self { range_values: Pass::new(gpu, &RANGE_VALUES, &[shown])?, shade: Pass::new(gpu, &SHADE, &shade)? })
     }
@@ -160,7 +160,7 @@ impl ShadePasses {
     ) -> Result<Vec<Step>, Error> {
         let LayerBuffers { surface, cover, extras, .. } = layers;
         let ShadeBuffers { uniform, keys, color_map, tables, image, linear, .. } = buffers;
-        let shown = Shown::new(&shading.color, layers.channels);
+        let shown = ShownQuantity::new(&shading.color, layers.channels);
         let backs = layers.channels.backs && shading.tones_backs();
         let at = 2 * shown as usize + usize::from(backs);
         if self.coloring.len() <= at {

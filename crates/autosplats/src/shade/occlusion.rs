@@ -18,7 +18,7 @@ use crate::camera::View;
 use crate::simd::F32s;
 
 /// Pairs of pixels: angle of the line through them in 16ths of a half turn, distance from the middle, and weight.
-/// Distances are in pixels of a picture [`HEIGHT`] pixels high; weights add up to about 1.
+/// Distances are in pixels of a picture [`PATTERN_HEIGHT_PX`] pixels high; weights add up to about 1.
 const PAIRS: [(f32, f32, f32); PAIR_COUNT] = [
     (0.0, 3.0, 0.07),
     (8.0, 3.0, 0.07),
@@ -32,16 +32,16 @@ const PAIRS: [(f32, f32, f32); PAIR_COUNT] = [
     (12.0, 18.0, 0.115),
 ];
 pub(super) const PAIR_COUNT: usize = 10;
-const HEIGHT: f32 = 900.0;
+const PATTERN_HEIGHT_PX: f32 = 900.0;
 /// Least factor on the distances, for small pictures.
-const LEAST_SCALE: f32 = 0.34;
+const MIN_PATTERN_SCALE: f32 = 0.34;
 /// Steepest rise beside a pixel that counts in full, as height by distance. A steeper rise is further in front, and
 /// counts for less.
-pub(super) const STEEPEST: f32 = 1.2;
+pub(super) const MAX_FULL_RISE: f32 = 1.2;
 /// Rise as which the furthest things in front still count.
-pub(super) const FURTHEST: f32 = 0.4;
+pub(super) const FARTHEST_RISE: f32 = 0.4;
 /// Least divisor of a rise, against division by zero.
-pub(super) const LEAST_RISE: f32 = 1e-3;
+pub(super) const MIN_RISE: f32 = 1e-3;
 /// Darkening at strength 1: of tones, and of the points' own colours, which contain shadows already.
 pub(super) const DARKENING: [f32; 2] = [4.5, 3.3];
 
@@ -56,7 +56,7 @@ pub(super) struct Pair {
 
 /// The pairs for a picture of this height in pixels.
 pub(super) fn pairs(height: u32) -> [Pair; PAIR_COUNT] {
-    let scale = (height as f32 / HEIGHT).max(LEAST_SCALE);
+    let scale = (height as f32 / PATTERN_HEIGHT_PX).max(MIN_PATTERN_SCALE);
     PAIRS.map(|(angle, distance_px, part)| {
         let (sin, cos) = (angle * std::f32::consts::PI / 16.0).sin_cos();
         let [dx, dy] = [cos, sin].map(|side| (side * distance_px * scale).round());
@@ -113,8 +113,8 @@ pub(super) fn light_left_simd<'a, S: Simd>(
 #[inline(always)]
 fn rise<S: Simd>(simd: S, depth: F32s<S>, there: F32s<S>, scale: F32s<S>) -> F32s<S> {
     let splat = |value: f32| F32s::splat(simd, value);
-    let rise = ((depth - there) * scale).max(splat(-STEEPEST));
-    rise.min((splat(STEEPEST * STEEPEST) / rise.max(splat(LEAST_RISE))).max(splat(FURTHEST)))
+    let rise = ((depth - there) * scale).max(splat(-MAX_FULL_RISE));
+    rise.min((splat(MAX_FULL_RISE * MAX_FULL_RISE) / rise.max(splat(MIN_RISE))).max(splat(FARTHEST_RISE)))
 }
 
 #[cfg(test)]
@@ -146,7 +146,7 @@ mod tests {
             layers.depth[at] = 1000.0 + of(x as f32 - MIDDLE as f32, y as f32 - MIDDLE as f32);
         }
         // The pairs of a picture 900 pixels high.
-        let pairs = pairs(HEIGHT as u32);
+        let pairs = pairs(PATTERN_HEIGHT_PX as u32);
         let mut depths = Depths::default();
         depths.fill(&layers, 0, SIZE, reach(&pairs) + 1);
         let mut left = vec![f32::NAN; SIZE.next_multiple_of(LANES)];

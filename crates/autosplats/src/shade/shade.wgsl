@@ -32,7 +32,7 @@ override BACK_COLOR: f32;
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);
 
 // Distance from a border, in pixels, at which the inner depth and normal are read.
-override INWARD: i32;
+override INNER_NORMAL_PX: i32;
 
 // The linear colour of a value. An unknown value gets the colour of the lower end; in a range without width every value
 // gets the middle colour.
@@ -159,7 +159,7 @@ fn outward_normal(pixel: vec2i, surface_here: vec4f, at_edge: bool) -> vec3f {
             outward += side;
         }
     }
-    let inner_pixel = pixel - INWARD * outward;
+    let inner_pixel = pixel - INNER_NORMAL_PX * outward;
     if !(depth_at(inner_pixel) < surface_here.w) {
         return surface_here.xyz;
     }

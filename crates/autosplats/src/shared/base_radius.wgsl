@@ -5,7 +5,7 @@
 #import screen
 #import surfel
 
-override LEAST_REACH: f32;
+override MIN_BASE_FIRST_RADII: f32;
 
 // First search radius of a surfel's point, world units.
 fn initial_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
@@ -15,5 +15,5 @@ fn initial_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
 
 // Radius in world units whose multiples are the radii of the balls around a surfel.
 fn base_radius(surfel: Surfel, cell_px: u32, cell_columns: u32) -> f32 {
-    return max(surfel.k_radius, LEAST_REACH * initial_radius(surfel, cell_px, cell_columns));
+    return max(surfel.k_radius, MIN_BASE_FIRST_RADII * initial_radius(surfel, cell_px, cell_columns));
 }

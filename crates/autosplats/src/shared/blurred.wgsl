@@ -1,39 +1,39 @@
 // Borders that are blurred by noise: see the CPU form, `trim/blurred.rs`. Imports: frame, layers, blocks, noise. The
-// including pass binds `measured`, `blocks` and `cover`, and defines `AROUND_PX`, `of_pixel_at`, `SILENT`, `YES` and
-// `NO`. "Marked" sixteenths of pixels hold points. See docs/decisions/0003-borders-of-noise.md.
+// including pass binds `measured`, `blocks` and `cover`, and defines `SPLAT_WINDOW_PX`, `of_pixel_at`, `SILENT`, `YES`
+// and `NO`. "Marked" sixteenths of pixels hold points. See docs/decisions/0003-borders-of-noise.md.
 
 #import blocks
 #import noise
 
-override LEAST_NOISE_PX: f32;
+override MIN_BLURRING_NOISE_PX: f32;
 // Squared radius of a window over the variance of its kernel.
-override PER_VARIANCE: f32;
+override WINDOW_PER_KERNEL_VARIANCE: f32;
 // Squared radius of a window over the variance of the noise, beyond that of the window without noise.
-override PER_NOISE: f32;
+override WINDOW_PER_NOISE_VARIANCE: f32;
 // Sine of a surface's tilt from which all noise counts.
-override TILTED: f32;
+override FULL_NOISE_SINE: f32;
 // Fraction of the noise that blurs a border.
-override BLURS: f32;
+override BLURRING_NOISE_SHARE: f32;
 // Radius of the window without noise, and largest radius, in pixels.
-override LEAST_RADIUS_PX: f32;
-override WIDEST_RADIUS_PX: f32;
+override MIN_WINDOW_PX: f32;
+override MAX_WINDOW_PX: f32;
 // Windows of a larger radius are summed up in 2x2 pixels, and in blocks from twice this radius.
-override FINE_RADIUS_PX: f32;
+override MAX_PIXEL_WINDOW_PX: f32;
 // Factor of the mean square that is subtracted from the mean.
-override SPREAD: f32;
+override SPREAD_WEIGHT: f32;
 // Largest allowed offset of the mean, in `blur_unit`: without noise, and with noise of `SURE_NOISE_PX` pixels or more.
-override OFF_UNSURE: f32;
-override OFF_SURE: f32;
+override MAX_OFFSET_UNSURE: f32;
+override MAX_OFFSET_SURE: f32;
 override SURE_NOISE_PX: f32;
 // If noise is certain, `SURE_NOISE_PX` drops to this multiple of the mean distance between the window's marked
 // sixteenths.
-override SURE_DISTANCES: f32;
-override FEWEST_BLURRED: u32;
+override SURE_NOISE_DISTANCES: f32;
+override MIN_WINDOW_SIXTEENTHS: u32;
 override FRINGE_NOISES: f32;
 // Largest allowed offset half-way to the empty region, as a fraction of that at the pixel.
-override OFF_HALF_WAY: f32;
+override HALF_WAY_OFFSET_SHARE: f32;
 // Width in blocks of the region beyond the fringe that is searched for empty blocks.
-override BEYOND_FRINGE: f32;
+override BLOCKS_BEYOND_FRINGE: f32;
 // Reach of a splat in splat radii.
 override SUPPORT: f32;
 
@@ -44,11 +44,11 @@ const FRINGE_BLOCKS = 16u;
 fn noise_px(pixel: vec2u, shown: vec4f, reach_px: f32) -> f32 {
     let eye = to_eye(unproject(vec2f(pixel) + 0.5, shown.w));
     let facing = dot(shown.xyz, eye) / length(eye);
-    let aside = min(sqrt(max(1.0 - facing * facing, 0.0)) / TILTED, 1.0);
+    let aside = min(sqrt(max(1.0 - facing * facing, 0.0)) / FULL_NOISE_SINE, 1.0);
     let size = pixel_size(shown.w);
     // Inverse of the splat radius's formula.
     let k_radius = reach_px / SUPPORT * size * (0.5 * sqrt(f32(frame.k)) / frame.splat_scale);
-    return BLURS * aside * noise_at(k_radius) / size;
+    return BLURRING_NOISE_SHARE * aside * noise_at(k_radius) / size;
 }
 
 // Width of a fringe in pixels.
@@ -61,26 +61,26 @@ fn fringe_px(reach_px: f32, noise: f32) -> f32 {
 fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
     // Points beyond the screen are unknown.
     let to_edge = min(pixel, frame.size - 1u - pixel);
-    let widest = min(WIDEST_RADIUS_PX, f32(min(to_edge.x, to_edge.y)));
-    let window = min(sqrt(LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_NOISE * noise * noise), widest);
+    let widest = min(MAX_WINDOW_PX, f32(min(to_edge.x, to_edge.y)));
+    let window = min(sqrt(MIN_WINDOW_PX * MIN_WINDOW_PX + WINDOW_PER_NOISE_VARIANCE * noise * noise), widest);
     // In windows narrower than splats, points reflect only their distances from each other, or scan lines.
-    if window < max(AROUND_PX, reach_px / SUPPORT) {
+    if window < max(SPLAT_WINDOW_PX, reach_px / SUPPORT) {
         return SILENT;
     }
     let here = moments(pixel, window);
-    if here.count < f32(FEWEST_BLURRED) {
+    if here.count < f32(MIN_WINDOW_SIXTEENTHS) {
         return SILENT;
     }
-    let blur = vec2f(window * window / PER_VARIANCE, noise * noise);
+    let blur = vec2f(window * window / WINDOW_PER_KERNEL_VARIANCE, noise * noise);
     let apart = window * sqrt(3.14159265 / here.count);
-    let sure_px = SURE_NOISE_PX + noise_sure() * (min(SURE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
-    let may_be = OFF_SURE + (OFF_UNSURE - OFF_SURE) * max(1.0 - noise / sure_px, 0.0);
+    let sure_px = SURE_NOISE_PX + noise_sure() * (min(SURE_NOISE_DISTANCES * apart, SURE_NOISE_PX) - SURE_NOISE_PX);
+    let may_be = MAX_OFFSET_SURE + (MAX_OFFSET_UNSURE - MAX_OFFSET_SURE) * max(1.0 - noise / sure_px, 0.0);
     // The length of the offset bounds its part in any direction.
     if length(here.offset) / blur_unit(blur) <= may_be {
         return NO;
     }
     let fringe = fringe_px(reach_px, noise);
-    let empty = to_empty(pixel, fringe + BEYOND_FRINGE * f32(BLOCK_PX));
+    let empty = to_empty(pixel, fringe + BLOCKS_BEYOND_FRINGE * f32(BLOCK_PX));
     if all(empty == vec2f(0.0)) {
         return SILENT;
     }
@@ -98,7 +98,7 @@ fn is_beside_blurred(pixel: vec2u, reach_px: f32, noise: f32) -> u32 {
         return YES;
     }
     let there = moments(half_way, window);
-    let goes_on = there.count >= f32(FEWEST_BLURRED) && off(there, ahead, blur) <= OFF_HALF_WAY * may_be;
+    let goes_on = there.count >= f32(MIN_WINDOW_SIXTEENTHS) && off(there, ahead, blur) <= HALF_WAY_OFFSET_SHARE * may_be;
     return select(YES, NO, goes_on);
 }
 
@@ -163,7 +163,7 @@ fn off(points: Moments, ahead: vec2f, blur: vec2f) -> f32 {
     let mean = -dot(points.offset, ahead) / unit;
     let square = dot(points.squares, vec3f(ahead.x * ahead.x, 2.0 * ahead.x * ahead.y, ahead.y * ahead.y));
     let of_noise = blur.x * blur.y / (blur.x + blur.y);
-    return mean - SPREAD * clamp((square - of_noise) / (unit * unit), 0.0, 1.0);
+    return mean - SPREAD_WEIGHT * clamp((square - of_noise) / (unit * unit), 0.0, 1.0);
 }
 
 // Number of marked sixteenths in a square of a grid; `side` is 1, 2 or 4 pixels.
@@ -195,7 +195,7 @@ fn moments(pixel: vec2u, window: f32) -> Moments {
     var sums = vec3f(0.0);
     var squares = vec3f(0.0);
     var count = 0.0;
-    let side = select(select(BLOCK_PX, 2u, window <= 2.0 * FINE_RADIUS_PX), 1u, window <= FINE_RADIUS_PX);
+    let side = select(select(BLOCK_PX, 2u, window <= 2.0 * MAX_PIXEL_WINDOW_PX), 1u, window <= MAX_PIXEL_WINDOW_PX);
     let reach = u32(window);
     let first = (pixel - reach) / side;
     let last = min((pixel + reach) / side, (frame.size + side - 1u) / side - 1u);

@@ -4,14 +4,14 @@
 #import noise
 #import surfel
 
-override ENOUGH: f32;
+override GOOD_NORMAL_ERROR_RAD: f32;
 override TINY_PX: f32;
 override TINY_SLOPE: f32;
 override TINY_REACH_PX: f32;
 override MOST_TINY: f32;
-override ROW: f32;
-override SCATTER: f32;
-override SCATTER_KNOWN: f32;
+override MIN_SCAN_LINE_ANISOTROPY: f32;
+override MAX_SCATTER_NOISES: f32;
+override MAX_SCATTER_KNOWN_NOISES: f32;
 
 // Level of the cells that have sheets.
 fn sheet_level() -> u32 {
@@ -22,19 +22,19 @@ fn sheet_level() -> u32 {
 fn good_enough(noise: f32, k_radius: f32, depth: f32) -> f32 {
     let pixel = pixel_size(depth);
     let dense = TINY_REACH_PX * pixel / k_radius;
-    return ENOUGH + TINY_SLOPE * min(dense * dense, MOST_TINY) * max(TINY_PX - noise / pixel, 0.0);
+    return GOOD_NORMAL_ERROR_RAD + TINY_SLOPE * min(dense * dense, MOST_TINY) * max(TINY_PX - noise / pixel, 0.0);
 }
 
 // Largest scatter about larger balls' quadrics, world units; `known` says whether the noise is known as that of a depth
 // camera.
 fn most_scatter(noise: f32, known: bool) -> f32 {
-    return select(SCATTER, SCATTER_KNOWN, known) * noise;
+    return select(MAX_SCATTER_NOISES, MAX_SCATTER_KNOWN_NOISES, known) * noise;
 }
 
 // Whether the first neighbours of a surfel form a scan line. Depth steps of a camera with known noise look alike but
 // are not on the surface.
 fn is_row(surfel: Surfel, known_noise: f32) -> bool {
-    return surfel.radius > 0.0 && surfel.major_ratio > ROW && known_noise == 0.0;
+    return surfel.radius > 0.0 && surfel.major_ratio > MIN_SCAN_LINE_ANISOTROPY && known_noise == 0.0;
 }
 
 // Whether noise calls for more than the first neighbours. Their normal's standard error is about the noise over the

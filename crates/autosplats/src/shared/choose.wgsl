@@ -3,11 +3,11 @@
 
 #import quadric
 
-override RELIABLE: f32;
+override MAX_RELIABLE_ERROR_RAD: f32;
 override LEAST_TRACE: f32;
-override THICKEST: f32;
-override AGREE: f32;
-override FARTHEST: f32;
+override MAX_NOISE_BALL_RADII: f32;
+override AGREE_ERRORS: f32;
+override MAX_MOVE_NOISES: f32;
 
 // The same surface with heights along its normal at the point. Accurate to second order near the point.
 fn upright(quadric: Quadric) -> Quadric {
@@ -68,14 +68,14 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
     for (var scale = 0u; scale < SCALES; scale++) {
         radius *= STEP;
         // A ball that is filled by noise has no surface; the largest is used as a last resort.
-        let thin = noise < THICKEST * radius;
+        let thin = noise < MAX_NOISE_BALL_RADII * radius;
         if !thin && scale + 1u < SCALES {
             continue;
         }
         let ball = ball_around(center, radius, CELLS_PER_RADIUS);
         if !has_axis {
             plane = plane_of(ball);
-            let least = noise * (1.0 / (RELIABLE * radius));
+            let least = noise * (1.0 / (MAX_RELIABLE_ERROR_RAD * radius));
             let is_vain = plane.weight < LEAST_TRACE * least * least && scale + 1u < SCALES;
             if plane.len < LEAST_CLUSTERS || is_vain {
                 continue;
@@ -86,7 +86,7 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
             continue;
         }
         let error = quadric.error * noise;
-        if !(thin && error < RELIABLE) {
+        if !(thin && error < MAX_RELIABLE_ERROR_RAD) {
             if fallback.len == 0u || quadric.error < fallback.error {
                 fallback = quadric;
             }
@@ -95,7 +95,7 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
         var share = 1.0;
         if reliable.w >= 0.0 {
             let across = cross(quadric.normal, reliable.xyz);
-            share = 1.0 - dot(across, across) / (AGREE * AGREE * (error * error + reliable.w * reliable.w));
+            share = 1.0 - dot(across, across) / (AGREE_ERRORS * AGREE_ERRORS * (error * error + reliable.w * reliable.w));
             if !(share > 0.0 && quadric.scatter <= scatter) {
                 break;
             }
@@ -116,7 +116,7 @@ fn choose(center: vec3f, least_radius: f32, first: vec4f, noise: f32, enough: f3
         best = upright(fallback);
     }
     // A quadric further away is another surface.
-    if !(abs(best.height) <= FARTHEST * noise) {
+    if !(abs(best.height) <= MAX_MOVE_NOISES * noise) {
         return Quadric();
     }
     return best;

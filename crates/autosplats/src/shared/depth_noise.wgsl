@@ -16,7 +16,7 @@ struct DepthRun {
 }
 
 // Noise that is known at a surfel.
-struct Known {
+struct KnownNoise {
     // Unit direction from the sensor, along which the noise acts, view space.
     ray: vec3f,
     // Standard deviation in world units; 0 if unknown.
@@ -24,7 +24,7 @@ struct Known {
 }
 
 // Noise that is known at a position in view space; `point` is the index in the cloud.
-fn known_at(place: vec3f, point: u32) -> Known {
+fn known_at(place: vec3f, point: u32) -> KnownNoise {
     var low = 0u;
     var high = arrayLength(&depth_noise);
     while high - low > 1u {
@@ -43,16 +43,16 @@ fn known_at(place: vec3f, point: u32) -> Known {
     // A sensor does not see points at its own place or behind it.
     if run.factor > 0.0 && depth > 0.0 {
         let noise = run.factor * select(pow(depth, run.power), 1.0, run.power == 0.0);
-        return Known(normalize(from_sensor), noise);
+        return KnownNoise(normalize(from_sensor), noise);
     }
-    return Known();
+    return KnownNoise();
 }
 
 // Noise that is known, if it exceeds the measured noise.
-fn known_beyond(measured_noise: f32, place: vec3f, point: u32) -> Known {
+fn known_beyond(measured_noise: f32, place: vec3f, point: u32) -> KnownNoise {
     let known = known_at(place, point);
     if known.noise > measured_noise {
         return known;
     }
-    return Known();
+    return KnownNoise();
 }

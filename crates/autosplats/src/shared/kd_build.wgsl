@@ -38,7 +38,7 @@ const KD_FINITE_LEFT = 3u;
 const KD_UNSPLIT = 4u;
 const KD_NONE = 0xffffffffu;
 // Larger coordinates count as not finite, because their squares would overflow.
-const KD_FARTHEST = 1e18;
+const KD_MAX_COORDINATE = 1e18;
 
 // A node of few points, which one workgroup turns into a subtree.
 struct KdSmall {
@@ -72,6 +72,6 @@ fn kd_coordinate(position: vec3f, axis: u32) -> f32 {
 
 fn kd_goes_left(point: vec4u, axis: u32, plane: f32) -> bool {
     // Magnitudes have the order of their bits; those of NaN are above all others.
-    let is_finite = all((point.xyz & vec3u(0x7fffffffu)) <= vec3u(bitcast<u32>(KD_FARTHEST)));
+    let is_finite = all((point.xyz & vec3u(0x7fffffffu)) <= vec3u(bitcast<u32>(KD_MAX_COORDINATE)));
     return select(kd_coordinate(kd_position(point), axis) < plane, is_finite, axis == KD_FINITE_LEFT);
 }

@@ -14,7 +14,7 @@ struct KdNode {
 const KD_FINITE = 1u;
 // Most levels of the tree.
 const KD_DEPTH = 64u;
-const KD_MOST = 3.4028234663852886e38;
+const KD_MAX_F32 = 3.4028234663852886e38;
 
 // A point of the tree: bits of its position relative to the cloud's origin, and its index in the cloud.
 alias KdPoint = vec4u;
@@ -43,7 +43,7 @@ fn kd_squared_distance(node: u32, center: vec3f) -> f32 {
 fn kd_walk(center: vec3f, radius: f32) -> KdWalk {
     var walk: KdWalk;
     walk.center = center;
-    walk.squared = min(radius * radius, KD_MOST);
+    walk.squared = min(radius * radius, KD_MAX_F32);
     walk.open[0] = KD_FINITE;
     walk.depth = select(0u, 1u, kd_squared_distance(KD_FINITE, center) <= walk.squared);
     walk.seen = 0u;

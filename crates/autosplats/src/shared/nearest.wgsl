@@ -8,10 +8,10 @@ override QUADS: u32;
 
 alias Nearest = array<vec4f, 16>;
 
-// The empty list. Unused places hold MOST. Surplus places at the front hold -1, below any distance, so that the k-th
+// The empty list. Unused places hold MAX_F32. Surplus places at the front hold -1, below any distance, so that the k-th
 // place is the last one.
 fn nearest_none() -> Nearest {
-    let m = vec4f(MOST);
+    let m = vec4f(MAX_F32);
     let first = select(m, vec4f(-1.0), vec4u(0u, 1u, 2u, 3u) < vec4u(4u * QUADS - K));
     return Nearest(first, m, m, m, m, m, m, m, m, m, m, m, m, m, m, m);
 }
@@ -117,7 +117,7 @@ fn nearest_take(list: ptr<function, Nearest>) -> f32 {
     if QUADS > 14u {
         (*list)[14] = vec4f((*list)[14].yzw, (*list)[15].x);
     }
-    (*list)[15] = vec4f((*list)[15].yzw, MOST);
+    (*list)[15] = vec4f((*list)[15].yzw, MAX_F32);
     return least;
 }
 

@@ -3,8 +3,8 @@
 // is none. `past` has a single element if no radii are kept.
 
 // Least and largest plausible radius, in first search radii.
-override LEAST_LIKELY: f32;
-override MOST_LIKELY: f32;
+override MIN_PAST_FIRST_RADII: f32;
+override MAX_PAST_FIRST_RADII: f32;
 
 // Radius to start the search of a point from; 0 if the last frame has no plausible one.
 fn past_radius(position_view: vec3f, initial_radius: f32) -> f32 {
@@ -16,5 +16,5 @@ fn past_radius(position_view: vec3f, initial_radius: f32) -> f32 {
         return 0.0;
     }
     let radius = bitcast<f32>(past[pixel]);
-    return select(0.0, radius, radius >= LEAST_LIKELY * initial_radius && radius <= MOST_LIKELY * initial_radius);
+    return select(0.0, radius, radius >= MIN_PAST_FIRST_RADII * initial_radius && radius <= MAX_PAST_FIRST_RADII * initial_radius);
 }

@@ -18,7 +18,7 @@ override MOST_LEVELS: u32;
 override CELLS_PER_RADIUS: f32;
 override LEAST_CLUSTERS: u32;
 override LEAST_OF_PLANE: u32;
-override FULL: f32;
+override FULL_WEIGHT_SQUARED_RADII: f32;
 override RIDGE: f32;
 override LEAST_PIVOT: f32;
 
@@ -89,7 +89,7 @@ fn ball_around(center: vec3f, radius: f32, cells_per_radius: f32) -> Ball {
 fn weighed(ball: Ball, per_radius: f32, cluster: vec4f) -> vec4f {
     let offset = (cluster.xyz - ball.center) * per_radius;
     let rest = 1.0 - (offset.x * offset.x + offset.y * offset.y + offset.z * offset.z);
-    let weight = min(rest * (1.0 / (1.0 - FULL)), 1.0) * cluster.w;
+    let weight = min(rest * (1.0 / (1.0 - FULL_WEIGHT_SQUARED_RADII)), 1.0) * cluster.w;
     return select(vec4f(0.0), vec4f(offset, weight), rest > 0.0);
 }
 
@@ -170,13 +170,13 @@ fn plane_beside(ball: Ball, side: vec3f, limit: f32) -> Plane {
 }
 
 // A row of the equations: the columns of xx, xy, yy and 1, the two of the slopes, and the right-hand side.
-struct Row {
+struct EquationRow {
     left: vec4f,
     right: vec3f,
 }
 
-fn without(row: Row, pivot: Row, factor: f32) -> Row {
-    return Row(row.left - factor * pivot.left, row.right - factor * pivot.right);
+fn without(row: EquationRow, pivot: EquationRow, factor: f32) -> EquationRow {
+    return EquationRow(row.left - factor * pivot.left, row.right - factor * pivot.right);
 }
 
 // Sums over clusters for a quadric: weight times the following, in radii, with x and y across the axis and h along it.
@@ -257,12 +257,12 @@ fn quadric_of(ball: Ball, axis: vec3f, curvature: f32) -> Quadric {
     let ridge = RIDGE * w;
     let least = LEAST_PIVOT * w;
     // Slopes come last: eliminating the other rows leaves the slopes' own matrix.
-    let r0 = Row(vec4f(fourth.x + ridge, fourth.y, fourth.z, second.x), vec3f(third.x, third.y, curved.x));
-    var r1 = Row(vec4f(fourth.y, fourth.z + ridge, fourth.w, second.y), vec3f(third.y, third.z, curved.y));
-    var r2 = Row(vec4f(fourth.z, fourth.w, sums.last + ridge, second.z), vec3f(third.z, third.w, curved.z));
-    var r3 = Row(vec4f(second, w), vec3f(first.yz, heights.x));
-    var r4 = Row(vec4f(third.xyz, first.y), vec3f(second.xy, heights.y));
-    var r5 = Row(vec4f(third.yzw, first.z), vec3f(second.yz, heights.z));
+    let r0 = EquationRow(vec4f(fourth.x + ridge, fourth.y, fourth.z, second.x), vec3f(third.x, third.y, curved.x));
+    var r1 = EquationRow(vec4f(fourth.y, fourth.z + ridge, fourth.w, second.y), vec3f(third.y, third.z, curved.y));
+    var r2 = EquationRow(vec4f(fourth.z, fourth.w, sums.last + ridge, second.z), vec3f(third.z, third.w, curved.z));
+    var r3 = EquationRow(vec4f(second, w), vec3f(first.yz, heights.x));
+    var r4 = EquationRow(vec4f(third.xyz, first.y), vec3f(second.xy, heights.y));
+    var r5 = EquationRow(vec4f(third.yzw, first.z), vec3f(second.yz, heights.z));
     var rest = heights.w;
 
     // `least` keeps rounding residues of dependent rows from being divisors.

@@ -6,9 +6,9 @@ const SPARSEST = 1u;
 const ALL = 2u;
 const STEADY_ALL = 3u;
 // Number of parts.
-const PARTS = 4u;
+const SAMPLE_PARTS = 4u;
 
 // Kinds: too few balls for a result; a quantile of all balls; a quantile of the balls in which the surface is thin.
-const NONE_TELL = 0u;
-const ALL_TELL = 1u;
-const THIN_TELL = 2u;
+const TOO_FEW_BALLS = 0u;
+const OF_ALL_BALLS = 1u;
+const OF_THIN_BALLS = 2u;

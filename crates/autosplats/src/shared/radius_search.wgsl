@@ -23,11 +23,11 @@ const CLAMPED_AT_GAP = -3.0;
 const OUT_OF_STEPS = -4.0;
 
 // Least expansion of a radius. Steps of √(k/σ) alone creep towards a single missing neighbour far away.
-const LEAST_GROWTH = 1.15;
+const MIN_EXPANSION = 1.15;
 // Relative width below which a bracket cannot separate distances.
-const NARROWEST = 0x1p-22;
+const MIN_BRACKET_WIDTH_RATIO = 0x1p-22;
 // Least distance whose square does not round to 0.
-const LEAST_DISTANCE = 2e-19;
+const MIN_SQUARABLE_DISTANCE = 2e-19;
 
 // Roots are compared everywhere, not squares: bounds are distances of points.
 fn apart(p: vec3f, q: vec3f) -> f32 {
@@ -58,7 +58,7 @@ fn is_within(search: Search, distance: f32) -> bool {
 // Differs from the paper: α aims at k + 1 neighbours, because any radius from the k-th neighbour to the next will do.
 // Aiming at the k-th itself misses in every second case, which costs an iteration.
 fn expansion(count: f32) -> f32 {
-    return max(sqrt((f32(frame.k) + 1.0) / max(count, 1.0)), LEAST_GROWTH);
+    return max(sqrt((f32(frame.k) + 1.0) / max(count, 1.0)), MIN_EXPANSION);
 }
 
 // Lower end of the samples: a. The textures have no channel for both a and d_max. An expanding radius stores d_max
@@ -85,20 +85,20 @@ fn up_to(distance: f32) -> f32 {
 
 // Data of a point after a gathering pass: its search, as handed on, the distance to the furthest neighbour that
 // answered, and counts.
-struct Known {
+struct GatheredCounts {
     asked: Search,
     furthest: f32,
     // Number of neighbours up to each sample radius.
     counts: vec4f,
 }
 
-fn recall(radii: vec4f, counters: vec4f) -> Known {
+fn recall(radii: vec4f, counters: vec4f) -> GatheredCounts {
     let asked = Search(radii.x, radii.y, radii.z);
-    return Known(asked, max(abs(radii.x), radii.w), max(asked.count, 0.0) + counters);
+    return GatheredCounts(asked, max(abs(radii.x), radii.w), max(asked.count, 0.0) + counters);
 }
 
 // The next step of a search. `others` is the number of all other screen points.
-fn advance(known: Known, initial_radius: f32, others: f32) -> Search {
+fn advance(known: GatheredCounts, initial_radius: f32, others: f32) -> Search {
     let asked = known.asked;
     if has_ended(asked) {
         return asked;
@@ -112,10 +112,10 @@ fn advance(known: Known, initial_radius: f32, others: f32) -> Search {
     return bracket(known);
 }
 
-fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
+fn expand(known: GatheredCounts, initial_radius: f32, others: f32) -> Search {
     let count = known.counts.w;
     let radius = known.asked.high;
-    let is_all = count >= others || radius >= MOST;
+    let is_all = count >= others || radius >= MAX_F32;
     if count == 0.0 {
         let limit = frame.outlier_growth * initial_radius;
         if is_all || radius >= limit {
@@ -123,7 +123,7 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
         }
         // Limited by the gap rule below, so that two neighbours found at once have no gap between them.
         let growth = min(sqrt(max(f32(frame.k), 10.0)), frame.gap_growth);
-        return Search(radius, min(min(radius * growth, limit), MOST), 0.0);
+        return Search(radius, min(min(radius * growth, limit), MAX_F32), 0.0);
     }
     let reach = max(frame.gap_growth * initial_radius, gap_growth_after(u32(count)) * known.furthest);
     if is_all || radius >= reach {
@@ -131,10 +131,10 @@ fn expand(known: Known, initial_radius: f32, others: f32) -> Search {
     }
     // Differs from the paper: no step is wider than a gap, so that none is stepped over.
     let step = min(radius * expansion(count), frame.gap_growth * max(radius, initial_radius));
-    return Search(-known.furthest, min(min(step, reach), MOST), count);
+    return Search(-known.furthest, min(min(step, reach), MAX_F32), count);
 }
 
-fn bracket(known: Known) -> Search {
+fn bracket(known: GatheredCounts) -> Search {
     let k = f32(frame.k);
     let radii = sample_radii(known.asked);
     let counts = known.counts;
@@ -151,14 +151,14 @@ fn bracket(known: Known) -> Search {
     if high.y == k {
         return ended(high.x, FOUND);
     }
-    if high.x - low.x <= NARROWEST * high.x {
+    if high.x - low.x <= MIN_BRACKET_WIDTH_RATIO * high.x {
         return ended(up_to(high.x), FOUND);
     }
     return Search(low.x, high.x, low.y);
 }
 
 // The neighbourhood of a search after the last iteration, whether or not the search has ended.
-fn settle(known: Known, initial_radius: f32, others: f32) -> Search {
+fn settle(known: GatheredCounts, initial_radius: f32, others: f32) -> Search {
     let search = advance(known, initial_radius, others);
     if has_ended(search) {
         return search;

@@ -1,7 +1,7 @@
 // Changes by a depth refinement, so that only changed parts are drawn again [Paper, §7]. Imports: frame.
 
 // Change of a splat.
-const AS_BEFORE = 0u;
+const UNCHANGED = 0u;
 const DIED = 1u;
 const REVIVED = 2u;
 

@@ -5,22 +5,22 @@
 #import surfel
 #import through
 
-override AREA: f32;
-override AREA_NEAR: f32;
+override MIN_AREA_RATIO: f32;
+override MIN_SIDE_AREA_RATIO: f32;
 override BEYOND: f32;
 override LEAST_BEYOND: f32;
 override MOST_BEYOND: f32;
-override BESIDE: f32;
-override HALVES: f32;
-override FLAT: f32;
-override ROW_TILT: f32;
-override OFF_AREA: f32;
-override SEEN_THROUGH: f32;
-override OFF_ROW: f32;
+override SIDE_SLACK_RADII: f32;
+override BALL_OVER_SIDE_WEIGHT: f32;
+override MAX_AREA_HEIGHT_RATIO: f32;
+override MAX_SCAN_LINE_TILT_SINE: f32;
+override AREA_HALF_THICKNESS_RADII: f32;
+override MAX_SEEN_THROUGH_SHARE: f32;
+override MAX_POINT_HEIGHT_RADII: f32;
 override EVEN_WEIGHT: f32;
-override REACH: f32;
-override FARTHEST_REACH: f32;
-override THIN_ROW: f32;
+override SEMI_AXIS_LINE_DISTANCES: f32;
+override MAX_SEMI_AXIS_RADII: f32;
+override THIN_LINE_ASPECT: f32;
 override LONGEST: f32;
 
 struct Area {
@@ -31,8 +31,8 @@ struct Area {
 
 // Whether a plane's points are flat and contain the scan line with direction `row`.
 fn is_flat(plane: Plane, row: vec3f) -> bool {
-    let is_thin = plane.variances.x <= FLAT * plane.variances.y;
-    return is_thin && abs(dot(plane.axis, row)) <= ROW_TILT && abs(dot(plane.axis, plane.mean)) <= OFF_ROW;
+    let is_thin = plane.variances.x <= MAX_AREA_HEIGHT_RATIO * plane.variances.y;
+    return is_thin && abs(dot(plane.axis, row)) <= MAX_SCAN_LINE_TILT_SINE && abs(dot(plane.axis, plane.mean)) <= MAX_POINT_HEIGHT_RADII;
 }
 
 // Whether a plane's points form an area: their width has at least this ratio to their length, by variances.
@@ -42,7 +42,7 @@ fn is_area(plane: Plane, least: f32) -> bool {
 
 // Whether an area is also one in the larger ball, and its weight grows faster than that of a line.
 fn goes_on(near: Plane, radius: f32, far: Plane, beyond: f32) -> bool {
-    return is_area(far, AREA) && far.weight * radius > near.weight * beyond;
+    return is_area(far, MIN_AREA_RATIO) && far.weight * radius > near.weight * beyond;
 }
 
 // Distance between scan lines in k-radii, from the weight of a ball of `in_k_radii`. Points on a line are k-radius /
@@ -58,25 +58,25 @@ fn area_beside(ball: Ball, beyond: Ball, row: vec3f) -> Area {
     var side = select(vec3f(0.0), across_eye * inverseSqrt(length_squared), length_squared > 0.0);
     var found = Area(Plane(), 0.0);
     for (var index = 0; index < 2; index++) {
-        let plane = plane_beside(ball, side, -BESIDE);
+        let plane = plane_beside(ball, side, -SIDE_SLACK_RADII);
         let bend = plane.variances.x * found.plane.variances.y;
         let is_flatter = found.radius == 0.0 || bend < found.plane.variances.x * plane.variances.y;
-        if is_area(plane, AREA_NEAR) && is_flat(plane, row) && is_flatter {
-            if goes_on(plane, ball.radius, plane_beside(beyond, side, -BESIDE), beyond.radius) {
+        if is_area(plane, MIN_SIDE_AREA_RATIO) && is_flat(plane, row) && is_flatter {
+            if goes_on(plane, ball.radius, plane_beside(beyond, side, -SIDE_SLACK_RADII), beyond.radius) {
                 found = Area(plane, ball.radius);
             }
         }
         side = -side;
     }
     // Weight as if the other side were equally full.
-    found.plane.weight *= HALVES;
+    found.plane.weight *= BALL_OVER_SIDE_WEIGHT;
     return found;
 }
 
 // Whether the background shows through a ball's disc square to `axis`.
 fn is_seen_through(ball: Ball, axis: vec3f) -> bool {
-    let cells = seen(ball, axis, OFF_AREA * ball.radius).cells;
-    return cells.y > SEEN_THROUGH * (cells.y + cells.x);
+    let cells = seen(ball, axis, AREA_HALF_THICKNESS_RADII * ball.radius).cells;
+    return cells.y > MAX_SEEN_THROUGH_SHARE * (cells.y + cells.x);
 }
 
 // The area that contains a surfel's scan line, from the first ball that holds an area.
@@ -89,7 +89,7 @@ fn area(surfel: Surfel, least_radius: f32) -> Area {
         radius *= STEP;
         let ball = ball_around(center, radius, CELLS_PER_RADIUS);
         let plane = plane_of(ball);
-        if !is_area(plane, AREA) {
+        if !is_area(plane, MIN_AREA_RATIO) {
             continue;
         }
         let apart = surfel.k_radius * rows_apart(radius / surfel.k_radius, plane.weight);
@@ -112,8 +112,8 @@ fn area(surfel: Surfel, least_radius: f32) -> Area {
 fn turned(surfel: Surfel, found: Area) -> Surfel {
     var out = surfel;
     if found.radius == 0.0 {
-        out.radius = surfel.radius * THIN_ROW;
-        out.major_ratio = 1.0 / THIN_ROW;
+        out.radius = surfel.radius * THIN_LINE_ASPECT;
+        out.major_ratio = 1.0 / THIN_LINE_ASPECT;
         return out;
     }
     let plane = found.plane;
@@ -122,7 +122,7 @@ fn turned(surfel: Surfel, found: Area) -> Surfel {
     out.curvature = curvature_of(plane);
     // The splat radius is 2/√k k-radii.
     let in_k_radii = found.radius / surfel.k_radius;
-    let reach = min(REACH * rows_apart(in_k_radii, plane.weight), FARTHEST_REACH * in_k_radii);
+    let reach = min(SEMI_AXIS_LINE_DISTANCES * rows_apart(in_k_radii, plane.weight), MAX_SEMI_AXIS_RADII * in_k_radii);
     let ratio = reach * (0.5 * sqrt(f32(frame.k)));
     out.radius = surfel.radius * max(ratio / LONGEST, 1.0);
     out.major_ratio = clamp(ratio, 1.0, LONGEST);

@@ -3,15 +3,15 @@
 
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-override FIRST_REACH: f32;
-override SLACK: f32;
+override FIRST_WINDOW_SLACK: f32;
+override PAST_RADIUS_SLACK: f32;
 override MAX_CANDIDATES: u32;
-override CROWDED: u32;
+override MIN_CROWDED_CANDIDATES: u32;
 override BOUND_STEP: f32;
 
 const MIN_POSITIVE = 1.1754943508222875e-38;
 
-struct Task {
+struct SearchTask {
     // First query of the round among those of both rounds.
     first: u32,
     len: u32,
@@ -23,7 +23,7 @@ struct Task {
     cell_columns: u32,
 }
 
-var<workgroup> task: Task;
+var<workgroup> task: SearchTask;
 
 // Index of the counter of the queries left.
 fn left_counter() -> u32 {

@@ -30,7 +30,7 @@ struct Sheet {
 }
 
 // A position relative to a sheet.
-struct Over {
+struct SheetPosition {
     u: vec3f,
     v: vec3f,
     // Coordinates along `u` and `v`, in radii.
@@ -41,7 +41,7 @@ struct Over {
     near: f32,
 }
 
-fn under(sheet: Sheet, place: vec3f) -> Over {
+fn under(sheet: Sheet, place: vec3f) -> SheetPosition {
     let u = any_orthonormal(sheet.axis);
     let v = cross(sheet.axis, u);
     let offset = (place - sheet.center) * (1.0 / sheet.radius);
@@ -50,11 +50,11 @@ fn under(sheet: Sheet, place: vec3f) -> Over {
     let along_x = x * (sheet.bend.x * x + sheet.bend.y * y);
     let along_y = y * (sheet.bend.z * y);
     let height = (sheet.height + along_x + along_y - dot(sheet.axis, offset)) * sheet.radius;
-    return Over(u, v, vec2f(x, y), height, 1.0 - (x * x + y * y));
+    return SheetPosition(u, v, vec2f(x, y), height, 1.0 - (x * x + y * y));
 }
 
 // Unit normal of the sheet at the position.
-fn sheet_normal(sheet: Sheet, over: Over) -> vec3f {
+fn sheet_normal(sheet: Sheet, over: SheetPosition) -> vec3f {
     let slope_x = 2.0 * sheet.bend.x * over.at.x + sheet.bend.y * over.at.y;
     let slope_y = 2.0 * sheet.bend.z * over.at.y + sheet.bend.y * over.at.x;
     return normalize(sheet.axis - over.u * slope_x - over.v * slope_y);

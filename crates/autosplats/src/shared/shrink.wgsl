@@ -3,23 +3,23 @@
 
 #import through
 
-override SPARSE: f32;
-override LONE: f32;
-override AROUND_SPARSE: f32;
-override ASIDE: f32;
-override OFF_MIDDLE: f32;
-override CROWD: f32;
-override STRAY_DOT: f32;
-override STRAY_DROPPED: f32;
+override SPARSE_MEDIAN_K_RADII: f32;
+override ISOLATED_SCORE: f32;
+override WIDER_BALL_K_RADII: f32;
+override MAX_PLANE_DISTANCE_K_RADII: f32;
+override MAX_MEAN_DISTANCE_K_RADII: f32;
+override CROWD_WEIGHT_PER_NEIGHBOR: f32;
+override DOT_OUTLIER_SCORE: f32;
+override DROPPED_OUTLIER_SCORE: f32;
 override DOT_PX: f32;
 override LEAST_ON: f32;
 override ON_DISC: f32;
 override ON_DISC_NOISE: f32;
-override DENSER: f32;
-override GOES_ON: f32;
-override FLAT_AROUND: f32;
-override WIDE_AROUND: f32;
-override ALL_AROUND: f32;
+override MIN_TESTED_FIRST_RADII: f32;
+override SURFACE_BALL_K_RADII: f32;
+override MAX_SURFACE_VARIATION: f32;
+override MIN_SURFACE_WIDTH_RATIO: f32;
+override MAX_SURFACE_MEAN_RADII: f32;
 override CELLS_TO_COUNT: f32;
 override SUPPORT: f32;
 
@@ -38,29 +38,29 @@ fn shrunk(surfel: Surfel, initial_radius: f32) -> f32 {
     }
     let ratio = surfel.k_radius / usual;
     var stray = surfel.curvature * ratio * ratio;
-    let is_sparse = ratio > SPARSE;
+    let is_sparse = ratio > SPARSE_MEDIAN_K_RADII;
     let local = surfel.k_radius / initial_radius;
-    if is_sparse || surfel.curvature * local * local > LONE {
-        let around = plane_of(ball_around(surfel.center, AROUND_SPARSE * surfel.k_radius, CELLS_PER_RADIUS));
+    if is_sparse || surfel.curvature * local * local > ISOLATED_SCORE {
+        let around = plane_of(ball_around(surfel.center, WIDER_BALL_K_RADII * surfel.k_radius, CELLS_PER_RADIUS));
         if is_sparse && around.len >= LEAST_CLUSTERS {
             stray = max(stray, curvature_of(around) * ratio * ratio);
         } else if is_sparse && around.weight < f32(frame.k) {
-            stray = max(stray, STRAY_DOT);
+            stray = max(stray, DOT_OUTLIER_SCORE);
         }
-        let is_crowd = around.weight > CROWD * f32(frame.k);
-        let is_aside = abs(dot(around.axis, around.mean)) * AROUND_SPARSE > ASIDE;
-        let is_outside = length(around.mean) * AROUND_SPARSE > OFF_MIDDLE;
+        let is_crowd = around.weight > CROWD_WEIGHT_PER_NEIGHBOR * f32(frame.k);
+        let is_aside = abs(dot(around.axis, around.mean)) * WIDER_BALL_K_RADII > MAX_PLANE_DISTANCE_K_RADII;
+        let is_outside = length(around.mean) * WIDER_BALL_K_RADII > MAX_MEAN_DISTANCE_K_RADII;
         if around.len >= LEAST_OF_PLANE && is_crowd && (is_aside || is_outside) {
             // Above any limit, in place of infinity, for which WGSL has no literal.
-            stray = 2.0 * STRAY_DROPPED;
+            stray = 2.0 * DROPPED_OUTLIER_SCORE;
         } else if around.len >= LEAST_OF_PLANE && around.len < LEAST_CLUSTERS && is_aside {
-            stray = max(stray, STRAY_DOT);
+            stray = max(stray, DOT_OUTLIER_SCORE);
         }
     }
-    if stray > STRAY_DROPPED && frame.keep_outliers == 0u {
+    if stray > DROPPED_OUTLIER_SCORE && frame.keep_outliers == 0u {
         return 0.0;
     }
-    return select(surfel.radius, dot_radius(surfel), stray >= STRAY_DOT);
+    return select(surfel.radius, dot_radius(surfel), stray >= DOT_OUTLIER_SCORE);
 }
 
 // Radius of a surfel, reduced if few of the points seen at its disc lie on the disc. Unchanged if the surfel belongs to
@@ -80,10 +80,10 @@ fn opened(surfel: Surfel, noise: f32) -> f32 {
     if !(share < LEAST_ON) {
         return surfel.radius;
     }
-    let around = plane_of(ball_around(surfel.center, GOES_ON * surfel.k_radius, CELLS_PER_RADIUS));
-    let is_flat = curvature_of(around) < FLAT_AROUND;
-    let is_wide = around.variances.y > WIDE_AROUND * around.variances.z;
-    let is_all_around = length(around.mean) < ALL_AROUND;
+    let around = plane_of(ball_around(surfel.center, SURFACE_BALL_K_RADII * surfel.k_radius, CELLS_PER_RADIUS));
+    let is_flat = curvature_of(around) < MAX_SURFACE_VARIATION;
+    let is_wide = around.variances.y > MIN_SURFACE_WIDTH_RATIO * around.variances.z;
+    let is_all_around = length(around.mean) < MAX_SURFACE_MEAN_RADII;
     let is_surface = around.len >= LEAST_CLUSTERS && is_flat && is_wide && is_all_around;
     return select(max(surfel.radius * (share / LEAST_ON), least), surfel.radius, is_surface);
 }

@@ -26,7 +26,7 @@ struct Splat {
 const FAN = 16u;
 const FAN_BITS = 4u;
 // Nodes of a tree of 4096 splats.
-const FAMILY = 4369u;
+const NODES_PER_TOP = 4369u;
 // Levels.
 const SPLATS = 0u;
 const LEAVES = 1u;
@@ -37,7 +37,7 @@ const DEAD = 0x8000u;
 
 // Start of a level in `tree`, the top one first. The number of splats is at index 0.
 fn level_start(level: u32) -> u32 {
-    let tops = (arrayLength(&tree) - 1u) / FAMILY;
+    let tops = (arrayLength(&tree) - 1u) / NODES_PER_TOP;
     let nodes_before = select(select(select(0u, 1u, level == RUNS), 17u, level == LEAVES), 273u, level == SPLATS);
     return 1u + nodes_before * tops;
 }

@@ -4,7 +4,7 @@
 #import quadric
 
 // Counts on a disc and behind it.
-struct Seen {
+struct SeenAtDisc {
     // Cells with points on the disc, and other cells with points behind it.
     cells: vec2f,
     // Points on the disc, and behind it. A point behind counts as many as would fall there if it lay on the disc's
@@ -14,7 +14,7 @@ struct Seen {
 
 // Counts on and behind a ball's disc square to `axis`, in the ball's cells. Points within `half_thickness` of the plane
 // are on the disc.
-fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
+fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> SeenAtDisc {
     let start = own_start();
     let step = own_step();
     // Cells and points.
@@ -41,7 +41,7 @@ fn seen(ball: Ball, axis: vec3f, half_thickness: f32) -> Seen {
         }
     }
     let all = all_of_seen(own);
-    return Seen(all.xy, all.zw);
+    return SeenAtDisc(all.xy, all.zw);
 }
 
 // Points of a cluster on the disc, and behind it.

@@ -14,7 +14,7 @@
 @group(0) @binding(4) var<storage, read_write> centers: array<atomic<u32>>;
 
 // Steps along the side of a pixel.
-override STEPS: f32;
+override CENTER_STEPS: f32;
 
 @compute @workgroup_size(256)
 fn add_centers(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -24,6 +24,6 @@ fn add_centers(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     }
     let splat = &splats[index];
     let pixel = pixel_xy((*splat).pixel);
-    let place = vec2u(clamp(STEPS * ((*splat).center_px - vec2f(pixel)), vec2f(0.0), vec2f(STEPS - 1.0)));
+    let place = vec2u(clamp(CENTER_STEPS * ((*splat).center_px - vec2f(pixel)), vec2f(0.0), vec2f(CENTER_STEPS - 1.0)));
     atomicAdd(&centers[pixel.y * frame.size.x + pixel.x], (1u << 24u) | (place.y << 12u) | place.x);
 }

@@ -2,7 +2,7 @@
 
 use autosplats_cloud::FieldValues;
 
-use super::trim::Shown;
+use super::trim::PixelSurface;
 use super::{GBuffer, TILE_AREA};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -142,8 +142,8 @@ impl TileLayers<'_> {
     }
 
     /// The surface at pixel `at` of the tile.
-    pub(super) fn shown(&self, at: usize) -> Shown {
-        Shown { depth: self.depth[at], normal: self.normal[at] }
+    pub(super) fn shown(&self, at: usize) -> PixelSurface {
+        PixelSurface { depth: self.depth[at], normal: self.normal[at] }
     }
 
     /// Empties the tile.

@@ -3,7 +3,7 @@
 //!
 //! A pixel is one integer, so centres may be added in any order by any number of threads. On the device a centre is one
 //! atomic addition. The highest eight bits are the count. Twelve bits each are the sums of rows and columns, in
-//! [`STEPS`] steps a pixel. More than 255 centres in a pixel overflow, which spoils only the border beside it.
+//! [`CENTER_STEPS`] steps a pixel. More than 255 centres in a pixel overflow, which spoils only the border beside it.
 //! Projection leaves at most two, and only adaptation to noise moves centres to other pixels.
 
 use super::bins::Run;
@@ -12,7 +12,7 @@ use super::{TILE, TILE_AREA};
 use crate::fit::Surfel;
 
 /// Steps along the side of a pixel.
-pub(super) const STEPS: f32 = 16.0;
+pub(super) const CENTER_STEPS: f32 = 16.0;
 /// Bits of a sum of steps.
 const SUM_BITS: u32 = 12;
 const SUM_MASK: u32 = (1 << SUM_BITS) - 1;
@@ -20,7 +20,8 @@ const SUM_MASK: u32 = (1 << SUM_BITS) - 1;
 /// The word of one centre in pixel (x, y).
 pub(super) fn one([x, y]: [usize; 2], center_px: [f32; 2]) -> u32 {
     // The centre lies in the pixel up to rounding.
-    let step = |center: f32, pixel: usize| (STEPS * (center - pixel as f32)).clamp(0.0, STEPS - 1.0) as u32;
+    let step =
+        |center: f32, pixel: usize| (CENTER_STEPS * (center - pixel as f32)).clamp(0.0, CENTER_STEPS - 1.0) as u32;
     1 << (2 * SUM_BITS) | step(center_px[1], y) << SUM_BITS | step(center_px[0], x)
 }
 
@@ -30,7 +31,7 @@ pub(super) fn mean(centers: u32) -> (f32, [f32; 2]) {
     let count = (centers >> (2 * SUM_BITS)) as f32;
     let sums = [centers & SUM_MASK, centers >> SUM_BITS & SUM_MASK];
     // From the pixel's middle to the middle of the mean step.
-    (count, sums.map(|sum| (sum as f32 / count.max(1.0) + 0.5) / STEPS - 0.5))
+    (count, sums.map(|sum| (sum as f32 / count.max(1.0) + 0.5) / CENTER_STEPS - 0.5))
 }
 
 /// Fills `centers` with the centres of the splats of `runs` whose pixels lie in `tile`.
@@ -65,7 +66,7 @@ mod tests {
                 let exact = all.clone().map(|place| place[axis]).sum::<f32>() / count as f32;
                 let off = offset[axis] - (exact - [7.5, 3.5][axis]);
                 // Half a step.
-                assert!(off.abs() <= 0.5 / STEPS + 1e-3, "{count} centres, axis {axis}: off by {off}");
+                assert!(off.abs() <= 0.5 / CENTER_STEPS + 1e-3, "{count} centres, axis {axis}: off by {off}");
             }
         }
         let (count, offset) = mean(one([7, 3], [-100.0, 1e9]));

@@ -6,8 +6,8 @@ use super::attributes::{Attributes, TileSums};
 use super::bins::Run;
 use super::centers::add_centers;
 use super::raster::{Tile, draw_attributes, draw_depth};
-use super::setup::RECOVER_REACH;
-use super::trim::blurred::Blurred;
+use super::setup::RECOVER_DISTANCE_RADII;
+use super::trim::blurred::BlurredBorders;
 use super::trim::{EMPTY, Outline, Rim, rim};
 use super::{GBuffer, TILE, TILE_AREA, tile_columns, tiled_index};
 use crate::adapt::Noise;
@@ -68,7 +68,7 @@ impl Splatter {
     pub(crate) fn hides(&self, [x, y]: [usize; 2], depth: f32, initial_radius_px: f32, view: &View) -> bool {
         let [width, height] = [view.width as usize, view.height as usize];
         let hidden = |x: usize, y: usize| depth > self.depth[tiled_index(width, x, y)];
-        let reach = (RECOVER_REACH * initial_radius_px) as usize;
+        let reach = (RECOVER_DISTANCE_RADII * initial_radius_px) as usize;
         hidden(x, y)
             && hidden(x.saturating_sub(reach), y)
             && hidden((x + reach).min(width - 1), y)
@@ -140,7 +140,7 @@ impl Splatter {
         (noise, per_radius): (Noise, f32),
     ) -> (&GBuffer, usize) {
         let Self { rims, centers, layers, .. } = self;
-        let blurred = Blurred::new(noise, per_radius, rims, sixteenths, view);
+        let blurred = BlurredBorders::new(noise, per_radius, rims, sixteenths, view);
         let outline = Outline { rims, centers, sixteenths, view, blurred: blurred.as_ref() };
         let tiles = layers.tiles().into_par_iter().enumerate();
         let covered = tiles.map(|(index, mut layers)| {

@@ -17,7 +17,7 @@
 
 // Whether to draw only the recovered splats.
 override RECOVERED_ONLY: bool;
-override MOST_PX: u32;
+override MAX_INVOCATION_PX: u32;
 
 @compute @workgroup_size(256)
 fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -30,7 +30,7 @@ fn depth(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
         return;
     }
     let area = bounds_area(bounds);
-    if area > MOST_PX {
+    if area > MAX_INVOCATION_PX {
         return;
     }
     let splat = splats[index];

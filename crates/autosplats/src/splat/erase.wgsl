@@ -19,7 +19,7 @@
 @group(0) @binding(5) var<storage, read_write> depth_map: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> cells: array<atomic<u32>>;
 
-override MOST_PX: u32;
+override MAX_INVOCATION_PX: u32;
 
 @compute @workgroup_size(256)
 fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -29,7 +29,7 @@ fn erase(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_inde
     }
     let bounds = living_bounds(tree[level_start(SPLATS) + index]);
     let area = bounds_area(bounds);
-    if area > MOST_PX {
+    if area > MAX_INVOCATION_PX {
         return;
     }
     let splat = splats[index];

@@ -11,18 +11,20 @@
 //! (`shared/splat.wgsl`, `shared/patch.wgsl`). The centres for trimming are counted in integers, again independent of
 //! the order.
 
-use super::centers::STEPS;
+use super::centers::CENTER_STEPS;
 use super::layers::{Channels, LayerBuffers};
 use super::raster::KERNEL_SLOPE;
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST, RECOVER_REACH};
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE, RECOVER_DISTANCE_RADII};
 use super::trim::blurred::{
-    BEYOND_FRINGE, BLOCK_PX, BLURS, FEWEST_BLURRED, FINE_RADIUS_PX, FRINGE_NOISES, LEAST_NOISE_PX, LEAST_RADIUS_PX,
-    OFF_BLURRED, OFF_HALF_WAY, PER_NOISE, PER_VARIANCE, SPREAD, SURE_DISTANCES, SURE_NOISE_PX, TILTED,
-    WIDEST_RADIUS_PX,
+    BLOCK_PX, BLOCKS_BEYOND_FRINGE, BLURRING_NOISE_SHARE, FRINGE_NOISES, FULL_NOISE_SINE, HALF_WAY_OFFSET_SHARE,
+    MAX_BLURRED_OFFSET, MAX_PIXEL_WINDOW_PX, MAX_WINDOW_PX, MIN_BLURRING_NOISE_PX, MIN_WINDOW_PX,
+    MIN_WINDOW_SIXTEENTHS, SPREAD_WEIGHT, SURE_NOISE_DISTANCES, SURE_NOISE_PX, WINDOW_PER_KERNEL_VARIANCE,
+    WINDOW_PER_NOISE_VARIANCE,
 };
 use super::trim::{
-    AROUND_PX, CORE_WEIGHT, FEWEST_POINTS, FEWEST_SPLATS, FINE_POINTS, FURTHEST, INNER_WEIGHT, LEAST_REACH_PX,
-    LEAST_SHARE, LONGEST_ALIGNED, MANY_POINTS, NARROW_PX, OFF_PX, STRIDES_PER_REACH,
+    CORE_WEIGHT, DECISIVE_SIXTEENTHS, EXTRA_STRIDES, FINE_DIRECTION_SIXTEENTHS, INNER_WEIGHT, LINE_LENGTH_REACHES,
+    MAX_ALIGNED_STRIDE_PX, MAX_NARROW_REACH_PX, MAX_SPLAT_MEAN_OFFSET_PX, MIN_SIXTEENTHS, MIN_SPLATS,
+    SIDE_SHARE_DIVISOR, SPLAT_WINDOW_PX, STRIDES_PER_REACH,
 };
 use crate::Error;
 use crate::adapt::gpu::NOISE_FLOATS;
@@ -69,7 +71,7 @@ const TRIM: PassSource = PassSource::new("splat/trim", include_str!("trim.wgsl")
 
 /// Most pixels of a splat's bounds that one invocation draws. On hardware the other invocations of its group wait for
 /// it; on a software device, the second value, a workgroup costs more.
-const MOST_PX: [u32; 2] = [128, 1024];
+const MAX_INVOCATION_PX: [u32; 2] = [128, 1024];
 /// Columns and rows of a patch, and splats that are drawn into it at a time.
 const PATCH: [u32; 2] = [16, 32];
 const BATCH: u32 = 64;
@@ -173,7 +175,7 @@ impl SplatPasses {
     /// [`Error::Device`], [`Error::DeviceMemory`].
     pub(crate) fn new(gpu: &Gpu, channels: Channels, linear: &[f32; 256]) -> Result<Self, Error> {
         let pass = |source: &PassSource| Pass::new(gpu, source, &[]);
-        let most_px = ("MOST_PX", MOST_PX[usize::from(gpu.is_software())].into());
+        let most_px = ("MAX_INVOCATION_PX", MAX_INVOCATION_PX[usize::from(gpu.is_software())].into());
         let dot_radius = ("DOT_RADIUS_PX", f64::from(DOT_RADIUS_PX));
         let set_up = |recovered: f64| {
             let constants = [
@@ -181,9 +183,9 @@ impl SplatPasses {
                 most_px,
                 dot_radius,
                 ("SUPPORT", SUPPORT.into()),
-                ("GRAZING", GRAZING.into()),
+                ("MIN_FACING_COSINE", MIN_FACING_COSINE.into()),
                 ("EPSILON_RADII", EPSILON_RADII.into()),
-                ("NEAREST", NEAREST.into()),
+                ("MAX_AXIS_PER_DEPTH", MAX_AXIS_PER_DEPTH.into()),
             ];
             Pass::new(gpu, &SET_UP, &constants)
         };
@@ -211,43 +213,43 @@ impl SplatPasses {
         let trim = |trims: f64| {
             let constants = [
                 ("TRIMS", trims),
-                ("FURTHEST", FURTHEST.into()),
+                ("LINE_LENGTH_REACHES", LINE_LENGTH_REACHES.into()),
                 ("STRIDES_PER_REACH", STRIDES_PER_REACH.into()),
-                ("LEAST_REACH_PX", LEAST_REACH_PX as f64),
-                ("LONGEST_ALIGNED", LONGEST_ALIGNED as f64),
-                ("LEAST_SHARE", LEAST_SHARE.into()),
-                ("FEWEST_POINTS_NARROW", FEWEST_POINTS[0].into()),
-                ("FEWEST_POINTS_WIDE", FEWEST_POINTS[1].into()),
-                ("MANY_POINTS", MANY_POINTS.into()),
-                ("FINE_POINTS", FINE_POINTS.into()),
-                ("AROUND_PX", AROUND_PX.into()),
-                ("OFF_PX", OFF_PX.into()),
-                ("FEWEST_SPLATS_NARROW", FEWEST_SPLATS[0].into()),
-                ("FEWEST_SPLATS_WIDE", FEWEST_SPLATS[1].into()),
-                ("NARROW_PX", NARROW_PX.into()),
-                ("STEPS", STEPS.into()),
-                ("LEAST_NOISE_PX", LEAST_NOISE_PX.into()),
-                ("LEAST_RADIUS_PX", LEAST_RADIUS_PX.into()),
-                ("PER_VARIANCE", PER_VARIANCE.into()),
-                ("PER_NOISE", PER_NOISE.into()),
-                ("TILTED", TILTED.into()),
-                ("BLURS", BLURS.into()),
-                ("WIDEST_RADIUS_PX", WIDEST_RADIUS_PX.into()),
-                ("FINE_RADIUS_PX", FINE_RADIUS_PX.into()),
-                ("SPREAD", SPREAD.into()),
-                ("OFF_UNSURE", OFF_BLURRED[0].into()),
-                ("OFF_SURE", OFF_BLURRED[1].into()),
+                ("EXTRA_STRIDES", EXTRA_STRIDES as f64),
+                ("MAX_ALIGNED_STRIDE_PX", MAX_ALIGNED_STRIDE_PX as f64),
+                ("SIDE_SHARE_DIVISOR", SIDE_SHARE_DIVISOR.into()),
+                ("MIN_SIXTEENTHS_NARROW", MIN_SIXTEENTHS[0].into()),
+                ("MIN_SIXTEENTHS_WIDE", MIN_SIXTEENTHS[1].into()),
+                ("DECISIVE_SIXTEENTHS", DECISIVE_SIXTEENTHS.into()),
+                ("FINE_DIRECTION_SIXTEENTHS", FINE_DIRECTION_SIXTEENTHS.into()),
+                ("SPLAT_WINDOW_PX", SPLAT_WINDOW_PX.into()),
+                ("MAX_SPLAT_MEAN_OFFSET_PX", MAX_SPLAT_MEAN_OFFSET_PX.into()),
+                ("MIN_SPLATS_NARROW", MIN_SPLATS[0].into()),
+                ("MIN_SPLATS_WIDE", MIN_SPLATS[1].into()),
+                ("MAX_NARROW_REACH_PX", MAX_NARROW_REACH_PX.into()),
+                ("CENTER_STEPS", CENTER_STEPS.into()),
+                ("MIN_BLURRING_NOISE_PX", MIN_BLURRING_NOISE_PX.into()),
+                ("MIN_WINDOW_PX", MIN_WINDOW_PX.into()),
+                ("WINDOW_PER_KERNEL_VARIANCE", WINDOW_PER_KERNEL_VARIANCE.into()),
+                ("WINDOW_PER_NOISE_VARIANCE", WINDOW_PER_NOISE_VARIANCE.into()),
+                ("FULL_NOISE_SINE", FULL_NOISE_SINE.into()),
+                ("BLURRING_NOISE_SHARE", BLURRING_NOISE_SHARE.into()),
+                ("MAX_WINDOW_PX", MAX_WINDOW_PX.into()),
+                ("MAX_PIXEL_WINDOW_PX", MAX_PIXEL_WINDOW_PX.into()),
+                ("SPREAD_WEIGHT", SPREAD_WEIGHT.into()),
+                ("MAX_OFFSET_UNSURE", MAX_BLURRED_OFFSET[0].into()),
+                ("MAX_OFFSET_SURE", MAX_BLURRED_OFFSET[1].into()),
                 ("SURE_NOISE_PX", SURE_NOISE_PX.into()),
-                ("SURE_DISTANCES", SURE_DISTANCES.into()),
-                ("FEWEST_BLURRED", FEWEST_BLURRED.into()),
+                ("SURE_NOISE_DISTANCES", SURE_NOISE_DISTANCES.into()),
+                ("MIN_WINDOW_SIXTEENTHS", MIN_WINDOW_SIXTEENTHS.into()),
                 ("FRINGE_NOISES", FRINGE_NOISES.into()),
-                ("BEYOND_FRINGE", BEYOND_FRINGE.into()),
-                ("OFF_HALF_WAY", OFF_HALF_WAY.into()),
+                ("BLOCKS_BEYOND_FRINGE", BLOCKS_BEYOND_FRINGE.into()),
+                ("HALF_WAY_OFFSET_SHARE", HALF_WAY_OFFSET_SHARE.into()),
                 ("SUPPORT", SUPPORT.into()),
             ];
             Pass::new(gpu, &TRIM, &constants)
         };
-        let reach = [("RECOVER_REACH", RECOVER_REACH.into()), ("MARGIN_REACH", MARGIN_REACH.into())];
+        let reach = [("RECOVER_DISTANCE_RADII", RECOVER_DISTANCE_RADII.into()), ("MARGIN_REACH", MARGIN_REACH.into())];
         let steps = gpu.uniform::<[f32; 256]>("linear values of colours")?;
         gpu.queue.write_buffer(&steps, 0, bytemuck::cast_slice(linear));
         Ok(Self {
@@ -267,7 +269,7 @@ impl SplatPasses {
             erase_large: Pass::new(gpu, &ERASE_LARGE, &[dot_radius])?,
             redraw: Pass::new(gpu, &REDRAW, &[dot_radius, most_px])?,
             attributes: Pass::new(gpu, &ATTRIBUTES, &attributes)?,
-            add_centers: Pass::new(gpu, &ADD_CENTERS, &[("STEPS", STEPS.into())])?,
+            add_centers: Pass::new(gpu, &ADD_CENTERS, &[("CENTER_STEPS", CENTER_STEPS.into())])?,
             sum_blocks: pass(&SUM_BLOCKS)?,
             trim: [trim(0.0)?, trim(1.0)?],
             linear: steps,

@@ -25,7 +25,7 @@ pub(super) const KERNEL_SLOPE: f32 = 0.52;
 const BATCH: usize = 32;
 
 /// Offsets of the pixels of a vector from its first pixel.
-const STEPS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
+const LANE_OFFSETS: [f32; 16] = [0., 1., 2., 3., 4., 5., 6., 7., 8., 9., 10., 11., 12., 13., 14., 15.];
 
 /// Draws the depth, pushed back by ε, of the living splats of `run` that touch `tile` [Paper, §7].
 pub(super) fn draw_depth(run: &Run, tile: Tile, view: &View, depth: &mut [f32]) {
@@ -44,7 +44,7 @@ fn draw_depth_entries_with<'a, S: Simd>(simd: S, run: &'a Run, tile: Tile, view:
         for Row { y, x, end, dx, dy } in rows(splat, tile, S::F32_LANES) {
             let row = &mut depth[y * TILE..][..TILE];
             let brush = brush.row(dy);
-            let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &STEPS, 0);
+            let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &LANE_OFFSETS, 0);
             for vector in x..end {
                 let fragment = brush.fragment(dx);
                 let pushed = fragment.depth + epsilon;
@@ -102,7 +102,7 @@ fn draw_attribute_entries_with<'a, S: Simd>(
             for Row { y, x, end, dx, dy } in rows(splat, tile, S::F32_LANES) {
                 let row = y * TILE..(y + 1) * TILE;
                 let brush = brush.row(dy);
-                let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &STEPS, 0);
+                let mut dx = F32s::splat(simd, dx) + F32s::load(simd, &LANE_OFFSETS, 0);
                 for vector in x..end {
                     let fragment = brush.fragment(dx);
                     dx += F32s::splat(simd, S::F32_LANES as f32);

@@ -21,7 +21,7 @@ fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         let index = block * 2048u + flag;
-        if index < counters[PASSIVE] && (passive[index] & BACK) != 0u {
+        if index < counters[PASSIVE] && (passive[index] & RECOVERED_FLAG) != 0u {
             rank_set(flag);
             is_recovered |= 1u << step;
         }
@@ -30,7 +30,7 @@ fn recover(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     for (var step = 0u; step < 8u; step++) {
         let flag = step * 256u + local;
         if (is_recovered & (1u << step)) != 0u {
-            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * 2048u + flag] & ~BACK;
+            queries[counters[ACTIVE] + block_sums[block] + rank_of(flag)] = passive[block * 2048u + flag] & ~RECOVERED_FLAG;
         }
     }
 }

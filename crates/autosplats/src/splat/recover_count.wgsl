@@ -22,7 +22,7 @@
 @group(0) @binding(6) var<storage, read_write> block_sums: array<u32>;
 
 // In first search radii; see `splat/setup.rs`.
-override RECOVER_REACH: f32;
+override RECOVER_DISTANCE_RADII: f32;
 
 var<workgroup> recovered_points: atomic<u32>;
 
@@ -39,7 +39,7 @@ fn recover_count(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocat
         if index < counters[PASSIVE] {
             let passive_point = passive[index];
             if matters(points[passive_point]) && is_back(points[passive_point]) {
-                passive[index] = passive_point | BACK;
+                passive[index] = passive_point | RECOVERED_FLAG;
                 own += 1u;
             }
         }
@@ -62,7 +62,7 @@ fn is_back(point: ScreenPoint) -> bool {
     let cell_px = counters[CELL_PX];
     let cell = density_cell(pixel, cell_px, counters[CELL_COLUMNS]);
     let last = frame.size - 1u;
-    let reach = u32(min(RECOVER_REACH * first_radius_px(density[cell].x, cell_px), 65535.0));
+    let reach = u32(min(RECOVER_DISTANCE_RADII * first_radius_px(density[cell].x, cell_px), 65535.0));
     let low = pixel - min(pixel, vec2u(reach));
     let high = min(pixel + reach, last);
     return !(is_hidden(low.x | (pixel.y << 16u), depth) && is_hidden(high.x | (pixel.y << 16u), depth)

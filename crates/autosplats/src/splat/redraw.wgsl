@@ -19,7 +19,7 @@
 @group(0) @binding(5) var<storage, read> cells: array<u32>;
 @group(0) @binding(6) var<storage, read_write> depth_map: array<atomic<u32>>;
 
-override MOST_PX: u32;
+override MAX_INVOCATION_PX: u32;
 
 @compute @workgroup_size(256)
 fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -32,7 +32,7 @@ fn redraw(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
         return;
     }
     let area = bounds_area(bounds);
-    if area > MOST_PX || !is_redrawn(index, bounds) {
+    if area > MAX_INVOCATION_PX || !is_redrawn(index, bounds) {
         return;
     }
     let splat = splats[index];

@@ -28,13 +28,13 @@ fn refine(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let before = tree[place].x;
     let bounds = living_bounds(vec2u(before, tree[place].y));
     if is_empty(bounds) {
-        changes[index] = AS_BEFORE;
+        changes[index] = UNCHANGED;
         return;
     }
     let splat = &splats[index];
     let now = select(bounds.x, bounds.x | DEAD, is_hidden((*splat).pixel, (*splat).depth));
     if now == before {
-        changes[index] = AS_BEFORE;
+        changes[index] = UNCHANGED;
         return;
     }
     tree[place].x = now;

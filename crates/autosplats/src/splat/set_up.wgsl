@@ -18,12 +18,12 @@
 // Whether only the recovered surfels are new.
 override RECOVERED_ONLY: bool;
 // Most pixels of a splat's bounds that one invocation draws.
-override MOST_PX: u32;
+override MAX_INVOCATION_PX: u32;
 override DOT_RADIUS_PX: f32;
 override SUPPORT: f32;
-override GRAZING: f32;
+override MIN_FACING_COSINE: f32;
 override EPSILON_RADII: f32;
-override NEAREST: f32;
+override MAX_AXIS_PER_DEPTH: f32;
 
 // Empty bounds: the first pixel lies beyond all, the last is 0.
 const NOWHERE = 0x7fffu;
@@ -42,7 +42,7 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let a = surfel.major_axis;
     let b = vec3f(n.y * a.z - n.z * a.y, n.z * a.x - n.x * a.z, n.x * a.y - n.y * a.x);
     let perspective = frame.perspective == 1u;
-    let most = select(infinity(), NEAREST * c.z, perspective);
+    let most = select(infinity(), MAX_AXIS_PER_DEPTH * c.z, perspective);
     let minor = min(SUPPORT * surfel.radius, most);
     let major = min(SUPPORT * surfel.radius * surfel.major_ratio, most);
     let place = level_start(SPLATS) + index;
@@ -56,12 +56,12 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let b_scale = 1.0 / (focal * minor);
     // How much the disc faces the line of sight, and the shear of each axis along that line.
     var facing = n.z;
-    var least_facing = GRAZING;
+    var least_facing = MIN_FACING_COSINE;
     var along = vec2f(a.z, b.z);
     var plane = vec2f(-n.x, -n.y);
     if perspective {
         facing = n.x * c.x + n.y * c.y + n.z * c.z;
-        least_facing = GRAZING * sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
+        least_facing = MIN_FACING_COSINE * sqrt(c.x * c.x + c.y * c.y + c.z * c.z);
         along = vec2f(a.x * c.x + a.y * c.y + a.z * c.z, b.x * c.x + b.y * c.y + b.z * c.z);
         plane = vec2f(n.x, n.y);
     }
@@ -85,7 +85,7 @@ fn set_up(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
     let y = extent(c.y, c.z, vec2f(axis_a.y, axis_b.y), across, center_px.y, frame.size.y);
     let bounds = vec2u(x, y);
     tree[place] = bounds;
-    if !is_empty(bounds) && bounds_area(bounds) > MOST_PX {
+    if !is_empty(bounds) && bounds_area(bounds) > MAX_INVOCATION_PX {
         large[atomicAdd(&counters[LARGE], 1u)] = index;
     }
     let epsilon = EPSILON_RADII * min(surfel.radius, most);

@@ -18,14 +18,14 @@ pub(super) const DOT_RADIUS_PX: f32 = 0.71;
 /// The surface seen there in the end has to be reconstructed.
 // Differs from the paper: the paper asks at the point's own pixel only. Grid culling then changes more of a picture,
 // and leaves holes.
-pub(super) const RECOVER_REACH: f32 = 1.3;
+pub(super) const RECOVER_DISTANCE_RADII: f32 = 1.3;
 /// Cosine of the angle to the line of sight below which a disc is drawn as a dot, because its gradients are no longer
 /// reliable.
-pub(super) const GRAZING: f32 = 0.01;
+pub(super) const MIN_FACING_COSINE: f32 = 0.01;
 /// Depth tolerance ε in splat radii: layers of one surface blend, layers further apart occlude.
 pub(super) const EPSILON_RADII: f32 = 1.0;
 /// Largest semi-axis of a splat in perspective, as a share of its depth.
-pub(super) const NEAREST: f32 = 0.5;
+pub(super) const MAX_AXIS_PER_DEPTH: f32 = 0.5;
 
 /// A surfel ready to be drawn. Depths and ε are in world units.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,7 +68,7 @@ impl Splat {
         let [nx, ny, nz] = surfel.normal;
         let a = surfel.major_axis;
         let b = [ny * a[2] - nz * a[1], nz * a[0] - nx * a[2], nx * a[1] - ny * a[0]];
-        let most = if view.perspective { NEAREST * cz } else { f32::INFINITY };
+        let most = if view.perspective { MAX_AXIS_PER_DEPTH * cz } else { f32::INFINITY };
         let minor = (SUPPORT * surfel.radius).min(most);
         let major = (SUPPORT * surfel.radius * surfel.major_ratio).min(most);
         if !(minor > 0.0) {
@@ -81,14 +81,14 @@ impl Splat {
         if view.perspective {
             let dot = |p: [f32; 3]| p[0] * cx + p[1] * cy + p[2] * cz;
             facing = dot(surfel.normal);
-            least_facing = GRAZING * (cx * cx + cy * cy + cz * cz).sqrt();
+            least_facing = MIN_FACING_COSINE * (cx * cx + cy * cy + cz * cz).sqrt();
             plane = [nx / (focal * facing), ny / (focal * facing)];
             let [a_shear, b_shear] = [dot(a) / facing, dot(b) / facing];
             u = [(a[0] - nx * a_shear) * a_scale, (a[1] - ny * a_shear) * a_scale];
             v = [(b[0] - nx * b_shear) * b_scale, (b[1] - ny * b_shear) * b_scale];
         } else {
             facing = nz;
-            least_facing = GRAZING;
+            least_facing = MIN_FACING_COSINE;
             plane = [-nx / (focal * nz), -ny / (focal * nz)];
             let [a_shear, b_shear] = [a[2] / nz, b[2] / nz];
             u = [(a[0] - nx * a_shear) * a_scale, (a[1] - ny * a_shear) * a_scale];

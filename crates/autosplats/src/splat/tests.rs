@@ -3,7 +3,7 @@
 use autosplats_cloud::FieldValues;
 use autosplats_cloud::glam::DVec3;
 
-use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, GRAZING, NEAREST};
+use super::setup::{DOT_RADIUS_PX, EPSILON_RADII, MAX_AXIS_PER_DEPTH, MIN_FACING_COSINE};
 use super::{Attributes, GBuffer, PointColors, Splatter};
 use crate::camera::{Camera, Projection, View};
 use crate::fit::{SUPPORT, Surfel};
@@ -34,7 +34,7 @@ struct Hit {
 fn hit(surfel: &Surfel, x: usize, y: usize, view: &View) -> Hit {
     let [center, normal, a] = [surfel.center, surfel.normal, surfel.major_axis].map(vector);
     let b = normal.cross(a);
-    let most = if view.perspective { f64::from(NEAREST) * center.z } else { f64::INFINITY };
+    let most = if view.perspective { f64::from(MAX_AXIS_PER_DEPTH) * center.z } else { f64::INFINITY };
     let minor = f64::from(SUPPORT * surfel.radius).min(most);
     let major = (f64::from(SUPPORT) * f64::from(surfel.radius) * f64::from(surfel.major_ratio)).min(most);
     let focal = f64::from(view.focal_px);
@@ -48,7 +48,7 @@ fn hit(surfel: &Surfel, x: usize, y: usize, view: &View) -> Hit {
     let reach = ((a.z * major).powi(2) + (b.z * minor).powi(2)).sqrt();
     let mut depth = center.z;
     let mut squared = f64::INFINITY;
-    if normal.dot(to_center).abs() > f64::from(GRAZING) {
+    if normal.dot(to_center).abs() > f64::from(MIN_FACING_COSINE) {
         let along = normal.dot(center - origin) / normal.dot(direction);
         let offset = origin + direction * along - center;
         squared = (offset.dot(a) / major).powi(2) + (offset.dot(b) / minor).powi(2);
@@ -65,7 +65,7 @@ fn kernel(squared: f64) -> f64 {
 }
 
 fn epsilon(surfel: &Surfel, view: &View) -> f64 {
-    let most = if view.perspective { NEAREST * surfel.center[2] } else { f32::INFINITY };
+    let most = if view.perspective { MAX_AXIS_PER_DEPTH * surfel.center[2] } else { f32::INFINITY };
     f64::from(EPSILON_RADII * surfel.radius.min(most))
 }
 

@@ -25,7 +25,7 @@ pub(super) mod blurred;
 #[cfg(test)]
 mod tests;
 
-use self::blurred::Blurred;
+use self::blurred::BlurredBorders;
 use super::centers::mean;
 use super::{TILE, TILE_AREA, tiled_index};
 use crate::camera::View;
@@ -38,43 +38,43 @@ pub(super) const CORE_WEIGHT: f32 = 0.68;
 /// pixel. Then no pixel's centre lies in a core.
 pub(super) const INNER_WEIGHT: f32 = 1.3;
 /// Length of a line to each side, in reaches of the pixel's heaviest splat.
-pub(super) const FURTHEST: f32 = 5.0;
+pub(super) const LINE_LENGTH_REACHES: f32 = 5.0;
 /// Strides that a line takes per reach of a splat. A stride is one pixel at least.
 pub(super) const STRIDES_PER_REACH: f32 = 6.0;
 /// Longest stride, in pixels, at which lines of neighbouring pixels stop at the same places.
-pub(super) const LONGEST_ALIGNED: isize = 3;
+pub(super) const MAX_ALIGNED_STRIDE_PX: isize = 3;
 /// Strides added to each line: a structure one pixel wide has cores only here and there along its length.
-pub(super) const LEAST_REACH_PX: usize = 2;
+pub(super) const EXTRA_STRIDES: usize = 2;
 /// Least share on each side of a border line, as a divisor: at least 1/8 of the marked sixteenths around a pixel. With
 /// fewer on any side the pixel is beside the surface. A sixteenth is marked if it holds a point.
-pub(super) const LEAST_SHARE: u32 = 8;
+pub(super) const SIDE_SHARE_DIVISOR: u32 = 8;
 /// Fewest marked sixteenths, of some 50 within a pixel, that can show an open side: around narrow splats, and around
 /// wide ones.
-pub(super) const FEWEST_POINTS: [u32; 2] = [5, 8];
+pub(super) const MIN_SIXTEENTHS: [u32; 2] = [5, 8];
 /// Marked sixteenths from which points alone decide: without an open side the pixel stays.
-pub(super) const MANY_POINTS: u32 = 18;
+pub(super) const DECISIVE_SIXTEENTHS: u32 = 18;
 /// Marked sixteenths from which 16 directions are tested instead of the eight of the lines.
-pub(super) const FINE_POINTS: u32 = 24;
+pub(super) const FINE_DIRECTION_SIXTEENTHS: u32 = 24;
 /// Radius in pixels of the window whose splats are averaged.
-pub(super) const AROUND_PX: f32 = 3.0;
+pub(super) const SPLAT_WINDOW_PX: f32 = 3.0;
 /// Largest offset in pixels of the mean of the splats in the window from the pixel's middle. At the straight end of
 /// evenly scattered points the mean is off by 0.8 pixels. Where a surface curves away, points get ever closer and the
 /// mean is off by less.
-pub(super) const OFF_PX: f32 = 0.7;
+pub(super) const MAX_SPLAT_MEAN_OFFSET_PX: f32 = 0.7;
 /// Fewest splats in the window whose mean decides: around narrow splats, and around wide ones. Around wide splats only
 /// a surface that curves away has so many at its border; a gap among sparse points has fewer.
-pub(super) const FEWEST_SPLATS: [f32; 2] = [3.0, 14.0];
+pub(super) const MIN_SPLATS: [f32; 2] = [3.0, 14.0];
 /// Reach in pixels of the widest narrow splat: points are about two pixels apart then.
-pub(super) const NARROW_PX: f32 = 3.0;
+pub(super) const MAX_NARROW_REACH_PX: f32 = 3.0;
 /// Distance in pixels, along either axis, from the middle of an empty 3×3 square up to which pixels are its border. The
 /// pixels form a square without its corners. A single empty pixel may be a gap between points, which this rule would
 /// widen.
-const BORDER_PX: usize = 3;
+const BORDER_DISTANCE_PX: usize = 3;
 /// Distance in pixels from a single empty pixel up to which pixels are beside a possible gap; a square without its
 /// corners. Only points decide there, and only if an empty pixel lies within this distance on their open side.
-const GAP_PX: usize = 2;
+const GAP_DISTANCE_PX: usize = 2;
 /// Pixels around a tile that its border tests read.
-const MARGIN: usize = BORDER_PX + 1;
+const MARGIN: usize = BORDER_DISTANCE_PX + 1;
 const _: () = assert!(TILE == 64, "a row of a tile is a word");
 /// Directions of the eight lines, in pixels.
 const LINES: [[isize; 2]; 8] = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
@@ -128,7 +128,7 @@ pub(super) fn rim(weight: f32, heaviest: f32, reach_px: f32) -> Rim {
 
 /// Visible surface at a pixel before trimming.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Shown {
+pub(super) struct PixelSurface {
     pub(super) depth: f32,
     /// Unit normal, view space.
     pub(super) normal: [f32; 3],
@@ -136,7 +136,7 @@ pub(super) struct Shown {
 
 /// Kind of emptiness close to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Near {
+pub(super) enum EmptyNearby {
     Nothing,
     /// A single empty pixel, which may be a gap between points.
     Gap,
@@ -146,18 +146,18 @@ pub(super) enum Near {
 
 /// Masks of the pixels of a tile that are close to emptiness: a word per row, the lowest bit for the first column.
 #[derive(Debug)]
-pub(super) struct Edges {
+pub(super) struct EmptyMasks {
     gaps: [u64; TILE],
     borders: [u64; TILE],
 }
 
-impl Edges {
+impl EmptyMasks {
     /// Kind of emptiness close to pixel (x, y) of the tile.
-    pub(super) fn near(&self, [x, y]: [usize; 2]) -> Near {
+    pub(super) fn near(&self, [x, y]: [usize; 2]) -> EmptyNearby {
         match [self.borders, self.gaps].map(|rows| rows[y] >> x & 1 == 1) {
-            [true, _] => Near::Border,
-            [_, true] => Near::Gap,
-            _ => Near::Nothing,
+            [true, _] => EmptyNearby::Border,
+            [_, true] => EmptyNearby::Gap,
+            _ => EmptyNearby::Nothing,
         }
     }
 }
@@ -171,7 +171,7 @@ pub(super) struct Outline<'a> {
     pub(super) sixteenths: &'a Sixteenths,
     pub(super) view: &'a View,
     /// State of borders that noise has blurred; `None` without noise.
-    pub(super) blurred: Option<&'a Blurred>,
+    pub(super) blurred: Option<&'a BlurredBorders>,
 }
 
 impl Outline<'_> {
@@ -184,7 +184,7 @@ impl Outline<'_> {
     }
 
     /// Masks of emptiness for the tile whose upper left pixel is (x0, y0).
-    pub(super) fn edges(&self, [x0, y0]: [usize; 2]) -> Edges {
+    pub(super) fn edges(&self, [x0, y0]: [usize; 2]) -> EmptyMasks {
         let [width, height] = self.size();
         let own = &self.rims[self.index([x0, y0])..][..TILE_AREA];
         // Bits of the empty pixels in a row of the tile with its margin.
@@ -203,7 +203,7 @@ impl Outline<'_> {
         };
         let rows: [u128; TILE + 2 * MARGIN] = std::array::from_fn(empty);
         // Bits of the middles of empty 3×3 squares.
-        let middles: [u128; TILE + 2 * BORDER_PX] = std::array::from_fn(|row| {
+        let middles: [u128; TILE + 2 * BORDER_DISTANCE_PX] = std::array::from_fn(|row| {
             let all = rows[row] & rows[row + 1] & rows[row + 2];
             all & all << 1 & all >> 1
         });
@@ -211,47 +211,47 @@ impl Outline<'_> {
         let wide = |bits: u128| narrow(bits) | bits << 3 | bits >> 3;
         let slim = |bits: u128| bits | bits << 1 | bits >> 1;
         let gaps = |y: usize| {
-            let around = &rows[y + MARGIN - GAP_PX..];
+            let around = &rows[y + MARGIN - GAP_DISTANCE_PX..];
             ((slim(around[0] | around[4]) | narrow(around[1] | around[2] | around[3])) >> MARGIN) as u64
         };
         let borders = |y: usize| {
             let inner = middles[y + 1..y + 6].iter().fold(0, |bits, row| bits | row);
             ((narrow(middles[y] | middles[y + 6]) | wide(inner)) >> MARGIN) as u64
         };
-        Edges { gaps: std::array::from_fn(gaps), borders: std::array::from_fn(borders) }
+        EmptyMasks { gaps: std::array::from_fn(gaps), borders: std::array::from_fn(borders) }
     }
 
     /// Whether pixel (x, y), which shows `shown`, is covered by a splat but by no surface.
-    pub(super) fn sticks_out(&self, x: usize, y: usize, shown: Shown, near: Near) -> bool {
+    pub(super) fn sticks_out(&self, x: usize, y: usize, shown: PixelSurface, near: EmptyNearby) -> bool {
         let own = self.rims[self.index([x, y])];
         if own == EMPTY {
             return false;
         }
         let by_density = self.is_beside_blurred([x, y], shown, own.abs());
         by_density
-            .or_else(|| self.is_beside([x, y], own.abs() > NARROW_PX, near))
+            .or_else(|| self.is_beside([x, y], own.abs() > MAX_NARROW_REACH_PX, near))
             .unwrap_or_else(|| own > 0.0 && self.is_open([x, y], own))
     }
 
     /// Whether pixel (x, y) is beside the surface by the points around; `None` if they do not decide. `wide` states
     /// whether its splat is wide.
-    fn is_beside(&self, [x, y]: [usize; 2], wide: bool, near: Near) -> Option<bool> {
+    fn is_beside(&self, [x, y]: [usize; 2], wide: bool, near: EmptyNearby) -> Option<bool> {
         let [width, height] = self.size();
-        let window = AROUND_PX as usize;
+        let window = SPLAT_WINDOW_PX as usize;
         // Points beyond the screen are unknown.
         let known = x >= window && y >= window && x + window < width && y + window < height;
-        if near == Near::Nothing || !known {
+        if near == EmptyNearby::Nothing || !known {
             return None;
         }
         let points = self.sixteenths.around([x, y]);
         let count = (points & DISC).count_ones();
-        let open = if count < FEWEST_POINTS[usize::from(wide)] { None } else { open_side(points) };
+        let open = if count < MIN_SIXTEENTHS[usize::from(wide)] { None } else { open_side(points) };
         if let Some([dx, dy]) = open {
             let most = dx.abs().max(dy.abs());
             let [dx, dy] = [dx, dy].map(|along| if 2 * along.abs() < most { 0 } else { along.signum() });
             let ahead = |steps: isize| [x.wrapping_add_signed(steps * dx), y.wrapping_add_signed(steps * dy)];
             let is_empty = |at: [usize; 2]| self.rims[self.index(at)] == EMPTY;
-            if near == Near::Gap && !(1..=GAP_PX as isize).any(|steps| is_empty(ahead(steps))) {
+            if near == EmptyNearby::Gap && !(1..=GAP_DISTANCE_PX as isize).any(|steps| is_empty(ahead(steps))) {
                 return None;
             }
             // A thin structure or an isolated point has points in this pixel, and no closed pixel behind it. It stays,
@@ -260,19 +260,19 @@ impl Outline<'_> {
             let stays = !is_empty(behind) && open_side(self.sixteenths.around(behind)).is_none();
             return Some(points & OWN == 0 || stays);
         }
-        if count >= MANY_POINTS {
+        if count >= DECISIVE_SIXTEENTHS {
             return Some(false);
         }
-        if near == Near::Gap {
+        if near == EmptyNearby::Gap {
             return None;
         }
-        let offset = self.splats_offset([x, y], FEWEST_SPLATS[usize::from(wide)])?;
-        Some(square(offset) > OFF_PX * OFF_PX)
+        let offset = self.splats_offset([x, y], MIN_SPLATS[usize::from(wide)])?;
+        Some(square(offset) > MAX_SPLAT_MEAN_OFFSET_PX * MAX_SPLAT_MEAN_OFFSET_PX)
     }
 
     /// Mean offset in pixels of the splats in the window around pixel (x, y); `None` if they are fewer than `fewest`.
     fn splats_offset(&self, [x, y]: [usize; 2], fewest: f32) -> Option<[f32; 2]> {
-        let window = AROUND_PX as usize;
+        let window = SPLAT_WINDOW_PX as usize;
         let mut splats = 0.0;
         let mut sums = [0f32; 3];
         for dy in 0..=2 * window {
@@ -283,7 +283,7 @@ impl Outline<'_> {
                 }
                 let (count, offset) = mean(centers);
                 let [ox, oy] = [offset[0] + (dx as f32 - window as f32), offset[1] + (dy as f32 - window as f32)];
-                let near = (1.0 - square([ox, oy]) / (AROUND_PX * AROUND_PX)).max(0.0);
+                let near = (1.0 - square([ox, oy]) / (SPLAT_WINDOW_PX * SPLAT_WINDOW_PX)).max(0.0);
                 let weight = count * near * near * near;
                 splats += if weight > 0.0 { count } else { 0.0 };
                 sums = [sums[0] + weight, sums[1] + weight * ox, sums[2] + weight * oy];
@@ -299,13 +299,13 @@ impl Outline<'_> {
         // Wide splats have wide cores, which strides do not miss. So the work per pixel is bounded whatever the
         // density.
         let stride = (reach_px / STRIDES_PER_REACH).max(1.0) as isize;
-        let strides = (FURTHEST * reach_px) as usize / stride as usize + LEAST_REACH_PX;
+        let strides = (LINE_LENGTH_REACHES * reach_px) as usize / stride as usize + EXTRA_STRIDES;
         let meets_core = |[dx, dy]: [isize; 2]| {
             // Lines of neighbouring pixels stop at the same places, or borders would be dotted where some lines stride
             // over a core. Long strides are not aligned: places that all lines stride over would show as rays.
             let (along, place) = if dx.abs() == 1 { (dx, x as isize) } else { (dy, y as isize) };
             let beyond = place % stride;
-            let first = match (stride > LONGEST_ALIGNED, along > 0 || beyond == 0) {
+            let first = match (stride > MAX_ALIGNED_STRIDE_PX, along > 0 || beyond == 0) {
                 (true, _) => stride,
                 (false, true) => stride - beyond,
                 (false, false) => beyond,
@@ -346,12 +346,12 @@ impl Outline<'_> {
 fn open_side(points: u64) -> Option<[isize; 2]> {
     let count = |side: u64| (points & side).count_ones();
     let all = count(DISC);
-    let is_few = |count: u32| LEAST_SHARE * count < all.max(1);
+    let is_few = |count: u32| SIDE_SHARE_DIVISOR * count < all.max(1);
     // Quick test: most pixels have points on all sides.
     if !QUARTERS.iter().any(|&quarter| is_few(count(quarter))) {
         return None;
     }
-    let told = if all < FINE_POINTS { LINES.len() } else { ACROSS.len() };
+    let told = if all < FINE_DIRECTION_SIXTEENTHS { LINES.len() } else { ACROSS.len() };
     let sides = |back: usize| (0..told).map(move |at| (count(SIDES[at][back]), back, at));
     let (least, back, at) = sides(0).chain(sides(1)).min()?;
     let sign = [1, -1][back];

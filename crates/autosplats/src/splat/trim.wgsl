@@ -22,28 +22,28 @@
 // 1 to trim, 0 only to count covered pixels.
 override TRIMS: u32;
 // Length of lines in reaches of the splat, strides per reach, and strides added to a line.
-override FURTHEST: f32;
+override LINE_LENGTH_REACHES: f32;
 override STRIDES_PER_REACH: f32;
-override LEAST_REACH_PX: i32;
+override EXTRA_STRIDES: i32;
 // Longest stride at which lines of neighbouring pixels stop at the same places.
-override LONGEST_ALIGNED: i32;
+override MAX_ALIGNED_STRIDE_PX: i32;
 // Marked sixteenths around a pixel: least share on each side, as a divisor; fewest that decide around narrow and wide
 // splats; and how many decide alone.
-override LEAST_SHARE: u32;
-override FEWEST_POINTS_NARROW: u32;
-override FEWEST_POINTS_WIDE: u32;
-override MANY_POINTS: u32;
+override SIDE_SHARE_DIVISOR: u32;
+override MIN_SIXTEENTHS_NARROW: u32;
+override MIN_SIXTEENTHS_WIDE: u32;
+override DECISIVE_SIXTEENTHS: u32;
 // Marked sixteenths from which 16 directions are tested instead of eight.
-override FINE_POINTS: u32;
+override FINE_DIRECTION_SIXTEENTHS: u32;
 // Splats around a pixel: window radius, largest offset of their mean, fewest that decide around narrow and wide splats,
 // and widest narrow reach.
-override AROUND_PX: f32;
-override OFF_PX: f32;
-override FEWEST_SPLATS_NARROW: f32;
-override FEWEST_SPLATS_WIDE: f32;
-override NARROW_PX: f32;
+override SPLAT_WINDOW_PX: f32;
+override MAX_SPLAT_MEAN_OFFSET_PX: f32;
+override MIN_SPLATS_NARROW: f32;
+override MIN_SPLATS_WIDE: f32;
+override MAX_NARROW_REACH_PX: f32;
 // Steps along the side of a pixel.
-override STEPS: f32;
+override CENTER_STEPS: f32;
 
 // Side in pixels of the square of a workgroup.
 const SQUARE = 32u;
@@ -230,7 +230,7 @@ fn blurred_by(place: vec2u, pixel: vec2u, reach_px: f32) -> f32 {
         return 0.0;
     }
     let noise = noise_px(pixel, surface[pixel.y * frame.size.x + pixel.x], reach_px);
-    if !(noise >= LEAST_NOISE_PX) {
+    if !(noise >= MIN_BLURRING_NOISE_PX) {
         return 0.0;
     }
     let margin = u32(ceil(fringe_px(reach_px, noise) / f32(BLOCK_PX))) + 1u;
@@ -257,7 +257,7 @@ fn sticks_out(place: vec2u, pixel: vec2u, own: f32) -> bool {
         answer = is_beside_blurred(pixel, abs(own), noise);
     }
     if answer == SILENT && is_gap(place) {
-        answer = is_beside(pixel, abs(own) > NARROW_PX, is_border(place));
+        answer = is_beside(pixel, abs(own) > MAX_NARROW_REACH_PX, is_border(place));
     }
     if answer == SILENT {
         return own > EMPTY_RIM && is_open(vec2i(pixel), own);
@@ -273,7 +273,7 @@ const NO = 2u;
 // Whether a pixel is beside the surface by the points around. `wide` states whether its splat is wide, `border` whether
 // an empty 3×3 square is close.
 fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
-    let window = u32(AROUND_PX);
+    let window = u32(SPLAT_WINDOW_PX);
     // Points beyond the screen are unknown.
     if any(pixel < vec2u(window)) || any(pixel + window >= frame.size) {
         return SILENT;
@@ -281,7 +281,7 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
     let points = around(pixel);
     let of_disc = count_disc(points);
     let open = open_side(points);
-    if of_disc >= select(FEWEST_POINTS_NARROW, FEWEST_POINTS_WIDE, wide) && open < 2u * DIRECTIONS {
+    if of_disc >= select(MIN_SIXTEENTHS_NARROW, MIN_SIXTEENTHS_WIDE, wide) && open < 2u * DIRECTIONS {
         let towards = across(open);
         let steep = 2 * abs(towards) >= vec2i(max(abs(towards.x), abs(towards.y)));
         let step = select(vec2i(0), sign(towards), steep);
@@ -296,13 +296,13 @@ fn is_beside(pixel: vec2u, wide: bool, border: bool) -> u32 {
         let behind = vec2u(vec2i(pixel) - step);
         return select(NO, YES, !is_empty(behind) && open_side(around(behind)) == 2u * DIRECTIONS);
     }
-    if of_disc >= MANY_POINTS {
+    if of_disc >= DECISIVE_SIXTEENTHS {
         return NO;
     }
     if !border {
         return SILENT;
     }
-    return mean_of_splats(pixel, select(FEWEST_SPLATS_NARROW, FEWEST_SPLATS_WIDE, wide));
+    return mean_of_splats(pixel, select(MIN_SPLATS_NARROW, MIN_SPLATS_WIDE, wide));
 }
 
 fn is_empty(pixel: vec2u) -> bool {
@@ -321,7 +321,7 @@ fn count_disc(points: vec2u) -> u32 {
 // The side with the fewest marked sixteenths around a pixel; twice `DIRECTIONS` if every side has enough.
 fn open_side(points: vec2u) -> u32 {
     let all = count_disc(points);
-    let told = select(DIRECTIONS, LINES, all < FINE_POINTS);
+    let told = select(DIRECTIONS, LINES, all < FINE_DIRECTION_SIXTEENTHS);
     var open = 0u;
     var least = all;
     for (var at = 0u; at < 2u * told; at++) {
@@ -332,7 +332,7 @@ fn open_side(points: vec2u) -> u32 {
             least = there;
         }
     }
-    return select(2u * DIRECTIONS, open, LEAST_SHARE * least < max(all, 1u));
+    return select(2u * DIRECTIONS, open, SIDE_SHARE_DIVISOR * least < max(all, 1u));
 }
 
 // Marked sixteenths of the 8×8 around a pixel's middle, a bit each, row by row.
@@ -356,7 +356,7 @@ fn of_pixel_at(index: u32) -> u32 {
 
 // Whether the mean of the splats around a pixel is far from its middle; `SILENT` if they are too few.
 fn mean_of_splats(pixel: vec2u, fewest: f32) -> u32 {
-    let window = u32(AROUND_PX);
+    let window = u32(SPLAT_WINDOW_PX);
     var splats = 0.0;
     var sum = 0.0;
     var offsets = vec2f(0.0);
@@ -364,7 +364,7 @@ fn mean_of_splats(pixel: vec2u, fewest: f32) -> u32 {
         for (var x = 0u; x <= 2u * window; x++) {
             let there = centers_of(pixel + vec2u(x, y) - window);
             let offset = there.xy + (vec2f(vec2u(x, y)) - f32(window));
-            let near = max(1.0 - dot(offset, offset) / (AROUND_PX * AROUND_PX), 0.0);
+            let near = max(1.0 - dot(offset, offset) / (SPLAT_WINDOW_PX * SPLAT_WINDOW_PX), 0.0);
             let weight = there.z * near * near * near;
             splats += select(0.0, there.z, weight > 0.0);
             sum += weight;
@@ -375,7 +375,7 @@ fn mean_of_splats(pixel: vec2u, fewest: f32) -> u32 {
         return SILENT;
     }
     let offset = offsets / sum;
-    return select(NO, YES, dot(offset, offset) > OFF_PX * OFF_PX);
+    return select(NO, YES, dot(offset, offset) > MAX_SPLAT_MEAN_OFFSET_PX * MAX_SPLAT_MEAN_OFFSET_PX);
 }
 
 // Offset in pixels of the mean of a pixel's centres from its middle, and their number.
@@ -383,13 +383,13 @@ fn centers_of(pixel: vec2u) -> vec3f {
     let bits = centers[pixel.y * frame.size.x + pixel.x];
     let count = f32(bits >> 24u);
     let sums = vec2f(vec2u(bits, bits >> 12u) & vec2u(0xfffu));
-    return vec3f((sums / max(count, 1.0) + 0.5) / STEPS - 0.5, count);
+    return vec3f((sums / max(count, 1.0) + 0.5) / CENTER_STEPS - 0.5, count);
 }
 
 fn is_open(pixel: vec2i, own: f32) -> bool {
     // Wide splats have wide cores, which strides do not miss. So the work per pixel is bounded whatever the density.
     let stride = i32(max(own / STRIDES_PER_REACH, 1.0));
-    let strides = i32(FURTHEST * own) / stride + LEAST_REACH_PX;
+    let strides = i32(LINE_LENGTH_REACHES * own) / stride + EXTRA_STRIDES;
     // A pixel without any core on its lines, such as that of an isolated point, sticks out of nothing.
     var is_tail = false;
     for (var line = 0u; line < LINES; line++) {
@@ -410,7 +410,7 @@ fn meets_core(origin: vec2i, direction: vec2i, stride: i32, strides: i32) -> boo
     let beyond = select(origin.y, origin.x, by_x) % stride;
     let is_up = select(direction.y, direction.x, by_x) > 0;
     let aligned = select(beyond, stride - beyond, is_up || beyond == 0);
-    let first = select(aligned, stride, stride > LONGEST_ALIGNED);
+    let first = select(aligned, stride, stride > MAX_ALIGNED_STRIDE_PX);
     for (var at = 0; at < strides; at++) {
         let pixel = origin + direction * (first + at * stride);
         if any(pixel < vec2i(0)) || any(pixel >= vec2i(frame.size)) {

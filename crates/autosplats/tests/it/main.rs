@@ -1,4 +1,5 @@
-//! The tests of the public interface, in one program: each further one is linked for itself, with all that the crate stands on.
+//! The tests of the public interface, in one program: each further one is linked for itself, with all that the crate
+//! stands on.
 
 mod backends;
 mod kd_tree;

@@ -9,7 +9,7 @@ use super::{
     super::{
         Job,
         placed::{fill, place},
-        table::{MAX_COLUMNS, Part},
+        table::{MAX_COLUMNS, ProgressRange},
     },
     colors::{Colors, color_fields},
     element::{Kind, Stored},
@@ -177,7 +177,7 @@ impl Dropped {
 /// Passes the points of a scan to the caller as preview chunks.
 pub(super) fn preview(job: &Job<'_>, source: &Source<'_>) -> Result<(), Error> {
     let quiet = Job { progress: &(), ..*job };
-    let part = Part { start: 0.0, len: 0.0 };
+    let part = ProgressRange { start: 0.0, len: 0.0 };
     let colors = Colors::new(&quiet, source);
     for start in (0..source.len()).step_by(CHUNK) {
         let lens = [CHUNK.min(source.len() - start)];
@@ -198,7 +198,7 @@ pub(super) fn cloud(job: &Job<'_>, sources: &[Source<'_>], trusted: bool, done: 
     let bytes: usize = fields.iter().map(|field| field.kind.size()).sum();
     job.check_memory(total, 12 + 3 + bytes + if job.options.exact { 12 + 6 } else { 0 })?;
     let steps = 2.0 + fields.len() as f32;
-    let part = |step: f32| Part { start: done + (1.0 - done) * step / steps, len: (1.0 - done) / steps };
+    let part = |step: f32| ProgressRange { start: done + (1.0 - done) * step / steps, len: (1.0 - done) / steps };
 
     let mut cloud = place(job, &lens, part(0.0), |index| move |i| sources[index].world(i))?;
     cloud = color_fields(job, sources, &lens, cloud, part(1.0))?;
@@ -257,22 +257,22 @@ pub(super) fn is_of_scanner(header: &ScanHeader, trusted: bool) -> bool {
 }
 
 /// A field of the cloud, and the scans that have it.
-struct Wanted {
+struct MergedField {
     name: String,
     kind: Kind,
     /// Pairs of scan index, ascending, and source of the values.
-    taken: Vec<(usize, Taken)>,
+    taken: Vec<(usize, FieldSource)>,
 }
 
-impl Wanted {
-    fn of(&self, scan: usize) -> Option<Taken> {
+impl MergedField {
+    fn of(&self, scan: usize) -> Option<FieldSource> {
         self.taken.binary_search_by_key(&scan, |(index, _)| *index).ok().map(|found| self.taken[found].1)
     }
 }
 
 /// Source of a field's value in a scan.
 #[derive(Clone, Copy)]
-enum Taken {
+enum FieldSource {
     /// The element's value plus a constant.
     Plain { element: usize, add: i64 },
     /// A time that counts from `start`, unless the element `invalid` marks it as invalid.
@@ -281,7 +281,7 @@ enum Taken {
     Normal { elements: [usize; 3], row: DVec3 },
 }
 
-impl Taken {
+impl FieldSource {
     fn integer(self, source: &Source<'_>, value: usize) -> i64 {
         match self {
             Self::Plain { element, add } => source.values.streams[element].integer(value).wrapping_add(add),
@@ -327,8 +327,8 @@ const NO_FIELDS: [&str; 11] = [
 ];
 
 /// The fields of all scans, in order of appearance.
-fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<Wanted> {
-    let mut fields: Vec<Wanted> = Vec::new();
+fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<MergedField> {
+    let mut fields: Vec<MergedField> = Vec::new();
     let mut by_name: HashMap<String, usize> = HashMap::new();
     let mut left_out = 0;
     for (index, source) in sources.iter().enumerate() {
@@ -336,7 +336,7 @@ fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<Wanted> {
             let next = fields.len();
             let at = *by_name.entry(name.clone()).or_insert(next);
             match fields.get_mut(at) {
-                None if at < MAX_COLUMNS => fields.push(Wanted { name, kind, taken: vec![(index, taken)] }),
+                None if at < MAX_COLUMNS => fields.push(MergedField { name, kind, taken: vec![(index, taken)] }),
                 None => {
                     by_name.remove(&name);
                     left_out += 1;
@@ -357,15 +357,15 @@ fn fields(job: &Job<'_>, sources: &[Source<'_>]) -> Vec<Wanted> {
 }
 
 /// Drops fields that some scans lack if filling them up would take more memory than the file's size justifies.
-fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<Wanted>) {
+fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<MergedField>) {
     let total: usize = sources.iter().map(Source::len).sum();
     let mut budget = job.bytes.len().saturating_mul(8).saturating_add(1 << 20);
     let (mut filled, mut dropped) = (Vec::new(), Vec::new());
     fields.retain_mut(|field| {
-        let stored = |&(index, taken): &(usize, Taken)| {
+        let stored = |&(index, taken): &(usize, FieldSource)| {
             let element = match taken {
-                Taken::Plain { element, .. } | Taken::Time { element, .. } => element,
-                Taken::Normal { elements, .. } => elements[0],
+                FieldSource::Plain { element, .. } | FieldSource::Time { element, .. } => element,
+                FieldSource::Normal { elements, .. } => elements[0],
             };
             let source = &sources[index];
             (source.len(), source.header.elements[element].stored.bits() == 0)
@@ -403,7 +403,7 @@ fn limit_fill(job: &Job<'_>, sources: &[Source<'_>], fields: &mut Vec<Wanted>) {
 }
 
 /// The fields of one scan: names, value types and sources.
-fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, Taken)> {
+fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, FieldSource)> {
     let header = source.header;
     let rows = DMat3::from_mat4(source.pose).transpose();
     let normals = ["normalX", "normalY", "normalZ"]
@@ -412,7 +412,7 @@ fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, Taken)> {
         [Some(x), Some(y), Some(z)] => Some([x, y, z]),
         _ => None,
     };
-    let mut fields: Vec<(String, Kind, Taken)> = Vec::new();
+    let mut fields: Vec<(String, Kind, FieldSource)> = Vec::new();
     for (index, element) in header.elements.iter().enumerate() {
         let kind = Kind::of(element.stored, job.options.exact);
         // A constant zero carries no information.
@@ -424,7 +424,7 @@ fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, Taken)> {
         }
         if let Some(axis) = normals.and_then(|normals| normals.iter().position(|&normal| normal == index)) {
             let turned = if source.pose == DMat4::IDENTITY { DMat3::IDENTITY } else { rows };
-            let taken = Taken::Normal { elements: normals.unwrap_or_default(), row: turned.col(axis) };
+            let taken = FieldSource::Normal { elements: normals.unwrap_or_default(), row: turned.col(axis) };
             let kind = if kind == Kind::Single { kind } else { Kind::Double };
             fields.push((format!("Normal{}", ["X", "Y", "Z"][axis]), kind, taken));
             continue;
@@ -433,15 +433,17 @@ fn of_scan(job: &Job<'_>, source: &Source<'_>) -> Vec<(String, Kind, Taken)> {
             Kind::Integer { min, max } => Kind::Integer { min: min.saturating_add(1), max: max.saturating_add(1) },
             other => other,
         };
-        let plain = Taken::Plain { element: index, add: 0 };
+        let plain = FieldSource::Plain { element: index, add: 0 };
         let (name, kind, taken) = match (&element.prefix, &*element.name) {
             (None, "intensity") => ("Intensity".into(), kind, plain),
             // E57 counts returns from 0.
-            (None, "returnIndex") => ("ReturnNumber".into(), add_one(kind), Taken::Plain { element: index, add: 1 }),
+            (None, "returnIndex") => {
+                ("ReturnNumber".into(), add_one(kind), FieldSource::Plain { element: index, add: 1 })
+            }
             (None, "returnCount") => ("NumberOfReturns".into(), kind, plain),
             (None, "timeStamp") => {
                 let (start, invalid) = (header.start.unwrap_or(0.0), header.element("isTimeStampInvalid"));
-                ("GpsTime".into(), Kind::Double, Taken::Time { element: index, start, invalid })
+                ("GpsTime".into(), Kind::Double, FieldSource::Time { element: index, start, invalid })
             }
             (None, "isTimeStampInvalid") if header.element("timeStamp").is_some() => continue,
             _ if fields.iter().any(|(name, ..)| *name == element.name) => (element.full_name(), kind, plain),

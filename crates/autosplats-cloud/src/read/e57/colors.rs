@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{
-    super::{Job, placed::fill, table::Part},
+    super::{Job, placed::fill, table::ProgressRange},
     cloud::Source,
     element::Stored,
 };
@@ -100,7 +100,7 @@ pub(super) fn color_fields(
     sources: &[Source<'_>],
     lens: &[usize],
     mut cloud: PointCloud,
-    part: Part,
+    part: ProgressRange,
 ) -> Result<PointCloud, Error> {
     let colors: Vec<_> = sources.iter().map(|source| Colors::new(job, source)).collect();
     if colors.iter().all(Option::is_none) {
@@ -116,7 +116,7 @@ pub(super) fn color_fields(
     })?;
     cloud = cloud.with_colors(bytes)?;
     if job.options.exact && !colors.iter().flatten().all(Colors::narrow) {
-        let part = Part { start: part.start + part.len, len: 0.0 };
+        let part = ProgressRange { start: part.start + part.len, len: 0.0 };
         for (channel, name) in ["Red", "Green", "Blue"].into_iter().enumerate() {
             let wide = fill(job, name, lens, part, |index| {
                 let colors = &colors[index];

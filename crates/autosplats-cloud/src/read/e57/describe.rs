@@ -11,7 +11,7 @@ use super::{
 use crate::{Error, Scan};
 
 /// Largest number of scans described one by one.
-const LISTED: usize = 100;
+const MAX_DESCRIBED_SCANS: usize = 100;
 
 pub(super) fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let (pages, root) = open(job)?;
@@ -63,7 +63,7 @@ fn details(root: &Root) -> Vec<(String, String)> {
         let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
         add("images", Some(format!("{}{names}; not read", root.images.len())));
     }
-    for (index, scan) in root.scans.iter().enumerate().take(LISTED) {
+    for (index, scan) in root.scans.iter().enumerate().take(MAX_DESCRIBED_SCANS) {
         let mut facts = vec![format!("{} points", scan.points)];
         if let Some([row, column]) = scan.indices {
             facts.push(format!("rows {} to {}, columns {} to {}", row[0], row[1], column[0], column[1]));

@@ -23,7 +23,7 @@ use crate::Error;
 const MAGIC: &[u8] = b"ASTM-E57";
 
 /// Largest number of losses in scans that are noted one by one.
-const TOLD: usize = 10;
+const MAX_NOTED_LOSSES: usize = 10;
 
 /// Fraction of the work that joining the streams takes.
 const GATHERING: f32 = 0.4;
@@ -78,9 +78,9 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
         }
         told.extend(faults.iter().map(|(scan, place, what)| format!("{scan} is left out: {place}: {what}")));
     }
-    told.iter().take(TOLD).for_each(|note| job.note(note));
-    if told.len() > TOLD {
-        job.note(format!("{} more losses in scans", told.len() - TOLD));
+    told.iter().take(MAX_NOTED_LOSSES).for_each(|note| job.note(note));
+    if told.len() > MAX_NOTED_LOSSES {
+        job.note(format!("{} more losses in scans", told.len() - MAX_NOTED_LOSSES));
     }
     dropped.note(job);
     Ok(cloud::cloud(job, &sources, root.is_ours(), GATHERING)?.with_crs(root.crs).into())

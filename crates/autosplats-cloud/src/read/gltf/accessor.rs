@@ -2,7 +2,7 @@
 
 use super::super::{
     Job,
-    table::{Part, Scalar, collect},
+    table::{ProgressRange, Scalar, collect},
 };
 use super::{
     buffers::Buffers,
@@ -113,7 +113,7 @@ impl<'a> Values<'a> {
     }
 
     /// The elements as vectors: missing numbers are 0, surplus numbers are dropped.
-    pub(super) fn vectors(&self, job: &Job<'_>, part: Part) -> Result<Vec<[f32; 3]>, Error> {
+    pub(super) fn vectors(&self, job: &Job<'_>, part: ProgressRange) -> Result<Vec<[f32; 3]>, Error> {
         let mut vectors =
             collect("vertices", self.count, job, part, |i| self.base.vector(i, self.width, self.normalized))?;
         self.replace(job, |to, values, from| vectors[to] = values.vector(from, self.width, self.normalized))?;
@@ -121,7 +121,7 @@ impl<'a> Values<'a> {
     }
 
     /// All numbers, element by element.
-    pub(super) fn numbers(&self, job: &Job<'_>, part: Part) -> Result<Vec<f64>, Error> {
+    pub(super) fn numbers(&self, job: &Job<'_>, part: ProgressRange) -> Result<Vec<f64>, Error> {
         let width = self.width;
         let count = self.count.saturating_mul(width);
         let mut numbers = collect("numbers", count, job, part, |i| {
@@ -136,7 +136,7 @@ impl<'a> Values<'a> {
     }
 
     /// The numbers as indices.
-    pub(super) fn indices(&self, job: &Job<'_>, part: Part) -> Result<Vec<u32>, Error> {
+    pub(super) fn indices(&self, job: &Job<'_>, part: ProgressRange) -> Result<Vec<u32>, Error> {
         if !matches!(self.base.scalar, Scalar::U8 | Scalar::U16 | Scalar::U32) {
             return Err(job.malformed(&self.place, "indices must be unsigned integers; export the file again"));
         }

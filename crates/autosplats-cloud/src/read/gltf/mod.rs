@@ -20,12 +20,12 @@ use self::{
     animation::Pose,
     buffers::Buffers,
     json::{Attributes, Container, Root},
-    plan::{FAN, Plan, STRIP, Shown, TRIANGLES},
+    plan::{FAN, PlacedPrimitive, Plan, STRIP, TRIANGLES},
 };
 use super::{
     Attribute, Contents, Description, Format, Job,
     mesh::{self, Faces},
-    table::{Part, reserve},
+    table::{ProgressRange, reserve},
 };
 use crate::{Axes, Crs, Error, FieldValues, Unit, merge::normal_matrix};
 
@@ -39,8 +39,8 @@ pub(super) const FORMAT: Format = Format {
 };
 
 /// Progress of a step within a primitive. There are many primitives, so a step takes no share of its own.
-fn part(start: f32) -> Part {
-    Part { start, len: 0.0 }
+fn part(start: f32) -> ProgressRange {
+    ProgressRange { start, len: 0.0 }
 }
 
 fn crs() -> Crs {
@@ -153,7 +153,7 @@ struct Scene<'a> {
     job: &'a Job<'a>,
     root: &'a Root<'a>,
     buffers: &'a Buffers<'a>,
-    part: Part,
+    part: ProgressRange,
 }
 
 impl Scene<'_> {
@@ -161,7 +161,7 @@ impl Scene<'_> {
     fn morphed(
         &self,
         index: usize,
-        shown: &Shown<'_>,
+        shown: &PlacedPrimitive<'_>,
         of_target: impl Fn(&Attributes) -> Option<usize>,
     ) -> Result<Vec<[f32; 3]>, Error> {
         let mut vectors = self.vectors(index, &[3], Some(shown.count))?;
@@ -199,8 +199,8 @@ struct Points {
 impl Points {
     fn new(job: &Job<'_>, root: &Root<'_>, plan: &Plan<'_>) -> Result<Self, Error> {
         let what = "the points of a glTF";
-        let has = |shown: &Shown<'_>| shown.primitive.attributes;
-        let colored = |shown: &Shown<'_>| has(shown).color.is_some() || base_color(root, shown) != [1.0; 3];
+        let has = |shown: &PlacedPrimitive<'_>| shown.primitive.attributes;
+        let colored = |shown: &PlacedPrimitive<'_>| has(shown).color.is_some() || base_color(root, shown) != [1.0; 3];
         let mut colors = plan.shown.iter().any(colored).then(Vec::new);
         let normal = plan.shown.iter().filter(|shown| has(shown).normal.is_some()).count();
         if normal > 0 && normal < plan.shown.len() {
@@ -214,7 +214,7 @@ impl Points {
         Ok(Self { positions, colors, normals })
     }
 
-    fn add(&mut self, scene: &Scene<'_>, shown: &Shown<'_>) -> Result<(), Error> {
+    fn add(&mut self, scene: &Scene<'_>, shown: &PlacedPrimitive<'_>) -> Result<(), Error> {
         let Attributes { position, normal, color } = shown.primitive.attributes;
         let Some(position) = position else { return Ok(()) };
         let local = scene.morphed(position, shown, |target| target.position)?;
@@ -244,7 +244,7 @@ impl Points {
     }
 }
 
-fn base_color(root: &Root<'_>, shown: &Shown<'_>) -> [f32; 3] {
+fn base_color(root: &Root<'_>, shown: &PlacedPrimitive<'_>) -> [f32; 3] {
     let material = shown.primitive.material.and_then(|index| root.materials.get(index));
     material.map_or([1.0; 3], |material| material.base_color())
 }
@@ -255,7 +255,7 @@ fn srgb(linear: f32) -> u16 {
     (value * 65535.0 + 0.5) as u16
 }
 
-fn add_faces(scene: &Scene<'_>, shown: &Shown<'_>, faces: &mut Faces) -> Result<(), Error> {
+fn add_faces(scene: &Scene<'_>, shown: &PlacedPrimitive<'_>, faces: &mut Faces) -> Result<(), Error> {
     let mode = shown.primitive.mode;
     if !matches!(mode, TRIANGLES | STRIP | FAN) {
         return Ok(());

@@ -14,13 +14,13 @@ use crate::Error;
 const MAX_POINTS_PER_BYTE: usize = 64;
 
 /// Number of points, and of primitives, that is allowed for files of any size.
-const ALWAYS: usize = 1 << 16;
+const ALWAYS_ALLOWED: usize = 1 << 16;
 
 /// Least bytes of the file per placed primitive, beyond those allowed for any file. A node with a mesh takes more.
 const BYTES_PER_SHOWN: usize = 8;
 
 /// A primitive at one of its places.
-pub(super) struct Shown<'a> {
+pub(super) struct PlacedPrimitive<'a> {
     pub(super) primitive: &'a Primitive,
     pub(super) world_from_mesh: DMat4,
     /// Index of its first point.
@@ -33,7 +33,7 @@ pub(super) struct Shown<'a> {
     pub(super) weights: Rc<[f64]>,
 }
 
-impl<'a> Shown<'a> {
+impl<'a> PlacedPrimitive<'a> {
     /// The morph targets with a weight other than zero, and these weights.
     pub(super) fn targets(&self) -> impl Iterator<Item = (&'a Attributes, f64)> {
         self.primitive.targets.iter().zip(self.weights.iter().copied()).filter(|(_, weight)| *weight != 0.0)
@@ -43,7 +43,7 @@ impl<'a> Shown<'a> {
 /// Everything that the scene shows.
 #[derive(Default)]
 pub(super) struct Plan<'a> {
-    pub(super) shown: Vec<Shown<'a>>,
+    pub(super) shown: Vec<PlacedPrimitive<'a>>,
     pub(super) points: usize,
     /// Corners of triangles, strips and fans.
     pub(super) corners: usize,
@@ -70,7 +70,7 @@ impl<'a> Plan<'a> {
         let mut plan = Self::default();
         let (mut lines, mut morphed) = (0, 0);
         let places = places(job, root, pose, &mut plan.notes)?;
-        let most = (job.bytes.len() / BYTES_PER_SHOWN).max(ALWAYS);
+        let most = (job.bytes.len() / BYTES_PER_SHOWN).max(ALWAYS_ALLOWED);
         let mut looked_at = 0;
         for (mesh, world_from_mesh, node) in places {
             let Some(mesh) = root.meshes.get(mesh) else {
@@ -120,7 +120,7 @@ impl<'a> Plan<'a> {
                 morphed += usize::from(!primitive.targets.is_empty() && pose.is_none());
                 let count = accessor.count;
                 let (shared, weights) = (shared.is_some(), Rc::clone(&weights));
-                plan.shown.push(Shown { primitive, world_from_mesh, first, count, shared, weights });
+                plan.shown.push(PlacedPrimitive { primitive, world_from_mesh, first, count, shared, weights });
             }
         }
         if lines > 0 {
@@ -134,8 +134,8 @@ impl<'a> Plan<'a> {
 
     /// Fails if meshes are placed so often that a small file would fill the memory.
     pub(super) fn check_size(&self, job: &Job<'_>, bytes: usize) -> Result<(), Error> {
-        let bound = bytes.saturating_mul(MAX_POINTS_PER_BYTE).max(ALWAYS);
-        let moved = |shown: &Shown<'_>| shown.count.saturating_mul(shown.targets().count());
+        let bound = bytes.saturating_mul(MAX_POINTS_PER_BYTE).max(ALWAYS_ALLOWED);
+        let moved = |shown: &PlacedPrimitive<'_>| shown.count.saturating_mul(shown.targets().count());
         let moved = self.shown.iter().map(moved).fold(0, usize::saturating_add);
         let most = self.points.max(moved).max(if job.triangles { self.corners } else { 0 });
         if most > bound {

@@ -96,7 +96,7 @@ impl Dimension {
 
 /// Facts about the values of some points.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct ValueFacts {
     /// Whether any value is not zero, by field.
     fields: Vec<bool>,
     residuals: bool,
@@ -105,7 +105,7 @@ pub(super) struct Seen {
     lossy_colors: bool,
 }
 
-impl Seen {
+impl ValueFacts {
     pub(super) fn add(&mut self, other: &Self) {
         self.fields.resize(self.fields.len().max(other.fields.len()), false);
         for (seen, other) in self.fields.iter_mut().zip(&other.fields) {
@@ -131,7 +131,7 @@ pub(super) struct Columns<'a> {
     fields: Vec<FieldValues>,
     /// Whether a colour above 255 has been found.
     wide_colors: AtomicBool,
-    seen: Seen,
+    seen: ValueFacts,
 }
 
 impl<'a> Columns<'a> {
@@ -159,7 +159,7 @@ impl<'a> Columns<'a> {
             fields: dimensions.iter().map(|dimension| dimension.zeros(count)).collect::<Result<_, _>>()?,
             dimensions,
             wide_colors: AtomicBool::new(false),
-            seen: Seen::default(),
+            seen: ValueFacts::default(),
         })
     }
 
@@ -186,7 +186,7 @@ impl<'a> Columns<'a> {
             residuals: split(&mut residuals, count),
             colors: split(&mut colors, count),
             fields: fields.iter_mut().map(|slice| slice.split(count)).collect(),
-            seen: Seen { fields: vec![false; self.dimensions.len()], ..Seen::default() },
+            seen: ValueFacts { fields: vec![false; self.dimensions.len()], ..ValueFacts::default() },
             narrow: 0,
             done: 0,
         });
@@ -300,7 +300,7 @@ pub(super) struct Piece<'a> {
     residuals: &'a mut [[f32; 3]],
     colors: &'a mut [[u8; 3]],
     fields: Vec<Slice<'a>>,
-    seen: Seen,
+    seen: ValueFacts,
     /// Number of leading points whose colours were read as 8 bits.
     narrow: usize,
     /// Number of points filled.

@@ -13,13 +13,13 @@ use crate::{
 const FINEST_DEGREE: f64 = 1e-5;
 
 /// The coordinate system, and notes about it.
-pub(super) struct Meaning {
+pub(super) struct CoordinateSystem {
     pub(super) crs: Crs,
     pub(super) notes: Vec<String>,
 }
 
 /// Reads the coordinate system. Well-known text takes precedence; GeoTIFF keys add what the text does not state.
-pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
+pub(super) fn of(header: &Header, records: &Records<'_>) -> CoordinateSystem {
     let mut notes = Vec::new();
     let data = |id| records.find(las::PROJECTION, id).map(|record| record.data);
     let wkt = data(las::WKT).map(|text| Found::from_wkt(&String::from_utf8_lossy(text)));
@@ -65,7 +65,7 @@ pub(super) fn of(header: &Header, records: &Records<'_>) -> Meaning {
     if crs.unit == Some(Unit::Degree) && crs.vertical_unit.is_none() {
         crs.vertical_unit = Some(Unit::Metre);
     }
-    Meaning { crs, notes }
+    CoordinateSystem { crs, notes }
 }
 
 /// Whether coordinates without a system look like longitude and latitude with heights in metres or feet. Such

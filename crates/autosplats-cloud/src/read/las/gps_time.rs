@@ -28,7 +28,7 @@ const SEQUENCES: usize = 4;
 const MULTIPLES: u32 = 511;
 
 /// Most differences in a sequence that do not fit its step. The next such difference becomes the step.
-const MAX_STRAYS: u8 = 3;
+const MAX_MISFITS: u8 = 3;
 
 /// Decoder of consecutive times.
 pub(super) struct GpsTimes {
@@ -47,7 +47,7 @@ pub(super) struct GpsTimes {
 struct Sequence {
     time: i64,
     step: i32,
-    strays: u8,
+    misfits: u8,
 }
 
 enum Code {
@@ -93,7 +93,7 @@ impl GpsTimes {
                     let time = i64::from(high) << 32 | i64::from(decoder.read_int()?);
                     self.newest = (self.newest + 1) % SEQUENCES;
                     self.current = self.newest;
-                    self.sequences[self.current] = Sequence { time, step: 0, strays: 0 };
+                    self.sequences[self.current] = Sequence { time, step: 0, misfits: 0 };
                     return Ok(time);
                 }
                 Code::Switch(on) => self.current = (self.current + on) % SEQUENCES,
@@ -137,7 +137,7 @@ impl Sequence {
     ) -> io::Result<i64> {
         let times = |factor: i32| self.step.wrapping_mul(factor);
         // The expected difference, the context of its correction, and whether the difference does not fit the step.
-        let (expected, context, stray) = match code {
+        let (expected, context, misfit) = match code {
             _ if self.step == 0 => (0, 0, false),
             0 => (0, 7, true),
             1 => (self.step, 1, false),
@@ -149,12 +149,12 @@ impl Sequence {
         };
         let difference = correction.decompress(decoder, expected, context)?;
         self.time = self.time.wrapping_add(i64::from(difference));
-        self.strays += u8::from(stray);
-        if self.step == 0 || self.strays > MAX_STRAYS {
+        self.misfits += u8::from(misfit);
+        if self.step == 0 || self.misfits > MAX_MISFITS {
             self.step = difference;
-            self.strays = 0;
+            self.misfits = 0;
         } else if code == 1 {
-            self.strays = 0;
+            self.misfits = 0;
         }
         Ok(self.time)
     }

@@ -6,8 +6,8 @@ use super::super::Job;
 use crate::{Error, las};
 
 /// Bytes of the header of LAS 1.0 to 1.2, and of LAS 1.4.
-const SHORT: usize = 227;
-const LONG: usize = 375;
+const LEGACY_HEADER_LEN: usize = 227;
+const HEADER_LEN_LAS14: usize = 375;
 
 /// Contents of the header, checked as far as reading needs.
 pub(super) struct Header {
@@ -42,7 +42,7 @@ impl Header {
             return Err(fail(0, "a LAS file begins with 'LASF'; this one does not".into()));
         }
         let long = bytes.len() > 25 && bytes[24] == 1 && bytes[25] >= 4;
-        let needed = if long { LONG } else { SHORT };
+        let needed = if long { HEADER_LEN_LAS14 } else { LEGACY_HEADER_LEN };
         if bytes.len() < needed || !bytes.starts_with(b"LASF") {
             let what = format!("the header of {needed} bytes is cut off; copy the file again");
             return Err(fail(bytes.len(), what));

@@ -37,7 +37,7 @@ const BATCH: usize = 1 << 19;
 const RUN: usize = 1 << 13;
 
 /// Largest edge of a box of points for which one origin suits `f32`.
-const WIDE: f64 = 1e6;
+const MAX_ORIGIN_BOX: f64 = 1e6;
 
 pub(super) const FORMAT: Format = Format {
     name: "LAS",
@@ -134,7 +134,7 @@ fn origin(header: &Header, count: usize, sample: impl Fn(usize) -> DVec3) -> DVe
     let middle = middle(count, sample);
     match header.sane_bounds() {
         Some([low, high])
-            if (high - low).max_element() < WIDE
+            if (high - low).max_element() < MAX_ORIGIN_BOX
                 // The middle of the sample is rounded.
                 && middle.cmpge(low - 1.0).all()
                 && middle.cmple(high + 1.0).all() =>

@@ -42,7 +42,7 @@ type Layer = ArithmeticDecoder<Cursor<Vec<u8>>>;
 /// Decoder of POINT14 in the records of one chunk.
 pub(super) struct Point14 {
     /// Whether later items receive the channel of every point, or only where it changes, as the first writers had it.
-    tells_channel: bool,
+    reports_channel: bool,
     sizes: [u32; LAYERS],
     layers: [Option<Layer>; LAYERS],
     channels: [Option<Box<Channel>>; CHANNELS],
@@ -53,7 +53,7 @@ impl Point14 {
     /// A decoder for version 3 or 4 of the compression.
     pub(super) fn new(version: u16) -> Self {
         Self {
-            tells_channel: version > 3,
+            reports_channel: version > 3,
             sizes: [0; LAYERS],
             layers: [const { None }; LAYERS],
             channels: [const { None }; CHANNELS],
@@ -127,7 +127,7 @@ impl<'a> LayeredFieldDecompressor<Cursor<&'a [u8]>> for Point14 {
             let channel = self.channels[self.current].get_or_insert_with(|| Box::new(Channel::new(last)));
             channel.last.set_channel(self.current);
         }
-        if changes.channel() || self.tells_channel {
+        if changes.channel() || self.reports_channel {
             *context = self.current;
         }
         let channel = self.channels[self.current].as_deref_mut().ok_or_else(unknown)?;

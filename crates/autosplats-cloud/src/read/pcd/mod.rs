@@ -11,7 +11,7 @@ use super::{
     columns::{MAX_COUNT, numbered},
     framing::Body,
     shown,
-    table::{Column, Part, Scalar, Table, reserve},
+    table::{Column, ProgressRange, Scalar, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
     xyz,
 };
@@ -21,7 +21,7 @@ pub(super) const FORMAT: Format =
     Format { name: "PCD", extensions: &["pcd"], recognised: header::recognised, sensor_frame: true, describe, read };
 
 /// Share of the work that parsing text takes.
-const PARSING: Part = Part { start: 0.0, len: 0.8 };
+const PARSING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
     if without_header(job) {
@@ -86,7 +86,7 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
     }
     let header = Header::parse(job)?;
     let long = |field: &&header::Field| field.name != "_" && field.count > MAX_COUNT;
-    for field in header.fields.iter().filter(long).take(LISTED) {
+    for field in header.fields.iter().filter(long).take(MAX_NOTED_FIELDS) {
         let name = shown(field.name.as_bytes());
         job.note(format!("{name} has {} values a point; left out, {MAX_COUNT} at most are read", field.count));
     }
@@ -126,10 +126,10 @@ fn read(job: &Job<'_>) -> Result<Contents, Error> {
 }
 
 /// Largest number of left-out fields that are noted one by one.
-const LISTED: usize = 10;
+const MAX_NOTED_FIELDS: usize = 10;
 
 /// Pairs of neighbours sampled to find out from where an image of points was taken.
-const RAYS: usize = 1 << 14;
+const MAX_SAMPLED_PAIRS: usize = 1 << 14;
 
 /// The sensor's pose, if VIEWPOINT is not the default, or if a file of this project states that the default is true.
 ///
@@ -156,7 +156,7 @@ fn image_from_origin(header: &Header, cloud: &PointCloud) -> bool {
         return false;
     };
     let ray = |i: usize| cloud.world_position(i).try_normalize().filter(|ray| ray.is_finite());
-    let step = cloud.len().div_ceil(RAYS).max(1);
+    let step = cloud.len().div_ceil(MAX_SAMPLED_PAIRS).max(1);
     let starts = (0..cloud.len().saturating_sub(1)).step_by(step).filter(|i| (i + 1) % width != 0);
     let mut angles: Vec<f64> = starts.filter_map(|i| Some(ray(i)?.cross(ray(i + 1)?).length())).collect();
     if angles.is_empty() {

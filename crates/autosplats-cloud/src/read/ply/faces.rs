@@ -6,7 +6,7 @@ use super::super::{
     Job, lines,
     mesh::Faces,
     shown,
-    table::{Part, Scalar},
+    table::{ProgressRange, Scalar},
     text,
 };
 use super::{
@@ -16,7 +16,7 @@ use super::{
 use crate::Error;
 
 /// Progress of reading faces, which is not shown: points come first.
-const PART: Part = Part { start: 1.0, len: 0.0 };
+const PART: ProgressRange = ProgressRange { start: 1.0, len: 0.0 };
 
 /// The triangles between `points` points.
 pub(super) fn triangles(job: &Job<'_>, header: &Header, points: usize) -> Result<Vec<[u32; 3]>, Error> {

@@ -9,7 +9,7 @@ use self::header::{Element, Encoding, Header};
 pub(super) use self::length::{Records, body};
 use super::{
     Attribute, Contents, Description, Format, Job, lines, shown,
-    table::{Column, Part, Scalar, Table, reserve},
+    table::{Column, ProgressRange, Scalar, Table, reserve},
     text::{Rows, TEXT, Token, is_coordinate},
 };
 use crate::{Error, PointCloud};
@@ -24,13 +24,13 @@ pub(super) const FORMAT: Format = Format {
 };
 
 /// Largest number of further elements that a description lists.
-const LISTED: usize = 100;
+const MAX_DESCRIBED_ELEMENTS: usize = 100;
 
 /// Largest file, in bytes, whose strips a description counts through; counting then takes milliseconds.
-const COUNTED: usize = 4 << 20;
+const MAX_COUNTED_BYTES: usize = 4 << 20;
 
 /// Share of the work that packing text or lists into records takes.
-const PACKING: Part = Part { start: 0.0, len: 0.8 };
+const PACKING: ProgressRange = ProgressRange { start: 0.0, len: 0.8 };
 
 fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let header = Header::parse(job)?;
@@ -43,10 +43,10 @@ fn describe(job: &Job<'_>) -> Result<Description, Error> {
     let count = |name: &str| header.elements.iter().find(|element| element.name == name).map(|element| element.count);
     // The number of triangles in a strip is known only by reading it.
     let in_strips = || {
-        count("tristrips").filter(|_| job.bytes.len() <= COUNTED)?;
+        count("tristrips").filter(|_| job.bytes.len() <= MAX_COUNTED_BYTES)?;
         faces::triangles(job, &header, vertex.count).ok().map(|triangles| triangles.len())
     };
-    let others = header.elements.iter().filter(|element| element.name != "vertex").take(LISTED);
+    let others = header.elements.iter().filter(|element| element.name != "vertex").take(MAX_DESCRIBED_ELEMENTS);
     Ok(Description {
         format: format!("PLY, {}", header.encoding.name()),
         points: Some(vertex.count as u64),
@@ -179,7 +179,7 @@ fn skip(job: &Job<'_>, header: &Header, before: &[Element], wanted: &Element) ->
     for element in before {
         at = match element.stride() {
             Some(stride) => element.count.checked_mul(stride).and_then(|len| at.checked_add(len)),
-            None => Some(walk(job, header, element, at, Part { start: 0.0, len: 0.0 }, |_| Ok(()))?),
+            None => Some(walk(job, header, element, at, ProgressRange { start: 0.0, len: 0.0 }, |_| Ok(()))?),
         }
         .filter(|&end| end <= job.bytes.len())
         .ok_or_else(|| cut_off(job, wanted))?;
@@ -194,7 +194,7 @@ fn walk(
     header: &Header,
     element: &Element,
     start: usize,
-    part: Part,
+    part: ProgressRange,
     mut keep: impl FnMut(&[u8]) -> Result<(), Error>,
 ) -> Result<usize, Error> {
     let mut at = start;

@@ -9,10 +9,10 @@ use super::{
 use crate::{Crs, Error, Unit};
 
 /// Rows sampled to guess the meaning of the columns.
-const SAMPLE: usize = 1000;
+const SAMPLED_ROWS: usize = 1000;
 
 /// Rows of numbers required to read a file of unknown name as points; a shorter file needs all its rows to be such.
-const SURE: usize = 2;
+const MIN_ROWS_OF_POINTS: usize = 2;
 
 /// The lines before the first point.
 pub(super) struct Preamble {
@@ -98,7 +98,7 @@ pub(in super::super) fn looks_like_rows(bytes: &[u8]) -> bool {
     lines.next_if(|line| Header::parse(line).is_some_and(|header| header.has_axes()));
     let rows = |line: &&[u8]| only_numbers(line) && text::values(line).count() >= 3;
     let mut count = 0;
-    for line in lines.take(SURE) {
+    for line in lines.take(MIN_ROWS_OF_POINTS) {
         if !rows(&line) {
             return false;
         }
@@ -220,7 +220,7 @@ impl Layout {
 fn sample(bytes: &[u8], start: usize) -> Vec<(usize, &[u8])> {
     let mut lines = Vec::new();
     let mut at = start;
-    while at < bytes.len() && lines.len() < SAMPLE && at - start < 1 << 20 {
+    while at < bytes.len() && lines.len() < SAMPLED_ROWS && at - start < 1 << 20 {
         let line = trimmed(&bytes[at..text::line_end(bytes, at)]);
         if !text::is_blank(line.trim_ascii()) && !text::is_count(line.trim_ascii()) {
             lines.push((at, line));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Frames, Surface, still};
-use crate::{Contents, Error, PointCloud, Progress, Timeline, sample::Strewn};
+use crate::{Contents, Error, PointCloud, Progress, Timeline, sample::SurfaceSamples};
 
 /// The same points in all frames are had by the same random numbers.
 const SEED: u64 = 1;
@@ -13,14 +13,14 @@ pub(super) struct Sampled {
     frames: Arc<dyn Frames>,
     count: usize,
     /// Places on the first frame's mesh, and it.
-    first: Option<(Strewn, Arc<Contents>)>,
+    first: Option<(SurfaceSamples, Arc<Contents>)>,
 }
 
 impl Sampled {
     pub(super) fn new(frames: Arc<dyn Frames>, count: usize, progress: &dyn Progress) -> Result<Self, Error> {
         let first = match frames.surface(0, progress)? {
             Surface::Scene(_) => None,
-            Surface::Mesh(mesh) => Some((Strewn::new(&mesh, count, SEED, progress)?, mesh)),
+            Surface::Mesh(mesh) => Some((SurfaceSamples::new(&mesh, count, SEED, progress)?, mesh)),
         };
         Ok(Self { frames, count, first })
     }
@@ -30,7 +30,7 @@ impl Sampled {
             Some((strewn, first)) if strewn.fits(mesh.cloud.len()) && first.triangles == mesh.triangles => {
                 strewn.on(&mesh.cloud, progress)
             }
-            _ => Strewn::new(mesh, self.count, SEED, progress)?.on(&mesh.cloud, progress),
+            _ => SurfaceSamples::new(mesh, self.count, SEED, progress)?.on(&mesh.cloud, progress),
         }
     }
 }

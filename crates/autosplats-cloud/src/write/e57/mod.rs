@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use self::{
     pages::Pages,
-    values::{Frame, Known, Value, values, xml_name},
+    values::{CloudFacts, Frame, Value, values, xml_name},
     xml::ScanEntry,
 };
 use super::{Format, Job};
@@ -30,7 +30,7 @@ const PACKET: usize = 1 << 16;
 const BATCH: usize = 64;
 
 /// Points that make a scan.
-struct Run {
+struct ScanPoints {
     name: Option<String>,
     pose: Option<DMat4>,
     /// Ranges of points in the cloud.
@@ -41,7 +41,7 @@ struct Run {
 fn write(job: &Job<'_>, file: &mut BufWriter<&mut File>) -> Result<(), Error> {
     let metric = in_metres(job)?;
     let job = &Job { cloud: metric.as_ref().unwrap_or(job.cloud), ..*job };
-    let known = Known::of(job.cloud);
+    let known = CloudFacts::of(job.cloud);
     notes(job, &known);
     let mut pages = Pages::new(file);
     let mut entries = Vec::new();
@@ -81,7 +81,7 @@ fn in_metres(job: &Job<'_>) -> Result<Option<PointCloud>, Error> {
 }
 
 /// Notes what the format cannot hold.
-fn notes(job: &Job<'_>, known: &Known<'_>) {
+fn notes(job: &Job<'_>, known: &CloudFacts<'_>) {
     let cloud = job.cloud;
     let is_lost = match cloud.axes() {
         Some(Axes::YUp | Axes::Camera) => true,
@@ -103,7 +103,7 @@ fn notes(job: &Job<'_>, known: &Known<'_>) {
 }
 
 /// The scans of the cloud, then the points outside of all scans.
-fn runs(job: &Job<'_>) -> Vec<Run> {
+fn runs(job: &Job<'_>) -> Vec<ScanPoints> {
     let cloud = job.cloud;
     let mut scans: Vec<_> = cloud.scans().iter().collect();
     scans.sort_by_key(|scan| (scan.points.start, scan.points.end));
@@ -122,7 +122,7 @@ fn runs(job: &Job<'_>) -> Vec<Run> {
         bent |= pose.is_none();
         let pose = pose.unwrap_or(DMat4::from_translation(scan.position()));
         let pose = if pose.is_finite() { pose } else { DMat4::IDENTITY };
-        runs.push(Run { name: scan.name.clone(), pose: Some(pose), len: range.len(), ranges: vec![range] });
+        runs.push(ScanPoints { name: scan.name.clone(), pose: Some(pose), len: range.len(), ranges: vec![range] });
     }
     if end < cloud.len() {
         outside.push(end..cloud.len());
@@ -135,7 +135,7 @@ fn runs(job: &Job<'_>) -> Vec<Run> {
     }
     let len = outside.iter().map(Range::len).sum();
     if len > 0 || runs.is_empty() {
-        runs.push(Run { name: None, pose: None, len, ranges: outside });
+        runs.push(ScanPoints { name: None, pose: None, len, ranges: outside });
     }
     runs
 }
@@ -151,9 +151,9 @@ fn rigid(map: DMat4) -> Option<DMat4> {
 /// Writes the packets of one scan.
 fn scan<'a>(
     job: &Job<'a>,
-    known: &Known<'a>,
+    known: &CloudFacts<'a>,
     pages: &mut Pages<'_, '_>,
-    run: &Run,
+    run: &ScanPoints,
     done: usize,
 ) -> Result<ScanEntry, Error> {
     let cloud = job.cloud;
@@ -229,7 +229,7 @@ fn scan<'a>(
     })
 }
 
-impl Run {
+impl ScanPoints {
     /// Indices in the cloud of some of the run's points.
     fn points(&self, wanted: Range<usize>) -> Vec<usize> {
         let mut points = Vec::with_capacity(wanted.len());

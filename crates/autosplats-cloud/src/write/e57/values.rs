@@ -162,7 +162,7 @@ fn put(values: &FieldValues, points: &[usize], less: u8, out: &mut Vec<u8>) {
 }
 
 /// Facts that take a pass over all points, computed once for all scans.
-pub(super) struct Known<'a> {
+pub(super) struct CloudFacts<'a> {
     /// Colours of 16 bits.
     pub(super) wide_colors: Option<[&'a FieldValues; 3]>,
     /// Whether [returns] are counted from 1.
@@ -171,7 +171,7 @@ pub(super) struct Known<'a> {
     pub(super) beyond: Vec<&'a str>,
 }
 
-impl<'a> Known<'a> {
+impl<'a> CloudFacts<'a> {
     pub(super) fn of(cloud: &'a PointCloud) -> Self {
         Self {
             wide_colors: wide_colors(cloud).filter(|[red, ..]| matches!(red, FieldValues::U16(_))),
@@ -187,7 +187,13 @@ impl<'a> Known<'a> {
 }
 
 /// All values of a cloud's points: positions in 32 bits if `single`, with a `state` if some points have no position.
-pub(super) fn values<'a>(job: &Job<'a>, known: &Known<'a>, frame: Frame, single: bool, state: bool) -> Vec<Value<'a>> {
+pub(super) fn values<'a>(
+    job: &Job<'a>,
+    known: &CloudFacts<'a>,
+    frame: Frame,
+    single: bool,
+    state: bool,
+) -> Vec<Value<'a>> {
     let cloud = job.cloud;
     let mut all = Vec::new();
     let mut add = |name: &str, source| all.push(Value { name: name.into(), source });

@@ -7,22 +7,22 @@ use super::super::Job;
 use crate::{Error, Unit};
 
 /// Largest number of steps from the offset, slightly less than 32 bits hold.
-const REACH: f64 = 2_147_483_600.0;
+const MAX_STEPS: f64 = 2_147_483_600.0;
 
 /// Step as a fraction of the cloud's size, if the cloud states no resolution; rounded down to a power of ten.
-const PART: f64 = 1e-6;
+const STEP_PER_SIZE: f64 = 1e-6;
 /// Coarsest step in the cloud's unit, if the cloud states no resolution.
-const STEP: f64 = 1e-3;
+const COARSEST_STEP: f64 = 1e-3;
 /// Coarsest step in degrees, about a millimetre.
-const STEP_DEGREES: f64 = 1e-8;
+const COARSEST_STEP_DEGREES: f64 = 1e-8;
 /// Finest step, if the cloud states no resolution.
-const FINEST: f64 = 1e-12;
+const FINEST_STEP: f64 = 1e-12;
 
 /// Distance of a coordinate from its integer, in steps, above which a loss is noted. `f32` causes smaller ones.
-const SLACK: f64 = 0.25;
+const MAX_UNNOTED_STEPS: f64 = 0.25;
 
 /// Number of points tried as the offset, if no round offset fits.
-const SAMPLES: usize = 5;
+const OFFSET_CANDIDATES: usize = 5;
 
 /// A coordinate is `offset + integer * scale`.
 pub(super) struct Grid {
@@ -36,22 +36,22 @@ impl Grid {
         let cloud = job.cloud;
         let known = cloud.resolution().filter(|step| step.is_finite() && step.cmpgt(DVec3::ZERO).all());
         if count == 0 {
-            return Ok(Self { scale: known.unwrap_or(DVec3::splat(STEP)), offset: DVec3::ZERO });
+            return Ok(Self { scale: known.unwrap_or(DVec3::splat(COARSEST_STEP)), offset: DVec3::ZERO });
         }
         let none = || [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let [low, high] =
             (0..count).into_par_iter().map(|i| [world(i); 2]).reduce(none, |[a, b], [c, d]| [a.min(c), b.max(d)]);
         let wished = known.unwrap_or_else(|| {
             let fine = |size: f64, coarsest: f64| {
-                let part = if size > 0.0 { 10_f64.powf((size * PART).log10().floor()) } else { coarsest };
-                part.clamp(FINEST, coarsest)
+                let part = if size > 0.0 { 10_f64.powf((size * STEP_PER_SIZE).log10().floor()) } else { coarsest };
+                part.clamp(FINEST_STEP, coarsest)
             };
             let size = high - low;
             if cloud.crs().unit == Some(Unit::Degree) {
-                let step = fine(size.truncate().max_element(), STEP_DEGREES);
-                DVec3::new(step, step, fine(size.z, STEP))
+                let step = fine(size.truncate().max_element(), COARSEST_STEP_DEGREES);
+                DVec3::new(step, step, fine(size.z, COARSEST_STEP))
             } else {
-                DVec3::splat(fine(size.max_element(), STEP))
+                DVec3::splat(fine(size.max_element(), COARSEST_STEP))
             }
         });
         let scale = DVec3::from_array([0, 1, 2].map(|axis| fitting(wished[axis], high[axis] - low[axis])));
@@ -73,8 +73,8 @@ impl Grid {
         };
         let mut offset = DVec3::from_array([0, 1, 2].map(|axis| round_offset(low[axis], high[axis], scale[axis])));
         let (mut miss, mut sums) = off(offset);
-        for sample in (0..SAMPLES).map(|sample| (count - 1) * sample / (SAMPLES - 1)) {
-            if known.is_none() || miss.max_element() <= SLACK {
+        for sample in (0..OFFSET_CANDIDATES).map(|sample| (count - 1) * sample / (OFFSET_CANDIDATES - 1)) {
+            if known.is_none() || miss.max_element() <= MAX_UNNOTED_STEPS {
                 break;
             }
             // The original offset is no multiple of its scale. Any point that was not moved since can serve as offset.
@@ -82,7 +82,7 @@ impl Grid {
             let steps = ((DVec3::midpoint(low, high) - place) / scale).round();
             let near = DVec3::from_array([0, 1, 2].map(|axis| {
                 let reached = (low[axis] - place[axis]).abs().max((high[axis] - place[axis]).abs());
-                if reached <= REACH * scale[axis] { place[axis] } else { place[axis] + steps[axis] * scale[axis] }
+                if reached <= MAX_STEPS * scale[axis] { place[axis] } else { place[axis] + steps[axis] * scale[axis] }
             }));
             let (most, others) = off(near);
             for axis in 0..3 {
@@ -92,7 +92,7 @@ impl Grid {
                 }
             }
         }
-        if miss.max_element() > SLACK {
+        if miss.max_element() > MAX_UNNOTED_STEPS {
             let DVec3 { x, y, z } = scale;
             let steps = if x == y && y == z { x.to_string() } else { format!("{x}, {y} and {z}") };
             job.note(format!("coordinates are rounded to steps of {steps}"));
@@ -104,7 +104,7 @@ impl Grid {
 /// The wished step times the least power of ten with which 32 bits cover `size`.
 fn fitting(wished: f64, size: f64) -> f64 {
     let mut step = wished;
-    while size > 2.0 * REACH * step {
+    while size > 2.0 * MAX_STEPS * step {
         step *= 10.0;
     }
     step
@@ -113,13 +113,13 @@ fn fitting(wished: f64, size: f64) -> f64 {
 /// Zero if the integers reach from there, otherwise a place in the middle, a whole number if that is a multiple of
 /// `step`.
 fn round_offset(low: f64, high: f64, step: f64) -> f64 {
-    if low.abs().max(high.abs()) <= REACH * step {
+    if low.abs().max(high.abs()) <= MAX_STEPS * step {
         return 0.0;
     }
     let middle = f64::midpoint(low, high);
     let whole = middle.round();
     let steps = whole / step;
-    let reached = (low - whole).abs().max((high - whole).abs()) <= REACH * step;
+    let reached = (low - whole).abs().max((high - whole).abs()) <= MAX_STEPS * step;
     if reached && (steps - steps.round()).abs() < 1e-3 { whole } else { (middle / step).round() * step }
 }
 

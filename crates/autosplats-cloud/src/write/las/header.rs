@@ -13,8 +13,8 @@ use crate::{
 };
 
 /// Bytes of the headers of LAS 1.2 and of LAS 1.4.
-const SHORT: usize = 227;
-const LONG: usize = 375;
+const LEGACY_HEADER_LEN: usize = 227;
+const HEADER_LEN_LAS14: usize = 375;
 
 /// Most bytes of data in a variable length record.
 const MAX_VLR: usize = 65_535;
@@ -68,7 +68,7 @@ impl Totals {
 /// Header and records as stored in the file, and the byte at which the points begin.
 pub(super) fn bytes(plan: &Plan<'_>, totals: &Totals, compression: Option<&LazVlr>) -> (Vec<u8>, usize) {
     let (records, count, wkt) = records(plan, compression);
-    let header_len = if plan.is_wide() { LONG } else { SHORT };
+    let header_len = if plan.is_wide() { HEADER_LEN_LAS14 } else { LEGACY_HEADER_LEN };
     let start = header_len + records.len();
     let mut bytes = Vec::with_capacity(start);
     bytes.extend(b"LASF");

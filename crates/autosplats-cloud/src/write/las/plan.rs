@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// 2⁵³: up to it, `f64` holds all integers.
-const WHOLE: f64 = 9_007_199_254_740_992.0;
+const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
 /// Most bytes of a record, and of a name.
 const MAX_RECORD: usize = 65_535;
@@ -73,11 +73,11 @@ impl<'a> Plan<'a> {
         let wide_colors = wide_colors(cloud);
         let colored = wide_colors.is_some() || cloud.colors().is_some();
         let is_color = |field: &Field| wide_colors.is_some() && colors::CHANNELS.contains(&&*field.name);
-        let fields: Vec<(&Field, Range)> = cloud
+        let fields: Vec<(&Field, ValueRange)> = cloud
             .fields()
             .iter()
             .filter(|field| !is_color(field))
-            .map(|field| (field, Range::of(&field.values)))
+            .map(|field| (field, ValueRange::of(&field.values)))
             .collect();
         let format = choose(&fields, colored, count);
 
@@ -238,7 +238,7 @@ fn wide_colors(cloud: &PointCloud) -> Option<[&[u16]; 3]> {
 
 /// Least and greatest value of a field.
 #[derive(Clone, Copy)]
-struct Range {
+struct ValueRange {
     low: f64,
     high: f64,
     /// Whether all values are whole numbers.
@@ -246,7 +246,7 @@ struct Range {
     finite: bool,
 }
 
-impl Range {
+impl ValueRange {
     fn of(values: &FieldValues) -> Self {
         let none = Self { low: f64::INFINITY, high: f64::NEG_INFINITY, whole: true, finite: true };
         let one = |value: f64| Self { low: value, high: value, whole: value.fract() == 0.0, finite: value.is_finite() };
@@ -278,7 +278,7 @@ impl Range {
             Place::U16(_) => self.whole && self.within(0.0, 65_535.0),
             Place::Angle(_) => self.within(-180.0, 180.0),
             // Integers beyond 2⁵³ do not fit; NaN is allowed here.
-            Place::F64(_) => !self.finite || !self.whole || self.within(-WHOLE, WHOLE),
+            Place::F64(_) => !self.finite || !self.whole || self.within(-MAX_EXACT_INTEGER, MAX_EXACT_INTEGER),
         }
     }
 }
@@ -295,8 +295,8 @@ struct IntensityScale {
 
 impl IntensityScale {
     /// A scale for intensities that do not fit unchanged, such as the 0 to 1 of most formats.
-    fn of(field: &Field, range: Range) -> Option<Self> {
-        let Range { low, high, .. } = range;
+    fn of(field: &Field, range: ValueRange) -> Option<Self> {
+        let ValueRange { low, high, .. } = range;
         let usable = low < high && low.is_finite() && high.is_finite();
         // If all values are NaN, the least one is above the greatest.
         let is_unit = low >= 0.0 && low <= high && high <= 1.0;
@@ -318,8 +318,8 @@ fn is_known(name: &str) -> bool {
 }
 
 /// The point format: of LAS 1.2, unless some value needs LAS 1.4.
-fn choose(fields: &[(&Field, Range)], colored: bool, count: usize) -> usize {
-    let needs_wide = |&(field, range): &(&Field, Range)| {
+fn choose(fields: &[(&Field, ValueRange)], colored: bool, count: usize) -> usize {
+    let needs_wide = |&(field, range): &(&Field, ValueRange)| {
         let find =
             |format: usize| las::places(format).into_iter().find(|(name, _)| field.name.eq_ignore_ascii_case(name));
         let fits = |format: usize| find(format).is_some_and(|(_, place)| range.fits(place));

@@ -8,7 +8,7 @@ use autosplats::cloud::{
     read_with,
 };
 
-use super::super::{Bits, Document, Layer, LayerId, Replace, SelectMode, What, export};
+use super::super::{Bits, Document, ExportScope, Layer, LayerId, Replace, SelectMode, export};
 use super::{cloud, edit};
 
 fn degrees(corner: DVec3) -> Arc<PointCloud> {
@@ -90,7 +90,7 @@ fn edits_in_metres_are_written_in_degrees() {
     document.move_selected(&DMat4::from_translation(DVec3::new(3.0, 4.0, 5.0)));
     document.set_pose(second, DMat4::from_translation(DVec3::new(0.0, 0.0, 7.0)));
     edit(&mut document, first, |layer| layer.edits.deleted = Bits::from_fn(10, |point| point == 0));
-    export(&document, What::All, &path, Replace::Nothing, &()).expect("written");
+    export(&document, ExportScope::All, &path, Replace::Nothing, &()).expect("written");
     let options = ReadOptions { exact: true, ..ReadOptions::default() };
     let written = read_with(&path, &options, &()).expect("read again");
     assert_eq!(written.len(), 19, "all but the deleted one");
@@ -123,7 +123,7 @@ fn beside_metres_all_is_written_in_metres() {
     document.add(Layer::new("metres", None, cloud(10, DVec3::ZERO)));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("out.ply");
-    export(&document, What::All, &path, Replace::Nothing, &()).expect("written");
+    export(&document, ExportScope::All, &path, Replace::Nothing, &()).expect("written");
     let written = PointCloud::from_path(&path, &()).expect("read again");
     let shown = document.shown();
     for index in 0..30 {

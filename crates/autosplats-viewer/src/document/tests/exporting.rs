@@ -12,7 +12,7 @@ use autosplats::cloud::{
     read_with, write,
 };
 
-use super::super::{ClipBox, Document, ExportError, Exported, Layer, Replace, What, export};
+use super::super::{ClipBox, Document, ExportError, ExportScope, Exported, Layer, Replace, export};
 use super::{FAR, cloud, document, edit, every, select_every};
 
 fn exact(path: &Path) -> PointCloud {
@@ -21,7 +21,7 @@ fn exact(path: &Path) -> PointCloud {
 }
 
 /// Exports to a new file and reads it again.
-fn round_trip(document: &Document, what: What) -> PointCloud {
+fn round_trip(document: &Document, what: ExportScope) -> PointCloud {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("out.ply");
     let Exported { points } = export(document, what, &path, Replace::Nothing, &()).expect("written");
@@ -40,7 +40,13 @@ fn all_that_was_asked_for_is_written_with_all_digits() {
         layer.edits.deleted = every(1000, 5);
     });
     document.clip = Some(ClipBox::new(FAR - 10.0, FAR + DVec3::new(1.0, 0.5, 5e3)));
-    for what in [What::Shown, What::Selected, What::Layer(second), What::All, What::Layer(first)] {
+    for what in [
+        ExportScope::Shown,
+        ExportScope::Selected,
+        ExportScope::Layer(second),
+        ExportScope::All,
+        ExportScope::Layer(first),
+    ] {
         let written = round_trip(&document, what);
         let mut wanted = Vec::new();
         for layer in &document.layers {
@@ -48,10 +54,10 @@ fn all_that_was_asked_for_is_written_with_all_digits() {
                 let (edits, place) = (&layer.edits, layer.position(point));
                 let seen = !edits.hidden.get(point) && document.clip.is_some_and(|clip| clip.contains(place));
                 let chosen = match what {
-                    What::Shown => seen,
-                    What::Selected => seen && edits.selected.get(point),
-                    What::Layer(id) => id == layer.id,
-                    What::All => true,
+                    ExportScope::Shown => seen,
+                    ExportScope::Selected => seen && edits.selected.get(point),
+                    ExportScope::Layer(id) => id == layer.id,
+                    ExportScope::All => true,
                 };
                 if chosen && !edits.deleted.get(point) {
                     let color = layer.cloud.colors().map(|colors| colors[point]);
@@ -67,7 +73,7 @@ fn all_that_was_asked_for_is_written_with_all_digits() {
         };
         assert_eq!(*ids, wanted.iter().map(|(_, _, id)| *id).collect::<Vec<_>>(), "{what:?}: their attributes");
     }
-    let written = round_trip(&document, What::Layer(first));
+    let written = round_trip(&document, ExportScope::Layer(first));
     let colors: Vec<_> = (0..1000).filter(|i| i % 5 > 0).map(|i| [i as u8, (i / 256) as u8, 7]).collect();
     assert_eq!(written.colors(), Some(&colors[..]), "their colours");
 }
@@ -88,7 +94,7 @@ fn layers_of_single_precision_keep_their_digits_together() {
     }
     let places: Vec<DVec3> =
         document.layers.iter().flat_map(|layer| [0, 1].map(|point| layer.position(point))).collect();
-    check_places(&round_trip(&document, What::All), &places);
+    check_places(&round_trip(&document, ExportScope::All), &places);
 }
 
 #[test]
@@ -101,7 +107,7 @@ fn sensors_go_with_their_layer() {
     document.set_pose(id, DMat4::from_translation(DVec3::Z));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("out.e57");
-    export(&document, What::All, &path, Replace::Nothing, &()).expect("written");
+    export(&document, ExportScope::All, &path, Replace::Nothing, &()).expect("written");
     let written = exact(&path);
     let sensor = written.scans().iter().find(|scan| scan.points.len() == 40).expect("half of its points");
     assert!(sensor.position().abs_diff_eq(FAR + DVec3::Z, 1e-9), "moved with it: {}", sensor.position());
@@ -133,19 +139,19 @@ fn files_are_replaced_only_if_that_is_said() {
     }
     for path in &inputs {
         for replace in [Replace::Nothing, Replace::Files] {
-            let refused = export(&document, What::All, path, replace, &());
+            let refused = export(&document, ExportScope::All, path, replace, &());
             assert!(matches!(refused, Err(ExportError::Input { .. })), "{}: {refused:?}", path.display());
         }
     }
-    let refused = export(&document, What::All, &other, Replace::Nothing, &());
+    let refused = export(&document, ExportScope::All, &other, Replace::Nothing, &());
     assert!(matches!(refused, Err(ExportError::Exists { .. })), "{refused:?}");
     assert_eq!(fs::read(&input).expect("the input"), old, "the input is as it was");
     assert_eq!(fs::read(&other).expect("the file"), b"precious", "the other one, too");
 
-    export(&document, What::All, &other, Replace::Files, &()).expect("may be replaced");
+    export(&document, ExportScope::All, &other, Replace::Files, &()).expect("may be replaced");
     assert_eq!(exact(&other).len(), 50, "the half that is left");
     for path in &inputs {
-        export(&document, What::All, path, Replace::Inputs, &()).expect("may be replaced");
+        export(&document, ExportScope::All, path, Replace::Inputs, &()).expect("may be replaced");
         assert_eq!(exact(&input).len(), 50, "{}", path.display());
     }
     #[cfg(unix)]
@@ -178,17 +184,17 @@ fn what_fails_leaves_all_as_it_was() {
     let new = folder.path().join("new.ply");
     let stop = Watcher { stop: true, ..Watcher::default() };
     for path in [&input, &new] {
-        let stopped = export(&document, What::All, path, Replace::Inputs, &stop);
+        let stopped = export(&document, ExportScope::All, path, Replace::Inputs, &stop);
         assert!(matches!(stopped, Err(ExportError::Cancelled)), "{stopped:?}");
     }
-    let none = export(&document, What::Selected, &input, Replace::Inputs, &());
+    let none = export(&document, ExportScope::Selected, &input, Replace::Inputs, &());
     assert!(matches!(none, Err(ExportError::Nothing)), "{none:?}");
-    let unknown = export(&document, What::All, &folder.path().join("new.jpg"), Replace::Inputs, &());
+    let unknown = export(&document, ExportScope::All, &folder.path().join("new.jpg"), Replace::Inputs, &());
     assert!(matches!(unknown, Err(ExportError::Cloud(Error::UnknownOutput { .. }))), "{unknown:?}");
-    let nowhere = export(&document, What::All, &folder.path().join("no/new.ply"), Replace::Inputs, &());
+    let nowhere = export(&document, ExportScope::All, &folder.path().join("no/new.ply"), Replace::Inputs, &());
     assert!(matches!(nowhere, Err(ExportError::Cloud(Error::Io { .. }))), "{nowhere:?}");
     document.layers.clear();
-    let empty = export(&document, What::All, &new, Replace::Inputs, &());
+    let empty = export(&document, ExportScope::All, &new, Replace::Inputs, &());
     assert!(matches!(empty, Err(ExportError::Nothing)), "{empty:?}");
     assert_eq!(fs::read(&input).expect("the input"), old, "the input is as it was");
     assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "and nothing is beside it");
@@ -201,7 +207,7 @@ fn losses_are_told() {
     document.add(Layer::new("b", None, Arc::new(PointCloud::new(FAR, vec![[0.0; 3]]))));
     let folder = tempfile::tempdir().expect("a folder");
     let watcher = Watcher::default();
-    export(&document, What::All, &folder.path().join("out.ply"), Replace::Nothing, &watcher).expect("written");
+    export(&document, ExportScope::All, &folder.path().join("out.ply"), Replace::Nothing, &watcher).expect("written");
     let notes = watcher.notes.into_inner().expect("no thread panicked");
     assert_eq!(notes.first().map(|note| &**note), Some("not all layers have Id; it is left out"), "{notes:?}");
 }

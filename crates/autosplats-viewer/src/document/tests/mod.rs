@@ -17,7 +17,7 @@ use autosplats::cloud::{
     glam::{DMat4, DVec3},
 };
 
-use super::{Bits, Document, Layer, LayerId, SelectMode, Shown};
+use super::{Bits, Document, Layer, LayerId, SelectMode, ShownCloud};
 
 /// A place so far from the origin that the step of `f32` is half a metre.
 const FAR: DVec3 = DVec3::new(512_000.0, 5_400_000.0, 300.0);
@@ -47,7 +47,7 @@ fn edit(document: &mut Document, id: LayerId, change: impl FnOnce(&mut Layer)) {
 }
 
 /// Selects every `step`th of the shown points.
-fn select_every(document: &mut Document, step: usize) -> Shown {
+fn select_every(document: &mut Document, step: usize) -> ShownCloud {
     let shown = document.shown();
     document.select(&shown, |index| index.is_multiple_of(step), SelectMode::Replace);
     shown

@@ -7,7 +7,7 @@ use std::{path::Path, sync::Arc};
 
 use autosplats::cloud::{PointCloud, ReadOptions, read_with};
 
-use super::super::{Document, Layer, Replace, What, export, pick::file_text};
+use super::super::{Document, ExportScope, Layer, Replace, export, pick::file_text};
 use super::{edit, every};
 use crate::tests::data;
 
@@ -44,7 +44,7 @@ fn own_formats_keep_all_digits() {
                 edit(&mut document, id, |layer| layer.edits.deleted = every(cloud.len(), step));
             }
             let target = folder.path().join(format!("{}-{}", step.is_some(), file.replace('/', "-")));
-            export(&document, What::Layer(id), &target, Replace::Nothing, &()).expect("written");
+            export(&document, ExportScope::Layer(id), &target, Replace::Nothing, &()).expect("written");
             let written = exact(&target);
             let kept: Vec<u32> =
                 (0..cloud.len() as u32).filter(|i| step.is_none_or(|step| i % step as u32 > 0)).collect();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use autosplats::cloud::glam::{DMat4, DQuat, DVec3};
 
-use super::super::{Bits, ClipBox, Document, Layer, LayerId, Shown};
+use super::super::{Bits, ClipBox, Document, Layer, LayerId, ShownCloud};
 use super::{FAR, cloud, document, edit, every};
 
 /// The points that should be shown, in order.
@@ -22,7 +22,7 @@ fn expected(document: &Document) -> Vec<(LayerId, usize)> {
     points
 }
 
-fn check(document: &Document, what: &str) -> Shown {
+fn check(document: &Document, what: &str) -> ShownCloud {
     let shown = document.shown();
     let expected = expected(document);
     let points: Vec<_> = (0..shown.len()).map(|index| shown.point(index).expect("of a layer")).collect();

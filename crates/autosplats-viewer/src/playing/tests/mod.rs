@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use autosplats::Backend;
 use eframe::egui;
 
-use super::{Heard, LIVE_MS, LIVE_SHARE};
+use super::{LIVE_MS, LIVE_SHARE, UpdateRate};
 use crate::app::App;
 use crate::look::Look;
 use crate::{Input, Options};
@@ -25,7 +25,7 @@ fn sequence(folder: &Path, frames: usize) -> String {
 
 #[test]
 fn pictures_of_what_is_live_are_there_before_the_next_update() {
-    let mut heard = Heard::default();
+    let mut heard = UpdateRate::default();
     assert_eq!(heard.live_ms(), LIVE_MS, "before anything is known");
     for (tick, now) in (0_u32..60).map(|tick| (u64::from(tick), f64::from(tick) * 0.05)) {
         heard.count(now, tick);

@@ -9,7 +9,7 @@
 
 use glam::DVec3;
 
-use super::{Law, WIDEST};
+use super::{Law, MAX_HALF_FOV_TANGENT};
 
 /// Expected points in a full window. A Kinect's picture is sampled at every fourth to sixth point. Windows are then 20
 /// pixels wide, twice as wide as those that the Kinect matches.
@@ -21,19 +21,19 @@ const RANGES: usize = 6;
 /// Fewest windows per range.
 const LEAST_WINDOWS: usize = 24;
 /// Quantile of a range's windows that is the noise.
-const QUANTILE: f64 = 0.2;
+const WINDOW_NOISE_QUANTILE: f64 = 0.2;
 /// Least ratio of the median depths of the farthest and the nearest range.
-const APART: f64 = 2.0;
+const MIN_DEPTH_RATIO: f64 = 2.0;
 /// Largest power of depth, up or down, that noise of inverse depths may follow.
-const STEEPEST: f64 = 0.5;
+const MAX_NOISE_POWER: f64 = 0.5;
 /// Largest deviation of ranges from such a power, as a standard deviation of logarithms.
-const TIGHT: f64 = 0.3;
+const MAX_POWER_MISFIT: f64 = 0.3;
 /// Least ratio of noise to rounding.
 const LEAST_NOISE: f64 = 8.0;
 /// Ratio of noise to what windows show of it. The slope of a window's plane absorbs a part.
-const UNSEEN: f64 = 1.25;
+const NOISE_OVER_RESIDUAL: f64 = 1.25;
 /// Cells along the longer side of the picture, for measuring how much of the picture is filled.
-const CELLS: f64 = 128.0;
+const FILL_CELLS: f64 = 128.0;
 
 /// Sums over a window's points, about its middle: of 1, u, v, d, and of the products.
 type Sums = [f64; 10];
@@ -44,7 +44,7 @@ pub(super) fn law(mut points: Vec<DVec3>, rounding: f64) -> Option<Law> {
         let inverse = 1.0 / point.z;
         let is_seen = point.z > rounding;
         *point = DVec3::new(point.x * inverse, point.y * inverse, inverse);
-        is_seen && point.x.abs() <= WIDEST && point.y.abs() <= WIDEST
+        is_seen && point.x.abs() <= MAX_HALF_FOV_TANGENT && point.y.abs() <= MAX_HALF_FOV_TANGENT
     });
     let windows = windows(&points);
     let len = windows.len() / RANGES;
@@ -57,7 +57,7 @@ pub(super) fn law(mut points: Vec<DVec3>, rounding: f64) -> Option<Law> {
         .take(RANGES)
         .map(|range| {
             let mut noise: Vec<f64> = range.iter().map(|window| window.noise).collect();
-            let at = (QUANTILE * len as f64) as usize;
+            let at = (WINDOW_NOISE_QUANTILE * len as f64) as usize;
             [-range[len / 2].inverse_depth.ln(), noise.select_nth_unstable_by(at, f64::total_cmp).1.ln()]
         })
         .collect();
@@ -70,10 +70,10 @@ pub(super) fn law(mut points: Vec<DVec3>, rounding: f64) -> Option<Law> {
     let slope = dn / dd;
     let off = ((nn - slope * dn).max(0.0) / RANGES as f64).sqrt();
     let nearest = ranges[0][0].exp();
-    let factor = UNSEEN * noise.exp();
-    let is_law = ranges[RANGES - 1][0].exp() >= APART * nearest
-        && slope.abs() <= STEEPEST
-        && off <= TIGHT
+    let factor = NOISE_OVER_RESIDUAL * noise.exp();
+    let is_law = ranges[RANGES - 1][0].exp() >= MIN_DEPTH_RATIO * nearest
+        && slope.abs() <= MAX_NOISE_POWER
+        && off <= MAX_POWER_MISFIT
         && factor * nearest * nearest > LEAST_NOISE * rounding;
     is_law.then_some(Law { factor, power: 2 })
 }
@@ -100,8 +100,8 @@ fn windows(on_picture: &[DVec3]) -> Vec<Window> {
         return Vec::new();
     }
     let cell = |side: f64, point: &DVec3| [0, 1].map(|axis| ((point[axis] - least[axis]) / side) as usize);
-    let side = longer / CELLS;
-    let columns = CELLS as usize + 1;
+    let side = longer / FILL_CELLS;
+    let columns = FILL_CELLS as usize + 1;
     let mut filled = vec![false; columns * columns];
     for point in on_picture {
         let [column, row] = cell(side, point);

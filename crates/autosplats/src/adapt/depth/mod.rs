@@ -32,18 +32,18 @@ const STEPS_SAMPLE: usize = 1 << 14;
 /// Points put into windows, of all scans together.
 const DISPARITY_SAMPLE: usize = 1 << 16;
 /// Largest share of a scan's points outside the field of view.
-const OUTSIDE: f64 = 0.001;
+const MAX_OUTSIDE_SHARE: f64 = 0.001;
 /// Tangent of half the widest field of view.
-const WIDEST: f64 = 4.0;
+const MAX_HALF_FOV_TANGENT: f64 = 4.0;
 /// Rounding of coordinates, relative to the largest one.
-const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
+const COORDINATE_ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Longest move of a surfel along the ray, in standard deviations; surfaces further away are others.
 pub(super) const FARTHEST_ALONG: f32 = 3.0;
 /// Largest factor by which a disc grows in length when it is turned.
 pub(super) const LONGEST_SHADOW: f32 = 2.0;
 /// Cosine between ray and normal at which half of the way to the plane is along the ray, half along the normal.
-pub(super) const GRAZING: f32 = 0.1;
+pub(super) const GRAZING_COSINE: f32 = 0.1;
 
 /// The noise law of one sensor, for the points from one index on.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -70,7 +70,7 @@ pub(crate) struct DepthNoise {
 
 /// The known noise at a surfel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Known {
+pub(super) struct KnownNoise {
     /// Standard deviation, world units.
     pub(super) noise: f32,
     /// Unit direction along which the noise acts, view space.
@@ -91,7 +91,7 @@ impl DepthNoise {
         let known = runs.iter().filter(|(_, scan)| scan.is_some()).count().max(1);
         let ends = runs.iter().skip(1).map(|(first, _)| *first as usize).chain([cloud.len()]);
         let of_run = |(&(first, scan), end): (&(u32, Option<&Scan>), usize)| {
-            let found = scan.and_then(|scan| of_scan(cloud, scan, first as usize..end, known));
+            let found = scan.and_then(|scan| law_of_scan(cloud, scan, first as usize..end, known));
             DepthRun { first, ..found.unwrap_or_else(bytemuck::Zeroable::zeroed) }
         };
         let mut found: Vec<DepthRun> = runs.iter().zip(ends).collect::<Vec<_>>().into_par_iter().map(of_run).collect();
@@ -117,7 +117,7 @@ impl DepthNoise {
 
     /// The noise at `place`, in the axes of these sensors, for a point of the cloud; `None` if unknown.
     #[inline(always)]
-    pub(super) fn at(&self, place: Vec3, point: u32) -> Option<Known> {
+    pub(super) fn at(&self, place: Vec3, point: u32) -> Option<KnownNoise> {
         let run = match self.runs.as_slice() {
             [] => return None,
             [run] => run,
@@ -130,20 +130,20 @@ impl DepthNoise {
             return None;
         }
         let noise = run.factor * if run.power == 0.0 { 1.0 } else { depth.powf(run.power) };
-        Some(Known { noise, ray: from_sensor / from_sensor.length() })
+        Some(KnownNoise { noise, ray: from_sensor / from_sensor.length() })
     }
 }
 
-impl Known {
+impl KnownNoise {
     /// Replaces a move by `offset` onto the plane with a `normal` by a move along the ray. Where the ray nearly lies in
     /// the plane, the move stays along the normal.
     #[inline(always)]
     pub(super) fn onto(&self, normal: Vec3, offset: Vec3) -> Vec3 {
         let distance = offset.dot(normal);
         let slope = self.ray.dot(normal);
-        let inverse = 1.0 / (slope * slope + GRAZING * GRAZING);
+        let inverse = 1.0 / (slope * slope + GRAZING_COSINE * GRAZING_COSINE);
         let along = distance * slope * inverse;
-        let rest = distance * GRAZING * GRAZING * inverse;
+        let rest = distance * GRAZING_COSINE * GRAZING_COSINE * inverse;
         let limit = FARTHEST_ALONG * self.noise;
         let part = if along.abs() > limit { limit / along.abs() } else { 1.0 };
         (self.ray * along + normal * rest) * part
@@ -155,14 +155,14 @@ impl Known {
     #[inline(always)]
     pub(super) fn shadow(&self, before: Vec3, after: Vec3) -> Option<(Vec3, f32)> {
         let slope = self.ray.dot(after);
-        let ratio = (self.ray.dot(before).abs() / slope.abs().max(GRAZING)).min(LONGEST_SHADOW);
+        let ratio = (self.ray.dot(before).abs() / slope.abs().max(GRAZING_COSINE)).min(LONGEST_SHADOW);
         let major = (self.ray - after * slope).try_normalize()?;
         (ratio > 1.0).then_some((major, ratio))
     }
 }
 
 /// The noise of a scan with these points; `scans` is the number of scans that share the samples.
-fn of_scan(cloud: &PointCloud, scan: &Scan, points: Range<usize>, scans: usize) -> Option<DepthRun> {
+fn law_of_scan(cloud: &PointCloud, scan: &Scan, points: Range<usize>, scans: usize) -> Option<DepthRun> {
     if points.len() < LEAST_POINTS {
         return None;
     }
@@ -177,7 +177,7 @@ fn of_scan(cloud: &PointCloud, scan: &Scan, points: Range<usize>, scans: usize) 
     let few = sample(STEPS_SAMPLE, DMat3::IDENTITY);
     // Coordinates are rounded relative to the cloud's origin.
     let largest = few.iter().map(|point| point.abs().max_element()).fold(position.abs().max_element(), f64::max);
-    let rounding = ROUNDING * largest;
+    let rounding = COORDINATE_ROUNDING * largest;
     let [x, y, z] = [scan.world_from_sensor.x_axis, scan.world_from_sensor.y_axis, scan.world_from_sensor.z_axis]
         .map(|axis| axis.truncate().normalize_or_zero());
     // A camera looks along its third axis, but some formats do not define a sensor's axes. So each axis with all points
@@ -186,10 +186,12 @@ fn of_scan(cloud: &PointCloud, scan: &Scan, points: Range<usize>, scans: usize) 
         let sensor_from_world = DMat3::from_cols(x, y, axis).transpose();
         let seen: Vec<DVec3> = few.iter().map(|point| sensor_from_world * *point).collect();
         let is_outside = |point: &&DVec3| {
-            !(point.z > rounding && point.x.abs() <= WIDEST * point.z && point.y.abs() <= WIDEST * point.z)
+            !(point.z > rounding
+                && point.x.abs() <= MAX_HALF_FOV_TANGENT * point.z
+                && point.y.abs() <= MAX_HALF_FOV_TANGENT * point.z)
         };
         let outside = seen.iter().filter(is_outside).count();
-        if seen.len() < LEAST_POINTS || outside as f64 > OUTSIDE * seen.len() as f64 {
+        if seen.len() < LEAST_POINTS || outside as f64 > MAX_OUTSIDE_SHARE * seen.len() as f64 {
             return None;
         }
         let law = steps::law(&seen, rounding).filter(|law| law.power == 2).or_else(|| {

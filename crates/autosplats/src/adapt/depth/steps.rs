@@ -17,15 +17,15 @@ const OTHER_VALUES: usize = 4;
 /// Least width of a step, in roundings of coordinates.
 const LEAST_STEP: f64 = 8.0;
 /// Fewest points of equal depth that are tested for lying on a line.
-const LEAST_ALIKE: usize = 8;
+const MIN_EQUAL_DEPTH_POINTS: usize = 8;
 /// Candidate powers of depth for the steps: of disparities, of something in between, of depths.
 const POWERS: [i32; 3] = [2, 1, 0];
 /// Largest deviation of a gap from a whole number of steps, in steps.
-const TIGHT: f64 = 0.25;
+const MAX_STEP_MISFIT: f64 = 0.25;
 /// Least share of the gaps that are one step wide.
-const ONE_STEP: f64 = 0.6;
+const MIN_ONE_STEP_SHARE: f64 = 0.6;
 /// Least share of the gaps that are a whole number of steps wide.
-const WHOLE_STEPS: f64 = 0.75;
+const MIN_WHOLE_STEPS_SHARE: f64 = 0.75;
 
 /// Standard deviation of a depth, in steps: 1/√3. Rounding alone gives half as much. But neighbours are rounded alike,
 /// so fits average out less than with independent errors, and depths between two steps toggle. With 1/√12 bodies are
@@ -54,7 +54,7 @@ fn fill_areas(points: &[DVec3], rounding: f64) -> bool {
     sorted.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     let [mut areas, mut all] = [0, 0];
     let mut along = Vec::new();
-    for alike in sorted.chunk_by(|a, b| b[0] - a[0] <= rounding).filter(|alike| alike.len() >= LEAST_ALIKE) {
+    for alike in sorted.chunk_by(|a, b| b[0] - a[0] <= rounding).filter(|alike| alike.len() >= MIN_EQUAL_DEPTH_POINTS) {
         let is_line = [1, 2].into_iter().any(|axis| {
             along.clear();
             along.extend(alike.iter().map(|point| point[axis]));
@@ -103,10 +103,11 @@ fn steps(values: &[f64]) -> Option<(f64, i32)> {
             });
             held.count() as f64 / widths.len() as f64
         };
-        let one = share(&|steps, off| steps == 1.0 && off <= TIGHT);
-        let whole = share(&|_, off| off <= TIGHT);
+        let one = share(&|steps, off| steps == 1.0 && off <= MAX_STEP_MISFIT);
+        let whole = share(&|_, off| off <= MAX_STEP_MISFIT);
         let spread = widths.iter().map(|width| off(*width).1.min(1.0)).sum::<f64>();
-        if one >= ONE_STEP && whole >= WHOLE_STEPS && best.is_none_or(|(least, ..)| spread < least) {
+        if one >= MIN_ONE_STEP_SHARE && whole >= MIN_WHOLE_STEPS_SHARE && best.is_none_or(|(least, ..)| spread < least)
+        {
             best = Some((spread, step, power));
         }
     }

@@ -222,7 +222,7 @@ fn noise_is_of_the_sensors_distance_not_the_eyes() {
 
 #[test]
 fn surfels_move_along_the_ray() {
-    let known = Known { noise: 0.1, ray: Vec3::Z };
+    let known = KnownNoise { noise: 0.1, ray: Vec3::Z };
     let normal = Vec3::new(0.6, 0.0, -0.8);
     for normal in [normal, -normal] {
         let moved = known.onto(normal, normal * 0.05);

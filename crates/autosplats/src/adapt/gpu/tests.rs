@@ -1,7 +1,7 @@
 //! The stage on the GPU against the CPU, with the same surfels.
 
 use super::super::cells::{CellRow, Cells, Cluster, Level};
-use super::super::noise::{Noise, Usual};
+use super::super::noise::{FrameStatistics, Noise};
 use super::super::tests::{Case, K, PROJECTIONS, angle};
 use super::*;
 use crate::fit::gpu::surfel_buffer;
@@ -18,15 +18,15 @@ const UNLIKE_CELLS: f64 = 1e-3;
 const UNLIKE_SURFELS: f64 = 1e-2;
 
 /// Results of the device.
-struct Made {
+struct DeviceResults {
     /// Clusters of each cell, level by level.
     cells: Cells,
-    usual: Usual,
+    usual: FrameStatistics,
     /// Of both rounds.
     surfels: Surfels,
 }
 
-fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
+fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> DeviceResults {
     let screen = upload_screen(gpu, &case.screen, &case.view);
     let mut known = DepthNoiseBuffer::new(gpu).expect("room");
     known.write(gpu, &case.known).expect("room");
@@ -46,9 +46,13 @@ fn on_device(gpu: &Gpu, passes: &AdaptPasses, case: &Case) -> Made {
     recorder.finish();
     let [level, power, k_radius, sheet_level, most, sure] =
         read_back::<[f32; NOISE_FLOATS]>(gpu, &buffers.measured, 1).expect("noise")[0];
-    Made {
+    DeviceResults {
         cells: read_cells(gpu, &buffers, screen.size),
-        usual: Usual { noise: Noise { level, power, most, sure }, k_radius, sheet_level: sheet_level as usize },
+        usual: FrameStatistics {
+            noise: Noise { level, power, most, sure },
+            k_radius,
+            sheet_level: sheet_level as usize,
+        },
         surfels: read_back(gpu, &surfels, fitted.len()).expect("surfels"),
     }
 }
@@ -107,7 +111,7 @@ fn compare_cells(device: &Cells, host: &Cells) -> Result<[usize; 2], String> {
     if is_enough { Ok([unlike, filled]) } else { Err(format!("{unlike} of {filled} cells differ")) }
 }
 
-fn compare_usual(device: Usual, host: Usual) -> Result<(), String> {
+fn compare_usual(device: FrameStatistics, host: FrameStatistics) -> Result<(), String> {
     // Without scatter, the rounding of positions a few units away remains.
     let near = |a: f32, b: f32| (a - b).abs() <= 0.01 * b.abs() + 1e-6;
     let same = near(device.noise.level, host.noise.level)
@@ -344,18 +348,21 @@ fn comparison_sees_what_is_wrong() {
 
     let usual = case.usual();
     assert!(compare_usual(usual, usual).is_ok(), "nothing is wrong yet");
-    let Usual { noise, k_radius, sheet_level } = usual;
+    let FrameStatistics { noise, k_radius, sheet_level } = usual;
     let Noise { level, power, sure, .. } = noise;
     let with = |level: f32, power: f32, k_radius: f32| {
         let noise = Noise { level, power, ..noise };
-        Usual { noise, k_radius, ..usual }
+        FrameStatistics { noise, k_radius, ..usual }
     };
     assert!(compare_usual(with(1.02 * level, power, k_radius), usual).is_err(), "more noise");
     assert!(compare_usual(with(level, 0.1, k_radius), usual).is_err(), "that grows");
-    let less_sure = Usual { noise: Noise { sure: 0.9 * sure, ..noise }, ..usual };
+    let less_sure = FrameStatistics { noise: Noise { sure: 0.9 * sure, ..noise }, ..usual };
     assert!(compare_usual(less_sure, usual).is_err(), "that is less sure");
     assert!(compare_usual(with(level, power, 1.001 * k_radius), usual).is_err(), "points further apart");
-    assert!(compare_usual(Usual { sheet_level: 3 - sheet_level, ..usual }, usual).is_err(), "sheets of other cells");
+    assert!(
+        compare_usual(FrameStatistics { sheet_level: 3 - sheet_level, ..usual }, usual).is_err(),
+        "sheets of other cells"
+    );
 
     let adapted = case.adapted();
     assert!(compare_surfels(&adapted, &adapted).is_ok(), "nothing is wrong yet");

@@ -5,7 +5,7 @@ use pulp::Simd;
 
 use super::{SHEETS, Sheet, Sheets};
 use crate::adapt::cells::Cells;
-use crate::adapt::cpu::{AGREE, FARTHEST, Goal};
+use crate::adapt::cpu::{AGREE_ERRORS, Goal, MAX_MOVE_NOISES};
 use crate::camera::View;
 use crate::search::{LANES, Lanes};
 use crate::simd::F32s;
@@ -36,9 +36,9 @@ const FIELDS: usize = 19;
 
 /// The sheets of a cell, one array per number for SIMD. All numbers are 0 where there is no sheet.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Stack(pub(super) [[f32; SHEETS]; FIELDS]);
+pub(super) struct CellSheets(pub(super) [[f32; SHEETS]; FIELDS]);
 
-impl Stack {
+impl CellSheets {
     pub(super) fn put(&mut self, at: usize, sheet: &Sheet) {
         let &Sheet { center, radius, axis, height, bend, error, curvature, scatter, trust } = sheet;
         let [xx, xy, xz, yy, yz, zz] = bend;
@@ -55,7 +55,7 @@ impl Stack {
 
 /// The sheets of four cells, one per lane. Successive surfels mostly share them, so the last ones are kept.
 #[derive(Debug)]
-pub(in crate::adapt) struct Around {
+pub(in crate::adapt) struct NearbySheets {
     /// First and last column, first and last row.
     cells: [usize; 4],
     fields: [Lanes; FIELDS],
@@ -64,7 +64,7 @@ pub(in crate::adapt) struct Around {
     row: Lanes,
 }
 
-impl Default for Around {
+impl Default for NearbySheets {
     fn default() -> Self {
         let zero = Lanes::default();
         // Matches no cells.
@@ -72,7 +72,7 @@ impl Default for Around {
     }
 }
 
-impl Around {
+impl NearbySheets {
     #[inline(always)]
     fn gather(&mut self, sheets: &Sheets, cells: [usize; 4], columns: usize) {
         if self.cells == cells {
@@ -86,7 +86,7 @@ impl Around {
             self.row.0[lanes.clone()].fill(row as f32);
             let cell = row * columns + column;
             // At the picture's border a cell appears twice, which does not change the ratio of weights.
-            let stack = if sheets.fitted[cell] { sheets.stacks[cell] } else { Stack::default() };
+            let stack = if sheets.fitted[cell] { sheets.stacks[cell] } else { CellSheets::default() };
             for (field, values) in self.fields.iter_mut().zip(&stack.0) {
                 field.0[lanes.clone()].copy_from_slice(values);
             }
@@ -105,7 +105,7 @@ impl Sheets {
         first: Option<(Vec3, f32)>,
         goal: &Goal,
         (cells, view): (&Cells, &View),
-        around: &mut [Around; 2],
+        around: &mut [NearbySheets; 2],
     ) -> Blend {
         let Some(level) = cells.levels.get(self.level) else { return Blend::Nothing };
         let per_side = 1.0 / level.side_px as f32;
@@ -117,7 +117,7 @@ impl Sheets {
         // Successive surfels of a strip alternate between rows of cells.
         let around = &mut around[y0 & 1];
         around.gather(self, [x0, x1, y0, y1], level.columns);
-        let per_farthest = 1.0 / (FARTHEST * goal.noise);
+        let per_farthest = 1.0 / (MAX_MOVE_NOISES * goal.noise);
         // Closures within arrays' methods are not inlined.
         let splat = |value: f32| F32s::splat(simd, value);
         let (zero, one, two) = (splat(0.0), splat(1.0), splat(2.0));
@@ -125,7 +125,7 @@ impl Sheets {
         // Weights, normals, heights.
         let mut told = [Lanes::default(); 5];
         let mut disagrees = false;
-        // In the order of `Stack::put`.
+        // In the order of `CellSheets::put`.
         #[rustfmt::skip]
         let [
             x_lanes, y_lanes, z_lanes, radius, per_radius, axis_x, axis_y, axis_z, height_lanes,
@@ -163,7 +163,8 @@ impl Sheets {
                 let (across_x, across_y, across_z) = (ny * fz - nz * fy, nz * fx - nx * fz, nx * fy - ny * fx);
                 let across = across_x * across_x + across_y * across_y + across_z * across_z;
                 // The smallest of a sheet's balls has not been held against any normal.
-                let agrees = across.at_most(splat(AGREE * AGREE) * (load(squared_error) + splat(error * error)));
+                let agrees =
+                    across.at_most(splat(AGREE_ERRORS * AGREE_ERRORS) * (load(squared_error) + splat(error * error)));
                 counts = is_there.and(agrees).and(load(scatter).at_most(splat(goal.scatter)));
                 disagrees |= zero.less(is_there.keep(one) - counts.keep(one)).any();
             }

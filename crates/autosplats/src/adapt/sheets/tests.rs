@@ -3,10 +3,10 @@
 use glam::Vec3;
 use pulp::Simd;
 
-use super::blend::{Around, Blend};
+use super::blend::{Blend, NearbySheets};
 use super::{SHEET_LEVELS, SHEETS, Sheets};
 use crate::adapt::cells::Cells;
-use crate::adapt::cpu::{FARTHEST, Goal};
+use crate::adapt::cpu::{Goal, MAX_MOVE_NOISES};
 use crate::adapt::tests::{Case, PROJECTIONS, angle};
 use crate::camera::View;
 use crate::fit::Surfel;
@@ -37,7 +37,7 @@ fn blend_with<'a, S: Simd>(
     first: Option<(Vec3, f32)>,
     cells: &'a Cells,
     view: &'a View,
-    around: &'a mut [Around; 2],
+    around: &'a mut [NearbySheets; 2],
 ) -> Blend {
     sheets.blend(simd, surfel.center, first, &goal(surfel, view), (cells, view), around)
 }
@@ -69,7 +69,7 @@ fn blended_one_by_one(sheets: &Sheets, surfel: &Surfel, cells: &Cells, view: &Vi
             );
             let height = (field(8) + bent.dot(from) - axis.dot(from)) * radius;
             let near = 1.0 - (from - axis * axis.dot(from)).length_squared();
-            let likely = 1.0 - (height / (FARTHEST * NOISE)).powi(2);
+            let likely = 1.0 - (height / (MAX_MOVE_NOISES * NOISE)).powi(2);
             if near > 0.0 && likely > 0.0 {
                 let weight = share * near * near * likely.powi(8) * trust;
                 let own = (axis - 2.0 * bent).normalize();
@@ -114,7 +114,7 @@ fn any_width_of_vectors_blends_to_the_same_bits() {
     let case = Case::new(&noisy(test_clouds::sphere(8000), NOISE), PROJECTIONS[0], [320, 240]);
     let cells = case.cells();
     let sheets = sheets_of(&case, &cells);
-    let [mut around, mut around_alone]: [[Around; 2]; 2] = Default::default();
+    let [mut around, mut around_alone]: [[NearbySheets; 2]; 2] = Default::default();
     let mut kinds = [0; 3];
     for (index, surfel) in case.fitted[0].iter().enumerate() {
         // Some have a reliable normal, and some of these differ from all sheets.

@@ -5,7 +5,7 @@ use autosplats_cloud::glam::{DMat3, DVec3};
 
 use super::*;
 use crate::camera::{Camera, Projection, View};
-use crate::fit::alone::FEW;
+use crate::fit::alone::FEW_NEIGHBORS;
 use crate::fit::tests::eigenvalues;
 use crate::fit::{FitRules, LONGEST, Surfels, fit};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
@@ -199,7 +199,7 @@ fn the_device_drops_what_the_host_drops() {
     assert!(host.len() - same <= 1, "{same} of {} are dropped alike", host.len());
     assert_eq!(counted, device.iter().filter(|surfel| is_dropped(surfel)).count(), "outliers are counted");
     let more = host.iter().zip(&plain).zip(case.moments()).filter(|((host, plain), _)| host.radius < plain.radius);
-    let (few, many): (Vec<_>, Vec<_>) = more.partition(|(_, moments)| moments.count < FEW);
+    let (few, many): (Vec<_>, Vec<_>) = more.partition(|(_, moments)| moments.count < FEW_NEIGHBORS);
     assert!(few.len() >= 5 && many.len() > 20, "{} with few, {} with many neighbours", few.len(), many.len());
 }
 

@@ -1,6 +1,6 @@
 //! Orientation by sensors on the GPU: one invocation per surfel, for clouds with known sensors.
 
-use super::{SEEN, SURE, Sensor, Sensors};
+use super::{MIN_EYE_COSINE, MIN_SENSOR_COSINE, Sensor, Sensors};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers};
@@ -35,7 +35,11 @@ impl OrientPasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let round = |round: Round| {
-            let constants = [("ROUND", f64::from(round as u32)), ("SURE", SURE.into()), ("SEEN", SEEN.into())];
+            let constants = [
+                ("ROUND", f64::from(round as u32)),
+                ("MIN_SENSOR_COSINE", MIN_SENSOR_COSINE.into()),
+                ("MIN_EYE_COSINE", MIN_EYE_COSINE.into()),
+            ];
             Pass::new(gpu, &ORIENT, &constants)
         };
         Ok(Self { rounds: [round(Round::Active)?, round(Round::Recovered)?] })

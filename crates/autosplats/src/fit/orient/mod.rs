@@ -17,13 +17,13 @@ use super::Surfel;
 use crate::camera::View;
 
 /// Cosine of the angle between the normal and the direction to the sensor above which the sensor's side is certain.
-pub(super) const SURE: f32 = 0.15;
+pub(super) const MIN_SENSOR_COSINE: f32 = 0.15;
 /// Cosine of the angle between the normal and the direction to the eye above which the eye's side is certain.
-pub(super) const SEEN: f32 = 0.05;
+pub(super) const MIN_EYE_COSINE: f32 = 0.05;
 /// Largest coordinate of a known sensor about the cloud's origin, world units. Larger squares could overflow.
-const FARTHEST: f32 = 1e18;
+const MAX_SENSOR_COORDINATE: f32 = 1e18;
 /// Surfels per task.
-const TASK: usize = 1 << 12;
+const TASK_SURFELS: usize = 1 << 12;
 
 /// Position of the sensor of a run of points, laid out as in `orient.wgsl`.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -50,7 +50,7 @@ pub(crate) fn has_sensors(cloud: &PointCloud) -> bool {
 /// Position of a scan's sensor about the cloud's origin; `None` if not finite or too far away.
 fn position(cloud: &PointCloud, scan: &Scan) -> Option<[f32; 3]> {
     let position = (scan.position() - cloud.origin()).as_vec3();
-    (position.is_finite() && position.abs().max_element() <= FARTHEST).then_some(position.to_array())
+    (position.is_finite() && position.abs().max_element() <= MAX_SENSOR_COORDINATE).then_some(position.to_array())
 }
 
 /// Runs of points by scan: the index of the first point, and the scan if any. The first run begins at point 0. A point
@@ -108,7 +108,7 @@ impl Sensors {
         if self.runs.is_empty() {
             return;
         }
-        surfels.par_chunks_mut(TASK).flatten_iter().for_each(|surfel| {
+        surfels.par_chunks_mut(TASK_SURFELS).flatten_iter().for_each(|surfel| {
             let sensor = self.of(surfel.source).map(|sensor| view.view_from_world * (sensor - view.eye_local));
             if sensor.is_some_and(|sensor| shows_back(surfel, sensor, view)) {
                 surfel.screen |= Surfel::BACK;
@@ -124,6 +124,6 @@ fn shows_back(surfel: &Surfel, sensor: Vec3, view: &View) -> bool {
     let to_sensor = sensor - center;
     // Thickness of the neighbourhood over its width: about the tangent of the normal's error angle.
     let rough = (2.0 * surfel.curvature).sqrt();
-    normal.dot(to_sensor) < -rough.max(SURE) * to_sensor.length()
-        && normal.dot(to_eye) > rough.max(SEEN) * to_eye.length()
+    normal.dot(to_sensor) < -rough.max(MIN_SENSOR_COSINE) * to_sensor.length()
+        && normal.dot(to_eye) > rough.max(MIN_EYE_COSINE) * to_eye.length()
 }

@@ -22,8 +22,8 @@ struct Sensor {
 
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
-override SURE: f32;
-override SEEN: f32;
+override MIN_SENSOR_COSINE: f32;
+override MIN_EYE_COSINE: f32;
 
 // The sensor of a point.
 fn sensor_of(point: u32) -> vec3f {
@@ -45,8 +45,8 @@ fn shows_back(surfel: Surfel, sensor: vec3f) -> bool {
     let to_sensor = to_view(sensor) - surfel.center;
     // Thickness of the neighbourhood over its width: about the tangent of the normal's error angle.
     let rough = sqrt(2.0 * surfel.curvature);
-    return dot(surfel.normal, to_sensor) < -max(rough, SURE) * length(to_sensor)
-        && dot(surfel.normal, eye) > max(rough, SEEN) * length(eye);
+    return dot(surfel.normal, to_sensor) < -max(rough, MIN_SENSOR_COSINE) * length(to_sensor)
+        && dot(surfel.normal, eye) > max(rough, MIN_EYE_COSINE) * length(eye);
 }
 
 @compute @workgroup_size(64)

@@ -4,13 +4,13 @@ use std::mem::{Discriminant, discriminant};
 
 use crate::Error;
 use crate::adapt::gpu::{AdaptBuffers, AdaptPasses, DepthNoiseBuffer};
-use crate::camera::{Reprojection, Seen};
+use crate::camera::{PlacedView, Reprojection};
 use crate::fit::gpu::{FitPasses, surfel_buffer};
 use crate::fit::orient::gpu::OrientPasses;
 use crate::gpu::{FrameUniform, Gpu, Step};
 use crate::project::DeviceCloud;
 use crate::project::gpu::{ProjectPasses, Round, ScreenBuffers};
-use crate::renderer::attributes::Wanted;
+use crate::renderer::attributes::SplatAttributes;
 use crate::renderer::{Reconstruction, Settings};
 use crate::search::gpu::{EnginePasses, EngineSteps, SearchBuffers, compile};
 use crate::search::past::gpu::{PastPasses, past_buffer};
@@ -111,7 +111,7 @@ impl Shape {
         margin: u32,
         halves: bool,
         sensors: Option<usize>,
-        wanted: &Wanted,
+        wanted: &SplatAttributes,
         Settings { reconstruction, shading, all_layers, .. }: &Settings,
     ) -> Self {
         Self {
@@ -119,7 +119,7 @@ impl Shape {
             margin,
             halves,
             search: (discriminant(&reconstruction.engine), reconstruction.k),
-            coherent: reconstruction.remembers(),
+            coherent: reconstruction.starts_from_past(),
             smooth: reconstruction.smooths(),
             adaptive: reconstruction.adaptive,
             depth_refinement: reconstruction.depth_refinement,
@@ -136,7 +136,7 @@ impl Shape {
 
 /// Device buffers that outlive the steps.
 #[derive(Clone, Copy)]
-pub(super) struct OnDevice<'a> {
+pub(super) struct ResidentBuffers<'a> {
     pub(super) cloud: &'a DeviceCloud,
     pub(super) sensors: Option<&'a wgpu::Buffer>,
     pub(super) depth_noise: &'a DepthNoiseBuffer,
@@ -145,14 +145,14 @@ pub(super) struct OnDevice<'a> {
 }
 
 /// Settings of a picture, and the format of its texture if it has one.
-pub(super) type Made = (Settings, Option<wgpu::TextureFormat>);
+pub(super) type PictureSettings = (Settings, Option<wgpu::TextureFormat>);
 
 /// A frame ready to be replayed.
 #[derive(Debug)]
 pub(super) struct Prepared {
     shape: Shape,
     /// The last frame, if there is one: view, identity of its points and how it was made.
-    pub(super) seen: Option<(Seen, u64, Made)>,
+    pub(super) seen: Option<(PlacedView, u64, PictureSettings)>,
     pub(super) screen: ScreenBuffers,
     /// [`Surfel`](crate::fit::Surfel) per query.
     pub(super) surfels: wgpu::Buffer,
@@ -169,7 +169,7 @@ impl Prepared {
         gpu: &Gpu,
         shape: Shape,
         passes: &mut Passes,
-        OnDevice { cloud, sensors, depth_noise, frame }: OnDevice<'_>,
+        ResidentBuffers { cloud, sensors, depth_noise, frame }: ResidentBuffers<'_>,
         settings: &Settings,
     ) -> Result<Self, Error> {
         passes.compile(gpu, &shape, settings)?;
@@ -248,11 +248,11 @@ impl Prepared {
     }
 
     /// Writes the uniforms of the next frame.
-    pub(super) fn tell(
+    pub(super) fn write_uniforms(
         &mut self,
         gpu: &Gpu,
         frame: &wgpu::Buffer,
-        (now, identity, format): (Seen, u64, Option<wgpu::TextureFormat>),
+        (now, identity, format): (PlacedView, u64, Option<wgpu::TextureFormat>),
         dot_px: f32,
         settings: &Settings,
         shading: &ShadeUniform,
@@ -264,7 +264,7 @@ impl Prepared {
             gap_factor: reconstruction.gap_factor,
             adaptive: reconstruction.adaptive,
         };
-        let told = FrameUniform {
+        let frame_uniform = FrameUniform {
             halves: self.shape.halves.into(),
             grid_culling: reconstruction.grid_culling.into(),
             adaptive: reconstruction.adaptive.into(),
@@ -283,7 +283,7 @@ impl Prepared {
         // New steps have no last frame to look back at. A change of k always makes new steps.
         let past = self.seen.take().filter(|_| self.shape.coherent || self.shape.smooth);
         let reprojected = past.and_then(|(past, points, made)| Some((Reprojection::new(&now, &past)?, points, made)));
-        let told = reprojected.map_or(told, |(past, points, made)| {
+        let frame_uniform = reprojected.map_or(frame_uniform, |(past, points, made)| {
             let same_points = points == identity;
             let (before, format_before) = &made;
             let is_alike = before.reconstruction == *reconstruction;
@@ -291,9 +291,9 @@ impl Prepared {
             let frames_averaged = if same_points { of_same } else { of_others } as f32;
             let same_picture = self.shape.smooth && same_points && before == settings && *format_before == format;
             let (same_points, same_picture) = (same_points.into(), same_picture.into());
-            FrameUniform { frames_averaged, same_points, same_picture, ..told.after(&past) }
+            FrameUniform { frames_averaged, same_points, same_picture, ..frame_uniform.after(&past) }
         });
-        gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&told));
+        gpu.queue.write_buffer(frame, 0, bytemuck::bytes_of(&frame_uniform));
         self.picture.write(gpu, shading, &settings.shading);
     }
 }

@@ -19,16 +19,16 @@ const SEARCH: PassSource = PassSource::new("search/kd_tree/search", include_str!
 const MOMENTS: PassSource = PassSource::new("search/kd_tree/moments", include_str!("moments.wgsl"));
 
 /// Most points of a small node.
-const SMALL: usize = 64;
+const MAX_SMALL_NODE_POINTS: usize = 64;
 /// Fewest points of a leaf, where there are more.
-const LEAST: usize = 8;
+const MIN_LEAF_POINTS: usize = 8;
 /// Number of points whose reading costs as much as a step down the tree. See docs/decisions/0015-search-engines.md.
-const STEP_COST: f64 = 16.0;
+const STEP_COST_POINTS: f64 = 16.0;
 /// Points of a large node that one workgroup processes.
 const CHUNK: usize = 256;
 /// Most nodes and points that one walk through the tree visits. Software devices end an invocation silently after
 /// 65535 rounds of its loops, and a search is two walks.
-const MOST_SEEN: u32 = 12_000;
+const MAX_WALK_VISITS: u32 = 12_000;
 
 /// `KdPoint` of `shared/kd_tree.wgsl`.
 type Point = [u32; 4];
@@ -51,7 +51,7 @@ enum Work {
 }
 
 /// Number of indirect dispatches.
-const WORKS: u64 = Work::Points as u64 + 1;
+const WORK_COUNT: u64 = Work::Points as u64 + 1;
 /// Bytes of the arguments of an indirect dispatch.
 const WORK_BYTES: u64 = 12;
 
@@ -59,7 +59,7 @@ const WORK_BYTES: u64 = 12;
 /// split that leaves three quarters on one side is not yet lopsided and takes 1/log₂(4/3) = 2.41 levels per halving. A
 /// lopsided split and the median after it take two. The number is even, so that all points end in the first list.
 fn levels(capacity: usize) -> usize {
-    let halvings = capacity.div_ceil(SMALL).next_power_of_two().ilog2() as usize;
+    let halvings = capacity.div_ceil(MAX_SMALL_NODE_POINTS).next_power_of_two().ilog2() as usize;
     (5 * halvings).div_ceil(4) * 2 + 6
 }
 
@@ -84,15 +84,15 @@ impl TreeBuffers {
     /// # Errors
     /// [`Error::DeviceLimit`] or [`Error::DeviceMemory`] if the device has too little.
     fn new(gpu: &Gpu, capacity: usize) -> Result<Self, Error> {
-        // Large nodes of a level have more than `SMALL` points each, apart from the root.
-        let large = capacity / (SMALL + 1) + 1;
+        // Large nodes of a level have more than `MAX_SMALL_NODE_POINTS` points each, apart from the root.
+        let large = capacity / (MAX_SMALL_NODE_POINTS + 1) + 1;
         // Nodes above the small nodes: twice the number with all small nodes half full.
         let upper = capacity / 8 + 64;
-        let lower = capacity / (LEAST / 2) + 1;
+        let lower = capacity / (MIN_LEAF_POINTS / 2) + 1;
         let points = |_| gpu.storage::<Point>("points of the kd-tree", capacity);
         let arguments = |_| {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
-            gpu.buffer("arguments of the kd-tree", WORKS * WORK_BYTES, usage)
+            gpu.buffer("arguments of the kd-tree", WORK_COUNT * WORK_BYTES, usage)
         };
         Ok(Self {
             capacity: capacity as u32,
@@ -137,7 +137,7 @@ impl KdTreePasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let pass = |source| Pass::new(gpu, source, &[]);
-        let most_seen = ("MOST_SEEN", MOST_SEEN.into());
+        let most_seen = ("MAX_WALK_VISITS", MAX_WALK_VISITS.into());
         let moments = |round| Pass::new(gpu, &MOMENTS, &[("ROUND", f64::from(round as u32)), most_seen]);
         Ok(Self {
             begin: pass(&BEGIN)?,
@@ -145,7 +145,11 @@ impl KdTreePasses {
             count: pass(&COUNT)?,
             place: pass(&PLACE)?,
             scatter: pass(&SCATTER)?,
-            small_tree: Pass::new(gpu, &SMALL_TREE, &[("LEAST", LEAST as f64), ("STEP_COST", STEP_COST)])?,
+            small_tree: Pass::new(
+                gpu,
+                &SMALL_TREE,
+                &[("MIN_LEAF_POINTS", MIN_LEAF_POINTS as f64), ("STEP_COST_POINTS", STEP_COST_POINTS)],
+            )?,
             search: Pass::new(gpu, &SEARCH, &[most_seen])?,
             moments: [moments(Round::Active)?, moments(Round::Recovered)?],
         })

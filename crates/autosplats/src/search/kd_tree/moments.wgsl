@@ -23,7 +23,7 @@
 // 0: the active points; 1: the recovered points, which follow them.
 override ROUND: u32;
 // Most nodes and points that a walk visits.
-override MOST_SEEN: u32;
+override MAX_WALK_VISITS: u32;
 
 struct Task {
     first: u32,
@@ -68,7 +68,7 @@ fn find(own: u32) -> Found {
     var walk = kd_walk(center, radius);
     var leaf = kd_next_leaf(&walk);
     while leaf.y > 0u {
-        for (var place = leaf.x; place < leaf.x + leaf.y && walk.seen < MOST_SEEN; place++) {
+        for (var place = leaf.x; place < leaf.x + leaf.y && walk.seen < MAX_WALK_VISITS; place++) {
             walk.seen += 1u;
             let away = bitcast<vec3f>(points[place].xyz) - center;
             let squared = kd_squared_length(away);
@@ -83,7 +83,7 @@ fn find(own: u32) -> Found {
             furthest = select(furthest, away, replaces);
             furthest_squared = max(squared, furthest_squared);
         }
-        if walk.seen >= MOST_SEEN {
+        if walk.seen >= MAX_WALK_VISITS {
             break;
         }
         leaf = kd_next_leaf(&walk);
@@ -94,7 +94,7 @@ fn find(own: u32) -> Found {
         next_squared = furthest_squared;
     }
     sums.k_radius = sqrt(next_squared);
-    return Found(sums, walk.seen >= MOST_SEEN);
+    return Found(sums, walk.seen >= MAX_WALK_VISITS);
 }
 
 @compute @workgroup_size(64)

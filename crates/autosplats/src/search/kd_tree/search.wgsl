@@ -23,7 +23,7 @@ const N_ITER = 2u;
 const ROUNDING = 1.000001;
 
 // Most nodes and points that one range search visits.
-override MOST_SEEN: u32;
+override MAX_WALK_VISITS: u32;
 
 @compute @workgroup_size(64)
 fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_index) local: u32) {
@@ -55,17 +55,17 @@ fn search(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_ind
                     bins[u32(min((distance - low) / per_bin, f32(N_HIST - 1u)))] += 1u;
                 }
                 walk.seen += 1u;
-                if walk.seen >= MOST_SEEN || coincident >= frame.k {
+                if walk.seen >= MAX_WALK_VISITS || coincident >= frame.k {
                     break;
                 }
             }
-            if walk.seen >= MOST_SEEN || coincident >= frame.k {
+            if walk.seen >= MAX_WALK_VISITS || coincident >= frame.k {
                 break;
             }
             leaf = kd_next_leaf(&walk);
         }
         // Differs from [ZHWG08]: a search that visits too much ends. The points visited still bound the radius.
-        let is_whole = walk.seen < MOST_SEEN;
+        let is_whole = walk.seen < MAX_WALK_VISITS;
         var so_far = nearer;
         var bin = 0u;
         while bin < N_HIST && so_far + bins[bin] < frame.k {

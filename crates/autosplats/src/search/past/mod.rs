@@ -14,18 +14,18 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use rayon::prelude::*;
 
 use super::{LANES, Neighborhoods};
-use crate::camera::{Reprojection, Seen};
+use crate::camera::{PlacedView, Reprojection};
 use crate::project::ScreenPoints;
 
 /// Factor on a k-radius of the last frame to start a search from: neighbours change, and pixels hold other points.
-pub(crate) const SLACK: f32 = 1.05;
+pub(crate) const PAST_RADIUS_SLACK: f32 = 1.05;
 /// Range of starting radii in first search radii. A radius outside belongs to another surface.
-pub(crate) const LIKELY: [f32; 2] = [0.1, 4.0];
+pub(crate) const PAST_FIRST_RADII_RANGE: [f32; 2] = [0.1, 4.0];
 /// Largest mean shortfall of the last frame's radii, over recent blocks, with which the CPU still uses them. Beyond,
 /// the radii of the previous block are as good.
-const TRUSTED: f32 = 1.2;
+const MAX_TRUSTED_SHORTFALL: f32 = 1.2;
 /// While the last frame's radii are not trusted, one block in this many still reads them, to notice a change.
-const SKIPPED: u32 = 8;
+const UNTRUSTED_CHECK_BLOCKS: u32 = 8;
 /// Values that a task clears.
 const CHUNK: usize = 1 << 16;
 
@@ -40,7 +40,7 @@ pub(crate) struct Trust {
 
 impl Default for Trust {
     fn default() -> Self {
-        Self { missed: SLACK, skipped: 0 }
+        Self { missed: PAST_RADIUS_SLACK, skipped: 0 }
     }
 }
 
@@ -48,14 +48,14 @@ impl Trust {
     /// Whether the next block should read the last frame's radii.
     #[inline(always)]
     pub(crate) fn looks_back(&mut self) -> bool {
-        self.skipped = if self.slack().is_some() { 0 } else { (self.skipped + 1) % SKIPPED };
+        self.skipped = if self.slack().is_some() { 0 } else { (self.skipped + 1) % UNTRUSTED_CHECK_BLOCKS };
         self.skipped == 0
     }
 
     /// Factor on the last frame's radii to start from; `None` if the radii are not trusted.
     #[inline(always)]
     pub(crate) fn slack(&self) -> Option<f32> {
-        (self.missed <= TRUSTED).then_some(self.missed.max(1.01))
+        (self.missed <= MAX_TRUSTED_SHORTFALL).then_some(self.missed.max(1.01))
     }
 
     /// Takes in the factor by which a block's radii fell short.
@@ -68,26 +68,26 @@ impl Trust {
 /// The k-radii of the last frame and of the present frame.
 #[derive(Debug, Default)]
 pub(crate) struct Past {
-    last: Radii,
-    next: Radii,
+    last: PastRadii,
+    next: PastRadii,
     reprojection: Option<Reprojection>,
 }
 
 /// The k-radii of one frame.
 #[derive(Debug, Default)]
-struct Radii {
+struct PastRadii {
     /// The view of the frame, and its k.
-    seen: Option<(Seen, u32)>,
+    seen: Option<(PlacedView, u32)>,
     /// Bits of the greatest k-radius per pixel; 0 where no point has k neighbours.
     pixels: Vec<AtomicU32>,
 }
 
 impl Past {
     /// Starts a frame. Clears radii left by an aborted frame.
-    pub(crate) fn begin(&mut self, now: Seen, k: u32) {
+    pub(crate) fn begin(&mut self, now: PlacedView, k: u32) {
         let past = self.last.seen.filter(|&(_, known)| known == k);
         self.reprojection = past.and_then(|(past, _)| Reprojection::new(&now, &past));
-        let Radii { seen, pixels } = &mut self.next;
+        let PastRadii { seen, pixels } = &mut self.next;
         *seen = Some((now, k));
         pixels.resize_with(now.view.width as usize * now.view.height as usize, AtomicU32::default);
         pixels.par_chunks_mut(CHUNK).for_each(|chunk| chunk.iter_mut().for_each(|radius| *radius.get_mut() = 0));
@@ -109,13 +109,13 @@ impl Past {
     pub(crate) fn radius(&self, position_view: [f32; 3], initial_radius: f32) -> Option<f32> {
         let pixel = self.reprojection.as_ref()?.pixel(position_view)?;
         let radius = f32::from_bits(self.last.pixels[pixel].load(Ordering::Relaxed));
-        let [least, most] = LIKELY;
+        let [least, most] = PAST_FIRST_RADII_RANGE;
         ((radius >= least * initial_radius) & (radius <= most * initial_radius)).then_some(radius)
     }
 
     /// Stores the k-radii of `queries` that found k neighbours.
     pub(crate) fn keep(&self, screen: &ScreenPoints, queries: &[u32], neighborhoods: &Neighborhoods) {
-        let Some((Seen { view, .. }, k)) = self.next.seen else { return };
+        let Some((PlacedView { view, .. }, k)) = self.next.seen else { return };
         queries.par_chunks(LANES).zip(&neighborhoods.blocks).with_min_len(64).for_each(|(queries, block)| {
             for (lane, &query) in queries.iter().enumerate() {
                 if block.count.0[lane] >= k as f32 {

@@ -11,14 +11,14 @@ use crate::test_clouds::{self, Random};
 
 const SIZE: [u32; 2] = [121, 90];
 
-fn seen(view: &View) -> Seen {
-    Seen { view: *view, origin: DVec3::ZERO }
+fn seen(view: &View) -> PlacedView {
+    PlacedView { view: *view, origin: DVec3::ZERO }
 }
 
 /// A past with these radii, seen by `view`.
 fn past(view: &View, k: u32, radii: &[f32]) -> Past {
     let pixels = radii.iter().map(|radius| AtomicU32::new(radius.to_bits())).collect();
-    let mut past = Past { last: Radii { seen: Some((seen(view), k)), pixels }, ..Past::default() };
+    let mut past = Past { last: PastRadii { seen: Some((seen(view), k)), pixels }, ..Past::default() };
     past.begin(seen(view), k);
     past
 }

@@ -11,21 +11,21 @@ use crate::camera::View;
 use crate::project::ScreenPoints;
 use crate::search::moments::{squared_distances, sum_moments};
 use crate::search::past::{Past, Trust};
-use crate::search::select::{GROUP, kth_smallest, largest_below};
+use crate::search::select::{CANDIDATE_GROUP, kth_smallest, largest_below};
 use crate::search::{
-    BOUND_STEP, CROWDED, EarlyEnd, LANES, Lanes, MAX_CANDIDATES, NeighborhoodBlock, Neighborhoods, SearchCounts,
-    SearchRules,
+    BOUND_STEP, EarlyEnd, LANES, Lanes, MAX_CANDIDATES, MIN_CROWDED_CANDIDATES, NeighborhoodBlock, Neighborhoods,
+    SearchCounts, SearchRules,
 };
 
 /// Blocks per task: enough to hide the start of a task, few enough for an even distribution.
 const TASK_BLOCKS: usize = 64;
 /// Factor on the expected k-radius for the spheres of the first window, in which most points find their k neighbours.
 /// The expected k-radius, in first search radii, is the mean of the block before.
-pub(super) const FIRST_REACH: f32 = 1.3;
+pub(super) const FIRST_WINDOW_SLACK: f32 = 1.3;
 /// Range of the expected k-radius, in first search radii.
-const REACH: [f32; 2] = [0.8, 4.0];
+const EXPECTED_FIRST_RADII_RANGE: [f32; 2] = [0.8, 4.0];
 /// Least growth factor of a radius that is too small.
-pub(super) const LEAST_GROWTH: f32 = 1.3;
+pub(super) const MIN_RADIUS_GROWTH: f32 = 1.3;
 
 /// Finds the neighbourhoods of `queries`, ascending indices of screen points. The `past` decides what is read first,
 /// but does not change the result.
@@ -46,14 +46,14 @@ pub(crate) fn search(
             // Tasks do not depend on the number of threads, so neither may the guesses that a task starts from.
             scratch.reach = 1.0;
             scratch.trust = Trust::default();
-            search_blocks(&Task { screen, view, rules, past }, queries, blocks, scratch)
+            search_blocks(&SearchInput { screen, view, rules, past }, queries, blocks, scratch)
         })
         .reduce(SearchCounts::default, |a, b| a + b);
 }
 
 /// Inputs that all blocks share.
 #[derive(Clone, Copy)]
-struct Task<'a> {
+struct SearchInput<'a> {
     screen: &'a ScreenPoints,
     view: &'a View,
     rules: &'a SearchRules,
@@ -98,7 +98,7 @@ struct Block {
 #[inline(always)]
 fn search_blocks_with<'a, S: Simd>(
     simd: S,
-    task: &'a Task<'a>,
+    task: &'a SearchInput<'a>,
     queries: &'a [u32],
     out: &'a mut [NeighborhoodBlock],
     scratch: &'a mut Scratch,
@@ -113,24 +113,24 @@ fn search_blocks_with<'a, S: Simd>(
 #[inline(always)]
 fn search_block<S: Simd>(
     simd: S,
-    task: &Task,
+    task: &SearchInput,
     queries: &[u32],
     out: &mut NeighborhoodBlock,
     scratch: &mut Scratch,
     counts: &mut SearchCounts,
 ) {
-    let Task { screen, view, rules, .. } = *task;
+    let SearchInput { screen, view, rules, .. } = *task;
     let mut block = Block::new(task, queries, scratch.reach, &mut scratch.trust);
     while block.pending.contains(&true) {
         let (window, group) = block.next_window(task);
         let everything = window.is_all();
-        let crowded = window.candidates(&screen.cells) > CROWDED;
+        let crowded = window.candidates(&screen.cells) > MIN_CROWDED_CANDIDATES;
         let mut bound: [f32; LANES] = std::array::from_fn(|lane| match crowded & group[lane] {
             true => block.bound_radius(lane, task),
             false => f32::INFINITY,
         });
         let candidates = gather(screen, &window, &mut scratch.candidates);
-        let padded = candidates.next_multiple_of(GROUP);
+        let padded = candidates.next_multiple_of(CANDIDATE_GROUP);
         squared_distances(simd, &block.position, &scratch.candidates[..padded], &mut scratch.squared);
         let enough = candidates > rules.k as usize;
         let mut exact = [false; LANES];
@@ -167,8 +167,13 @@ fn search_block<S: Simd>(
             let upper = if enough { kth_radius } else { f32::INFINITY };
             sort_lane(&scratch.squared, lane, known, &mut scratch.sorted);
             let crowded = crowded | bound[lane].is_finite();
-            let verdict =
-                judge(task, &block, lane, &scratch.sorted, Known { radius: known, exact: exact[lane], upper, crowded });
+            let verdict = judge(
+                task,
+                &block,
+                lane,
+                &scratch.sorted,
+                KnownNeighbors { radius: known, exact: exact[lane], upper, crowded },
+            );
             if let Verdict::Grow(radius) = verdict {
                 block.radius.0[lane] = radius;
                 continue;
@@ -220,7 +225,7 @@ enum Verdict {
 
 /// Knowledge of a point's neighbours after a window was read.
 #[derive(Clone, Copy)]
-struct Known {
+struct KnownNeighbors {
     /// Distance up to which all neighbours are known.
     radius: f32,
     /// Whether the k-th neighbour is among the known.
@@ -232,9 +237,9 @@ struct Known {
 }
 
 /// Applies the rules to one point; `squared` holds its squared distances up to the known radius, ascending.
-fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known) -> Verdict {
-    let Task { screen, view, rules, .. } = *task;
-    let Known { radius, exact, upper, crowded } = known;
+fn judge(task: &SearchInput, block: &Block, lane: usize, squared: &[f32], known: KnownNeighbors) -> Verdict {
+    let SearchInput { screen, view, rules, .. } = *task;
+    let KnownNeighbors { radius, exact, upper, crowded } = known;
     match rules.early_end(squared, block.initial_radius.0[lane], radius) {
         Some(EarlyEnd::Outlier) => return Verdict::Outlier,
         Some(EarlyEnd::Gap(neighbors)) => return Verdict::Clamped(neighbors),
@@ -244,10 +249,11 @@ fn judge(task: &Task, block: &Block, lane: usize, squared: &[f32], known: Known)
     if radius == f32::INFINITY {
         return if squared.is_empty() { Verdict::Outlier } else { Verdict::Clamped(squared.len()) };
     }
-    let growth = (rules.k as f32 / squared.len().max(1) as f32).sqrt().max(LEAST_GROWTH);
+    let growth = (rules.k as f32 / squared.len().max(1) as f32).sqrt().max(MIN_RADIUS_GROWTH);
     // The candidates bound the k-radius, but only loosely across a depth step.
     let next = upper.min(2.0 * radius * growth);
-    if !crowded && Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) <= CROWDED {
+    if !crowded && Window::of_sphere(block.center(lane), next, view).candidates(&screen.cells) <= MIN_CROWDED_CANDIDATES
+    {
         return Verdict::Grow(next);
     }
     let bound = block.bound_radius(lane, task);
@@ -304,8 +310,8 @@ fn unruled<S: Simd>(
 
 impl Block {
     #[inline(always)]
-    fn new(task: &Task, queries: &[u32], reach: f32, trust: &mut Trust) -> Self {
-        let Task { screen, view, rules, past } = *task;
+    fn new(task: &SearchInput, queries: &[u32], reach: f32, trust: &mut Trust) -> Self {
+        let SearchInput { screen, view, rules, past } = *task;
         let mut block = Self {
             position: [Lanes::default(); 3],
             initial_radius: Lanes::default(),
@@ -323,7 +329,7 @@ impl Block {
             }
             let radius = screen.density.initial_radius(point, rules.k, view);
             block.initial_radius.0[lane] = radius;
-            let (mut likely, mut slack) = (reach * radius, FIRST_REACH);
+            let (mut likely, mut slack) = (reach * radius, FIRST_WINDOW_SLACK);
             if looks_back && let Some(past_radius) = past.radius(point.position_view, radius) {
                 block.likely.0[lane] = past_radius;
                 if let Some(past_slack) = trust.slack() {
@@ -344,7 +350,7 @@ impl Block {
         let full = (0..lanes).filter(|&lane| out.count.0[lane] >= k as f32);
         let ratios = full.map(|lane| out.k_radius.0[lane] / self.initial_radius.0[lane]);
         let (count, sum) = ratios.fold((0.0, 0.0), |(count, sum), ratio| (count + 1.0, sum + ratio));
-        let [least, most] = REACH;
+        let [least, most] = EXPECTED_FIRST_RADII_RANGE;
         (sum / f32::max(count, 1.0)).clamp(least, most)
     }
 
@@ -357,8 +363,8 @@ impl Block {
 
     /// Whether the bound on search work may be nearer than the threshold of a lane.
     #[inline(never)]
-    fn meets_bound(&self, lane: usize, task: &Task) -> bool {
-        let Task { screen, view, .. } = *task;
+    fn meets_bound(&self, lane: usize, task: &SearchInput) -> bool {
+        let SearchInput { screen, view, .. } = *task;
         let beyond = 1.01 * BOUND_STEP * self.threshold.0[lane].sqrt();
         let window = Window::of_sphere(self.center(lane), beyond, view);
         screen.points.len() > MAX_CANDIDATES && window.candidates(&screen.cells) > MAX_CANDIDATES
@@ -366,8 +372,8 @@ impl Block {
 
     /// Largest radius that the search of a point may reach.
     #[cold]
-    fn bound_radius(&self, lane: usize, task: &Task) -> f32 {
-        let Task { screen, view, .. } = *task;
+    fn bound_radius(&self, lane: usize, task: &SearchInput) -> f32 {
+        let SearchInput { screen, view, .. } = *task;
         if screen.points.len() <= MAX_CANDIDATES {
             return f32::INFINITY;
         }
@@ -391,8 +397,8 @@ impl Block {
 
     /// The window to read next, and the lanes that the window serves.
     #[inline(always)]
-    fn next_window(&self, task: &Task) -> (Window, [bool; LANES]) {
-        let Task { screen, view, .. } = *task;
+    fn next_window(&self, task: &SearchInput) -> (Window, [bool; LANES]) {
+        let SearchInput { screen, view, .. } = *task;
         let mut union = Window::EMPTY;
         let mut first = None;
         for lane in (0..LANES).filter(|&lane| self.pending[lane]) {
@@ -428,8 +434,8 @@ impl Block {
 #[inline(always)]
 fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>) -> usize {
     let most = window.candidates(&screen.cells);
-    if candidates.len() < most + GROUP {
-        candidates.resize(most + GROUP, [0.0; 3]);
+    if candidates.len() < most + CANDIDATE_GROUP {
+        candidates.resize(most + CANDIDATE_GROUP, [0.0; 3]);
     }
     let mut len = 0;
     for run in window.runs(&screen.cells) {
@@ -440,7 +446,7 @@ fn gather(screen: &ScreenPoints, window: &Window, candidates: &mut Vec<[f32; 3]>
             len += usize::from((window.near <= depth) & (depth <= window.far));
         }
     }
-    candidates[len..len + GROUP].fill([f32::INFINITY; 3]);
+    candidates[len..len + CANDIDATE_GROUP].fill([f32::INFINITY; 3]);
     len
 }
 

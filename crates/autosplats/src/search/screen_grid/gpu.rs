@@ -1,11 +1,11 @@
 //! The screen-grid search on the GPU: one invocation per point, or per four points for larger k.
 
-use super::cpu::{FIRST_REACH, LEAST_GROWTH};
+use super::cpu::{FIRST_WINDOW_SLACK, MIN_RADIUS_GROWTH};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers, WorkPass};
 use crate::search::past;
-use crate::search::{BOUND_STEP, CROWDED, MARGIN_PX, MAX_CANDIDATES, STEEP};
+use crate::search::{BOUND_STEP, MARGIN_PX, MAX_CANDIDATES, MIN_CROWDED_CANDIDATES, OUTLIER_RADIUS_SLACK};
 
 #[cfg(test)]
 pub(crate) const PASSES: &[PassSource] = &[SEARCH, SEARCH_FOUR];
@@ -13,7 +13,7 @@ const SEARCH: PassSource = PassSource::new("search/screen_grid/search", include_
 const SEARCH_FOUR: PassSource = PassSource::new("search/screen_grid/search_four", include_str!("search_four.wgsl"));
 
 /// Least k for which four points are searched at a time. See docs/decisions/0015-search-engines.md.
-const FOUR_FROM: u32 = 11;
+const MIN_K_FOUR_AT_A_TIME: u32 = 11;
 
 /// `Neighborhood` of `shared/surfel.wgsl`.
 type Neighborhood = [f32; 12];
@@ -42,23 +42,23 @@ struct RoundPasses {
 
 impl RoundPasses {
     fn new(gpu: &Gpu, k: u32, four: bool, round: Round) -> Result<Self, Error> {
-        let [least, most] = past::LIKELY;
+        let [least, most] = past::PAST_FIRST_RADII_RANGE;
         let common = [
-            ("LEAST_LIKELY", least.into()),
-            ("MOST_LIKELY", most.into()),
-            ("SLACK", past::SLACK.into()),
+            ("MIN_PAST_FIRST_RADII", least.into()),
+            ("MAX_PAST_FIRST_RADII", most.into()),
+            ("PAST_RADIUS_SLACK", past::PAST_RADIUS_SLACK.into()),
             ("ROUND", f64::from(round as u32)),
             ("K", k.into()),
-            ("FIRST_REACH", FIRST_REACH.into()),
+            ("FIRST_WINDOW_SLACK", FIRST_WINDOW_SLACK.into()),
             ("MARGIN_PX", MARGIN_PX.into()),
             ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
-            ("CROWDED", CROWDED as f64),
+            ("MIN_CROWDED_CANDIDATES", MIN_CROWDED_CANDIDATES as f64),
             ("BOUND_STEP", BOUND_STEP.into()),
         ];
         let own = [
             ("QUADS", k.div_ceil(4).into()),
-            ("LEAST_GROWTH", LEAST_GROWTH.into()),
-            ("STEEP", STEEP.into()),
+            ("MIN_RADIUS_GROWTH", MIN_RADIUS_GROWTH.into()),
+            ("OUTLIER_RADIUS_SLACK", OUTLIER_RADIUS_SLACK.into()),
             ("LEFT_ONLY", f64::from(u8::from(four))),
         ];
         Ok(Self {
@@ -74,7 +74,7 @@ impl SearchPasses {
     /// # Errors
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu, k: u32) -> Result<Self, Error> {
-        Self::with_form(gpu, k, k >= FOUR_FROM)
+        Self::with_form(gpu, k, k >= MIN_K_FOUR_AT_A_TIME)
     }
 
     fn with_form(gpu: &Gpu, k: u32, four: bool) -> Result<Self, Error> {

@@ -30,33 +30,33 @@
 @group(0) @binding(7) var<storage, read> left: array<u32>;
 @group(0) @binding(8) var<storage, read> past: array<u32>;
 
-override LEAST_GROWTH: f32;
-override STEEP: f32;
+override MIN_RADIUS_GROWTH: f32;
+override OUTLIER_RADIUS_SLACK: f32;
 // Whether to search only the queries that `search_four` left.
 override LEFT_ONLY: bool;
 
 // Rounds of loops after which a query counts as bounded. The limit is far below a software device's: such a device
 // runs several invocations together, each loop as long as the longest of them.
-const MOST_ROUNDS = 25000u;
+const MAX_LOOP_ROUNDS = 25000u;
 
 var<workgroup> clamped: atomic<u32>;
 var<workgroup> bounded: atomic<u32>;
 
 // A window's points as seen by one query.
-struct Seen {
+struct WindowNeighbors {
     // Distance to the nearest neighbour.
     nearest: f32,
     // Number of neighbours within the radius that the window certainly holds, and squared distance to the last.
     sure: u32,
     sure_squared: f32,
-    // The first gap: squared distance to the neighbour before it (MOST if none), the length at which it counts, its
+    // The first gap: squared distance to the neighbour before it (MAX_F32 if none), the length at which it counts, its
     // end.
     gap_squared: f32,
     gap_reach: f32,
     gap_end: f32,
 }
 
-struct Found {
+struct SearchResult {
     // Squared distance up to which points are neighbours.
     squared: f32,
     is_clamped: bool,
@@ -68,10 +68,10 @@ fn squared_length(v: vec3f) -> f32 {
     return fma(v.z, v.z, fma(v.y, v.y, v.x * v.x));
 }
 
-// Squared distance of a candidate; MOST for the query itself and after the end of the run.
+// Squared distance of a candidate; MAX_F32 for the query itself and after the end of the run.
 fn squared_from(center: vec3f, at: u32, end: u32, query: u32) -> f32 {
     let squared = squared_length(points[min(at, end - 1u)].position_view - center);
-    return select(squared, MOST, at == query || at >= end);
+    return select(squared, MAX_F32, at == query || at >= end);
 }
 
 // Lists the k nearest points of a window.
@@ -101,9 +101,9 @@ fn read_window(query: u32, center: vec3f, window: Window) -> Nearest {
 }
 
 // Goes through the k nearest in order. All points within the square root of `sure_squared` are known.
-fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> Seen {
+fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> WindowNeighbors {
     var list = nearest;
-    var seen = Seen(MOST, 0u, 0.0, MOST, 0.0, 0.0);
+    var seen = WindowNeighbors(MAX_F32, 0u, 0.0, MAX_F32, 0.0, 0.0);
     var last_squared = 0.0;
     var last = 0.0;
     var neighbors = 0u;
@@ -118,12 +118,12 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
         if last > 0.0 {
             reach = max(reach, gap_growth_after(neighbors) * last);
         }
-        if last > 0.0 && seen.gap_squared == MOST && distance > reach {
+        if last > 0.0 && seen.gap_squared == MAX_F32 && distance > reach {
             seen.gap_squared = last_squared;
             seen.gap_reach = reach;
             seen.gap_end = distance;
         }
-        if squared == MOST {
+        if squared == MAX_F32 {
             break;
         }
         seen.nearest = min(seen.nearest, distance);
@@ -138,22 +138,22 @@ fn look_through(nearest: Nearest, initial_radius: f32, sure_squared: f32) -> See
     return seen;
 }
 
-fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
+fn find(query: u32, center: vec3f, initial_radius: f32) -> SearchResult {
     let strip_px = f32(task.strip_px);
     let outlier_radius = frame.outlier_growth * initial_radius;
-    let farthest_first = select(1.0, STEEP, frame.adaptive == 1u) * outlier_radius;
+    let farthest_first = select(1.0, OUTLIER_RADIUS_SLACK, frame.adaptive == 1u) * outlier_radius;
     let likely = past_radius(center, initial_radius);
     // A radius that rounds to 0 would never grow.
-    var radius = max(select(FIRST_REACH * initial_radius, SLACK * likely, likely > 0.0), MIN_POSITIVE);
+    var radius = max(select(FIRST_WINDOW_SLACK * initial_radius, PAST_RADIUS_SLACK * likely, likely > 0.0), MIN_POSITIVE);
     var window = window_grown(window_of_sphere(center, radius), strip_px);
-    var len = window_len(window, task.strip_px, CROWDED);
+    var len = window_len(window, task.strip_px, MIN_CROWDED_CANDIDATES);
     // A point alone in its cell may look into a crowd, where a smaller window suffices.
     for (var halving = 0u; halving < 40u && len > MAX_CANDIDATES; halving++) {
         radius *= 0.5;
         window = window_grown(window_of_sphere(center, radius), strip_px);
-        len = window_len(window, task.strip_px, CROWDED);
+        len = window_len(window, task.strip_px, MIN_CROWDED_CANDIDATES);
     }
-    var seen: Seen;
+    var seen: WindowNeighbors;
     // Largest radius that the search may reach; 0 until computed.
     var farthest = 0.0;
     for (var step = 0u; step < 256u; step++) {
@@ -163,43 +163,43 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
         let is_all = window_contains(window, picture());
         // The bound applies where few points were read too, if there are many a little further out. The result then
         // does not depend on what was read.
-        let is_crowded = len > CROWDED || (kth_squared < MOST && !is_unbounded(center, kth_radius));
+        let is_crowded = len > MIN_CROWDED_CANDIDATES || (kth_squared < MAX_F32 && !is_unbounded(center, kth_radius));
         if is_crowded && farthest == 0.0 {
             farthest = bound_radius(center, initial_radius);
         }
-        let bound = select(MOST, farthest, is_crowded);
-        let is_exact = kth_squared < MOST && kth_radius <= bound
+        let bound = select(MAX_F32, farthest, is_crowded);
+        let is_exact = kth_squared < MAX_F32 && kth_radius <= bound
             && (is_all || window_contains(window, window_of_sphere(center, kth_radius)));
         // No gap begins within the first search radius.
         if is_exact && kth_radius <= min(frame.gap_growth * initial_radius, outlier_radius) {
-            return Found(kth_squared, false, false);
+            return SearchResult(kth_squared, false, false);
         }
 
         // All neighbours up to this distance are known.
-        let sure = min(select(radius, MOST, is_all), bound);
-        seen = look_through(nearest, initial_radius, min(sure * sure, MOST));
+        let sure = min(select(radius, MAX_F32, is_all), bound);
+        seen = look_through(nearest, initial_radius, min(sure * sure, MAX_F32));
         let known = select(sure, kth_radius, is_exact);
         if min(seen.nearest, known) > farthest_first {
-            return Found(0.0, false, false);
+            return SearchResult(0.0, false, false);
         }
         let is_gap_sure = is_exact || seen.gap_squared <= sure * sure;
-        if seen.gap_squared < MOST && is_gap_sure && min(seen.gap_end, known) > seen.gap_reach {
+        if seen.gap_squared < MAX_F32 && is_gap_sure && min(seen.gap_end, known) > seen.gap_reach {
             let is_lone = seen.nearest > outlier_radius;
-            return Found(select(seen.gap_squared, 0.0, is_lone), !is_lone, false);
+            return SearchResult(select(seen.gap_squared, 0.0, is_lone), !is_lone, false);
         }
         if is_exact {
-            return Found(kth_squared, false, false);
+            return SearchResult(kth_squared, false, false);
         }
-        if sure == MOST {
+        if sure == MAX_F32 {
             // The end of the points.
-            return Found(seen.sure_squared, seen.sure > 0u, false);
+            return SearchResult(seen.sure_squared, seen.sure > 0u, false);
         }
 
-        let growth = max(sqrt(f32(K) / f32(max(seen.sure, 1u))), LEAST_GROWTH);
+        let growth = max(sqrt(f32(K) / f32(max(seen.sure, 1u))), MIN_RADIUS_GROWTH);
         // The points read bound the k-radius, but only loosely across a depth step.
-        let upper = select(MOST, kth_radius, kth_squared < MOST);
+        let upper = select(MAX_F32, kth_radius, kth_squared < MAX_F32);
         radius = min(upper, 2.0 * sure * growth);
-        if is_crowded || window_len(window_of_sphere(center, radius), task.strip_px, CROWDED) > CROWDED {
+        if is_crowded || window_len(window_of_sphere(center, radius), task.strip_px, MIN_CROWDED_CANDIDATES) > MIN_CROWDED_CANDIDATES {
             if farthest == 0.0 {
                 farthest = bound_radius(center, initial_radius);
             }
@@ -210,19 +210,19 @@ fn find(query: u32, center: vec3f, initial_radius: f32) -> Found {
             radius = min(radius, farthest);
         }
         window = window_grown(window_of_sphere(center, radius), strip_px);
-        len = window_len(window, task.strip_px, CROWDED);
+        len = window_len(window, task.strip_px, MIN_CROWDED_CANDIDATES);
         let strips = window_strips(window, task.strip_px);
-        if rounds + len / 2u + strips.y - strips.x > MOST_ROUNDS {
+        if rounds + len / 2u + strips.y - strips.x > MAX_LOOP_ROUNDS {
             break;
         }
     }
-    return Found(seen.sure_squared, seen.sure > 0u, true);
+    return SearchResult(seen.sure_squared, seen.sure > 0u, true);
 }
 
 // Largest radius that the search of a point may reach, as defined in search/mod.rs.
 fn bound_radius(center: vec3f, initial_radius: f32) -> f32 {
     if task.visible <= MAX_CANDIDATES {
-        return MOST;
+        return MAX_F32;
     }
     var radius = max(initial_radius, MIN_POSITIVE);
     while window_len(window_of_sphere(center, radius), task.strip_px, MAX_CANDIDATES) > MAX_CANDIDATES && radius > MIN_POSITIVE {

@@ -35,11 +35,11 @@ override K: u32;
 
 // Most windows per invocation, most screen points plus strips in a window, and most counting passes over a window. All
 // passes together take less than half of the 65535 rounds after which software devices end an invocation.
-const MOST_WINDOWS = 3u;
-const MOST_SHARED = 1536u;
-const MOST_COUNTS = 3u;
+const MAX_WINDOWS = 3u;
+const MAX_WINDOW_READS = 1536u;
+const MAX_COUNTING_PASSES = 3u;
 // Most candidates in a bracket for which a list of eight finds the k-th, from below or from above.
-const FEW = 15u;
+const MAX_LISTED_CANDIDATES = 15u;
 
 // Number of queries of the workgroup that are left to `search`.
 var<workgroup> left_len: atomic<u32>;
@@ -163,14 +163,14 @@ fn narrow(four: Four, window: Window, bracket: ptr<function, Bracket>) {
     lower(bracket, t[0], n[0]);
 }
 
-// Lists the candidates in the brackets of at most FEW candidates.
+// Lists the candidates in the brackets of at most MAX_LISTED_CANDIDATES candidates.
 fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
     // Count from the end of the bracket that is nearer to the k-th. Distances from above are listed as negatives.
     let from_low = vec4u(K) - bracket.low_count;
     let from_high = bracket.high_count - vec4u(K + 1u);
     let is_upward = from_low <= from_high;
     let sign = select(vec4f(-1.0), vec4f(1.0), is_upward);
-    let m = vec4f(MOST);
+    let m = vec4f(MAX_F32);
     var least = Eight(m, m, m, m, m, m, m, m);
     var furthest = vec4f(0.0);
     let strips = window_strips(window, task.strip_px);
@@ -203,40 +203,40 @@ fn list(four: Four, window: Window, bracket: Bracket, limit: vec4f) -> Listed {
     return Listed(sign * kth, furthest);
 }
 
-// Squared distances to the k-th neighbours; MOST for queries that are left to `search`.
+// Squared distances to the k-th neighbours; MAX_F32 for queries that are left to `search`.
 fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
-    var found = vec4f(MOST);
+    var found = vec4f(MAX_F32);
     var open = valid;
-    var radius = FIRST_REACH * initial_radius;
+    var radius = FIRST_WINDOW_SLACK * initial_radius;
     for (var lane = 0u; lane < 4u; lane++) {
         let likely = past_radius(center(four, lane), initial_radius[lane]);
-        radius[lane] = select(radius[lane], SLACK * likely, likely > 0.0);
+        radius[lane] = select(radius[lane], PAST_RADIUS_SLACK * likely, likely > 0.0);
     }
     radius = max(radius, vec4f(MIN_POSITIVE));
     let outlier_radius = frame.outlier_growth * initial_radius;
     // A k-th neighbour up to this radius breaks no rule.
     let unruled = min(frame.gap_growth * initial_radius, outlier_radius);
     let is_gap_first = frame.gap_growth * initial_radius <= outlier_radius;
-    for (var step = 0u; step < MOST_WINDOWS && any(open); step++) {
+    for (var step = 0u; step < MAX_WINDOWS && any(open); step++) {
         let window = window_of_four(four, radius, open);
-        let len = window_len(window, task.strip_px, CROWDED);
+        let len = window_len(window, task.strip_px, MIN_CROWDED_CANDIDATES);
         let strips = window_strips(window, task.strip_px);
-        if len + strips.y - strips.x > MOST_SHARED {
+        if len + strips.y - strips.x > MAX_WINDOW_READS {
             break;
         }
         // The query itself is at distance 0 and counts.
-        var bracket = Bracket(vec4f(-MIN_POSITIVE), min(radius * radius, vec4f(MOST)), vec4u(0u), vec4u(0u));
+        var bracket = Bracket(vec4f(-MIN_POSITIVE), min(radius * radius, vec4f(MAX_F32)), vec4u(0u), vec4u(0u));
         var is_enough = open;
-        for (var count = 0u; count < MOST_COUNTS; count++) {
+        for (var count = 0u; count < MAX_COUNTING_PASSES; count++) {
             narrow(four, window, &bracket);
             is_enough = open & (bracket.high_count > vec4u(K));
-            if !any(is_enough & (bracket.high_count - bracket.low_count > vec4u(FEW))) {
+            if !any(is_enough & (bracket.high_count - bracket.low_count > vec4u(MAX_LISTED_CANDIDATES))) {
                 break;
             }
         }
-        let is_listed = is_enough & (bracket.high_count - bracket.low_count <= vec4u(FEW));
+        let is_listed = is_enough & (bracket.high_count - bracket.low_count <= vec4u(MAX_LISTED_CANDIDATES));
         if any(is_listed) {
-            let listed = list(four, window, bracket, min(unruled * unruled, vec4f(MOST)));
+            let listed = list(four, window, bracket, min(unruled * unruled, vec4f(MAX_F32)));
             let kth = sqrt(listed.kth);
             let furthest = sqrt(listed.furthest);
             // A gap would begin at the furthest point within reach of the first radius.
@@ -256,7 +256,7 @@ fn find(four: Four, initial_radius: vec4f, valid: vec4<bool>) -> vec4f {
 
 // Sums the points up to the squared distances, about the queries themselves.
 fn sum_moments(four: Four, found: vec4f, first: u32) {
-    let is_found = found < vec4f(MOST);
+    let is_found = found < vec4f(MAX_F32);
     if !any(is_found) {
         return;
     }
@@ -318,7 +318,7 @@ fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
     let first = 4u * (group_index(workgroup) * 64u + local);
     let indices = vec4u(first, first + 1u, first + 2u, first + 3u);
     let valid = indices < vec4u(task.len);
-    var found = vec4f(MOST);
+    var found = vec4f(MAX_F32);
     if first < task.len {
         var four: Four;
         var initial_radius: vec4f;
@@ -334,7 +334,7 @@ fn search_four(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocatio
         sum_moments(four, found, first);
     }
     // The other queries go to a list, whose order does not matter.
-    let is_left = one_if(valid & (found == vec4f(MOST)));
+    let is_left = one_if(valid & (found == vec4f(MAX_F32)));
     let own = is_left.x + is_left.y + is_left.z + is_left.w;
     var place = atomicAdd(&left_len, own);
     workgroupBarrier();

@@ -38,7 +38,7 @@ fn distribute_vertex(@builtin(vertex_index) vertex: u32) -> Splat {
     var radius = 0.0;
     if IS_LAST {
         search = settle(known, initial_radius, others);
-        radius = select(0.0, max(search.high, LEAST_DISTANCE), has_neighbors(search));
+        radius = select(0.0, max(search.high, MIN_SQUARABLE_DISTANCE), has_neighbors(search));
     } else {
         search = advance(known, initial_radius, others);
         // A converged point covers its own pixel and hands on the radius found.
@@ -62,5 +62,5 @@ fn distribute_fragment(splat: Splat) -> @location(0) vec4f {
     if !is_within(Search(splat.search.x, splat.search.y, splat.search.z), distance) {
         discard;
     }
-    return vec4f(0.0, 0.0, 0.0, max(distance, LEAST_DISTANCE));
+    return vec4f(0.0, 0.0, 0.0, max(distance, MIN_SQUARABLE_DISTANCE));
 }

@@ -192,15 +192,21 @@ impl EnginePasses for CommunicationPasses {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         let arguments = gpu.buffer("arguments of splats", size_of::<Arguments>() as u64, usage)?;
         let convergence = gpu.storage::<u32>("convergence", 2 * (ITERATIONS + 1))?;
-        let bound =
-            Bound { passes: self, gpu, buffers, textures: &textures, arguments: &arguments, convergence: &convergence };
+        let bound = BoundPasses {
+            passes: self,
+            gpu,
+            buffers,
+            textures: &textures,
+            arguments: &arguments,
+            convergence: &convergence,
+        };
         let rounds = [Round::Active, Round::Recovered].map(|round| bound.steps(round));
         Ok(EngineSteps { rounds, convergence: Some(convergence) })
     }
 }
 
 /// The passes with their resources.
-struct Bound<'a> {
+struct BoundPasses<'a> {
     passes: &'a CommunicationPasses,
     gpu: &'a Gpu,
     buffers: SearchBuffers<'a>,
@@ -209,7 +215,7 @@ struct Bound<'a> {
     convergence: &'a wgpu::Buffer,
 }
 
-impl Bound<'_> {
+impl BoundPasses<'_> {
     fn steps(&self, round: Round) -> Vec<Step> {
         let mut steps = vec![self.begin(round)];
         if round == Round::Active {

@@ -3,9 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::super::cpu::{ENCODE_STEPS, Scene, darkening, given_light, sample_step, shows_colors};
-use super::super::edges::{Edges, LESS_TILTED, SEARCH};
+use super::super::edges::{EDGE_SEARCH_PX, Edges, MIN_TILT_LOSS};
 use super::super::light::{CLAY, FILL, FILL_LIGHT, GROUND, KEY, KEY_LIGHT, KEY_WRAP, SHOULDER, SKY};
-use super::super::occlusion::{FURTHEST, LEAST_RISE, PAIR_COUNT, STEEPEST, pairs};
+use super::super::occlusion::{FARTHEST_RISE, MAX_FULL_RISE, MIN_RISE, PAIR_COUNT, pairs};
 use super::super::{ColorMode, Shading};
 use super::{encode_words, pitch};
 use crate::splat::{Channels, LayerBuffers};
@@ -13,7 +13,7 @@ use crate::splat::{Channels, LayerBuffers};
 /// What colours a surface, numbered as in `shared/shading.wgsl`; from [`Height`](Self::Height) on these are values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the colour modes, resolved")]
-pub(crate) enum Shown {
+pub(crate) enum ShownQuantity {
     Clay,
     Color,
     Normal,
@@ -25,7 +25,7 @@ pub(crate) enum Shown {
     Scalar,
 }
 
-impl Shown {
+impl ShownQuantity {
     pub(super) fn new(mode: &ColorMode, layers: Channels) -> Self {
         match mode {
             ColorMode::Height => Self::Height,
@@ -89,7 +89,7 @@ impl ShadeUniform {
         let [width, height] = [scene.view.width, scene.view.height];
         let pixels = width as usize * height as usize;
         let step = sample_step(pixels);
-        let colored = Shown::new(&shading.color, layers.channels) == Shown::Color;
+        let colored = ShownQuantity::new(&shading.color, layers.channels) == ShownQuantity::Color;
         let edges = Edges::new(scene.view);
         Self {
             key: KEY.to_array(),
@@ -99,11 +99,11 @@ impl ShadeUniform {
             fill: FILL.to_array(),
             darkening: darkening(shading, colored),
             fill_light: FILL_LIGHT,
-            steepest: STEEPEST,
+            steepest: MAX_FULL_RISE,
             ground: GROUND,
-            furthest: FURTHEST,
+            furthest: FARTHEST_RISE,
             sky: SKY,
-            least_rise: LEAST_RISE,
+            least_rise: MIN_RISE,
             clay: CLAY,
             edge_factor: edges.factor,
             up: scene.up.as_vec3().to_array(),
@@ -120,8 +120,8 @@ impl ShadeUniform {
             encode_steps: ENCODE_STEPS as u32,
             backgrounds: encode_words() as u32,
             measures: if layers.channels.color { layers.size.iter().product() } else { 0 },
-            edge_search: SEARCH as i32,
-            less_tilted: LESS_TILTED,
+            edge_search: EDGE_SEARCH_PX as i32,
+            less_tilted: MIN_TILT_LOSS,
             pairs: pairs(height).map(|pair| {
                 let [dx, dy] = pair.step.map(|side| side as f32);
                 [dx, dy, pair.inverse_px, pair.part]

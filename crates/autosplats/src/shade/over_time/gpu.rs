@@ -1,7 +1,7 @@
 //! Temporal smoothing of pictures on the GPU: a pass that looks back and one that keeps the picture, an invocation per
 //! pixel.
 
-use super::{LEAST_SEEN, SAME_PX, SHARE};
+use super::{MAX_SAME_DEPTH_PX, MIN_SEEN_WEIGHT, PAST_SHARE};
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::shade::cpu::ENCODE_STEPS;
@@ -54,9 +54,9 @@ impl PictureOverTimePasses {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let row_pixels = ("ROW_PIXELS", ROW_PIXELS.into());
         let average = [
-            ("SHARE", SHARE.into()),
-            ("SAME_PX", SAME_PX.into()),
-            ("LEAST_SEEN", LEAST_SEEN.into()),
+            ("PAST_SHARE", PAST_SHARE.into()),
+            ("MAX_SAME_DEPTH_PX", MAX_SAME_DEPTH_PX.into()),
+            ("MIN_SEEN_WEIGHT", MIN_SEEN_WEIGHT.into()),
             ("ENCODE_STEPS", ENCODE_STEPS as f64),
             row_pixels,
         ];

@@ -2,10 +2,10 @@
 //!
 //! A far surface has more points than pixels, and each picture shows others of them. So detail finer than pixels
 //! flickers, as in a picture of one ray a pixel. Successive pictures together contain more detail than each alone. The
-//! last picture must have shown the pixel's surface at the same depth within [`SAME_PX`] pixels. Then the pixel becomes
-//! the mean of both, in linear light. The last picture is such a mean itself, so the weight of older pictures halves
-//! with each one. A larger share of the past would be steadier than the truth, in which light moves with the camera,
-//! and would blur. See docs/decisions/0014-frame-to-frame.md.
+//! last picture must have shown the pixel's surface at the same depth within [`MAX_SAME_DEPTH_PX`] pixels. Then the
+//! pixel becomes the mean of both, in linear light. The last picture is such a mean itself, so the weight of older
+//! pictures halves with each one. A larger share of the past would be steadier than the truth, in which light moves
+//! with the camera, and would blur. See docs/decisions/0014-frame-to-frame.md.
 //!
 //! Only pictures of the same points and settings are averaged, and only where requested
 //! ([`Reconstruction::steady`](crate::Reconstruction::steady)). Layers, and the image in linear light, are not
@@ -18,28 +18,28 @@ mod tests;
 use rayon::prelude::*;
 
 use super::{Image, linear_steps};
-use crate::camera::{Reprojection, Seen, View};
+use crate::camera::{PlacedView, Reprojection, View};
 use crate::shade::cpu::{encode, encode_table};
 use crate::splat::GBuffer;
 
 /// Share of the last picture in a pixel, 0 to 1.
-pub(super) const SHARE: f32 = 0.5;
+pub(super) const PAST_SHARE: f32 = 0.5;
 /// Largest difference in depth of the same surface, in pixels.
-pub(super) const SAME_PX: f32 = 3.0;
+pub(super) const MAX_SAME_DEPTH_PX: f32 = 3.0;
 /// Least share, in the bilinear weights of the last picture's four pixels, of pixels that showed the same surface.
-pub(super) const LEAST_SEEN: f32 = 0.1;
+pub(super) const MIN_SEEN_WEIGHT: f32 = 0.1;
 
 /// State that the last picture, made with settings `M`, leaves for the next one. Keeps its buffers.
 #[derive(Debug)]
 pub(crate) struct LastPicture<M> {
     /// View and origin of the last picture, identity of its points, and its settings; `None` without a last picture.
-    made: Option<(Seen, u64, M)>,
-    kept: Kept,
+    made: Option<(PlacedView, u64, M)>,
+    kept: KeptPicture,
 }
 
 /// Depths and colours of a picture, kept for the next one.
 #[derive(Debug, Default)]
-struct Kept {
+struct KeptPicture {
     /// Depths row by row; infinite where no surface is.
     depths: Vec<f32>,
     pixels: Vec<[u8; 4]>,
@@ -47,8 +47,8 @@ struct Kept {
 
 /// A picture that begins, with its view into the last one.
 #[derive(Debug)]
-pub(crate) struct Following<'a> {
-    last: &'a mut Kept,
+pub(crate) struct PictureInProgress<'a> {
+    last: &'a mut KeptPicture,
     view: View,
     /// Reprojection into the last picture, if the two are to be averaged.
     past: Option<Reprojection>,
@@ -56,21 +56,21 @@ pub(crate) struct Following<'a> {
 
 impl<M> Default for LastPicture<M> {
     fn default() -> Self {
-        Self { made: None, kept: Kept::default() }
+        Self { made: None, kept: KeptPicture::default() }
     }
 }
 
 impl<M: PartialEq> LastPicture<M> {
     /// Begins a picture with this view, without a margin, and these settings. The state of a picture that was given up
     /// is dropped.
-    pub(crate) fn begin(&mut self, now: Seen, identity: u64, made: &M) -> Following<'_> {
+    pub(crate) fn begin(&mut self, now: PlacedView, identity: u64, made: &M) -> PictureInProgress<'_> {
         let last = self.made.take().filter(|(_, points, before)| *points == identity && before == made);
         let past = last.and_then(|(then, ..)| Reprojection::new(&now, &then));
-        Following { last: &mut self.kept, view: now.view, past }
+        PictureInProgress { last: &mut self.kept, view: now.view, past }
     }
 
     /// Completes the picture that began.
-    pub(crate) fn end(&mut self, now: Seen, identity: u64, made: M) {
+    pub(crate) fn end(&mut self, now: PlacedView, identity: u64, made: M) {
         self.made = Some((now, identity, made));
     }
 
@@ -80,7 +80,7 @@ impl<M: PartialEq> LastPicture<M> {
     }
 }
 
-impl Following<'_> {
+impl PictureInProgress<'_> {
     /// Averages a picture with the last one, and keeps it for the next.
     pub(super) fn average(self, layers: &GBuffer, image: &mut Image) {
         let Self { last, view, past } = self;
@@ -91,7 +91,7 @@ impl Following<'_> {
     }
 }
 
-impl Kept {
+impl KeptPicture {
     fn mix_into(&self, image: &mut Image, layers: &GBuffer, view: &View, past: &Reprojection) {
         let (steps, table) = (linear_steps(), encode_table());
         let width = image.width as usize;
@@ -108,7 +108,7 @@ impl Kept {
                 };
                 for (channel, then) in pixel.iter_mut().zip(then) {
                     let now = steps[usize::from(*channel)];
-                    *channel = encode(table, now + SHARE * (then - now));
+                    *channel = encode(table, now + PAST_SHARE * (then - now));
                 }
             }
         });
@@ -127,7 +127,7 @@ impl Kept {
         }
         let first = y as usize * width + x as usize;
         let [right, below] = [x.fract(), y.fract()];
-        let tolerance = SAME_PX * view.pixel_size(depth);
+        let tolerance = MAX_SAME_DEPTH_PX * view.pixel_size(depth);
         let (mut sum, mut all) = ([0.0; 3], 0.0);
         let weights = [(1.0 - right) * (1.0 - below), right * (1.0 - below), (1.0 - right) * below, right * below];
         for (at, weight) in [first, first + 1, first + width, first + width + 1].into_iter().zip(weights) {
@@ -137,7 +137,7 @@ impl Kept {
                 all += weight;
             }
         }
-        (all >= LEAST_SEEN).then(|| sum.map(|channel| channel / all))
+        (all >= MIN_SEEN_WEIGHT).then(|| sum.map(|channel| channel / all))
     }
 
     fn keep(&mut self, layers: &GBuffer, image: &Image) {

@@ -16,9 +16,9 @@
 @group(0) @binding(4) var<storage, read> tables: array<u32>;
 @group(0) @binding(5) var<storage, read_write> image: array<u32>;
 
-override SHARE: f32;
-override SAME_PX: f32;
-override LEAST_SEEN: f32;
+override PAST_SHARE: f32;
+override MAX_SAME_DEPTH_PX: f32;
+override MIN_SEEN_WEIGHT: f32;
 override ENCODE_STEPS: u32;
 // Alignment of the image's rows in pixels.
 override ROW_PIXELS: u32;
@@ -53,19 +53,19 @@ fn over_time(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_
     for (var corner = 0u; corner < 4u; corner++) {
         let offset = vec2u(corner & 1u, corner >> 1u);
         let at = (first.y + offset.y) * width + first.x + offset.x;
-        if abs(past_depths[at] - position.z) < SAME_PX * unit {
+        if abs(past_depths[at] - position.z) < MAX_SAME_DEPTH_PX * unit {
             let along = select(1.0 - part, part, offset == vec2u(1u));
             let weight = along.x * along.y;
             sum += weight * linear_of(past_image[at]);
             total += weight;
         }
     }
-    if total < LEAST_SEEN {
+    if total < MIN_SEEN_WEIGHT {
         return;
     }
     let pitch = (width + ROW_PIXELS - 1u) / ROW_PIXELS * ROW_PIXELS;
     let word = image[pixel.y * pitch + pixel.x];
     let now = linear_of(word);
-    let mean = now + SHARE * (sum / total - now);
+    let mean = now + PAST_SHARE * (sum / total - now);
     image[pixel.y * pitch + pixel.x] = encode_color(mean, ENCODE_STEPS) | (word & 0xff000000u);
 }

@@ -11,7 +11,7 @@ const WHITE: [u8; 4] = [255; 4];
 const HALF: [u8; 4] = [188, 188, 188, 255];
 
 /// A view from the front, moved right by this many pixels.
-fn seen(right: f64) -> Seen {
+fn seen(right: f64) -> PlacedView {
     let eye = DVec3::new(right, 0.0, 0.0);
     let camera = Camera {
         eye,
@@ -19,7 +19,7 @@ fn seen(right: f64) -> Seen {
         up: DVec3::NEG_Y,
         projection: Projection::OrthographicHeight(SIZE[1].into()),
     };
-    Seen { view: camera.view(DVec3::ZERO, SIZE).expect("a view"), origin: DVec3::ZERO }
+    PlacedView { view: camera.view(DVec3::ZERO, SIZE).expect("a view"), origin: DVec3::ZERO }
 }
 
 /// A wall that covers all but the uppermost row of pixels.
@@ -35,7 +35,7 @@ fn wall(depth: f32) -> GBuffer {
 }
 
 /// Shows `layers` in one colour as the picture after `last`.
-fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen: Seen, settings: u32) -> Image {
+fn show(last: &mut LastPicture<u32>, (layers, color): (&GBuffer, [u8; 4]), seen: PlacedView, settings: u32) -> Image {
     let pixels = vec![color; (SIZE[0] * SIZE[1]) as usize];
     let mut image = Image { width: SIZE[0], height: SIZE[1], pixels, linear: Vec::new() };
     last.begin(seen, 1, &settings).average(layers, &mut image);
@@ -64,9 +64,9 @@ fn a_surface_seen_before_is_the_mean_of_both() {
 
 #[test]
 fn another_surface_is_not() {
-    let as_deep = DEPTH + 0.9 * SAME_PX;
+    let as_deep = DEPTH + 0.9 * MAX_SAME_DEPTH_PX;
     assert_eq!(second_row([DEPTH, as_deep], 0.0, 0)[1], HALF, "nearly as deep");
-    for depth in [DEPTH + 1.1 * SAME_PX, DEPTH - 1.1 * SAME_PX] {
+    for depth in [DEPTH + 1.1 * MAX_SAME_DEPTH_PX, DEPTH - 1.1 * MAX_SAME_DEPTH_PX] {
         assert_eq!(second_row([DEPTH, depth], 0.0, 0), [WHITE; 8], "{depth}");
     }
 }

@@ -1,8 +1,8 @@
 //! Temporal smoothing on the GPU: a pass that looks back, and one that keeps the frame, each with an invocation per
 //! surfel.
 
-use super::points::{ALIKE, Fitted};
-use super::surfaces::NEAR;
+use super::points::{Fitted, MIN_SURFACE_COSINE};
+use super::surfaces::MAX_SURFACE_DISTANCE_RADII;
 use crate::Error;
 use crate::gpu::{Gpu, Pass, PassSource, Step};
 use crate::project::gpu::{Round, ScreenBuffers, Work};
@@ -56,7 +56,11 @@ impl OverTimePasses {
     /// [`Error::Device`].
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, Error> {
         let smooth = |round: Round| {
-            let constants = [("ROUND", f64::from(round as u32)), ("NEAR", NEAR.into()), ("ALIKE", ALIKE.into())];
+            let constants = [
+                ("ROUND", f64::from(round as u32)),
+                ("MAX_SURFACE_DISTANCE_RADII", MAX_SURFACE_DISTANCE_RADII.into()),
+                ("MIN_SURFACE_COSINE", MIN_SURFACE_COSINE.into()),
+            ];
             Pass::new(gpu, &OVER_TIME, &constants)
         };
         Ok(Self {

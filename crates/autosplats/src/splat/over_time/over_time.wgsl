@@ -23,8 +23,8 @@
 
 // 0: the active points; 1: the recovered ones, which follow them.
 override ROUND: u32;
-override NEAR: f32;
-override ALIKE: f32;
+override MAX_SURFACE_DISTANCE_RADII: f32;
+override MIN_SURFACE_COSINE: f32;
 
 // Moves a surfel to `center` and turns it by `share` of the way towards `before`, a normal on the same side.
 fn draw_to(place: u32, center: vec3f, before: vec3f, share: f32) {
@@ -63,7 +63,7 @@ fn smoothed(place: u32) -> f32 {
             let then = fitted[found - 1u];
             let normal = back * then.normal;
             let facing = dot(normal, surfel.normal);
-            if abs(facing) >= ALIKE {
+            if abs(facing) >= MIN_SURFACE_COSINE {
                 let count = min(then.frames + 1.0, frame.frames_averaged);
                 let share = 1.0 - 1.0 / count;
                 let moved = surfel.center + share * (point + back * then.offset - surfel.center);
@@ -84,7 +84,7 @@ fn smoothed(place: u32) -> f32 {
     let distance = dot(seen.xyz, position - past_unproject(pixel, seen.w));
     let normal = back * seen.xyz;
     let facing = dot(normal, surfel.normal);
-    if !(abs(distance) <= NEAR * surfel.k_radius && abs(facing) >= ALIKE) {
+    if !(abs(distance) <= MAX_SURFACE_DISTANCE_RADII * surfel.k_radius && abs(facing) >= MIN_SURFACE_COSINE) {
         return 1.0;
     }
     let share = 1.0 - 1.0 / frame.frames_averaged;

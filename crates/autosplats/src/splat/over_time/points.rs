@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::surfaces::{draw_to, draw_towards, seen_before};
-use crate::camera::{Reprojection, Seen, View};
+use crate::camera::{PlacedView, Reprojection, View};
 use crate::fit::{Surfel, Surfels};
 use crate::project::{ScreenPoints, half_at};
 use crate::splat::GBuffer;
@@ -14,7 +14,7 @@ use crate::splat::GBuffer;
 /// Frames of the same points that are averaged. See docs/decisions/0014-frame-to-frame.md.
 pub(crate) const STEADY_FRAMES: u32 = 8;
 /// Least cosine of the angle between the surfel's normal and that of the same surface in the last frame.
-pub(super) const ALIKE: f32 = 0.7;
+pub(super) const MIN_SURFACE_COSINE: f32 = 0.7;
 /// Surfels, or halves of pixels, per task.
 const TASK: usize = 4096;
 
@@ -36,19 +36,19 @@ pub(crate) struct Fitted {
 #[derive(Debug)]
 pub(crate) struct OverTime<M> {
     /// View and origin of the last frame, identity of its points, and its settings; `None` if there is no last frame.
-    seen: Option<(Seen, u64, M)>,
+    seen: Option<(PlacedView, u64, M)>,
     /// Index plus 1 in `fitted` for the point of each half of a pixel; 0 if there is none.
     halves: Vec<AtomicU32>,
     fitted: Vec<Fitted>,
     /// View into the last frame; `None` if this frame does not continue it.
-    past: Option<Past>,
+    past: Option<LookBack>,
     /// Number of frames averaged in each surfel of this frame.
     frames: Vec<f32>,
 }
 
 /// Look back from a frame into the last one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Past {
+pub(super) struct LookBack {
     reprojection: Reprojection,
     same_points: bool,
     /// Number of frames to average.
@@ -65,14 +65,14 @@ impl<M: PartialEq> OverTime<M> {
     /// Begins a frame of the cloud with this identity. The frame continues the last one if both were `made` with the
     /// same settings. Then `of_same` frames are averaged for the same points, `of_others` for others. The state of a
     /// frame that was given up is dropped.
-    pub(crate) fn begin(&mut self, now: Seen, identity: u64, made: &M, [of_same, of_others]: [u32; 2]) {
+    pub(crate) fn begin(&mut self, now: PlacedView, identity: u64, made: &M, [of_same, of_others]: [u32; 2]) {
         self.frames.clear();
         let last = self.seen.take().filter(|(.., before)| before == made);
         self.past = last.and_then(|(then, points, _)| {
             let same_points = points == identity;
             let frames = if same_points { of_same } else { of_others } as f32;
             let reprojection = Reprojection::new(&now, &then)?;
-            Some(Past { reprojection, same_points, frames })
+            Some(LookBack { reprojection, same_points, frames })
         });
     }
 
@@ -88,7 +88,7 @@ impl<M: PartialEq> OverTime<M> {
         self.frames.resize(first + surfels.len(), 1.0);
         let Some(past) = self.past.filter(|past| past.frames > 1.0) else { return };
         let Self { halves, fitted, frames, .. } = self;
-        let known = Known { past: &past, halves, fitted, last, screen };
+        let known = LastFrame { past: &past, halves, fitted, last, screen };
         let tasks = surfels.par_chunks_mut(TASK).zip(frames[first..].par_chunks_mut(TASK));
         tasks.for_each(|(surfels, frames)| {
             for (surfel, frames) in surfels.iter_mut().zip(frames) {
@@ -98,7 +98,7 @@ impl<M: PartialEq> OverTime<M> {
     }
 
     /// Keeps the fits of this frame; `surfels` are all of its surfels.
-    pub(crate) fn end(&mut self, now: Seen, identity: u64, made: M, surfels: &Surfels, screen: &ScreenPoints) {
+    pub(crate) fn end(&mut self, now: PlacedView, identity: u64, made: M, surfels: &Surfels, screen: &ScreenPoints) {
         let Self { halves, fitted, frames, .. } = self;
         let view = &now.view;
         halves.resize_with(2 * view.width as usize * view.height as usize, AtomicU32::default);
@@ -124,8 +124,8 @@ impl<M: PartialEq> OverTime<M> {
 }
 
 /// The last frame, and the screen points of this one.
-struct Known<'a> {
-    past: &'a Past,
+struct LastFrame<'a> {
+    past: &'a LookBack,
     halves: &'a [AtomicU32],
     fitted: &'a [Fitted],
     last: &'a GBuffer,
@@ -133,10 +133,10 @@ struct Known<'a> {
     screen: &'a ScreenPoints,
 }
 
-impl Known<'_> {
+impl LastFrame<'_> {
     /// Averages a surfel. Returns the number of frames in its mean.
     fn smooth(&self, surfel: &mut Surfel, view: &View) -> f32 {
-        let Past { reprojection, same_points, frames: most } = self.past;
+        let LookBack { reprojection, same_points, frames: most } = self.past;
         if surfel.radius == 0.0 {
             return 1.0;
         }
@@ -147,7 +147,7 @@ impl Known<'_> {
                 let back = reprojection.rotation.transpose();
                 let normal = back * Vec3::from(then.normal);
                 let facing = normal.dot(surfel.normal.into());
-                if facing.abs() >= ALIKE {
+                if facing.abs() >= MIN_SURFACE_COSINE {
                     let frames = (then.frames + 1.0).min(*most);
                     let share = 1.0 - 1.0 / frames;
                     let center = Vec3::from(surfel.center);

@@ -3,20 +3,21 @@
 //! A surfel looks back to its place in the last frame. If the surface seen there is near and faces the same way, it
 //! counts as the same one. The surfel then moves and turns towards it by a share of the way. So noise is averaged over
 //! frames with fading weights, and only the last frame's picture is kept. Moving surfaces lag by as many frames.
-//! Surfaces that move by more than [`NEAR`] k-radii a frame are left alone. Detail as fine as pixels is blurred.
+//! Surfaces that move by more than [`MAX_SURFACE_DISTANCE_RADII`] k-radii a frame are left alone. Detail as fine as
+//! pixels is blurred.
 
 use glam::Vec3;
 
-use super::points::ALIKE;
+use super::points::MIN_SURFACE_COSINE;
 use crate::camera::{Reprojection, View};
 use crate::fit::Surfel;
 use crate::splat::{GBuffer, tiled_index};
 
 /// Largest distance of the same surface in the last frame, in k-radii of the surfel.
-pub(super) const NEAR: f32 = 0.5;
+pub(super) const MAX_SURFACE_DISTANCE_RADII: f32 = 0.5;
 
 /// A surface of the last frame, in view space.
-pub(super) struct Surface {
+pub(super) struct LastSurface {
     /// Unit normal, on the same side as the surfel's.
     normal: Vec3,
     /// Distance in world units by which the surfel lies in front.
@@ -24,7 +25,7 @@ pub(super) struct Surface {
 }
 
 /// The surface that the last frame showed at the surfel's place, if it is the same.
-pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<Surface> {
+pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) -> Option<LastSurface> {
     let pixel = past.pixel(surfel.center)?;
     let width = past.view.width as usize;
     let [x, y] = [pixel % width, pixel / width];
@@ -37,12 +38,14 @@ pub(super) fn seen_before(surfel: &Surfel, last: &GBuffer, past: &Reprojection) 
     let distance = normal.dot(past.position(surfel.center) - seen);
     let normal = past.rotation.transpose() * normal;
     let facing = normal.dot(surfel.normal.into());
-    let is_same = distance.abs() <= NEAR * surfel.k_radius && facing.abs() >= ALIKE && surfel.radius > 0.0;
-    is_same.then(|| Surface { normal: normal * facing.signum(), distance: distance * facing.signum() })
+    let is_same = distance.abs() <= MAX_SURFACE_DISTANCE_RADII * surfel.k_radius
+        && facing.abs() >= MIN_SURFACE_COSINE
+        && surfel.radius > 0.0;
+    is_same.then(|| LastSurface { normal: normal * facing.signum(), distance: distance * facing.signum() })
 }
 
 /// Moves and turns a surfel towards a surface by `share` of the way, 0 to below 1.
-pub(super) fn draw_towards(surfel: &mut Surfel, surface: &Surface, share: f32, view: &View) {
+pub(super) fn draw_towards(surfel: &mut Surfel, surface: &LastSurface, share: f32, view: &View) {
     let center = Vec3::from(surfel.center) - share * surface.distance * surface.normal;
     draw_to(surfel, center, surface.normal, share, view);
 }

@@ -28,7 +28,7 @@ use glam::Vec3;
 use pulp::Simd;
 use rayon::prelude::*;
 
-use super::{AROUND_PX, EMPTY, Outline, Rim, Shown};
+use super::{EMPTY, Outline, PixelSurface, Rim, SPLAT_WINDOW_PX};
 use crate::adapt::Noise;
 use crate::camera::View;
 use crate::fit::SUPPORT;
@@ -36,47 +36,48 @@ use crate::project::Sixteenths;
 use crate::splat::{TILE, tiled_index};
 
 /// Least noise in pixels that blurs a border. With less noise, detail of far views that passes for noise would be cut.
-pub(in crate::splat) const LEAST_NOISE_PX: f32 = 0.25;
+pub(in crate::splat) const MIN_BLURRING_NOISE_PX: f32 = 0.25;
 /// Squared window radius per variance of its kernel, along one axis.
-pub(in crate::splat) const PER_VARIANCE: f32 = 10.0;
+pub(in crate::splat) const WINDOW_PER_KERNEL_VARIANCE: f32 = 10.0;
 /// Sine of a surface's tilt from the eye from which the whole noise counts. Below 1, because normals in a fringe lean
 /// towards the eye.
-pub(in crate::splat) const TILTED: f32 = 0.8;
+pub(in crate::splat) const FULL_NOISE_SINE: f32 = 0.8;
 /// Share of the noise that blurs a border. With the whole noise borders are too narrow by a few tenths of a pixel, and
 /// slits open.
-pub(in crate::splat) const BLURS: f32 = 0.87;
+pub(in crate::splat) const BLURRING_NOISE_SHARE: f32 = 0.87;
 /// Growth of the squared window radius per variance of the noise, both in square pixels.
-pub(in crate::splat) const PER_NOISE: f32 = 12.0;
+pub(in crate::splat) const WINDOW_PER_NOISE_VARIANCE: f32 = 12.0;
 /// Radius in pixels of the window without noise. Smaller windows hold so few points that borders come out ragged.
-pub(in crate::splat) const LEAST_RADIUS_PX: f32 = 4.0;
+pub(in crate::splat) const MIN_WINDOW_PX: f32 = 4.0;
 /// Largest radius of a window, in pixels.
-pub(in crate::splat) const WIDEST_RADIUS_PX: f32 = 48.0;
+pub(in crate::splat) const MAX_WINDOW_PX: f32 = 48.0;
 /// Largest radius in pixels of windows that are summed pixel by pixel. Windows up to twice this are summed in pairs of
 /// pixels along both axes, wider ones in blocks.
-pub(in crate::splat) const FINE_RADIUS_PX: f32 = 8.0;
+pub(in crate::splat) const MAX_PIXEL_WINDOW_PX: f32 = 8.0;
 /// Weight of the mean square against the mean. A larger weight depends less on how a surface ends, and more on single
 /// points where these are few.
-pub(in crate::splat) const SPREAD: f32 = 0.25;
+pub(in crate::splat) const SPREAD_WEIGHT: f32 = 0.25;
 /// Largest measure on a surface, in w²/√(w² + σ²): for little noise, and for certain noise. Little noise may be small
-/// structure, so its limit is about that of sharp borders, [`OFF_PX`](super::OFF_PX). The second limit holds from
-/// [`SURE_NOISE_PX`] or [`SURE_DISTANCES`] on; limits between are interpolated.
-pub(in crate::splat) const OFF_BLURRED: [f32; 2] = [0.5, 0.335];
+/// structure, so its limit is about that of sharp borders,
+/// [`MAX_SPLAT_MEAN_OFFSET_PX`](super::MAX_SPLAT_MEAN_OFFSET_PX). The second limit holds from [`SURE_NOISE_PX`] or
+/// [`SURE_NOISE_DISTANCES`] on; limits between are interpolated.
+pub(in crate::splat) const MAX_BLURRED_OFFSET: [f32; 2] = [0.5, 0.335];
 /// Noise in pixels from which the limit is that of certain noise.
 pub(in crate::splat) const SURE_NOISE_PX: f32 = 0.8;
 /// Noise from which the limit is that of certain noise, if the frame's noise is certain and this is less than
 /// [`SURE_NOISE_PX`]. The unit is the mean distance of marked sixteenths in the window, its empty part included. At a
 /// border that distance is √2 times as large as on the surface.
-pub(in crate::splat) const SURE_DISTANCES: f32 = 1.25;
+pub(in crate::splat) const SURE_NOISE_DISTANCES: f32 = 1.25;
 /// Fewest marked sixteenths in a window whose moments decide.
-pub(in crate::splat) const FEWEST_BLURRED: u32 = 12;
+pub(in crate::splat) const MIN_WINDOW_SIXTEENTHS: u32 = 12;
 /// Width of a fringe in multiples of the noise, beside the reach of its splats.
 pub(in crate::splat) const FRINGE_NOISES: f32 = 3.0;
 /// Largest width of a fringe, in blocks.
 pub(crate) const FRINGE_BLOCKS: usize = 16;
 /// Share of the limit that the mean has to exceed half way to the empty pixel.
-pub(in crate::splat) const OFF_HALF_WAY: f32 = 0.7;
+pub(in crate::splat) const HALF_WAY_OFFSET_SHARE: f32 = 0.7;
 /// Distance beyond the fringe, in blocks, up to which empty blocks define the direction to the empty side.
-pub(in crate::splat) const BEYOND_FRINGE: f32 = 2.0;
+pub(in crate::splat) const BLOCKS_BEYOND_FRINGE: f32 = 2.0;
 /// Side of a block in pixels.
 pub(crate) const BLOCK_PX: usize = 4;
 
@@ -90,7 +91,7 @@ const LANES: usize = 8;
 
 /// Number of sixteenths that hold points (marked ones) in each square of a picture, row by row.
 #[derive(Debug)]
-struct Held {
+struct SixteenthCounts {
     /// Side of a square in pixels.
     side: usize,
     columns: usize,
@@ -101,18 +102,18 @@ struct Held {
 
 /// Noise of a frame, and density and emptiness of its picture.
 #[derive(Debug)]
-pub(in crate::splat) struct Blurred {
+pub(in crate::splat) struct BlurredBorders {
     noise: Noise,
     /// K-radius per splat radius.
     per_radius: f32,
     /// Counts in single pixels, in pairs along both axes, and in blocks.
-    held: [Held; 3],
+    held: [SixteenthCounts; 3],
     /// Distance of each block to the nearest empty one, in blocks, the larger along either axis. An empty block has no
     /// splats and, in the margin of the picture, no points either.
     to_empty: Vec<u8>,
 }
 
-impl Blurred {
+impl BlurredBorders {
     /// State for a picture whose k-radii are `per_radius` splat radii; `None` without noise.
     pub(in crate::splat) fn new(
         noise: Noise,
@@ -125,7 +126,7 @@ impl Blurred {
             return None;
         }
         let [width, height] = [view.width as usize, view.height as usize];
-        let pixels = Held::new([1, width, height], |x, y| sixteenths.of(y * width + x).count_ones() as u16);
+        let pixels = SixteenthCounts::new([1, width, height], |x, y| sixteenths.of(y * width + x).count_ones() as u16);
         let pairs = pixels.in_pairs();
         let blocks = pairs.in_pairs();
         let [columns, rows] = [blocks.columns, blocks.rows];
@@ -173,13 +174,13 @@ impl Blurred {
         Some(Self { noise, per_radius, held: [pixels, pairs, blocks], to_empty })
     }
 
-    fn blocks(&self) -> &Held {
+    fn blocks(&self) -> &SixteenthCounts {
         &self.held[2]
     }
 
     /// The squares that a window of this radius is summed in.
-    fn squares(&self, window: f32) -> &Held {
-        let wider = [1.0, 2.0].map(|times| usize::from(window > times * FINE_RADIUS_PX));
+    fn squares(&self, window: f32) -> &SixteenthCounts {
+        let wider = [1.0, 2.0].map(|times| usize::from(window > times * MAX_PIXEL_WINDOW_PX));
         &self.held[wider[0] + wider[1]]
     }
 
@@ -217,10 +218,10 @@ impl Blurred {
 impl Outline<'_> {
     /// Whether pixel (x, y), covered by a splat of this reach, is beside a surface whose border noise has blurred.
     /// `None` if there is too little noise, too few points, or nothing empty within a fringe.
-    pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], shown: Shown, reach_px: f32) -> Option<bool> {
+    pub(super) fn is_beside_blurred(&self, [x, y]: [usize; 2], shown: PixelSurface, reach_px: f32) -> Option<bool> {
         let blurred = self.blurred?;
-        let Blurred { noise, per_radius, .. } = blurred;
-        let Shown { depth, normal } = shown;
+        let BlurredBorders { noise, per_radius, .. } = blurred;
+        let PixelSurface { depth, normal } = shown;
         let pixel = self.view.pixel_size(depth);
         // One more block, because blocks that a border crosses are not empty.
         let blocks = |fringe: f32| (fringe / BLOCK_PX as f32).ceil() as u8 + 1;
@@ -228,15 +229,15 @@ impl Outline<'_> {
         let to_empty = blurred.blocks_to_empty(x / BLOCK_PX, y / BLOCK_PX);
         // Early exit: most pixels lie further inside than any noise is wide.
         let most_noise_px = noise.level / pixel;
-        if !(most_noise_px >= LEAST_NOISE_PX) || to_empty > blocks(fringe_of(most_noise_px)) {
+        if !(most_noise_px >= MIN_BLURRING_NOISE_PX) || to_empty > blocks(fringe_of(most_noise_px)) {
             return None;
         }
         let radius_px = reach_px / SUPPORT;
         let to_eye = self.view.to_eye(self.view.unproject([x as f32 + 0.5, y as f32 + 0.5], depth));
         let facing = Vec3::from(normal).dot(to_eye) / to_eye.length();
-        let aside = ((1.0 - facing * facing).max(0.0).sqrt() / TILTED).min(1.0);
-        let noise_px = BLURS * aside * noise.at(per_radius * radius_px * pixel) / pixel;
-        if !(noise_px >= LEAST_NOISE_PX) {
+        let aside = ((1.0 - facing * facing).max(0.0).sqrt() / FULL_NOISE_SINE).min(1.0);
+        let noise_px = BLURRING_NOISE_SHARE * aside * noise.at(per_radius * radius_px * pixel) / pixel;
+        if !(noise_px >= MIN_BLURRING_NOISE_PX) {
             return None;
         }
         let fringe = fringe_of(noise_px);
@@ -246,24 +247,25 @@ impl Outline<'_> {
         let [width, height] = self.size();
         // Points beyond the screen are unknown.
         let to_edge = x.min(y).min(width - 1 - x).min(height - 1 - y) as f32;
-        let widest = WIDEST_RADIUS_PX.min(to_edge);
-        let window = (LEAST_RADIUS_PX * LEAST_RADIUS_PX + PER_NOISE * noise_px * noise_px).sqrt().min(widest);
+        let widest = MAX_WINDOW_PX.min(to_edge);
+        let window =
+            (MIN_WINDOW_PX * MIN_WINDOW_PX + WINDOW_PER_NOISE_VARIANCE * noise_px * noise_px).sqrt().min(widest);
         // A window narrower than splats would show the distances between points, or scan lines.
-        if window < AROUND_PX.max(radius_px) {
+        if window < SPLAT_WINDOW_PX.max(radius_px) {
             return None;
         }
         let squares = blurred.squares(window);
         let here = moments(squares, [x, y], window)?;
-        let blur = Blur { window: window * window / PER_VARIANCE, noise: noise_px * noise_px };
+        let blur = BlurVariances { window: window * window / WINDOW_PER_KERNEL_VARIANCE, noise: noise_px * noise_px };
         let apart = window * (PI / here.count).sqrt();
-        let sure_px = SURE_NOISE_PX + noise.sure * ((SURE_DISTANCES * apart).min(SURE_NOISE_PX) - SURE_NOISE_PX);
-        let [unsure, sure] = OFF_BLURRED;
+        let sure_px = SURE_NOISE_PX + noise.sure * ((SURE_NOISE_DISTANCES * apart).min(SURE_NOISE_PX) - SURE_NOISE_PX);
+        let [unsure, sure] = MAX_BLURRED_OFFSET;
         let may_be = sure + (unsure - sure) * (1.0 - noise_px / sure_px).max(0.0);
         // An offset that is small in total is small in any direction.
         if blur.most_off(here) <= may_be {
             return Some(false);
         }
-        let towards = blurred.towards_empty([x, y], fringe + BEYOND_FRINGE * BLOCK_PX as f32)?;
+        let towards = blurred.towards_empty([x, y], fringe + BLOCKS_BEYOND_FRINGE * BLOCK_PX as f32)?;
         if blur.off(here, towards) <= may_be {
             return Some(false);
         }
@@ -284,12 +286,12 @@ impl Outline<'_> {
         if (x.min(y).min(width - 1 - x).min(height - 1 - y) as f32) < window {
             return Some(true);
         }
-        let goes_on = |half_way: Moments| blur.off(half_way, towards) <= OFF_HALF_WAY * may_be;
+        let goes_on = |half_way: Moments| blur.off(half_way, towards) <= HALF_WAY_OFFSET_SHARE * may_be;
         Some(!moments(squares, [x, y], window).is_some_and(goes_on))
     }
 }
 
-impl Held {
+impl SixteenthCounts {
     fn new([side, columns, rows]: [usize; 3], count: impl Fn(usize, usize) -> u16 + Sync) -> Self {
         let mut counts = vec![0; columns * rows + LANES];
         counts.par_chunks_mut(columns).take(rows).enumerate().for_each(|(y, row)| {
@@ -310,12 +312,12 @@ impl Held {
 
 /// Variances, in square pixels, of the window and of the noise.
 #[derive(Clone, Copy, Debug)]
-struct Blur {
+struct BlurVariances {
     window: f32,
     noise: f32,
 }
 
-impl Blur {
+impl BlurVariances {
     /// Unit of the measure, w²/√(w² + σ²), in pixels.
     fn unit(self) -> f32 {
         self.window / (self.window + self.noise).sqrt()
@@ -334,7 +336,7 @@ impl Blur {
         let square = xx * x * x + 2.0 * xy * x * y + yy * y * y;
         // Variance that noise adds to the places of points in the window.
         let of_noise = self.window * self.noise / (self.window + self.noise);
-        mean - SPREAD * ((square - of_noise) / (self.unit() * self.unit())).clamp(0.0, 1.0)
+        mean - SPREAD_WEIGHT * ((square - of_noise) / (self.unit() * self.unit())).clamp(0.0, 1.0)
     }
 }
 
@@ -352,7 +354,7 @@ struct Moments {
 /// there are too few marked sixteenths.
 #[pulp::with_simd(moments = pulp::Arch::new())]
 #[inline(always)]
-fn moments_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) -> Option<Moments> {
+fn moments_with<S: Simd>(_: S, squares: &SixteenthCounts, [x, y]: [usize; 2], window: f32) -> Option<Moments> {
     let reach = window as usize;
     // Offset in pixels of the first square's middle from the pixel's, then the range of squares.
     let along = |at: usize, most: usize| {
@@ -391,7 +393,7 @@ fn moments_with<S: Simd>(_: S, squares: &Held, [x, y]: [usize; 2], window: f32) 
     let sum = |lanes: [f32; LANES]| lanes.iter().sum::<f32>();
     let [count, weight] = [count, weight].map(sum);
     let of_weight = |lanes: [f32; LANES]| sum(lanes) / weight;
-    (count >= FEWEST_BLURRED as f32).then(|| Moments {
+    (count >= MIN_WINDOW_SIXTEENTHS as f32).then(|| Moments {
         offset: [right, down].map(of_weight),
         squares: [xx, xy, yy].map(of_weight),
         count,
@@ -407,7 +409,7 @@ mod tests {
     /// grows with this power of the distance from the end; noise is in pixels.
     fn off_at_end(power: f32, noise_px: f32) -> [f32; 2] {
         let [width, height] = [256, 256];
-        let ([x, y], window) = ([128, 128], (16.0 + PER_NOISE * noise_px * noise_px).sqrt());
+        let ([x, y], window) = ([128, 128], (16.0 + WINDOW_PER_NOISE_VARIANCE * noise_px * noise_px).sqrt());
         let (sin, cos) = 0.4f32.sin_cos();
         let mut random = Random::new(91);
         let mut counts = vec![0; width * height];
@@ -419,14 +421,14 @@ mod tests {
                 counts[row * width + column] += 1;
             }
         }
-        let pixels = Held::new([1, width, height], |x, y| counts[y * width + x]);
+        let pixels = SixteenthCounts::new([1, width, height], |x, y| counts[y * width + x]);
         let pairs = pixels.in_pairs();
-        let blur = Blur { window: window * window / PER_VARIANCE, noise: noise_px * noise_px };
+        let blur = BlurVariances { window: window * window / WINDOW_PER_KERNEL_VARIANCE, noise: noise_px * noise_px };
         let [pixels, pairs] =
             [pixels, pairs].map(|squares| moments(&squares, [x, y], window).expect("there are thousands"));
         let off = blur.off(pixels, [-sin, -cos]);
         let differs = (blur.off(pairs, [-sin, -cos]) - off).abs();
-        assert!(window < FINE_RADIUS_PX || differs < 0.03, "in pairs of pixels it differs by {differs}");
+        assert!(window < MAX_PIXEL_WINDOW_PX || differs < 0.03, "in pairs of pixels it differs by {differs}");
         [off, blur.most_off(pixels)]
     }
 
@@ -448,7 +450,7 @@ mod tests {
         let mut random = Random::new(92);
         for [width, height] in [[1, 1], [2, 3], [7, 4], [5, 9]] {
             let counts: Vec<_> = (0..width * height).map(|_| random.below(17) as u16).collect();
-            let pairs = Held::new([1, width, height], |x, y| counts[y * width + x]).in_pairs();
+            let pairs = SixteenthCounts::new([1, width, height], |x, y| counts[y * width + x]).in_pairs();
             assert_eq!([pairs.side, pairs.columns, pairs.rows], [2, width.div_ceil(2), height.div_ceil(2)]);
             for (x, y) in (0..pairs.columns).flat_map(|x| (0..pairs.rows).map(move |y| (x, y))) {
                 let inside = |&at: &usize| at % width / 2 == x && at / width / 2 == y;

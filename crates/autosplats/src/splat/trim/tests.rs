@@ -11,7 +11,7 @@ use crate::test_clouds::Random;
 use autosplats_cloud::glam::DVec3;
 
 /// The very edge of a surface that curves away.
-const SHOWN: Shown = Shown { depth: 1.0, normal: [1.0, 0.0, 0.0] };
+const SHOWN: PixelSurface = PixelSurface { depth: 1.0, normal: [1.0, 0.0, 0.0] };
 
 fn view(size: [u32; 2]) -> View {
     let camera =
@@ -175,7 +175,7 @@ fn told(wide: bool, per_column: usize, depth: impl Fn(f32) -> f32) -> [f64; 2] {
     for (x, y) in (3..TILE - 3).flat_map(|x| (3..TILE - 3).map(move |y| (x, y))) {
         let below = y as f32 + 0.5 - line(x as f32 + 0.5);
         if below.abs() < 2.0 {
-            let is_beside = outline.is_beside([x, y], wide, Near::Border);
+            let is_beside = outline.is_beside([x, y], wide, EmptyNearby::Border);
             let is_right = is_beside == Some(below < 0.0);
             counts = [counts[0] + 1, counts[1] + usize::from(is_beside.is_some()), counts[2] + usize::from(is_right)];
         }
@@ -214,7 +214,7 @@ fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32
     let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let known = |sure: f32| Noise { level: noise_px * view.pixel_size(1.0), sure, ..Noise::NONE };
-    let blurred = Blurred::new(sure.map_or(Noise::NONE, known), 1.6, &rims, &sixteenths, &view);
+    let blurred = BlurredBorders::new(sure.map_or(Noise::NONE, known), 1.6, &rims, &sixteenths, &view);
     assert_eq!(blurred.is_some(), sure.is_some(), "nothing is blurred without noise");
     let outline = Outline {
         rims: &rims,
@@ -226,7 +226,7 @@ fn above_the_line(per_pixel: usize, noise_px: f32, sure: Option<f32>) -> Vec<f32
     if sure.is_some() {
         let told = |reach_px: f32| outline.is_beside_blurred([32, 28], SHOWN, reach_px);
         assert!(told(2.0).is_some() && told(60.0).is_none(), "where splats are wide, windows tell of rows");
-        let facing = Shown { normal: [0.0, 0.0, -1.0], ..SHOWN };
+        let facing = PixelSurface { normal: [0.0, 0.0, -1.0], ..SHOWN };
         assert!(outline.is_beside_blurred([32, 28], facing, 2.0).is_none(), "what faces the eye is not blurred");
     }
     let edges = outline.edges([0, 0]);
@@ -280,7 +280,7 @@ fn a_surface_before_a_denser_one_is_no_fringe() {
     let rims: Vec<_> = (0..TILE_AREA).map(|pixel| if pixel % TILE < 44 { -7.0 } else { EMPTY }).collect();
     let (sixteenths, view) = (Sixteenths::with(size, points), view(size.map(|side| side as u32)));
     let noise = Noise { level: 2.0 * view.pixel_size(1.0), ..Noise::NONE };
-    let blurred = Blurred::new(noise, 1.6, &rims, &sixteenths, &view);
+    let blurred = BlurredBorders::new(noise, 1.6, &rims, &sixteenths, &view);
     assert!(blurred.is_some(), "there is noise");
     let blurred = blurred.as_ref();
     let outline = Outline { rims: &rims, centers: &[0; TILE_AREA], sixteenths: &sixteenths, view: &view, blurred };
@@ -304,7 +304,8 @@ fn blocks_know_how_far_an_empty_one_is() {
             }
         }
         let noise = Noise { level: 1.0, ..Noise::NONE };
-        let blurred = Blurred::new(noise, 1.6, &rims, &Sixteenths::with([width, height], []), &view).expect("noise");
+        let blurred =
+            BlurredBorders::new(noise, 1.6, &rims, &Sixteenths::with([width, height], []), &view).expect("noise");
         let [columns, rows] = [width, height].map(|side| side.div_ceil(BLOCK_PX));
         let is_empty = |bx: usize, by: usize| {
             let pixels =
@@ -330,7 +331,7 @@ fn what_is_empty_lies_where_it_does() {
         let rim = |pixel: usize| if is_empty(pixel % TILE, pixel / TILE) { EMPTY } else { 2.0 };
         let rims: Vec<_> = (0..TILE_AREA).map(rim).collect();
         let noise = Noise { level: 1.0, ..Noise::NONE };
-        let blurred = Blurred::new(noise, 1.6, &rims, &Sixteenths::with([TILE; 2], []), &view).expect("noise");
+        let blurred = BlurredBorders::new(noise, 1.6, &rims, &Sixteenths::with([TILE; 2], []), &view).expect("noise");
         blurred.towards_empty(at, 16.0)
     };
     let is_near = |found: Option<[f32; 2]>, [x, y]: [f32; 2]| {
@@ -395,9 +396,9 @@ fn borders_are_pixels_close_to_an_empty_square_and_gaps_those_close_to_an_empty_
                     })
                 };
                 let expected = match [around(7, 4, &is_square), around(5, 2, &is_empty)] {
-                    [true, _] => Near::Border,
-                    [_, true] => Near::Gap,
-                    _ => Near::Nothing,
+                    [true, _] => EmptyNearby::Border,
+                    [_, true] => EmptyNearby::Gap,
+                    _ => EmptyNearby::Nothing,
                 };
                 assert_eq!(edges.near([x, y]), expected, "{column}, {row}");
                 all[expected as usize] += 1;
@@ -430,9 +431,9 @@ fn slits_between_dense_points_open_beside_single_empty_pixels() {
     for [x, y] in pixels {
         let inside = depth(x as f32 + 0.5, y as f32 + 0.5);
         let near = edges.near([x, y]);
-        assert_ne!(near, Near::Border, "no square of the slit is empty: {x}, {y}");
+        assert_ne!(near, EmptyNearby::Border, "no square of the slit is empty: {x}, {y}");
         // Further from the slit's border too few points decide.
-        if near == Near::Gap && (0.2..0.5).contains(&inside.abs()) {
+        if near == EmptyNearby::Gap && (0.2..0.5).contains(&inside.abs()) {
             let is_beside = inside < 0.0;
             let [right, all] = &mut counts[usize::from(is_beside)];
             *right += u32::from(outline.sticks_out(x, y, SHOWN, near) == is_beside);

@@ -10,10 +10,10 @@ use crate::adapt::{DepthRun, SCALES, SHEETS, SLABS};
 use crate::fit::Surfel;
 use crate::fit::orient::Sensor;
 use crate::gpu::{FrameUniform, GROUPS_PER_ROW, PassSource, link};
-use crate::project::gpu::{BLOCK, COUNTERS, Counter, Work};
+use crate::project::gpu::{COUNTERS, Counter, RANK_BLOCK_FLAGS, Work};
 use crate::project::{ChunkUniform, ScreenPoint};
 use crate::search::splat_communication::gpu::Arguments;
-use crate::shade::gpu::{ShadeUniform, Shown};
+use crate::shade::gpu::{ShadeUniform, ShownQuantity};
 use crate::splat::over_time::Fitted;
 use crate::splat::{BLOCK_PX, Cover, FRINGE_BLOCKS};
 
@@ -224,7 +224,7 @@ fn constants_are_alike_in_rust_and_wgsl() {
     let counters = counters.map(|counter| (screaming(&counter), counter as u32));
     assert_eq!(constants(&parse("#import counters\n")), counters, "counters in WGSL, and in Rust");
 
-    use Shown::{Clay, Color, Curvature, Depth, Height, KRadius, Normal, Radius, Scalar};
+    use ShownQuantity::{Clay, Color, Curvature, Depth, Height, KRadius, Normal, Radius, Scalar};
     let shown = [Clay, Color, Normal, Height, Depth, Radius, KRadius, Curvature, Scalar];
     let shown = shown.map(|shown| (format!("SHOW_{}", screaming(&shown)), shown as u32));
     let shading = passes().find(|pass| pass.path == "shade/shade").expect("a pass").module();
@@ -263,6 +263,6 @@ fn constants_are_alike_in_rust_and_wgsl() {
     assert_eq!(constant("#import sheet\n", "SHEETS"), SHEETS as u32, "sheets of a cell");
     let adapt = passes().find(|pass| pass.path == "adapt/adapt").expect("a pass");
     assert_eq!(constant(adapt.source, "SCALES"), SCALES as u32, "balls around a point");
-    assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, BLOCK, "flags that a workgroup ranks");
+    assert_eq!(constant("#import rank\n", "RANK_WORDS") * 32, RANK_BLOCK_FLAGS, "flags that a workgroup ranks");
     assert_eq!(constant("#import groups\n", "GROUPS_PER_ROW"), GROUPS_PER_ROW, "workgroups in a row");
 }

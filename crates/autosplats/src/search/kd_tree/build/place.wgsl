@@ -134,7 +134,7 @@ fn place(@builtin(local_invocation_index) local: u32) {
         }
         let both = state.nodes + 2u * so_far.x;
         let is_root = own.axis == KD_FINITE_LEFT;
-        nodes[both] = KdNode(vec3f(KD_MOST), 0u, vec3f(-KD_MOST), 1u);
+        nodes[both] = KdNode(vec3f(KD_MAX_F32), 0u, vec3f(-KD_MAX_F32), 1u);
         nodes[both + 1u] = nodes[both];
         nodes[own.node].first = both;
         nodes[own.node].len = 0u;

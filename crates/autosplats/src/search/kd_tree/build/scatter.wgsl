@@ -20,7 +20,7 @@ var<workgroup> bits: array<atomic<u32>, 8>;
 // Boxes of the points that each invocation moves left and right: least and negated greatest coordinates.
 var<workgroup> boxes: array<f32, 768>;
 
-const MOST = 3.4028234663852886e38;
+const MAX_F32 = 3.4028234663852886e38;
 
 fn bound(place: u32, local: u32, value: vec3f) {
     boxes[place * 64u + local] = value.x;
@@ -46,10 +46,10 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     workgroupBarrier();
     let own = large[task.large];
     let before = chunk_sums[chunk] - chunk_sums[own.first_chunk];
-    var left_low = vec3f(MOST);
-    var left_high = vec3f(MOST);
-    var right_low = vec3f(MOST);
-    var right_high = vec3f(MOST);
+    var left_low = vec3f(MAX_F32);
+    var left_high = vec3f(MAX_F32);
+    var right_low = vec3f(MAX_F32);
+    var right_high = vec3f(MAX_F32);
     for (var flag = local; task.first + flag < task.end; flag += 64u) {
         let at = task.first + flag;
         let point = points[at];
@@ -85,13 +85,13 @@ fn scatter(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation_in
     if local >= 12u || task.first >= task.end || task.axis == KD_UNSPLIT || slot == KD_NONE {
         return;
     }
-    var least = MOST;
+    var least = MAX_F32;
     for (var invocation = 0u; invocation < 64u; invocation++) {
         least = min(least, boxes[local * 64u + invocation]);
     }
     let axis = local % 3u;
     let words = slot * KD_LARGE_WORDS;
-    if least == MOST {
+    if least == MAX_F32 {
         // No point of this chunk goes to that child.
         return;
     }

@@ -23,9 +23,9 @@
 @group(0) @binding(5) var<storage, read_write> nodes: array<KdNode>;
 
 // Fewest points of a leaf, where there are more. So the nodes below a small node are at most a quarter of its points.
-override LEAST: u32;
+override MIN_LEAF_POINTS: u32;
 // Number of points whose reading costs as much as a step down the tree.
-override STEP_COST: f32;
+override STEP_COST_POINTS: f32;
 
 // Coordinates of the points, axis by axis.
 var<workgroup> coordinates: array<f32, 192>;
@@ -69,8 +69,8 @@ fn split_cost(axis: u32, plane: f32, left: u32, count: u32) -> f32 {
     let around = 2.0 * frame.first_radius;
     let to_left = f32(left) * (plane - low + around);
     let to_right = f32(count - left) * (high - plane + around);
-    let cost = STEP_COST + (to_left + to_right) / (high - low + around);
-    return select(MOST, cost, left >= LEAST && count - left >= LEAST);
+    let cost = STEP_COST_POINTS + (to_left + to_right) / (high - low + around);
+    return select(MAX_F32, cost, left >= MIN_LEAF_POINTS && count - left >= MIN_LEAF_POINTS);
 }
 
 @compute @workgroup_size(64)
@@ -118,10 +118,10 @@ fn small_tree(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
         let count = ones(mask);
         let is_mine = is_in(mask, local);
         if local < 6u {
-            var least = MOST;
+            var least = MAX_F32;
             let sign = select(-1.0, 1.0, local < 3u);
             for (var at = 0u; at < len; at++) {
-                least = min(least, select(MOST, sign * coordinates[64u * (local % 3u) + at], is_in(mask, at)));
+                least = min(least, select(MAX_F32, sign * coordinates[64u * (local % 3u) + at], is_in(mask, at)));
             }
             box[local] = least;
         }
@@ -130,7 +130,7 @@ fn small_tree(@builtin(workgroup_id) workgroup: vec3u, @builtin(local_invocation
             atomicStore(&best, KD_NONE);
         }
         workgroupBarrier();
-        var cost = MOST;
+        var cost = MAX_F32;
         var axis = 0u;
         if is_mine {
             let costs = vec3f(

@@ -15,7 +15,7 @@
 @group(0) @binding(3) var<storage, read_write> nodes: array<KdNode>;
 
 // Number of points whose median stands for the median of a node.
-const SAMPLES = 15u;
+const MEDIAN_SAMPLES = 15u;
 
 fn corner(keys: vec3u) -> vec3f {
     return bitcast<vec3f>(vec3u(key_bits(keys.x), key_bits(keys.y), key_bits(keys.z)));
@@ -23,22 +23,22 @@ fn corner(keys: vec3u) -> vec3f {
 
 // Coordinate of one of the points spread evenly over a node's run.
 fn sample(at: u32, large_node: KdLarge, axis: u32) -> f32 {
-    let place = large_node.first + at * (large_node.len / SAMPLES);
+    let place = large_node.first + at * (large_node.len / MEDIAN_SAMPLES);
     return kd_coordinate(kd_position(points[place]), axis);
 }
 
 fn sampled_median(large_node: KdLarge, axis: u32) -> f32 {
     var median = 0.0;
-    for (var own = 0u; own < SAMPLES; own++) {
+    for (var own = 0u; own < MEDIAN_SAMPLES; own++) {
         let x = sample(own, large_node, axis);
         var less = 0u;
         var up_to = 0u;
-        for (var other = 0u; other < SAMPLES; other++) {
+        for (var other = 0u; other < MEDIAN_SAMPLES; other++) {
             let y = sample(other, large_node, axis);
             less += select(0u, 1u, y < x);
             up_to += select(0u, 1u, y <= x);
         }
-        if less <= SAMPLES / 2u && up_to > SAMPLES / 2u {
+        if less <= MEDIAN_SAMPLES / 2u && up_to > MEDIAN_SAMPLES / 2u {
             median = x;
         }
     }

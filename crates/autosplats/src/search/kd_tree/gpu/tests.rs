@@ -139,7 +139,7 @@ fn check_tree(found: &Found, positions: &[[f32; 3]], case: &str) -> (usize, usiz
             assert_eq!(position, positions[index], "{case}: point {index} is where it was");
             assert!((0..3).all(|a| low[a] <= position[a] && position[a] <= high[a]), "{case}: {index} in its box");
         }
-        if len > SMALL as u32 {
+        if len > MAX_SMALL_NODE_POINTS as u32 {
             large += 1;
             assert_eq!(low, high, "{case}: a leaf of {len} points is in one place");
         }
@@ -319,7 +319,7 @@ fn levels_are_enough_for_splits_as_uneven_as_they_may_be() {
         let levels = levels(capacity);
         let left = capacity as f64 * 0.75f64.powi(levels as i32);
         assert!(
-            left <= SMALL as f64 && levels.is_multiple_of(2),
+            left <= MAX_SMALL_NODE_POINTS as f64 && levels.is_multiple_of(2),
             "{capacity}: {left} points are left after {levels} levels"
         );
     }

@@ -19,7 +19,7 @@ fn vectors_of_any_width_give_the_same_bits() {
     for (name, positions) in test_clouds::all(2000) {
         let (screen, view) = screen(positions);
         let rules = SearchRules { k: 10, outlier_expansions: Some(3), gap_factor: Some(4.0), adaptive: true };
-        let task = Task { screen: &screen, view: &view, rules: &rules, past: &Past::default() };
+        let task = SearchInput { screen: &screen, view: &view, rules: &rules, past: &Past::default() };
         let queries: Vec<u32> = (0..screen.points.len() as u32).collect();
         let mut blocks = vec![NeighborhoodBlock::default(); queries.len().div_ceil(LANES)];
         let mut scalar = blocks.clone();
@@ -41,12 +41,12 @@ fn no_more_candidates_are_read_than_allowed() {
         let mut blocks = vec![NeighborhoodBlock::default(); queries.len().div_ceil(LANES)];
         let mut scratch = Scratch::default();
         search_blocks(
-            &Task { screen: &screen, view: &view, rules: &rules, past: &Past::default() },
+            &SearchInput { screen: &screen, view: &view, rules: &rules, past: &Past::default() },
             &queries,
             &mut blocks,
             &mut scratch,
         );
         let read = scratch.candidates.len();
-        assert!(read <= 2 * MAX_CANDIDATES + GROUP, "{read} candidates at a time with {rules:?}");
+        assert!(read <= 2 * MAX_CANDIDATES + CANDIDATE_GROUP, "{read} candidates at a time with {rules:?}");
     }
 }

@@ -4,7 +4,7 @@ use autosplats_cloud::PointCloud;
 use autosplats_cloud::glam::DVec3;
 
 use super::*;
-use crate::camera::{Camera, Projection, Reprojection, Seen, View};
+use crate::camera::{Camera, PlacedView, Projection, Reprojection, View};
 use crate::gpu::{Clock, FrameUniform, Recorder, read_back, test_gpu};
 use crate::project::gpu::tests::upload_screen;
 use crate::project::gpu::{COUNTERS, Counter};
@@ -31,7 +31,7 @@ pub(crate) fn frame_buffer_after(
     let Some(radii) = radii else {
         return (frame_buffer(gpu, view, rules), past_buffer(gpu, None).expect("room"));
     };
-    let seen = Seen { view: *view, origin: DVec3::ZERO };
+    let seen = PlacedView { view: *view, origin: DVec3::ZERO };
     let told = told(view, rules).after(&Reprojection::new(&seen, &seen).expect("the same camera"));
     (frame_buffer_with(gpu, &told), gpu.storage_with("past", radii).expect("room"))
 }
