@@ -27,7 +27,7 @@ const COMPANIONS: [(&str, &str); 4] = [
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let program = build(root)?;
     let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let data = data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))?;
+    let data = data.canonicalize().with_context(|| format!("{}: the test data is needed", data.display()))?;
 
     let mut document = HEAD.to_owned();
     formats(&program, &mut document)?;
@@ -37,7 +37,7 @@ pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let target = root.join("docs/FORMATS.md");
     if check {
         let there = read_to_string(&target).unwrap_or_default();
-        ensure!(there == document, "docs/FORMATS.md is not what this build makes; cargo xtask formats writes it");
+        ensure!(there == document, "docs/FORMATS.md differs from what this build writes; run cargo xtask formats");
         println!("docs/FORMATS.md is up to date");
         return Ok(());
     }
@@ -57,7 +57,7 @@ fn build(root: &Path) -> Result<PathBuf> {
         let message: Value = serde_json::from_str(line).ok()?;
         Some(PathBuf::from(message["executable"].as_str()?))
     });
-    programs.next_back().context("cargo builds no program")
+    programs.next_back().context("cargo build reports no program")
 }
 
 /// The tables of formats, read and written.
@@ -69,12 +69,12 @@ fn formats(program: &Path, document: &mut String) -> Result<()> {
     for format in list("read") {
         let (name, extensions) = name_and_extensions(&format);
         let Some(words) = WORDS.iter().find(|words| words.name == name) else {
-            bail!("xtask/src/formats/words.rs has no words about the format {name}");
+            bail!("xtask/src/formats/words.rs does not describe the format {name}");
         };
         let _ = writeln!(document, "| {name} | {extensions} | {} | {} |", words.kept, words.not_kept);
     }
     document.push_str(
-        "\n## Written\n\nThe extension of the output tells the format.\n\n| format | extensions |\n|---|---|\n",
+        "\n## Written\n\nThe extension of the output selects the format.\n\n| format | extensions |\n|---|---|\n",
     );
     for format in list("written") {
         let (name, extensions) = name_and_extensions(&format);
@@ -93,9 +93,9 @@ fn name_and_extensions(format: &Value) -> (&str, String) {
 fn schema(program: &Path, document: &mut String) -> Result<()> {
     let output = Command::new(program).args(["info", "--help"]).output().context("cannot start the program")?;
     let help = String::from_utf8(output.stdout)?;
-    let start = help.find("Fields of the JSON").context("info --help does not explain its JSON")?;
+    let start = help.find("Fields of the JSON").context("info --help does not list the fields of its JSON")?;
     document.push_str(
-        "\n## The JSON of info\n\n`autosplats info --json` prints one object, for several inputs an array.\n\n",
+        "\n## The JSON of info\n\n`autosplats info --json` prints one object, or an array for several inputs.\n\n",
     );
     let _ = writeln!(document, "```text\n{}\n```", help[start..].trim_end());
     Ok(())
@@ -118,7 +118,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
         }
         let outcome = Outcome::of(program, data, &name, &pictures.path().join("picture.png"))?;
         if name.ends_with(".mcap") && !name.contains("lfs") {
-            others.entry("recordings, which are played".into()).or_default().push(name);
+            others.entry("recordings, which the program plays".into()).or_default().push(name);
             continue;
         }
         match rows.last_mut().filter(|row| row.continues(&name, &outcome)) {
@@ -128,7 +128,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     }
     document.push('\n');
     document.push_str(FILES);
-    document.push_str("\n| file | format | points | values of a point | from .. to | unit, system | sensors | noted, or the error | rendered |\n");
+    document.push_str("\n| file | format | points | attributes | bounds: min .. max | unit, coordinate system | sensors | warnings or error | rendered |\n");
     document.push_str("|---|---|---|---|---|---|---|---|---|\n");
     rows.iter().for_each(|row| document.push_str(&row.to_markdown()));
     let points: usize = rows.iter().map(Row::files).sum();
@@ -136,7 +136,7 @@ fn files(program: &Path, data: &Path, document: &mut String) -> Result<()> {
     let rendered: usize = rows.iter().filter(|row| row.is_rendered()).map(Row::files).sum();
     let _ = writeln!(
         document,
-        "\n{points} point files: {read} are read, {rendered} of them rendered.\n\nNot point files:\n"
+        "\nOf {points} point files, {read} are read and {rendered} are rendered.\n\nFiles without points:\n"
     );
     for (about, names) in others {
         let _ = writeln!(document, "- {about}: {}", names.join(", "));
