@@ -25,7 +25,7 @@ impl Journal {
         let bad = |why: String| {
             Failure::new(
                 Exit::Input,
-                format!("{}: no journal of measurements: {why}; --fresh starts anew", path.display()),
+                format!("{}: not a journal of measurements: {why}; --fresh starts a new one", path.display()),
             )
         };
         let entries = match read_to_string(path) {

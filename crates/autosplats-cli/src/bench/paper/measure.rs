@@ -355,7 +355,7 @@ fn kiddo_ms(points: &[[f32; 3]]) -> f64 {
 /// Says how to have kiddo.
 #[cfg(not(feature = "kiddo"))]
 pub(super) fn kiddo(_: &Loaded<'_>, _: &Exact) -> Outcome<KiddoTimes> {
-    Err("this program was built without it; cargo build --release --features kiddo".into())
+    Err("this program was built without kiddo; build it with cargo build --release --features kiddo".into())
 }
 
 /// Part of the pixels that look different with grid culling.

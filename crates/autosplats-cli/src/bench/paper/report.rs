@@ -56,17 +56,17 @@ impl Report<'_> {
         let folder = self.folder;
         let mut page = String::from("# The paper's evaluation, repeated\n\n");
         if self.quick {
-            page += "**A quick run: scenes and pictures are small, and figures mean little.**\n\n";
+            page += "**A quick run: scenes and pictures are small, so the numbers mean little.**\n\n";
         }
         page.push_str(
-            "Written by `autosplats bench paper`; `autosplats bench paper --help` says how to repeat it. The paper is Preiner, \
-             Jeschke and Wimmer, *Auto Splats*, 2012; its figures are from a GeForce \
-             GTX 580 with an Intel i7-930. Measured here on:\n\n",
+            "This page is written by `autosplats bench paper`; `autosplats bench paper --help` says how to repeat it. \
+             The paper is Preiner, Jeschke and Wimmer, *Auto Splats*, 2012. It measured on a GeForce GTX 580 and an \
+             Intel i7-930. This page was measured on:\n\n",
         );
         for device in self.renderers.describe() {
             _ = writeln!(page, "- {device}");
         }
-        page += "\nScenes:\n\n| scene | the paper's points | visible there | points here | picture | what it is |\n|---|--:|--:|--:|---|---|\n";
+        page += "\nScenes:\n\n| scene | points, paper | visible, paper | points here | picture | contents here |\n|---|--:|--:|--:|---|---|\n";
         for scene in self.scenes {
             let PaperScene { name, paper, size: [width, height], .. } = scene;
             let points = match self.timing(scene, Task::Table(Method::GridCpu, false)) {
@@ -102,10 +102,11 @@ impl Report<'_> {
     fn table_1(&self, page: &mut String) {
         _ = write!(
             page,
-            "\n## Table 1: finding the {K} nearest neighbours\n\nMilliseconds, medians of up to {FRAMES} frames after one that \
-             does not count; frames of more than three seconds are taken once, as they come. In brackets microseconds for each \
-             point searched for: those reconstructed, for a kd-tree all; \\* with grid culling. Kd-trees hold all points and are \
-             built anew for each frame, which is part of their time.\n\n\
+            "\n## Table 1: finding the {K} nearest neighbours\n\nTimes are in milliseconds. Each is the median of up \
+             to {FRAMES} frames after a warm-up frame. A frame of more than three seconds is measured once, without \
+             warm-up. Rows with \\* use grid culling. Brackets give the microseconds for each point searched for: the \
+             reconstructed points, or all points for a kd-tree. A kd-tree holds all points and is built again for each \
+             frame; its time includes the build.\n\n\
              | scene | visible | reconstructed | paper: kd-tree | paper: Auto Splats |"
         );
         for method in Method::ALL {
@@ -147,25 +148,26 @@ impl Report<'_> {
 
     /// What separates these figures from the paper's.
     fn why_times_differ(&self, page: &mut String) {
-        *page +=
-            "\nWhy they differ: the paper's figures come from a graphics card of 2012, which rasterises by hardware.";
+        *page += "\nWhy the times differ: the paper measured on a graphics card of 2012, which rasterises in hardware.";
         if self.renderers.is_software() {
-            *page += " The GPU here is a program on the processor: it rasterises and blends with a few cores, each pass is waited \
-                      for. Its times say nothing about a card's; ratios between its columns may, but hardly those of splat \
-                      communication, the one that rasterises.";
+            *page += " The GPU here is software on the processor. It rasterises and blends with a few cores, and the \
+                      program waits for each pass. Its times say nothing about a graphics card. Ratios between its \
+                      columns may say something, except those of splat communication, which is the method that \
+                      rasterises.";
         }
-        *page += " The screen grid does other work than either: it reads neighbourhoods instead of drawing them in each of some ten \
-                  iterations, and it searches for visible points only, which a kd-tree of all points \
-                  cannot know.\n";
+        *page += " The screen grid works in another way than both rivals. Splat communication draws each neighbourhood \
+                  in about ten iterations; the screen grid reads it. A kd-tree searches for all points, because it \
+                  does not know which are visible; the screen grid searches for visible points only.\n";
     }
 
     /// The paper's speedups: the kd-tree's time over that of another search, by point and overall.
     fn ratios(&self, page: &mut String) {
         *page += "\n### Ratios on one device\n\n\
-                  Of search times. Overall is time over time; by point, as in the paper, the kd-tree's time is divided by all \
-                  points and the other's by the visible ones. The paper, splat communication against its kd-tree: bunny 1.47 by \
-                  point and 1.56 overall, Imperia 1.37 and 2.57, horses 1.00 and 1.44, with culling 1.64 and 2.38. The kd-tree \
-                  has the first radius that was fastest of those that find 99.9 % of the k-radii, by trying.\n\n\
+                  The ratios compare search times. *Overall* divides time by time. *By point*, as in the paper, first \
+                  divides the kd-tree's time by all points and the other time by the visible points. The paper's \
+                  ratios of its kd-tree over splat communication, by point and overall, are 1.47 and 1.56 (bunny), \
+                  1.37 and 2.57 (Imperia), 1.00 and 1.44 (horses), 1.64 and 2.38 (horses with culling). The kd-tree \
+                  here uses the fastest of several first radii that find 99.9 % of the k-radii.\n\n\
                   | scene | kd-tree's first radius, accuracy | kd-tree over splat communication: by point | overall \
                   | kd-tree over screen grid: by point | overall | splat communication over screen grid |\n\
                   |---|---|--:|--:|--:|--:|--:|\n";
@@ -219,14 +221,15 @@ impl Report<'_> {
             }
         }
         if !missed.is_empty() {
-            _ = writeln!(page, "\nNot as it should be: {}.", missed.join("; "));
+            _ = writeln!(page, "\nExpectations that this run misses: {}.", missed.join("; "));
         }
     }
 
     fn culling(&self, page: &mut String) {
         *page += "\n## Grid culling\n\n\
-                  Search with culling as part of that without, and what it changes: pixels that differ by more than two steps \
-                  of 255. The paper has 71 for 117 ms (0.61) with the horses, 123 for 264 (0.47) in the cathedral.\n\n\
+                  The table gives the search time with culling divided by the time without. The last column is the \
+                  share of pixels that culling changes by more than 2 of 255. In the paper, culling reduces 117 ms to \
+                  71 ms (0.61) for the horses and 264 ms to 123 ms (0.47) for the cathedral.\n\n\
                   | scene | paper |";
         for method in Method::ALL {
             _ = write!(page, " {} |", method.name());
@@ -252,21 +255,23 @@ impl Report<'_> {
             let differ: Option<f64> = self.journal.get(&Task::Culling.key(scene, self.renderers));
             _ = writeln!(page, " {} |", differ.map_or_else(|| "–".to_owned(), percent));
         }
-        *page += "\nWhy they differ: how much there is to save depends on how much of what is visible lies behind something, \
-                  which Table 1 tells (reconstructed out of visible), and points are put back that the first depth map hides \
-                  only by splats sticking out of silhouettes: without them holes open there. Splat communication iterates \
-                  anew for the points put back. The paper does not say what changes in its pictures.\n";
+        *page += "\nWhy the ratios differ: culling saves the work for visible points that lie behind a surface. Table \
+                  1 shows their share: the visible points that are not reconstructed. Some points are hidden only by \
+                  splats that stick out of a silhouette. They are put back after the first depth map, because holes \
+                  would open there. Splat communication iterates again for these points. The paper does not say what \
+                  culling changes in its pictures.\n";
     }
 
     fn accuracy(&self, page: &mut String) {
         _ = write!(
             page,
             "\n## Accuracy\n\n\
-             Parts of the visible points whose neighbourhood is the exact one, by its k-radius to a part in ten thousand: among \
-             visible points (what a search in the picture can find), and among all points of the cloud (the price of searching \
-             in the picture, which is what the kd-tree does not pay). A neighbourhood that a rule cuts short, at a gap, at the \
-             bound on work or because it has no point near enough, is not exact. The work: how many points are searched for, and in how many iterations. k = {K}, no \
-             culling.\n\n\
+             The table gives the share of visible points with an exact neighbourhood: the k-radius is right to one \
+             part in ten thousand. *On the screen* means exact among the visible points, which is all that a search in \
+             the picture can find. *In space* means exact among all points of the cloud. A neighbourhood is *cut \
+             short* if it ends at a gap, at the bound on work, or because no point is near enough; such a \
+             neighbourhood is not exact. The last columns give the number of points searched for and of iterations. k \
+             = {K}, without culling.\n\n\
              | scene | method | exact on the screen | cut short | exact in space | points searched for | iterations |\n\
              |---|---|--:|--:|--:|--:|--:|\n"
         );
@@ -305,11 +310,12 @@ impl Report<'_> {
             page,
             "\n## Figure 6: normals on the fly and beforehand\n\n\
              ![on the fly; beforehand]({folder}/{FIGURE_6})\n\n\
-             Left: normals found on the fly, among the visible points. Right: found beforehand among all points by the same \
-             estimator, k = {K}. The paper shows the pictures and observes \"a similar visualization\", with \"minor artifacts \
-             due to information loss at silhouettes\". Here, over {points} points: {mean:.2}° between the normals in the mean, \
-             {median:.2}° in the median, {rmse:.2}° root mean square; {} below 5°, {} below 10°. The pictures \
-             are {} (PSNR).\n",
+             Left: normals from the visible points, estimated for this frame. Right: normals from all points, \
+             estimated beforehand by the same estimator, k = {K}. The paper shows the pictures and observes \"a \
+             similar visualization\", with \"minor artifacts due to information loss at silhouettes\". Here the angle \
+             between both normals, over {points} points, has a mean of {mean:.2}°, a median of {median:.2}° and a root \
+             mean square of {rmse:.2}°. It is below 5° for {} of the points and below 10° for {}. The pictures are {} \
+             (PSNR).\n",
             percent(within_5),
             percent(within_10),
             psnr.map_or_else(|| "equal".into(), |psnr| format!("{psnr:.1} dB apart"))
@@ -323,9 +329,10 @@ impl Report<'_> {
             page,
             "\n## Figure 7: two scales\n\n\
              ![surface; k-radius; single splats; nearer]({folder}/{FIGURE_7})\n\n\
-             As many points on the small body as on the large one: the surface, the k-radius in colours, splats made smaller so \
-             that single ones are seen, and those of the small one seven times as near. No parameter says how large anything \
-             is: the k-radius is {large:.4} on the large body and {small:.4} on the small one in the median, {:.1} to one.\n",
+             The small body has as many points as the large one. The pictures show the surface, the k-radius in \
+             colours, splats made smaller so that each is visible, and the splats of the small body seven times as \
+             near. No parameter states a size. The median k-radius is {large:.4} on the large body and {small:.4} on \
+             the small one, a ratio of {:.1}.\n",
             large / small
         );
     }
@@ -340,17 +347,18 @@ impl Report<'_> {
             page,
             "\n## Figure 9: curvature\n\n\
                   ![the statue; nearer; its curvature]({folder}/{FIGURE_9})\n\n\
-                  The statue, a closer look, and the surface variation there, found in the same frame as the normals.\n"
+                  The pictures show the statue, a part of it, and the surface variation of that part, which is \
+                  computed with the normals in the same frame.\n"
         );
     }
 
     fn figure_10(&self, page: &mut String) {
         *page += "\n## Figure 10: time per stage\n\n\
-                  With grid culling, for neighbourhoods of different sizes. The paper's chart gives no numbers; in it the search \
-                  is the main part throughout and grows with k, fitting costs about as much as splatting. Here the search is the \
-                  main part with splat communication; with the screen grid it is one stage among others, and fitting costs less \
-                  than splatting everywhere. Stages are medians of up to \
-                  five frames, or one of more than three seconds.\n\n";
+                  The charts give the time of each stage for several k, with grid culling. The paper's chart has no \
+                  numbers: its search takes most of the time and grows with k, and fitting costs about as much as \
+                  splatting. Here the search takes most of the time with splat communication. With the screen grid it \
+                  does not, and fitting always costs less than splatting. Times are medians of up to five frames; a \
+                  frame of more than three seconds is measured once.\n\n";
         let folder = self.folder;
         for scene in self.scenes {
             for method in Method::BY_STAGE {
@@ -372,8 +380,10 @@ impl Report<'_> {
             page,
             "\n## Figure 11: convergence of splat communication\n\n\
              ![points without a radius]({folder}/{CONVERGENCE})\n\n\
-             Points without a k-radius before each iteration, k = {K}, no culling. The paper: 7 to 10 iterations to 99.9 %, \
-             \"generally, 6–7 iterations already provide a good quality\". Converged here, in percent:\n\n| scene |"
+             The chart shows how many points have no k-radius yet before each iteration; k = {K}, without culling. The \
+             paper needs 7 to 10 iterations for 99.9 % and observes that \"generally, 6–7 iterations already provide a \
+             good quality\". The table gives the percentage of points that converged here after each iteration.\n\n| \
+             scene |"
         );
         // The paper's chart is of percentages left.
         let longest = lines.iter().map(|line| line.points.len()).max().unwrap_or(1);
@@ -417,7 +427,7 @@ impl Report<'_> {
             }
         }
         if !lines.is_empty() {
-            *page += "\n## What was refused\n\n";
+            *page += "\n## What a device refused\n\n";
             *page += &lines.join("\n");
             *page += "\n";
         }
@@ -435,8 +445,7 @@ impl Report<'_> {
 
     /// Writes the charts that the page shows.
     pub(super) fn write_charts(&self, folder: &Path) -> Result<(), Failure> {
-        let labels =
-            Labels { title: "splat communication", x: "iteration", y: "% of the points without a radius before it" };
+        let labels = Labels { title: "splat communication", x: "iteration", y: "points without a k-radius, %" };
         let lines = self.convergence();
         if !lines.is_empty() {
             let svg = log_lines(labels, &lines);

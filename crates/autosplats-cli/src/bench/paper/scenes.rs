@@ -96,10 +96,10 @@ impl PaperScene {
     /// What it is made of, for the report.
     pub(super) fn origin(&self) -> String {
         match &self.source {
-            Source::Generated(scene) => format!("generated in its place, `scene:{scene}:{}`", self.points),
+            Source::Generated(scene) => format!("a generated scene instead: `scene:{scene}:{}`", self.points),
             Source::File(path) => format!("all points of `{}`", file_name(path)),
             Source::Gallop(folder) => {
-                format!("{HORSES} moments of `{}`, {} points strewn over the surfaces", file_name(folder), self.points)
+                format!("{HORSES} moments of `{}`, {} points sampled from the surfaces", file_name(folder), self.points)
             }
         }
     }
@@ -170,7 +170,7 @@ fn herd(folder: &Path, count: usize, quiet: bool) -> Result<PointCloud, Failure>
     }
     files.sort();
     if files.is_empty() {
-        return Err(Failure::new(Exit::Input, format!("{}: there is no file in it", folder.display())));
+        return Err(Failure::new(Exit::Input, format!("{}: the folder has no files", folder.display())));
     }
     let bar = Bar::new("resampling the gallop", quiet);
     let options = ReadOptions::default();
