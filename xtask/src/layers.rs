@@ -1,5 +1,6 @@
-//! The rules of import, for every crate: a room (a folder or file directly below `src`) uses rooms before it, and no circle
-//! closes. Names are resolved: `crate::Name` counts as the room that `Name` is re-exported from, and so does `super::`.
+//! The rules of import, for every crate: a room (a folder or file directly below `src`) uses rooms before it, and no
+//! circle closes. Names are resolved: `crate::Name` counts as the room that `Name` is re-exported from, and so does
+//! `super::`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{read_dir, read_to_string};
@@ -11,16 +12,53 @@ use syn::visit::{self, Visit};
 /// The stages of `autosplats` in the order of a frame. Its other rooms come before all stages.
 const STAGES: [&str; 8] = ["project", "search", "fit", "normals", "adapt", "splat", "shade", "renderer"];
 
-/// The crates whose folders are checked, and the circles between rooms that are known and to be cut.
-const CRATES: [(&str, &[&[&str]]); 8] = [
-    ("crates/autosplats", &[]),
-    ("crates/autosplats-cloud", &[]),
-    ("crates/autosplats-film", &[]),
-    ("crates/autosplats-viewer", &[]),
-    ("crates/autosplats-cli", &[]),
-    ("quality", &[]),
-    ("fuzz", &[]),
-    ("xtask", &[]),
+/// The crates that are checked.
+const CRATES: [&str; 8] = [
+    "crates/autosplats",
+    "crates/autosplats-cloud",
+    "crates/autosplats-film",
+    "crates/autosplats-viewer",
+    "crates/autosplats-cli",
+    "quality",
+    "fuzz",
+    "xtask",
+];
+
+/// Circles of rooms that are known and still to be cut, by crate. None may be added, and one that is cut leaves the
+/// list.
+const KNOWN_CIRCLES: [(&str, &[&str]); 8] = [
+    ("crates/autosplats-cloud", &["cloud", "error", "memory", "merge", "progress", "read", "write"]),
+    (
+        "crates/autosplats-viewer",
+        &[
+            "app",
+            "editing",
+            "gizmo",
+            "kept",
+            "keys",
+            "legend",
+            "output",
+            "overlay",
+            "panels",
+            "playing",
+            "rate",
+            "recording",
+            "render",
+            "state",
+            "storage",
+            "tools",
+            "viewport",
+        ],
+    ),
+    ("crates/autosplats-viewer", &["glance", "loading"]),
+    (
+        "crates/autosplats-cli",
+        &["args", "bench", "choices", "convert", "first_radius", "info", "input", "render", "threads"],
+    ),
+    ("quality", &["exact", "picture"]),
+    ("quality", &["mesh", "surface"]),
+    ("quality", &["page", "target"]),
+    ("quality", &["subject", "view"]),
 ];
 
 /// Which room uses which, with one file as the witness of each arrow.
@@ -29,26 +67,23 @@ type Arrows = BTreeMap<(String, String), PathBuf>;
 /// Checks every crate below `root`.
 pub(crate) fn check(root: &Path) -> Result<()> {
     let mut wrong = Vec::new();
-    for (name, known) in CRATES {
+    for name in CRATES {
         let house = House::read(&root.join(name).join("src"))?;
         let arrows = house.arrows();
         if name == "crates/autosplats" {
             wrong.extend(against_the_frame(&arrows));
         }
         let circles = circles(&arrows);
-        let known: Vec<Vec<&str>> = known.iter().map(|circle| circle.to_vec()).collect();
-        for circle in &circles {
-            if !known.iter().any(|known| known == circle) {
-                let files = arrows
-                    .iter()
-                    .filter(|((from, to), _)| [from, to].iter().all(|room| circle.contains(&room.as_str())));
-                let files: Vec<_> =
-                    files.map(|((from, to), file)| format!("{from} -> {to} ({})", file.display())).collect();
-                wrong.push(format!("{name}: a circle of rooms {}:\n    {}", circle.join(", "), files.join("\n    ")));
-            }
+        let known = || KNOWN_CIRCLES.iter().filter(|(crate_name, _)| *crate_name == name).map(|(_, circle)| *circle);
+        for circle in circles.iter().filter(|circle| !known().any(|known| known == **circle)) {
+            let files =
+                arrows.iter().filter(|((from, to), _)| [from, to].iter().all(|room| circle.contains(&room.as_str())));
+            let files: Vec<_> =
+                files.map(|((from, to), file)| format!("{from} -> {to} ({})", file.display())).collect();
+            wrong.push(format!("{name}: a circle of rooms {}:\n    {}", circle.join(", "), files.join("\n    ")));
         }
-        for known in known.iter().filter(|known| !circles.iter().any(|circle| circle == *known)) {
-            wrong.push(format!("{name}: the circle {} is cut: take it off the list in xtask", known.join(", ")));
+        for known in known().filter(|known| !circles.iter().any(|circle| circle == known)) {
+            wrong.push(format!("{name}: the circle {} is no more: take it off KNOWN_CIRCLES", known.join(", ")));
         }
         println!("{name}: {} files, {} arrows between rooms", house.files.len(), arrows.len());
     }
@@ -114,6 +149,8 @@ impl House {
     fn read(source: &Path) -> Result<Self> {
         let mut paths = Vec::new();
         collect(source, &mut paths)?;
+        // Tests may use what is built on a room.
+        paths.retain(|path| !path.iter().any(|part| part == "tests" || part == "tests.rs"));
         ensure!(!paths.is_empty(), "there is no Rust file in {}", source.display());
         let mut house = Self { files: Vec::new(), aliases: BTreeMap::new(), modules: BTreeSet::from([Vec::new()]) };
         for path in paths {
@@ -236,6 +273,18 @@ impl Named {
         }
     }
 
+    /// What a macro or an attribute is given is text to the parser.
+    fn text(&mut self, text: &str) {
+        let text = text.replace(" :: ", "::");
+        let in_path = |character: char| character.is_alphanumeric() || "_:".contains(character);
+        for path in text.split(|character| !in_path(character)) {
+            let names: Vec<String> = path.split("::").map(str::to_owned).collect();
+            if names.len() > 1 && names.iter().all(|name| !name.is_empty() && !name.contains(':')) {
+                self.paths.push(names);
+            }
+        }
+    }
+
     fn alias(&mut self, name: Option<String>, path: Vec<String>) {
         self.aliases.extend(name.map(|name| (name, path.clone())));
         self.paths.push(path);
@@ -247,17 +296,14 @@ impl<'ast> Visit<'ast> for Named {
         self.tree(&[], &item.tree);
     }
 
-    /// What a macro is given is text to the parser.
     fn visit_macro(&mut self, item: &'ast syn::Macro) {
-        let text: String = item.tokens.to_string().replace(" :: ", "::");
-        let in_path = |character: char| character.is_alphanumeric() || "_:".contains(character);
-        for path in text.split(|character| !in_path(character)) {
-            let names: Vec<String> = path.split("::").map(str::to_owned).collect();
-            if names.len() > 1 && names.iter().all(|name| !name.is_empty() && !name.contains(':')) {
-                self.paths.push(names);
-            }
-        }
+        self.text(&item.tokens.to_string());
         visit::visit_macro(self, item);
+    }
+
+    fn visit_meta_list(&mut self, list: &'ast syn::MetaList) {
+        self.text(&list.tokens.to_string());
+        visit::visit_meta_list(self, list);
     }
 
     fn visit_path(&mut self, path: &'ast syn::Path) {
@@ -307,6 +353,7 @@ mod tests {
         assert_eq!(found("use crate::{splat as other}; fn f() { other::g() }"), ["fit splat"], "another name");
         assert_eq!(found("use crate::search::*;"), ["fit search"], "a glob");
         assert_eq!(found("fn f() { assert!(g(crate::splat::cpu::f()), \"{}\", 1) }"), ["fit splat"], "in a macro");
+        assert_eq!(found("#[error(\"{}\", crate::search::A)] struct B;"), ["fit search"], "in an attribute");
         assert_eq!(found("// use crate::splat::A;\nuse std::search::B; use super::C;"), [""; 0], "none of these");
     }
 

@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, Result, bail};
 
-use crate::{FEATURES, cargo_command, install, run};
+use crate::machine::install;
+use crate::{FEATURES, cargo_command, run};
 
 /// The packages and their versions.
 const PACKAGES: &str = "crates/autosplats-cloud/tests/interop/requirements.txt";
@@ -17,8 +18,8 @@ const PYTHON: [&str; 2] = ["python3-venv", "python3-pip"];
 /// The test that needs a network with multicast, which nobody else uses.
 const NEEDS_MULTICAST: &str = "whoever_answers_on_the_network_is_heard";
 
-/// A Python that has the packages: the one that `AUTOSPLATS_PYTHON` names, or one that is made for it. Where there can be none
-/// that is an error in CI; elsewhere it is told why there is none.
+/// A Python that has the packages: the one that `AUTOSPLATS_PYTHON` names, or one that is made for it. Where there can
+/// be none that is an error in CI; elsewhere it is told why there is none.
 pub(crate) fn find_python(root: &Path) -> Result<Result<PathBuf, String>> {
     if let Some(python) = std::env::var_os("AUTOSPLATS_PYTHON") {
         println!("AUTOSPLATS_PYTHON names {}", Path::new(&python).display());

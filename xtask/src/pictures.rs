@@ -1,4 +1,5 @@
-//! `cargo xtask pictures`: a fixed list of pictures, layers and normals with a hash of each, to prove that a change moves no pixel.
+//! `cargo xtask pictures`: a fixed list of pictures, layers and normals with a hash of each, to prove that a change
+//! moves no pixel.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -33,7 +34,8 @@ const SCENES: [&str; 6] = [
 /// Folders of `data` that are one input each: their files follow each other.
 const SEQUENCES: [&str; 2] = ["animation", "sequences"];
 
-/// Inputs that are rendered with every setting: dense, noisy, of a depth camera, of a spinning lidar, coloured, classified.
+/// Inputs that are rendered with every setting: dense, noisy, of a depth camera, of a spinning lidar, coloured,
+/// classified.
 const VARIED: [&str; 6] = [
     "scene:statue:200K",
     "multiview/bunny_scans/bun000.ply",
@@ -163,7 +165,7 @@ fn render(program: &Path, data: &Path, out: &Path) -> Result<()> {
         let hex = digest.iter().fold(String::new(), |text, byte| format!("{text}{byte:02x}"));
         let _ = writeln!(hashes, "{hex} {}", file.file_name().display());
     }
-    let failed = failed.into_inner()?;
+    let failed = failed.into_inner().expect("no worker panics");
     for (name, code) in &failed {
         let _ = writeln!(hashes, "exit {code} {name}");
     }

@@ -1,5 +1,8 @@
 //! Errors of rendering and of normal estimation.
 
+/// Longest allowed side of an image in pixels.
+pub const MAX_SIDE: u32 = 16_384;
+
 /// Error of rendering or of normal estimation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -17,8 +20,8 @@ pub enum Error {
         /// The valid range.
         range: &'static str,
     },
-    /// A side of the image is 0 or longer than [`MAX_SIDE`](crate::MAX_SIDE).
-    #[error("image size {width}x{height}: each side must be within 1 to {}", crate::MAX_SIDE)]
+    /// A side of the image is 0 or longer than [`MAX_SIDE`].
+    #[error("image size {width}x{height}: each side must be within 1 to {MAX_SIDE}")]
     ImageSize {
         /// Requested width in pixels.
         width: u32,

@@ -43,12 +43,12 @@ mod test_clouds;
 
 pub use autosplats_cloud as cloud;
 pub use camera::{Camera, Lens, Projection, ViewDirection, guess_axes};
-pub use error::Error;
+pub use error::{Error, MAX_SIDE};
 pub use gpu::{AdapterSummary, PassTime, adapters};
 pub use normals::{NormalSettings, Normals, Orientation, Viewpoint, estimate_normals};
 pub use renderer::{
-    BYTES_PER_PIXEL, Backend, Counts, Frame, MAX_SIDE, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings,
-    Timings, best_first_radius, shade_layers, still_supersample, usual_exposure,
+    BYTES_PER_PIXEL, Backend, Counts, Frame, PointSurfel, RadiusTrial, Reconstruction, Renderer, Settings, Timings,
+    best_first_radius, shade_layers, still_supersample, usual_exposure,
 };
 pub use search::SearchEngine;
 pub use shade::{Background, Backs, ColorMap, ColorMode, Image, Shading};

@@ -12,8 +12,13 @@ use std::process::{Command, Stdio};
 use anyhow::{Context as _, Result, bail, ensure};
 use serde_json::Value;
 
+use crate::{FEATURES, cargo_command};
+
 use self::outcome::{Outcome, Row};
 use self::words::{FILES, HEAD, WORDS};
+
+/// The document, from the repository's root.
+const DOCUMENT: &str = "docs/FORMATS.md";
 
 /// Files that go with point files: documentation, poses, pictures. The folder's own README describes them.
 const COMPANIONS: [(&str, &str); 4] = [
@@ -23,33 +28,51 @@ const COMPANIONS: [(&str, &str); 4] = [
     ("color_", "colour picture"),
 ];
 
-/// Writes the document, or only compares it with what would be written.
-pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
-    let program = build(root)?;
-    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
-    let data = data.canonicalize().with_context(|| format!("{}: the test data is needed", data.display()))?;
-
-    let mut document = HEAD.to_owned();
-    formats(&program, &mut document)?;
-    schema(&program, &mut document)?;
-    files(&program, &data, &mut document)?;
-
-    let target = root.join("docs/FORMATS.md");
-    if check {
-        let there = read_to_string(&target).unwrap_or_default();
-        ensure!(there == document, "docs/FORMATS.md differs from what this build writes; run cargo xtask formats");
-        println!("docs/FORMATS.md is up to date");
-        return Ok(());
-    }
-    std::fs::write(&target, document).with_context(|| target.display().to_string())?;
+/// Writes the document.
+pub(crate) fn write(root: &Path, program: &Path) -> Result<()> {
+    let target = root.join(DOCUMENT);
+    std::fs::write(&target, document(root, program)?).with_context(|| target.display().to_string())?;
     println!("{}", target.display());
     Ok(())
 }
 
-/// Builds the command and returns where it is.
-fn build(root: &Path) -> Result<PathBuf> {
-    let mut command = Command::new("cargo");
-    command.current_dir(root).args(["build", "--package", "autosplats-cli", "--message-format", "json"]);
+/// Checks that the document is what this build writes. Where there is no data this says that nothing is checked; where `CI` is set
+/// it fails.
+pub(crate) fn check(root: &Path, program: &Path) -> Result<()> {
+    if data(root).is_err() && std::env::var_os("CI").is_none() {
+        println!("the test data are absent: {DOCUMENT} is not checked");
+        return Ok(());
+    }
+    let there = read_to_string(root.join(DOCUMENT)).unwrap_or_default();
+    let document = document(root, program)?;
+    let differing = there.lines().zip(document.lines()).find(|(there, new)| there != new);
+    if let Some((there, new)) = differing {
+        println!("there: {there}\nmade:  {new}");
+    }
+    ensure!(there == document, "{DOCUMENT} is not what this build makes; cargo xtask formats writes it");
+    println!("{DOCUMENT} is up to date");
+    Ok(())
+}
+
+fn data(root: &Path) -> Result<PathBuf> {
+    let data = std::env::var_os("AUTOSPLATS_DATA").map_or_else(|| root.join("../shared/data"), PathBuf::from);
+    data.canonicalize().with_context(|| format!("{}: the test data are needed", data.display()))
+}
+
+fn document(root: &Path, program: &Path) -> Result<String> {
+    let mut document = HEAD.to_owned();
+    formats(program, &mut document)?;
+    schema(program, &mut document)?;
+    files(program, &data(root)?, &mut document)?;
+    Ok(document)
+}
+
+/// Builds the command as the tests have it, and returns where it is.
+pub(crate) fn build(root: &Path) -> Result<PathBuf> {
+    let mut command = cargo_command(root);
+    command
+        .args(["build", "--locked", "--workspace", "--bin", "autosplats", "--message-format", "json"])
+        .args(FEATURES);
     let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     ensure!(output.status.success(), "cargo build: {}", output.status);
     let messages = String::from_utf8(output.stdout)?;
@@ -57,7 +80,7 @@ fn build(root: &Path) -> Result<PathBuf> {
         let message: Value = serde_json::from_str(line).ok()?;
         Some(PathBuf::from(message["executable"].as_str()?))
     });
-    programs.next_back().context("cargo build reports no program")
+    programs.next_back().context("cargo builds no program")
 }
 
 /// The tables of formats, read and written.

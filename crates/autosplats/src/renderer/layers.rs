@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use crate::Error;
 use crate::camera::Camera;
 use crate::shade::{ColorMode, Image, Scene, Shading, shade};
 use crate::splat::GBuffer;
+use crate::{Error, MAX_SIDE};
 
-use super::{MAX_SIDE, Settings};
+use super::Settings;
 
 /// Shades `layers` like a frame, on the CPU: a frame's surface with other settings, or a surface from elsewhere. Create
 /// layers with [`GBuffer::new`].

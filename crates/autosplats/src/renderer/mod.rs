@@ -15,13 +15,13 @@ use autosplats_cloud::PointCloud;
 
 use self::cpu::{CpuRenderer, check_engine};
 use self::gpu::GpuRenderer;
-use crate::Error;
 use crate::camera::{Camera, View};
 use crate::fit::GivenPlanes;
 use crate::gpu::{AdapterSummary, Gpu, PassTime};
 use crate::normals::Normals;
 use crate::shade::Image;
 use crate::splat::GBuffer;
+use crate::{Error, MAX_SIDE};
 
 pub use exposure::usual_exposure;
 pub use first_radius::{RadiusTrial, best_first_radius};
@@ -29,9 +29,6 @@ pub use layers::shade_layers;
 pub use settings::{Reconstruction, Settings};
 pub use still::{BYTES_PER_PIXEL, still_supersample};
 pub use surfels::PointSurfel;
-
-/// Longest allowed side of an image in pixels.
-pub const MAX_SIDE: u32 = 16_384;
 
 /// Numbers of points of one frame, by what became of them. All except `covered` and `value_range` include the margin
 /// around the picture, if there is one.

@@ -2,7 +2,7 @@
 
 use autosplats_cloud::check_memory;
 
-use super::MAX_SIDE;
+use crate::MAX_SIDE;
 
 /// Approximate memory in bytes that stages and layers take per pixel of a picture.
 pub const BYTES_PER_PIXEL: u64 = 100;

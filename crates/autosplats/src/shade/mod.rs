@@ -32,8 +32,6 @@ pub(crate) mod over_time;
 mod settings;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod truth;
 
 pub(crate) use classes::class_colors;
 pub(crate) use cpu::{Scene, shade};

@@ -1,5 +1,7 @@
 //! Tests on pictures small enough to write down.
 
+mod truth;
+
 use autosplats_cloud::glam::DVec3;
 
 use super::*;

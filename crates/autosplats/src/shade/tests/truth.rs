@@ -6,7 +6,7 @@ use autosplats_cloud::Scene as ExactScene;
 use autosplats_cloud::glam::DVec3;
 use rayon::prelude::*;
 
-use super::*;
+use super::super::*;
 use crate::camera::{Camera, Projection};
 use crate::splat::GBuffer;
 use crate::{Renderer, Settings};

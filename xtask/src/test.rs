@@ -1,0 +1,113 @@
+//! `cargo xtask test`: everything that a change has to pass, cheapest first.
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail, ensure};
+
+use crate::machine::{component, find_data, find_device, find_screen, left_out};
+use crate::programs::Programs;
+use crate::{FEATURES, cargo, cargo_command, formats, layers, lengths, peers, run};
+
+/// Steps that report their time, and the time of each for the summary.
+struct Steps {
+    start: Instant,
+    done: Vec<(&'static str, f64)>,
+}
+
+impl Steps {
+    fn new() -> Self {
+        Self { start: Instant::now(), done: Vec::new() }
+    }
+
+    fn step<T>(&mut self, name: &'static str, check: impl FnOnce() -> Result<T>) -> Result<T> {
+        println!("\n== {name}");
+        let start = Instant::now();
+        let outcome = check().with_context(|| format!("step '{name}' failed"))?;
+        let seconds = start.elapsed().as_secs_f64();
+        println!("== {name}: {seconds:.1} s");
+        self.done.push((name, seconds));
+        Ok(outcome)
+    }
+
+    fn summary(&self) {
+        println!("\nseconds by step");
+        self.done.iter().for_each(|(name, seconds)| println!("{seconds:8.1}  {name}"));
+        println!("\nall passed in {:.0} s", self.start.elapsed().as_secs_f64());
+    }
+}
+
+/// Everything, in one profile and one set of features, so that no crate is built twice for its tests.
+pub(crate) fn everything(root: &Path) -> Result<()> {
+    let mut steps = Steps::new();
+    let python = RefCell::new(Err(String::new()));
+    steps.step("what the machine has", || {
+        find_data(root)?;
+        find_device()?;
+        find_screen()?;
+        *python.borrow_mut() = peers::find_python(root)?;
+        python.borrow().as_ref().err().into_iter().for_each(left_out);
+        component("fmt", "rustfmt")?;
+        component("clippy", "clippy")
+    })?;
+    cheap(root, &mut steps)?;
+    let programs = steps.step("build of tests", || Programs::build(root))?;
+    steps.step("tests", || programs.run())?;
+    steps.step("tests of examples", || {
+        cargo(root, &[&["test", "--locked", "--workspace", "--doc"][..], &FEATURES].concat())
+    })?;
+    steps.step("docs/FORMATS.md", || formats::check(root, programs.command()?))?;
+    if let Ok(python) = &*python.borrow() {
+        steps.step("tests with programs of others", || peers::test(root, python, &["--ignored"]))?;
+    }
+    let deny = ["--", "-D", "warnings"];
+    steps.step("lints", || {
+        cargo(root, &[&["clippy", "--locked", "--workspace"][..], &FEATURES, &["--all-targets"], &deny].concat())
+    })?;
+    // The few lines that are there only without Zenoh or without the window.
+    steps.step("lints of the command alone", || {
+        cargo(root, &[&["clippy", "--locked", "-p", "autosplats-cli", "--no-default-features"][..], &deny].concat())
+    })?;
+    steps.step("documentation", || {
+        let mut command = cargo_command(root);
+        // With examples, though there are none, the libraries' documentation stands on what the lints have checked.
+        command.args(["doc", "--locked", "--workspace", "--no-deps", "--lib", "--examples"]).args(FEATURES);
+        run(command.env("RUSTDOCFLAGS", "-D warnings"))
+    })?;
+    steps.summary();
+    python.borrow().as_ref().err().into_iter().for_each(left_out);
+    Ok(())
+}
+
+/// What takes seconds.
+pub(crate) fn rules(root: &Path) -> Result<()> {
+    let mut steps = Steps::new();
+    component("fmt", "rustfmt")?;
+    cheap(root, &mut steps)?;
+    steps.summary();
+    Ok(())
+}
+
+fn cheap(root: &Path, steps: &mut Steps) -> Result<()> {
+    steps.step("format", || cargo(root, &["fmt", "--all", "--check"]).context("cargo fmt --all puts it right"))?;
+    steps.step("imports", || layers::check(root))?;
+    steps.step("lengths of files, comments and documents", || lengths::check(root))?;
+    steps.step("autosplats-cloud never reaches wgpu", || check_dependencies(root))
+}
+
+/// Reading points must stay possible without a graphics stack.
+fn check_dependencies(root: &Path) -> Result<()> {
+    let mut command = cargo_command(root);
+    command.args(["tree", "--locked", "-p", "autosplats-cloud", "-e", "normal,build", "--prefix", "none"]);
+    let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "cargo tree: {}", output.status);
+    let tree = String::from_utf8(output.stdout)?;
+    ensure!(tree.starts_with("autosplats-cloud "), "cargo tree shows something else: {tree}");
+    if let Some(line) = tree.lines().find(|line| line.starts_with("wgpu")) {
+        bail!("autosplats-cloud depends on {line}");
+    }
+    println!("{} packages", tree.lines().count());
+    Ok(())
+}
