@@ -1,19 +1,21 @@
-//! Where the timelines of several inputs begin on the one clock of all.
+//! Alignment of the timelines of several inputs on one common clock.
 //!
-//! Recordings that were made at the same time, as several robots or several drives make them, belong together as their stamps say.
-//! Stamps of others say nothing of each other, and all begin at once.
+//! Recordings made at the same time, for instance of several robots, are aligned by their stamps. All other inputs
+//! start when the clock starts.
 
 use std::time::Duration;
 
-/// When each of some inputs begins: so long after the first one that was recorded at the same time as it, or `None` where
-/// there is no such one and it begins with the clock. `spans` are [those of their clocks](crate::Source::clock_span):
-/// nanoseconds of the first and last stamp, and `None` of what has no stamps or none that others share.
+/// Start of each input after the start of its group: the inputs whose recording times overlap, directly or through
+/// others. `None` for an input that overlaps with no other and starts with the clock.
+///
+/// `spans` are the [clock spans](crate::Source::clock_span): first and last stamp in nanoseconds, or `None` for inputs
+/// without a shared clock.
 pub fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
     let mut order: Vec<(usize, [i64; 2])> =
         spans.iter().enumerate().filter_map(|(number, span)| Some((number, (*span)?))).collect();
     order.sort_by_key(|&(number, [first, _])| (first, number));
     let mut beginnings = vec![None; spans.len()];
-    // Each overlaps one before it, but for the first of a group.
+    // Every member of a group except the first overlaps with an earlier member.
     for group in groups(&order) {
         if let [(_, [begin, _]), _, ..] = *group {
             for &(number, [first, _]) in group {
@@ -24,7 +26,7 @@ pub fn beginnings(spans: &[Option<[i64; 2]>]) -> Vec<Option<Duration>> {
     beginnings
 }
 
-/// Parts of a list in the order of first stamps that have no time in common.
+/// Splits spans, sorted by first stamp, into groups without any time in common.
 fn groups(mut order: &[(usize, [i64; 2])]) -> impl Iterator<Item = &[(usize, [i64; 2])]> {
     std::iter::from_fn(move || {
         let mut end = order.first()?.1[1];
@@ -54,7 +56,7 @@ mod tests {
     fn what_was_recorded_at_once_is_shown_at_once() {
         let at = |first: i64, last: i64| Some([first * 1_000_000_000, last * 1_000_000_000]);
         let spans = [at(105, 120), None, at(100, 110), at(500, 510), at(118, 130)];
-        // The last overlaps the first only, which overlaps the third.
+        // The last span overlaps with the first only, and the first overlaps with the third.
         assert_eq!(seconds(beginnings(&spans)), [Some(5.0), None, Some(0.0), None, Some(18.0)]);
         assert_eq!(
             seconds(beginnings(&[at(0, 9), at(10, 20)])),

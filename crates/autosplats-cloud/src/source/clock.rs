@@ -1,24 +1,24 @@
-//! The clock of a sensor, by the stamps of what comes from it: when they go back, somebody may have begun anew.
+//! The clock of a sensor, from the stamps of its messages: tells overtaken messages from a clock that was set back.
 
 use std::time::Duration;
 
-/// So many messages in a row that are older than the newest, each newer than the one before, come from a clock that was set
-/// back. Fewer may have been held up together on their way.
+/// Number of consecutive messages, each older than the newest but newer than the message before, that mean the clock
+/// was set back. Fewer messages may have been delayed together.
 const ROW: u32 = 4;
 
-/// What a stamp means after those before it.
+/// Meaning of a stamp relative to the earlier stamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
-    /// Newer than all before, or as new as the newest.
+    /// At least as new as all earlier stamps.
     Onward,
-    /// Older than the newest: it was overtaken, or begins what may turn out to be a clock that was set back.
+    /// Older than the newest: either overtaken, or the start of a clock that was set back.
     Behind {
-        /// Whether it may be the first of them.
+        /// Whether the stamp starts a new series of late stamps.
         first: bool,
     },
-    /// The clock was set back: by too much for a message that was overtaken, or for too many of them.
+    /// The clock was set back: by more than the allowed jump, or for too many consecutive messages.
     Restarted {
-        /// Whether it is the first after it.
+        /// Whether the stamp itself is the first of the new clock.
         first: bool,
     },
 }
@@ -27,15 +27,15 @@ pub(super) enum Order {
 #[derive(Debug, Default)]
 pub(super) struct Clock {
     newest: Option<i64>,
-    /// The last of those in a row that were behind, and how many they are.
+    /// Last stamp and length of the current series of late, increasing stamps.
     row: Option<(i64, u32)>,
 }
 
 impl Clock {
-    /// Takes the next stamp, in nanoseconds. What is older than the newest by more than `jump` has not been overtaken.
+    /// Takes the next stamp, in nanoseconds. A stamp older than the newest by more than `jump` restarts the clock.
     pub(super) fn hear(&mut self, stamp: i64, jump: Duration) -> Order {
         let Some(newest) = self.newest.filter(|&newest| stamp < newest) else {
-            // The newest again says nothing about which clock it is of.
+            // A repeat of the newest stamp fits both the old and a restarted clock.
             if self.newest != Some(stamp) {
                 *self = Self { newest: Some(stamp), row: None };
             }
@@ -43,7 +43,7 @@ impl Clock {
         };
         let (count, first) = match self.row {
             Some((last, count)) if stamp > last => (count + 1, false),
-            // The same one sent again.
+            // The same stamp sent again.
             Some((last, count)) if stamp == last => (count, false),
             _ => (1, true),
         };

@@ -1,4 +1,4 @@
-//! The points to be shown of streams: the newest of each sensor, or also what came before.
+//! Merges streams into the cloud to show: the newest points of each sensor, and optionally older ones.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -11,18 +11,19 @@ use glam::DMat4;
 use super::clock::{Clock, Order};
 use crate::{PointCloud, Update};
 
-/// A clock that goes back by more than this was set anew, or a recording has begun again; by less, messages may have overtaken
-/// each other, unless several in a row are older than the newest and in order among themselves.
+/// A stamp older than the newest by more than this means a restarted clock or recording. By less, messages may have
+/// overtaken each other, unless several consecutive ones increase among themselves.
 const JUMP: Duration = Duration::from_secs(1);
 
-/// What [`Latest`] keeps beside the newest points.
+/// Which older points [`Latest`] keeps beside the newest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LatestOptions {
-    /// Also what is no older than this, by the stamps of the same sensor.
+    /// Keeps updates up to this much older than the newest stamp of the same sensor. Default `None`: only the newest.
     pub decay: Option<Duration>,
-    /// Also everything that came before.
+    /// Keeps all earlier updates. Default false.
     pub accumulate: bool,
-    /// Points that are kept at most, beside the newest of each sensor; the oldest go first. 100 million by default.
+    /// Maximum number of points to keep. The oldest updates are removed first, but never the newest of a sensor.
+    /// Default 100 million.
     pub most_points: usize,
 }
 
@@ -32,47 +33,51 @@ impl Default for LatestOptions {
     }
 }
 
-/// What became of an update that was put into [`Latest`].
+/// Outcome of [`Latest::put`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// It is shown.
+    /// The update is shown.
     Shown,
-    /// It is shown, and what was known of its sensor before its clock went back is forgotten: it went back by more than a second
-    /// and more than is kept, or this is the fourth in a row that is older than the newest and newer than the one before it.
-    /// Where everything is kept it takes both.
+    /// The update is shown, and older updates of its sensor are removed, because the sensor's clock went back. A clock
+    /// went back if:
+    ///
+    /// - the stamp is older than the newest by more than a second and more than `decay`, or
+    /// - this is the fourth consecutive stamp that is older than the newest and newer than the one before.
+    ///
+    /// With `accumulate` both conditions must hold.
     Restarted,
-    /// Older than what had come before, and than all that is kept.
+    /// The update is refused because it is older than the newest and than everything that is kept.
     Late,
-    /// Of a time of which there are points already.
+    /// The update is refused because its sensor already has an update with the same stamp.
     Duplicate,
 }
 
-/// Counts of what became of updates and of the points kept.
+/// Counts of the outcomes of updates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LatestStatistics {
     /// Updates that were shown.
     pub shown: u64,
-    /// Updates refused as older than all that is kept.
+    /// Updates refused as [late](Arrival::Late).
     pub late: u64,
-    /// Updates refused as of a time of which there were points already.
+    /// Updates refused as [duplicates](Arrival::Duplicate).
     pub duplicates: u64,
-    /// Times that a clock went back and its sensor was begun anew.
+    /// Clocks that went back, after which the sensor started anew.
     pub restarted: u64,
-    /// Updates given up since there were more points than are kept.
+    /// Updates removed because there were more points than [`LatestOptions::most_points`].
     pub given_up: u64,
 }
 
-/// Takes the updates of one or several streams, each with a pose, and makes the one cloud to be shown.
+/// Merges the updates of one or more streams, each with a pose, into the one cloud to show.
 ///
-/// Stamps are compared within a sensor alone, since streams have clocks of their own. Whoever seeks in a stream or plays it
-/// again [restarts](Self::restart) it here.
+/// Stamps are compared only within a sensor, because streams have separate clocks. Call [`restart`](Self::restart)
+/// after a seek or a replay.
 #[derive(Debug, Default)]
 pub struct Latest {
     options: LatestOptions,
     poses: Vec<DMat4>,
-    /// By stream and channel.
+    /// Sensors by stream and channel.
     sensors: BTreeMap<(usize, usize), Sensor>,
-    /// Updates that have come so far.
+    /// Number of updates accepted so far.
     arrivals: u64,
     merged: Option<Arc<PointCloud>>,
     statistics: LatestStatistics,
@@ -80,12 +85,12 @@ pub struct Latest {
 
 #[derive(Debug, Default)]
 struct Sensor {
-    /// In the order of stamps.
+    /// Sorted by stamp.
     kept: VecDeque<Kept>,
     clock: Clock,
-    /// The first arrival that may be of a clock that was set back.
+    /// Arrival number of the first update that may belong to a clock that was set back.
     since: u64,
-    /// Whether what comes next takes the place of all that is kept.
+    /// Whether the next update replaces everything kept.
     restarts: bool,
 }
 
@@ -97,18 +102,18 @@ struct Kept {
 }
 
 impl Latest {
-    /// Nothing yet.
+    /// Creates an empty `Latest`.
     pub fn new(options: LatestOptions) -> Self {
         Self { options, ..Self::default() }
     }
 
-    /// Adds a stream and returns its number. Its points are moved by `world_from_stream`, an affine map.
+    /// Adds a stream and returns its number. `world_from_stream` is an affine map for its points.
     pub fn add(&mut self, world_from_stream: DMat4) -> usize {
         self.poses.push(world_from_stream);
         self.poses.len() - 1
     }
 
-    /// Moves a stream.
+    /// Changes the pose of a stream.
     ///
     /// # Panics
     /// If there is no such stream.
@@ -119,7 +124,7 @@ impl Latest {
         }
     }
 
-    /// Changes what is kept from now on; what is too old then is given up.
+    /// Changes the options, and removes updates that are too old for the new options.
     pub fn set_options(&mut self, options: LatestOptions) {
         self.options = options;
         for sensor in self.sensors.values_mut() {
@@ -149,11 +154,11 @@ impl Latest {
             Duration::from_nanos(newest.saturating_sub(stamp).max(0).unsigned_abs())
         };
         let mut restarted = false;
-        // Where everything is kept no single stamp may take it all away.
+        // With `accumulate`, a single stamp must not remove everything.
         match sensor.clock.hear(stamp, if accumulate { Duration::MAX } else { jump }) {
             Order::Onward => {}
             Order::Behind { first } => sensor.since = if first { self.arrivals } else { sensor.since },
-            // There late points are shown as any, so that none need to go for them.
+            // With `accumulate`, late points are shown like any others, so a small step back removes nothing.
             Order::Restarted { first } if !accumulate || behind(sensor) > jump => {
                 let since = if first { self.arrivals } else { sensor.since };
                 sensor.kept.retain(|kept| kept.arrival >= since);
@@ -180,21 +185,22 @@ impl Latest {
         if restarted { Arrival::Restarted } else { Arrival::Shown }
     }
 
-    /// Forgets the points of a stream.
+    /// Removes all updates of a stream.
     pub fn forget(&mut self, stream: usize) {
         self.sensors.retain(|key, _| key.0 != stream);
         self.merged = None;
     }
 
-    /// Has a stream begin anew at whatever time comes next, as after a seek. What is shown stays until then.
+    /// Starts a stream anew at the stamp of its next update, for instance after a seek. Until then its points stay
+    /// visible.
     pub fn restart(&mut self, stream: usize) {
         for (_, sensor) in self.sensors.iter_mut().filter(|(key, _)| key.0 == stream) {
             sensor.restarts = true;
         }
     }
 
-    /// All points that are to be shown. The same cloud as before, with the same [identity](PointCloud::identity), as long as
-    /// nothing has changed; a single update that is not moved is handed through.
+    /// All points to show. The same cloud, with the same [identity](PointCloud::identity), is returned until something
+    /// changes. A single update with the identity pose is returned without a copy.
     pub fn cloud(&mut self) -> Arc<PointCloud> {
         let poses = &self.poses;
         let merge = || {
@@ -212,12 +218,12 @@ impl Latest {
         Arc::clone(self.merged.get_or_insert_with(merge))
     }
 
-    /// What became of updates so far.
+    /// Counts of the outcomes of updates so far.
     pub fn statistics(&self) -> LatestStatistics {
         self.statistics
     }
 
-    /// Gives up the oldest updates while there are too many points, but not the newest of a sensor.
+    /// Removes the oldest updates while there are too many points, but keeps the newest of each sensor.
     fn bound(&mut self) {
         let mut points: usize =
             self.sensors.values().flat_map(|sensor| &sensor.kept).map(|kept| kept.cloud.len()).sum();
@@ -233,7 +239,7 @@ impl Latest {
 }
 
 impl Sensor {
-    /// Drops what is too old to be shown, and says whether there was any.
+    /// Removes updates that are too old, and returns whether there were any.
     fn expire(&mut self, options: &LatestOptions) -> bool {
         let before = self.kept.len();
         if !options.accumulate {

@@ -1,4 +1,4 @@
-//! Where clouds come from.
+//! Sources of point clouds: files, sequences, recordings, live streams and generated scenes.
 
 pub(crate) mod align;
 pub(crate) mod animation;
@@ -31,64 +31,72 @@ use self::{
 };
 use crate::{Error, PointCloud, Progress, ReadOptions, Scene, read::colors_beside, read_mesh, read_with};
 
-/// What begins the name of a generated scene.
+/// Prefix of the name of a generated scene.
 const SCENE_PREFIX: &str = "scene:";
-/// What begins the address of points over Zenoh.
+/// Prefix of the address of points over Zenoh.
 const REMOTE_PREFIX: &str = "zenoh://";
-/// Bytes that a generated point takes: position and colour.
+/// Bytes of memory per generated point: position and colour.
 const BYTES_PER_GENERATED_POINT: u64 = 16;
-/// Files of a sequence that are shown in a second.
+/// Default files per second of a sequence.
 const SEQUENCE_FPS: f64 = 10.0;
-/// Times a second that what moves all the while is looked at.
+/// Default frames per second of an animated glTF or scene.
 const MOTION_FPS: f64 = 30.0;
-/// How long the first points of something live are waited for.
+/// How long [`Source::read`] waits for the first points of a live stream.
 const FIRST_POINTS: Duration = Duration::from_secs(10);
 
-/// Something that points come from.
+/// An input of points.
 #[derive(Clone, Debug)]
 pub enum Source {
     /// A file of any of the [formats](crate::formats).
     File(PathBuf),
-    /// A generated scene of so many points.
+    /// A generated scene and its number of points.
     Scene(Scene, usize),
-    /// A folder of files, or a pattern that stands for them, which follow each other.
+    /// A folder of files or a pattern that matches files, one file per frame.
     Sequence(String),
-    /// A recording of a robot: a file, or a folder of ROS 2.
+    /// A recording of a robot: an MCAP file, a ROS 1 bag or the folder of a ROS 2 bag.
     Recording(PathBuf),
     /// PLY and PCD files, one after the other, from standard input.
     StandardInput,
-    /// Topics of ROS 2 over Zenoh, by their address; played with the feature `zenoh` only.
+    /// The address of ROS 2 topics over Zenoh. [`Source::play`] needs the feature `zenoh`.
     Remote(String),
 }
 
-/// How what moves is played.
+/// How [`Source::play`] plays a source. Options that do not apply to the kind of source are ignored, unless stated.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlayOptions {
-    /// Files of a sequence in a second, 10 if it is not said; times a second that a glTF or a scene is looked at, else 30.
+    /// Frames per second: files of a sequence (default 10), or poses of an animated glTF or scene (default 30).
     pub fps: Option<f64>,
-    /// Topics of a recording; all of them if there are none.
+    /// Topics of a recording to play; empty for all topics with points.
     pub topics: Vec<String>,
-    /// Coordinate frame of a recording, or of robots heard over Zenoh, that points are brought into; see
+    /// Coordinate frame that the points of a recording or of robots over Zenoh are transformed into. See
     /// [`RecordingOptions::frame`].
     pub frame: Option<String>,
-    /// Points that are strewn over a mesh in place of its vertices.
+    /// Number of points sampled on a surface in place of the vertices of its mesh. Sources without a surface fail with
+    /// [`Error::NoSurface`].
     pub sample: Option<usize>,
-    /// Simulated scanners, 1 to 4, that stand around and whose points are taken in place of all.
+    /// Number of simulated scanners, at least 1, placed around the surface. Their points replace all others. Sources
+    /// without a surface fail with [`Error::NoSurface`].
     pub scanners: Option<usize>,
-    /// Another seed makes other noise of the scanners.
+    /// Seed of the scanners' noise.
     pub seed: u64,
-    /// A folder is no sequence: its newest file is shown, as it changes.
+    /// Shows only the newest file of a sequence, and reloads it when it changes.
     pub watch: bool,
-    /// All that comes through a pipe is taken, as in [`LiveOptions::all`].
+    /// Plays every frame of standard input and drops none. See [`LiveOptions::all`].
     pub all: bool,
-    /// What is kept beside the newest points.
+    /// Points that stay visible beside the newest ones.
     pub latest: LatestOptions,
 }
 
 impl Source {
-    /// What a name means: `scene:NAME[:COUNT][@SECONDS]`; `zenoh://[HOST[:PORT]]/TOPIC`; `-`, standard input; a folder, or a pattern with `*` or `?` that is no
-    /// file, for a sequence or a recording; a recording by its extension (`.mcap`, `.bag`, `.db3`); or else a file, which need
-    /// not exist.
+    /// Parses the name of a source:
+    ///
+    /// - `scene:NAME[:COUNT][@SECONDS]` is a generated scene.
+    /// - `zenoh://[HOST[:PORT]]/TOPIC` is a live topic.
+    /// - `-` is standard input.
+    /// - A path that [`is_recording`](crate::is_recording) accepts is a recording: `.mcap`, `.bag`, `.db3`, or the
+    ///   folder of a ROS 2 bag.
+    /// - Any other folder, and a pattern with `*` or `?` that is not itself a path, is a sequence.
+    /// - Anything else is a file, which need not exist.
     ///
     /// # Errors
     /// [`Error::UnknownScene`] and [`Error::BadScene`].
@@ -110,7 +118,7 @@ impl Source {
         }
     }
 
-    /// The file, or the folder of a recording, if it is one.
+    /// The path of a file or recording; `None` for other sources.
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::File(path) | Self::Recording(path) => Some(path),
@@ -118,8 +126,8 @@ impl Source {
         }
     }
 
-    /// All files that it is read from, as far as they are there now: of a sequence those that its name stands for, of a
-    /// recording's folder all that are in it; and the pictures that give depth images their colours.
+    /// All files that currently belong to the source: the files of a sequence, of a recording's folder, and the images
+    /// that give depth images their colours.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = match self {
             Self::File(path) => vec![path.clone()],
@@ -133,7 +141,7 @@ impl Source {
         files
     }
 
-    /// The last part of its path, pattern or address; none of what has no such thing.
+    /// The last component of the path, pattern or address; `None` for scenes and standard input.
     pub fn short_name(&self) -> Option<String> {
         let path = match self {
             Self::File(path) | Self::Recording(path) => path,
@@ -143,7 +151,7 @@ impl Source {
         path.file_name().map(|name| name.to_string_lossy().into_owned())
     }
 
-    /// Bytes that will be taken at least, as far as that is known without a look at it.
+    /// Lower bound of the memory needed, in bytes, without opening the source; 0 if unknown.
     pub fn least_bytes(&self) -> u64 {
         match self {
             Self::Scene(_, count) => *count as u64 * BYTES_PER_GENERATED_POINT,
@@ -151,18 +159,19 @@ impl Source {
         }
     }
 
-    /// Whether its points change by themselves. Files and scenes can be [played](Self::play) as well.
+    /// Whether the points change by themselves. Files and scenes return false, but can be [played](Self::play) as well.
     pub fn moves(&self) -> bool {
         matches!(self, Self::Sequence(_) | Self::Recording(_) | Self::StandardInput | Self::Remote(_))
     }
 
-    /// The [span](Timeline::span) of its timeline by a clock that others may share, as [`beginnings`](crate::beginnings) takes it.
-    /// Recordings have such a clock; the stamps of all others count from their own beginning.
+    /// The [span](Timeline::span) of the timeline on a clock shared with other sources, for
+    /// [`beginnings`](crate::beginnings). `None` except for recordings, since other stamps count from the start of
+    /// their own source.
     pub fn clock_span(&self, timeline: &Timeline) -> Option<[i64; 2]> {
         matches!(self, Self::Recording(_)).then(|| timeline.span()).flatten()
     }
 
-    /// Reads or generates the cloud; of what moves, the first.
+    /// Reads or generates the cloud. A source that changes gives its first frame.
     ///
     /// # Errors
     /// Those of [`read`](crate::read), of [`Scene::sample`] or of [`play`](Self::play).
@@ -180,11 +189,13 @@ impl Source {
         }
     }
 
-    /// Makes it ready to be played. What stands still has one frame.
+    /// Prepares the source for playing. A static file has one frame.
     ///
     /// # Errors
-    /// [`Error::NoFrames`] if there is nothing to play, [`Error::BadValue`], [`Error::NoSurface`] for scanners and samples of what
-    /// has none, and those of reading what all frames need.
+    /// - [`Error::NoFrames`] if there is nothing to play.
+    /// - [`Error::BadValue`] if an option is out of its range.
+    /// - [`Error::NoSurface`] if samples or scanners are asked for and there is no surface.
+    /// - The errors of reading what all frames share.
     pub fn play(&self, play: &PlayOptions, options: &ReadOptions, progress: &dyn Progress) -> Result<Player, Error> {
         let fps = play.fps.unwrap_or(MOTION_FPS);
         let animation = match self {
@@ -204,7 +215,7 @@ impl Source {
             }
             #[cfg(not(feature = "zenoh"))]
             Self::Remote(address) => {
-                let why = "this build has no Zenoh; it takes one with the feature 'zenoh'".into();
+                let why = "this program was built without Zenoh; build it with the feature 'zenoh'".into();
                 return Err(Error::NoFrames { name: address.clone(), why });
             }
             Self::Sequence(name) if play.watch => return Self::plain(Live::watch(name.as_ref(), options)?, play),
@@ -234,7 +245,7 @@ impl Source {
         Ok(Player::new(Box::new(animation.play()), play.latest.clone()))
     }
 
-    /// Plays what has points and no surface.
+    /// Plays a stream of points without a surface.
     fn plain(stream: impl Stream + 'static, play: &PlayOptions) -> Result<Player, Error> {
         if play.sample.is_some() || play.scanners.is_some() {
             return Err(Error::NoSurface);

@@ -1,4 +1,4 @@
-//! What is to be seen of a stream at one moment.
+//! Plays a stream: the points visible at one moment.
 
 use std::{
     sync::Arc,
@@ -10,46 +10,49 @@ use glam::DMat4;
 use super::latest::{Latest, LatestOptions, LatestStatistics};
 use crate::{Error, Next, PointCloud, Progress, Stream, Update};
 
-/// How long a wait may last before somebody may cancel it.
+/// Longest wait between two checks for cancellation.
 const STEP: Duration = Duration::from_millis(100);
 
-/// Frames of the same channel before one that cannot be read among which one is looked for that can.
+/// How many earlier frames of the same channel are tried when a frame cannot be read.
 const STEPS_BACK: usize = 16;
 
-/// Plays a stream: makes the cloud that is to be seen at a frame of its timeline, or now.
+/// Plays a stream: builds the cloud that is visible at a frame of the timeline, or now for a live stream.
 ///
-/// A frame is the same points whatever was played before it, but for those that [decay](LatestOptions::decay) where frames cannot
-/// be read or channels have different rates: it counts from the newest of their channel. And where more than 16 frames of a
-/// channel in a row cannot be read, only who played on still sees its last points.
+/// A frame shows the same points whatever was played before, with two exceptions:
+///
+/// - With [`decay`](LatestOptions::decay), if frames cannot be read or channels have different rates. Decay counts from
+///   the newest update of each channel.
+/// - If more than 16 consecutive frames of a channel cannot be read. Only uninterrupted playback then still shows its
+///   last points.
 pub struct Player {
     stream: Box<dyn Stream>,
     options: LatestOptions,
     latest: Latest,
-    /// The frame that was played last.
+    /// The frame played last.
     last: Option<usize>,
 }
 
 impl Player {
-    /// Plays a stream, and keeps what `options` say beside the newest points.
+    /// Creates a player. `options` say which older points stay visible.
     pub fn new(stream: Box<dyn Stream>, options: LatestOptions) -> Self {
         let mut latest = Latest::new(options.clone());
         latest.add(DMat4::IDENTITY);
         Self { stream, latest, options, last: None }
     }
 
-    /// What is played.
+    /// The stream being played.
     pub fn stream(&self) -> &dyn Stream {
         &*self.stream
     }
 
-    /// What became of the updates that the stream handed out: shown, late, known already. What it dropped or refused itself is in
-    /// its own [statistics](Stream::statistics).
+    /// Outcomes of the updates that the stream returned. The stream's own [statistics](Stream::statistics) count what
+    /// it dropped or refused itself.
     pub fn latest_statistics(&self) -> LatestStatistics {
         self.latest.statistics()
     }
 
-    /// The points that are seen at a frame of the timeline: of each channel the newest by then, and what is kept of older ones.
-    /// What cannot be read is told as a note, once for each frame, and the points before it stay.
+    /// The points visible at a frame of the timeline: the newest of each channel, and older ones as the options say. A
+    /// frame that cannot be read is reported as a note, and the points before it stay.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` asked to stop.
@@ -59,20 +62,20 @@ impl Player {
         }
         let mut after = self.last;
         if self.last.is_some_and(|last| last > frame) {
-            // What came later must not be seen.
+            // Later points must not be visible.
             self.latest.forget(0);
             (self.last, after) = (None, None);
         }
         let all = self.needed(frame);
         for &needed in all.iter().filter(|&&needed| after.is_none_or(|after| needed > after)) {
-            // Instead of a frame that cannot be read whoever comes here sees what was before it, as all do who played on.
+            // If a frame cannot be read, an earlier one takes its place, as in uninterrupted playback.
             let mut next = Some(needed);
             for _ in 0..=STEPS_BACK {
                 let Some(tried) = next.filter(|&next| after.is_none_or(|after| next > after)) else { break };
                 if self.put(tried, progress)? {
                     break;
                 }
-                // Those that are needed themselves have their own turn.
+                // Frames that are needed themselves are read in their own turn.
                 next = self.before(tried).filter(|before| all.binary_search(before).is_err());
             }
         }
@@ -80,16 +83,16 @@ impl Player {
         Ok(self.latest.cloud())
     }
 
-    /// The frame that was seen until this one took its place: of the same channel.
+    /// The previous frame of the same channel.
     fn before(&self, frame: usize) -> Option<usize> {
         let seen = self.stream.seen_at(frame);
         self.stream.seen_at(frame.checked_sub(1)?).into_iter().find(|before| !seen.contains(before))
     }
 
-    /// Reads a frame; says whether that was possible.
+    /// Reads a frame, and returns whether that succeeded.
     fn put(&mut self, frame: usize, progress: &dyn Progress) -> Result<bool, Error> {
-        // By the time of the timeline, which is in order, and no two are of the same time: what messages say of themselves may
-        // stand still or overtake each other.
+        // Uses the stamps of the timeline, made unique by the frame number. Stamps in messages may stand still or go
+        // back.
         let stamp = self.stream.timeline().and_then(|timeline| timeline.stamps().get(frame).copied());
         self.stream.seek(frame);
         for _ in 0..self.stream.updates_per_frame() {
@@ -109,11 +112,11 @@ impl Player {
         Ok(true)
     }
 
-    /// The first frame, or of a live stream the first update, which is waited for no longer than `patience`, counted anew as long
-    /// as [bytes](Stream::received) of it come.
+    /// The first frame, or the first update of a live stream. Waits up to `patience`, and longer while
+    /// [bytes](Stream::received) arrive: each arrival starts the wait anew.
     ///
     /// # Errors
-    /// Those of [`frame`](Self::frame) and [`next`](Self::next), [`Error::NoFrames`] if nothing comes.
+    /// Those of [`frame`](Self::frame) and [`next`](Self::next); [`Error::NoFrames`] if nothing arrives.
     pub fn first(&mut self, patience: Duration, progress: &dyn Progress) -> Result<Arc<PointCloud>, Error> {
         if self.stream.timeline().is_some() {
             return self.frame(0, progress);
@@ -132,7 +135,7 @@ impl Player {
         Err(Error::NoFrames { name: "the stream".into(), why })
     }
 
-    /// The frames that a frame is made of, in order.
+    /// The frames that must be read to show `frame`, in order.
     fn needed(&self, frame: usize) -> Vec<usize> {
         if self.options.accumulate {
             return (0..=frame).collect();
@@ -150,8 +153,8 @@ impl Player {
         needed
     }
 
-    /// The points that are seen once the next update of a live stream has come; `None` if none came within `patience`. What
-    /// cannot be read is told as a note.
+    /// The points visible after the next update of a live stream; `None` if none arrived within `patience`. An update
+    /// that cannot be read is reported as a note.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` asked to stop; [`Error::NoFrames`] when the stream has ended.

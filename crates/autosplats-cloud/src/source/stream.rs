@@ -1,104 +1,105 @@
-//! Points that change: what sequences, recordings, live connections and simulated scanners have in common.
+//! Streams of points: what sequences, recordings, live connections and simulated scanners have in common.
 
 use std::{sync::Arc, time::Duration};
 
 use crate::{Error, PointCloud, Progress};
 
-/// Points that change over time, an update after the other.
+/// Points that change over time, one update after the other.
 ///
-/// There are two kinds. One has a [timeline](Self::timeline): all its frames are known, each can be sought, and the same frame
-/// is the same points each time. The other is live: updates come when they come, what is not taken in time is replaced by what
-/// is newer, and counted.
+/// There are two kinds of streams. A stream with a [timeline](Self::timeline) knows all its frames, can seek to each of
+/// them, and gives the same points for a frame each time. A live stream gives updates as they arrive. Updates that
+/// nobody takes in time are replaced by newer ones and counted, unless the stream is set to keep all.
 pub trait Stream: Send {
-    /// The times of all frames, if they are known.
+    /// The times of all frames; `None` for a live stream.
     fn timeline(&self) -> Option<&Timeline>;
 
-    /// The frames that together are seen at the time of `frame`, in order: of each channel the newest by then. Where all channels
-    /// have updates in every frame, that is the frame alone.
+    /// The frames that together are visible at the time of `frame`, in order: the newest of each channel. If every
+    /// frame has updates of all channels, this is only `frame`.
     fn seen_at(&self, frame: usize) -> Vec<usize> {
         vec![frame]
     }
 
-    /// Updates that each frame of the timeline has, one after the other; 1 but for several simulated scanners.
+    /// Number of updates per frame of the timeline. Larger than 1 only for several simulated scanners.
     fn updates_per_frame(&self) -> usize {
         1
     }
 
-    /// Makes `frame` the [next](Self::next) one; beyond the last there is none. Nothing is read yet. Live streams stay as
-    /// they are.
+    /// Makes `frame` the [next](Self::next) one, without reading it. Beyond the last frame, `next` returns
+    /// [`Next::End`]. Live streams ignore the call.
     fn seek(&mut self, frame: usize);
 
-    /// The next update. Waits for it no longer than `patience` if it is live; one of a timeline takes the time that reading
-    /// takes, which `progress` hears of and may cancel.
+    /// The next update. A live stream waits up to `patience`. A stream with a timeline takes the time needed for
+    /// reading, with reports to `progress`, which may cancel it.
     ///
     /// # Errors
-    /// Those of reading. The stream goes on behind what failed: the next call is about what follows.
+    /// Those of reading. After an error the stream continues with the update that follows.
     fn next(&mut self, patience: Duration, progress: &dyn Progress) -> Result<Next, Error>;
 
-    /// What became of the updates so far.
+    /// Counts of the outcomes of updates so far.
     fn statistics(&self) -> Statistics;
 
-    /// Bytes that have come of updates so far, whole or not, for whoever waits for the first: while they become more, something is
-    /// on its way. 0 where nobody counts them.
+    /// Bytes of updates that have arrived so far, complete or not. Growth tells a caller that waits for the first
+    /// update that data are on their way. 0 if the stream does not count them.
     fn received(&self) -> u64 {
         0
     }
 }
 
-/// What [`Stream::next`] found.
+/// Result of [`Stream::next`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Next {
     /// New points.
     Update(Update),
-    /// Nothing came in time; something may yet.
+    /// Nothing arrived in time; more may follow.
     Nothing,
-    /// There will be no more, unless an earlier frame is sought.
+    /// The end: no update follows unless the caller seeks to an earlier frame.
     End,
 }
 
 /// The points of one sensor at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update {
-    /// Which of the stream's sensors it is of, counted from 0: an update takes the place of the one before of the same
-    /// channel, and leaves other channels alone.
+    /// Number of the sensor within the stream, from 0. An update replaces the previous one of its channel and leaves
+    /// other channels alone.
     pub channel: usize,
-    /// When the points were measured, in nanoseconds; of recordings since 1970, of sequences since their beginning.
+    /// Time of measurement in nanoseconds: since 1970 for recordings, since the start for sequences.
     pub stamp: i64,
-    /// The points, in the stream's common frame. Where the sensor stood say [their scans](PointCloud::scans).
+    /// The points, in the stream's common coordinate frame. [Their scans](PointCloud::scans) hold the positions of the
+    /// sensor.
     pub cloud: Arc<PointCloud>,
 }
 
-/// What became of the updates of a stream so far.
+/// Counts of the outcomes of a stream's updates so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Handed out by [`Stream::next`].
+    /// Updates returned by [`Stream::next`].
     pub taken: u64,
-    /// Replaced by newer ones before anyone took them.
+    /// Updates replaced by newer ones before anyone took them.
     pub dropped: u64,
-    /// Not readable, older than what had come before, or not to be brought into the frame that was asked for.
+    /// Updates refused: unreadable, or not convertible to the coordinate frame asked for.
     pub refused: u64,
-    /// Why the last one was refused, in a line.
+    /// Reason for the last refusal, in one line.
     pub last_refusal: Option<String>,
-    /// Times that a connection was made anew.
+    /// Number of reconnections.
     pub reconnected: u64,
-    /// Why nothing comes over a connection, in a line, while that is so.
+    /// Why nothing arrives over a connection at present, in one line.
     pub waiting: Option<String>,
 }
 
-/// When the frames of a stream happen, in order.
+/// The times of a stream's frames, sorted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Timeline {
     stamps: Vec<i64>,
 }
 
 impl Timeline {
-    /// Frames at these times, in nanoseconds; brought into order where they are not.
+    /// Creates a timeline from stamps in nanoseconds, and sorts them.
     pub fn new(mut stamps: Vec<i64>) -> Self {
         stamps.sort_unstable();
         Self { stamps }
     }
 
-    /// `frames` frames, `fps` of them a second, the first at 0.
+    /// Creates a timeline of `frames` frames at `fps` frames per second, the first at 0.
     ///
     /// # Errors
     /// [`Error::BadValue`] if `fps` is not above 0 and at most 100,000.
@@ -114,23 +115,24 @@ impl Timeline {
         self.stamps.len()
     }
 
-    /// Whether there is no frame.
+    /// Whether there are no frames.
     pub fn is_empty(&self) -> bool {
         self.stamps.is_empty()
     }
 
-    /// When each frame happens, in nanoseconds, never falling.
+    /// Stamp of each frame in nanoseconds, sorted.
     pub fn stamps(&self) -> &[i64] {
         &self.stamps
     }
 
-    /// The first and the last stamp, in nanoseconds; `None` if there is no frame. What they count from, and whether others
-    /// count from the same, [the source](crate::Source::clock_span) knows.
+    /// The first and the last stamp, in nanoseconds; `None` without frames.
+    /// [`Source::clock_span`](crate::Source::clock_span) tells whether they count from a shared origin.
     pub fn span(&self) -> Option<[i64; 2]> {
         Some([*self.stamps.first()?, *self.stamps.last()?])
     }
 
-    /// From the first frame to the last one's end, which lasts as long as the others do on average; zero if there is none.
+    /// Time from the start of the first frame to the end of the last, which lasts as long as the others on average.
+    /// Zero without frames.
     pub fn duration(&self) -> Duration {
         let Some([first, last]) = self.span() else { return Duration::ZERO };
         let span = last.abs_diff(first);
@@ -138,7 +140,7 @@ impl Timeline {
         Duration::from_nanos(if frames > 1 { span.saturating_add(span / (frames - 1)) } else { span })
     }
 
-    /// The frame that is shown so long after the first one: the last that happens by then.
+    /// The frame shown at a time since the first frame: the last that starts by then.
     pub fn frame_at(&self, since_first: Duration) -> usize {
         let Some(first) = self.stamps.first() else { return 0 };
         let time = i128::from(*first) + i128::try_from(since_first.as_nanos()).unwrap_or(i128::MAX >> 1);

@@ -1,20 +1,20 @@
-//! Numbers and strings as they lie in ROS messages; records of recordings have them as those of ROS 1 do.
+//! Numbers and strings in ROS messages. Records of MCAP files and bags use the layout of ROS 1.
 
 use std::borrow::Cow;
 
-/// How a ROS message is written as bytes.
+/// Serialization of a ROS message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
-    /// As ROS 1 does: little-endian and without gaps.
+    /// ROS 1: little-endian, without padding.
     Ros1,
-    /// As ROS 2 does, CDR: four bytes say the byte order, numbers are aligned.
+    /// CDR of ROS 2: a header of four bytes gives the byte order, and numbers are aligned.
     Cdr,
 }
 
-/// What data compressed by Zstandard begin with.
+/// First bytes of data compressed by Zstandard.
 pub(crate) const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
 
-/// What is wrong with some bytes, and at which of them.
+/// A fault in a byte sequence and its offset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Fault {
     pub(crate) at: usize,
@@ -26,23 +26,23 @@ impl Fault {
         Self { at, what: what.into() }
     }
 
-    /// The byte, as the place of an error.
+    /// The offset as the `place` of an [`Error::Malformed`](crate::Error::Malformed).
     pub(crate) fn place(&self) -> String {
         format!("byte {}", self.at)
     }
 }
 
-/// Bytes that are read value by value, never beyond their end.
+/// Reader of single values that never reads beyond the end.
 #[derive(Clone)]
 pub(crate) struct Wire<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where alignment is counted from.
+    /// Offset from which alignment counts.
     start: usize,
-    /// No number is aligned to more than this.
+    /// Largest alignment of a number, in bytes.
     alignment: usize,
     big_endian: bool,
-    /// Whether strings end in a zero.
+    /// Whether strings end with a zero byte.
     zero: bool,
 }
 
@@ -58,7 +58,7 @@ macro_rules! number {
 }
 
 impl<'a> Wire<'a> {
-    /// Reads little-endian values without gaps, from a byte on.
+    /// Reads little-endian values without padding, from offset `at` on.
     pub(crate) fn plain(bytes: &'a [u8], at: usize) -> Self {
         Self { bytes, at, start: at, alignment: 1, big_endian: false, zero: false }
     }
@@ -69,15 +69,15 @@ impl<'a> Wire<'a> {
             return Ok(Self::plain(bytes, 0));
         }
         let Some([first, kind, _, _]) = bytes.first_chunk::<4>() else {
-            return Err(Fault::new(0, "the four bytes that begin a CDR message are not there; it is cut off"));
+            return Err(Fault::new(0, "the message is cut off within the four bytes of its CDR header"));
         };
         if bytes.starts_with(ZSTD) {
-            let what = "each message of this recording is compressed by itself; 'ros2 bag convert' undoes that";
+            let what = "the messages of this recording are compressed one by one; convert it with 'ros2 bag convert'";
             return Err(Fault::new(0, what));
         }
         let alignment = match (first, kind) {
             (0, 0 | 1) => 8,
-            // The second version aligns numbers of eight bytes to four, and is the same otherwise.
+            // XCDR2 aligns 8-byte numbers to 4 bytes and is otherwise the same.
             (0, 6 | 7) => 4,
             (0, 2 | 3 | 8..=11) => {
                 let what =
@@ -91,35 +91,34 @@ impl<'a> Wire<'a> {
 
     number!(u8, u16, u32, i32, u64, f64);
 
-    /// The byte that is next.
+    /// Offset of the next byte.
     pub(crate) fn at(&self) -> usize {
         self.at
     }
 
-    /// Bytes left.
+    /// Number of bytes left.
     pub(crate) fn left(&self) -> usize {
         self.bytes.len().saturating_sub(self.at)
     }
 
-    /// So many bytes.
+    /// Takes `len` bytes.
     pub(crate) fn take(&mut self, len: usize, what: &str) -> Result<&'a [u8], Fault> {
         let taken = self.at.checked_add(len).and_then(|end| self.bytes.get(self.at..end));
         let Some(taken) = taken else {
-            let what =
-                format!("{len} bytes of {what} are wanted and {} are left; it is cut off or damaged", self.left());
+            let what = format!("{what}: {len} bytes expected, {} left; the data are cut off or damaged", self.left());
             return Err(Fault::new(self.at.min(self.bytes.len()), what));
         };
         self.at += len;
         Ok(taken)
     }
 
-    /// As many bytes as the number before them says.
+    /// Takes a byte string that is preceded by its length.
     pub(crate) fn bytes(&mut self, what: &str) -> Result<&'a [u8], Fault> {
         let len = self.u32(what)?;
         self.take(len as usize, what)
     }
 
-    /// Text; what is no UTF-8 becomes a sign for that.
+    /// Takes a string. Invalid UTF-8 becomes replacement characters.
     pub(crate) fn string(&mut self, what: &str) -> Result<Cow<'a, str>, Fault> {
         let mut text = self.bytes(what)?;
         if self.zero {
@@ -128,7 +127,8 @@ impl<'a> Wire<'a> {
         Ok(String::from_utf8_lossy(text))
     }
 
-    /// The length of a list of which each item takes at least `least` bytes: no longer than what is left can hold.
+    /// Takes the length of a list whose items have at least `least` bytes each. Fails if the bytes left cannot hold the
+    /// list.
     pub(crate) fn list(&mut self, least: usize, what: &str) -> Result<usize, Fault> {
         let at = self.at;
         let len = self.u32(what)? as usize;
@@ -144,7 +144,7 @@ impl<'a> Wire<'a> {
     }
 }
 
-/// What most messages begin with: when something was measured, in nanoseconds, and the frame it is in.
+/// Reads a message header: time of measurement in nanoseconds and name of the coordinate frame.
 pub(crate) fn header<'a>(wire: &mut Wire<'a>, encoding: Encoding) -> Result<(i64, Cow<'a, str>), Fault> {
     let seconds = match encoding {
         Encoding::Ros1 => {
