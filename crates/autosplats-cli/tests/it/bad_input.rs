@@ -57,8 +57,8 @@ fn files_that_are_no_clouds() {
     let folder = Folder::with_sphere();
     folder.fail(&render("missing.ply"), 3, &["missing.ply"]);
     std::fs::create_dir(folder.path("nothing")).expect("a folder");
-    folder.fail(&render("nothing"), 3, &["nothing", "no files in this folder"]);
-    folder.fail(&render("nothing/*.ply"), 3, &["nothing/*.ply", "no file has such a name"]);
+    folder.fail(&render("nothing"), 3, &["nothing", "the folder has no files"]);
+    folder.fail(&render("nothing/*.ply"), 3, &["nothing/*.ply", "no file matches"]);
     folder.write("unknown.doc", "no points\n");
     folder.fail(&render("unknown.doc"), 3, &["unknown.doc", "PLY"]);
     folder.write("empty.ply", "");

@@ -131,7 +131,7 @@ impl Player {
                 (since, received) = (Instant::now(), now);
             }
         }
-        let why = format!("nothing came within {} s", patience.as_secs());
+        let why = format!("no points within {} s", patience.as_secs());
         Err(Error::NoFrames { name: "the stream".into(), why })
     }
 

@@ -1,4 +1,4 @@
-//! A glTF that moves.
+//! Animated glTF files.
 
 use std::{
     path::{Path, PathBuf},
@@ -11,13 +11,13 @@ use crate::{
     read::{gltf_animation, read_gltf_at},
 };
 
-/// Frames beyond which an animation is rather broken than long.
+/// Largest number of frames of an animation. Files that claim more are likely damaged.
 const MAX_FRAMES: f64 = 1e6;
 
-/// The first animation of a glTF, at times that are equally far apart.
+/// The first animation of a glTF, sampled at equal time steps.
 pub(super) struct Gltf {
     path: PathBuf,
-    /// The file, so that all frames are of the same one.
+    /// Content of the file, kept in memory so that all frames come from one version of it.
     bytes: Vec<u8>,
     timeline: Timeline,
 }

@@ -1,10 +1,10 @@
-//! Points and surfaces that move, all frames of which are known: sequences of files, animated meshes, scenes.
+//! Moving points and surfaces whose frames are all known: sequences of files, animated meshes, scenes.
 //!
 //! # How it works
 //!
-//! Each kind is a [`Frames`]: it has a timeline and reads any of its frames, whichever came before. What is made of others,
-//! as points strewn over a moving mesh, is one as well and asks for the surface of a frame. [`Playback`] turns any of them into
-//! a [`Stream`](crate::Stream).
+//! Each kind implements [`Frames`]: it has a timeline and can read any of its frames in any order. Derived kinds, such
+//! as points sampled on a moving mesh, implement [`Frames`] too and ask another [`Frames`] for the surface of a frame.
+//! [`Playback`] turns any of them into a [`Stream`](crate::Stream).
 
 mod gltf;
 mod playback;
@@ -21,22 +21,22 @@ pub(crate) use self::sequence::{candidates, is_named_as_cloud, natural};
 use super::scanner::{Scanned, Scanner};
 use crate::{Axes, Contents, Error, PointCloud, Progress, ReadOptions, Scene, Timeline};
 
-/// Points that tell how large a scene is.
+/// Number of points sampled on a scene to find its size.
 const PLACED_BY: usize = 20_000;
 
-/// Frames by their numbers.
+/// Random access to the frames of an animation.
 pub(crate) trait Frames: Send + Sync {
     fn timeline(&self) -> &Timeline;
 
-    /// Sensors, each of which has points of its own in every frame.
+    /// Number of sensors, each with its own points in every frame.
     fn channels(&self) -> usize {
         1
     }
 
-    /// The points of a frame, of each channel.
+    /// The points of a frame, one cloud per channel.
     fn read(&self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error>;
 
-    /// What the points of a frame are on, if that is known.
+    /// The surface under the points of a frame, if known.
     fn surface(&self, _frame: usize, _progress: &dyn Progress) -> Result<Surface, Error> {
         Err(Error::NoSurface)
     }
@@ -48,18 +48,19 @@ pub(crate) enum Surface {
     Mesh(Arc<Contents>),
 }
 
-/// Something that moves and is known at all times: played by a [`Playback`].
+/// A movement known at all times. A [`Playback`] plays it.
 #[derive(Clone)]
 pub struct Animation {
     frames: Arc<dyn Frames>,
 }
 
 impl Animation {
-    /// The files of a folder, or those that a pattern like `scans/frame_*.ply` stands for, of any
-    /// [formats](crate::formats), `fps` of them a second, in the order of the numbers in their names.
+    /// Plays the files of a folder, or the files that match a pattern like `scans/frame_*.ply`, as frames. Files may
+    /// have any of the [formats](crate::formats) and are sorted by the numbers in their names. `fps` is the number of
+    /// frames per second.
     ///
-    /// What is no cloud is left out, with one note: files of other kinds, and those without a number in their names if
-    /// others have one. Files without faces are the first one's mesh if they have as many vertices.
+    /// Files that are not clouds are left out, with one note. So are files without a number in their name if others
+    /// have one. A file without faces gets those of the first file if both have the same number of vertices.
     ///
     /// # Errors
     /// [`Error::NoFrames`] if no file is left, [`Error::Io`] and [`Error::BadValue`].
@@ -67,47 +68,48 @@ impl Animation {
         Ok(Self { frames: Arc::new(sequence::Sequence::find(name, fps, options, progress)?) })
     }
 
-    /// The first animation of a glTF, looked at `fps` times a second: morph targets and the places of nodes. Skeletons do
-    /// not move.
+    /// Plays the first animation of a glTF, `fps` frames per second. Morph targets and the transforms of nodes are
+    /// animated; skins are not.
     ///
     /// # Errors
-    /// [`Error::NoFrames`] if nothing in it moves, those of [`read`](crate::read), and [`Error::BadValue`].
+    /// [`Error::NoFrames`] if nothing in the file moves, those of [`read`](crate::read), and [`Error::BadValue`].
     pub fn gltf(path: &Path, fps: f64, progress: &dyn Progress) -> Result<Self, Error> {
         Ok(Self { frames: Arc::new(gltf::Gltf::open(path, fps, progress)?) })
     }
 
-    /// A built-in scene of `count` points: one round of its animation, or ten seconds of one that stands still.
+    /// Plays a built-in scene of `count` points: one period of its animation, or ten seconds of a static scene.
     ///
     /// # Errors
-    /// [`Error::BadValue`] if `fps` is none.
+    /// [`Error::BadValue`] if `fps` is out of range.
     pub fn scene(scene: &Scene, count: usize, fps: f64) -> Result<Self, Error> {
         Ok(Self { frames: Arc::new(still::MovingScene::new(scene, count, fps)?) })
     }
 
-    /// What does not move, for scanners to look at: a single frame.
+    /// A single frame without movement, for instance as a target for scanners.
     pub fn still(contents: Contents) -> Self {
         Self { frames: Arc::new(still::Still::new(contents)) }
     }
 
-    /// `count` points strewn over the surface in place of a mesh's vertices or of a scene's own number. While the mesh has
-    /// the same faces they stay at the same places on it.
+    /// Replaces the points by `count` points sampled on the surface. While a mesh keeps its faces, the samples keep
+    /// their places on it.
     ///
     /// # Errors
-    /// [`Error::NoSurface`] if the first frame has none, those of reading it, and [`Error::OutOfMemory`].
+    /// [`Error::NoSurface`] if the first frame has no surface, those of reading it, and [`Error::OutOfMemory`].
     pub fn sampled(&self, count: usize, progress: &dyn Progress) -> Result<Self, Error> {
         Ok(Self { frames: Arc::new(sampled::Sampled::new(Arc::clone(&self.frames), count, progress)?) })
     }
 
-    /// What `scanners` see of the surface, each on a channel of its own. The same `seed` gives the same points.
+    /// Replaces the points by those that `scanners` measure on the surface, one channel per scanner. The same `seed`
+    /// gives the same points.
     ///
     /// # Errors
-    /// [`Error::BadValue`] for what a scanner cannot be, and [`Error::OutOfMemory`]. What has no surface fails when it is
-    /// played.
+    /// [`Error::BadValue`] for invalid properties of a scanner, and [`Error::OutOfMemory`]. An animation without a
+    /// surface fails only when it is played.
     pub fn scanned(&self, scanners: Vec<Scanner>, seed: u64) -> Result<Self, Error> {
         Ok(Self { frames: Arc::new(Scanned::new(Arc::clone(&self.frames), scanners, seed)?) })
     }
 
-    /// `count` scanners [around](Scanner::around) its first frame. Where nothing says what is up, Y is, as in models.
+    /// Places `count` scanners [around](Scanner::around) the first frame. Without known axes, Y is up, as in models.
     ///
     /// # Errors
     /// Those of reading the first frame, and [`Error::NoSurface`].
@@ -128,12 +130,12 @@ impl Animation {
         Ok(Scanner::around(low, high, up, count))
     }
 
-    /// When its frames happen.
+    /// The times of the frames.
     pub fn timeline(&self) -> &Timeline {
         self.frames.timeline()
     }
 
-    /// Plays it from the first frame on.
+    /// Plays the animation from the first frame on.
     pub fn play(&self) -> Playback {
         Playback::new(Arc::clone(&self.frames))
     }

@@ -1,4 +1,4 @@
-//! Frames one after the other, the next one read while the last is shown.
+//! Plays frames in order, and reads the next frame while the last one is shown.
 
 use std::{
     collections::{BTreeSet, VecDeque},
@@ -13,20 +13,21 @@ use std::{
 use super::Frames;
 use crate::{Error, Next, PointCloud, Progress, Statistics, Stream, Timeline, Update};
 
-/// Time between two looks at whether to stop.
+/// Time between two checks for cancellation.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// An [`Animation`](crate::Animation) that is played. Frames that follow each other are read ahead, one at a time.
+/// An [`Animation`](crate::Animation) that is played. While frames follow each other, the next one is read ahead.
 ///
-/// A frame that cannot be read fails once; when it comes again it is [nothing](Next::Nothing), and the points before stay.
+/// A frame that cannot be read returns an error once. After that it returns [`Next::Nothing`], and the points before it
+/// stay.
 pub struct Playback {
     frames: Arc<dyn Frames>,
-    /// The frame to be read next.
+    /// The frame to read next.
     next: usize,
-    /// Updates of the frame before that were not taken yet.
+    /// Updates of the last frame that nobody has taken yet.
     ready: VecDeque<Update>,
     ahead: Option<Ahead>,
-    /// The frame that was read last.
+    /// The frame read last.
     last: Option<usize>,
     failed: BTreeSet<usize>,
     statistics: Statistics,
@@ -38,14 +39,14 @@ impl Playback {
         Self { frames, next: 0, ready: VecDeque::new(), ahead: None, last: None, failed: BTreeSet::new(), statistics }
     }
 
-    /// Reads a frame, or waits for it if that has begun.
+    /// Reads a frame, or waits for it if it is already being read ahead.
     fn read(&mut self, frame: usize, progress: &dyn Progress) -> Result<Vec<Arc<PointCloud>>, Error> {
         if let Some(ahead) = self.ahead.take_if(|ahead| ahead.frame == frame)
             && let Some(read) = ahead.wait(progress)
         {
             return read;
         }
-        // What there is to be said of one frame there is of all.
+        // Notes about one frame hold for all, so only the first frame passes them on.
         self.frames.read(frame, &Quiet { progress, notes: self.last.is_none() })
     }
 }
@@ -90,7 +91,7 @@ impl Stream for Playback {
                     return if self.failed.insert(frame) { Err(error) } else { Ok(Next::Nothing) };
                 }
             }
-            // Who jumps about does not want the neighbours.
+            // Neighbouring frames are not read ahead while a caller seeks.
             if in_a_row {
                 let following = (frame + 1) % self.frames.timeline().len();
                 self.ahead = Ahead::start(&self.frames, following);
@@ -106,7 +107,7 @@ impl Stream for Playback {
     }
 }
 
-/// A frame that a thread is reading. It is given up when this is dropped.
+/// A frame that a thread reads ahead. Dropping `Ahead` cancels the thread.
 struct Ahead {
     frame: usize,
     read: Receiver<Result<Vec<Arc<PointCloud>>, Error>>,
@@ -114,7 +115,7 @@ struct Ahead {
 }
 
 impl Ahead {
-    /// Nothing where there are no threads.
+    /// Returns `None` if no thread can be started.
     fn start(frames: &Arc<dyn Frames>, frame: usize) -> Option<Self> {
         let (sender, read) = sync_channel(1);
         let given_up = Arc::new(AtomicBool::new(false));
@@ -126,7 +127,7 @@ impl Ahead {
         Some(Self { frame, read, given_up })
     }
 
-    /// Nothing if the thread has died.
+    /// Waits for the frame. Returns `None` if the thread has panicked.
     fn wait(self, progress: &dyn Progress) -> Option<Result<Vec<Arc<PointCloud>>, Error>> {
         loop {
             match self.read.recv_timeout(LOOK) {
@@ -145,7 +146,7 @@ impl Drop for Ahead {
     }
 }
 
-/// Nobody listens to what is read ahead.
+/// Progress of a frame that is read ahead: reports go nowhere.
 struct Behind(Arc<AtomicBool>);
 
 impl Progress for Behind {
@@ -156,7 +157,7 @@ impl Progress for Behind {
     }
 }
 
-/// Passes on how far it is, and notes if they are wanted, but no previews: what is on the screen stays until the frame is whole.
+/// Passes on reports, and notes if `notes` is set, but no previews: the shown points stay until the frame is complete.
 struct Quiet<'a> {
     progress: &'a dyn Progress,
     notes: bool,

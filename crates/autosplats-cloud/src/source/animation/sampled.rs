@@ -1,18 +1,18 @@
-//! Points strewn over surfaces that move.
+//! Points sampled on moving surfaces.
 
 use std::sync::Arc;
 
 use super::{Frames, Surface, still};
 use crate::{Contents, Error, PointCloud, Progress, Timeline, sample::SurfaceSamples};
 
-/// The same points in all frames are had by the same random numbers.
+/// Fixed seed, so that all frames have the same samples.
 const SEED: u64 = 1;
 
-/// So many points on the surface of each frame.
+/// `count` points on the surface of each frame.
 pub(super) struct Sampled {
     frames: Arc<dyn Frames>,
     count: usize,
-    /// Places on the first frame's mesh, and it.
+    /// The samples on the first frame's mesh, and that mesh.
     first: Option<(SurfaceSamples, Arc<Contents>)>,
 }
 

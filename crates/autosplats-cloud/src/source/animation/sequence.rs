@@ -1,4 +1,4 @@
-//! Files as frames: all of a folder, or those that a pattern stands for.
+//! Files as frames: all files of a folder, or those that match a pattern.
 
 use std::{
     cmp::Ordering,
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::{Frames, Surface};
 use crate::{Contents, Error, PointCloud, Progress, ReadOptions, Timeline, describe, formats, read_mesh, read_with};
 
-/// Files, a frame each.
+/// Files, one per frame.
 pub(super) struct Sequence {
     files: Vec<PathBuf>,
     timeline: Timeline,
@@ -27,7 +27,7 @@ impl Sequence {
         let files = clouds(name, found, options)?;
         if files.len() < all {
             let (left_out, frames) = (all - files.len(), files.len());
-            let what = format!("left out {left_out} of {all} files, which are no clouds or have no number");
+            let what = format!("left out {left_out} of {all} files, which are not clouds or have no number");
             progress.note(&format!("{what}; {frames} are the frames"));
         }
         let timeline = Timeline::even(files.len(), fps)?;
@@ -35,7 +35,7 @@ impl Sequence {
     }
 
     fn mesh(&self, frame: usize, progress: &dyn Progress) -> Result<Contents, Error> {
-        // Vertices are counted, so none may be taken for a place where nothing was measured.
+        // Keeps points without a return: the number of vertices must match the faces.
         let options = ReadOptions { keep_no_returns: true, ..self.options.clone() };
         read_mesh(&self.files[frame], &options, progress)
     }
@@ -86,8 +86,8 @@ pub(crate) fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
         vec![path.into()]
     } else {
         let pattern = glob::glob(name)
-            .map_err(|error| Error::NoFrames { name: name.into(), why: format!("it is no pattern: {error}") })?;
-        // Folders that may not be looked into have no frames.
+            .map_err(|error| Error::NoFrames { name: name.into(), why: format!("bad pattern: {error}") })?;
+        // Folders that cannot be read are skipped.
         pattern.filter_map(Result::ok).collect()
     };
     files.retain(|file| file.is_file());
@@ -95,12 +95,12 @@ pub(crate) fn candidates(name: &str) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
-/// Those of the files that are clouds, or would be if they were whole.
+/// Keeps the files that are clouds, damaged ones included.
 fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<PathBuf>, Error> {
     let no_frames = |why: String| Error::NoFrames { name: name.into(), why };
     if files.is_empty() {
         let folder = Path::new(name).is_dir();
-        let why = if folder { "there are no files in this folder" } else { "no file has such a name" };
+        let why = if folder { "the folder has no files" } else { "no file matches" };
         return Err(no_frames(why.into()));
     }
     let looked =
@@ -121,7 +121,7 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
             None => "none of its files is a cloud".into(),
         }));
     }
-    // Poses and cameras beside numbered frames may look like rows of points.
+    // Pose and camera files beside numbered frames may look like text files of points.
     let numbered =
         |file: &PathBuf| file.file_stem().is_some_and(|s| s.to_string_lossy().contains(|c: char| c.is_ascii_digit()));
     if kept.iter().any(numbered) {
@@ -130,14 +130,14 @@ fn clouds(name: &str, files: Vec<PathBuf>, options: &ReadOptions) -> Result<Vec<
     Ok(kept)
 }
 
-/// Whether a file has an extension of a format that is read, and is not hidden.
+/// Whether a file is not hidden and has the extension of a readable format.
 pub(crate) fn is_named_as_cloud(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let ends = |extension: &&str| name.strip_suffix(extension).is_some_and(|stem| stem.ends_with('.'));
     !name.starts_with('.') && formats().any(|(_, extensions)| extensions.iter().any(ends))
 }
 
-/// Names in the order of the numbers in them: `frame_2` before `frame_10`.
+/// Natural order of names: `frame_2` before `frame_10`.
 pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     let (mut a, mut b) = (a, b);
     loop {
@@ -147,7 +147,7 @@ pub(crate) fn natural(a: &str, b: &str) -> Ordering {
             let ((left, rest), (right, other)) = (a.split_at(number(a)), b.split_at(number(b)));
             let value = |digits: &str| digits.trim_start_matches('0').to_owned();
             let (l, r) = (value(left), value(right));
-            // Of equal numbers the one with fewer zeros comes first.
+            // Of equal numbers the one with fewer leading zeros comes first.
             let order = l.len().cmp(&r.len()).then_with(|| l.cmp(&r)).then_with(|| left.len().cmp(&right.len()));
             if order != Ordering::Equal {
                 return order;

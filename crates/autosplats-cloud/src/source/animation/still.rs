@@ -1,11 +1,11 @@
-//! Scenes over time, and what stands still.
+//! Scenes over time, and clouds and meshes that do not move.
 
 use std::sync::{Arc, OnceLock};
 
 use super::{Frames, Surface};
 use crate::{Contents, Error, PointCloud, Progress, Scene, Timeline};
 
-/// Seconds that a scene without animation is shown for.
+/// Length of the timeline of a static scene, in seconds.
 const STILL: f64 = 10.0;
 
 /// A built-in scene.
@@ -13,7 +13,7 @@ pub(super) struct MovingScene {
     scene: Scene,
     count: usize,
     timeline: Timeline,
-    /// Points of a scene that does not move.
+    /// The points, cached if the scene is static.
     still: OnceLock<Arc<PointCloud>>,
 }
 
@@ -21,7 +21,7 @@ impl MovingScene {
     pub(super) fn new(scene: &Scene, count: usize, fps: f64) -> Result<Self, Error> {
         let seconds = if scene.is_animated() { Scene::PERIOD } else { STILL };
         let frames = (seconds * fps).round().max(1.0) as usize;
-        // Rates that are none end here, before their frames are counted.
+        // Rejects an invalid rate before frames are counted.
         Timeline::even(0, fps)?;
         let timeline = Timeline::even(frames, frames as f64 / seconds)?;
         Ok(Self { scene: scene.clone(), count, timeline, still: OnceLock::new() })
@@ -29,7 +29,7 @@ impl MovingScene {
 
     fn at(&self, frame: usize) -> Scene {
         if !self.scene.is_animated() {
-            // Clones share what has been made.
+            // Clones share the prepared data.
             self.scene.prepare();
             return self.scene.clone();
         }
@@ -49,7 +49,7 @@ impl Frames for MovingScene {
         }
         let cloud = Arc::new(sample(&self.at(frame), self.count, progress)?);
         if !self.scene.is_animated() {
-            // Who was first does not matter: both have made the same points.
+            // Another thread may have stored its result first; both results are the same.
             return Ok(vec![self.still.get_or_init(|| cloud).clone()]);
         }
         Ok(vec![cloud])
@@ -60,7 +60,7 @@ impl Frames for MovingScene {
     }
 }
 
-/// Points on a scene.
+/// Samples points on a scene.
 pub(super) fn sample(scene: &Scene, count: usize, progress: &dyn Progress) -> Result<PointCloud, Error> {
     scene.sample(count, &|done| {
         progress.report(done);

@@ -1,4 +1,4 @@
-//! Files one after the other from a pipe.
+//! Reads files one after the other from a pipe.
 
 use std::{
     io::{ErrorKind, Read},
@@ -13,10 +13,10 @@ use crate::{
     read_bytes,
 };
 
-/// Bytes asked for at a time.
+/// Bytes read at a time.
 const PIECE: usize = 1 << 16;
 
-/// Reads until the input ends or nobody wants its points.
+/// Reads until the input ends or the mailbox is abandoned.
 pub(super) fn read(mut input: impl Read, name: &Path, options: &LiveOptions, mailbox: &Mailbox) {
     let mut framing = Framing::new(options.max_frame_bytes);
     let mut piece = vec![0; PIECE];
@@ -36,7 +36,7 @@ pub(super) fn read(mut input: impl Read, name: &Path, options: &LiveOptions, mai
         while let Some(found) = framing.next() {
             deliver(found, name, options, mailbox);
         }
-        // What is no file is nothing to wait for.
+        // Bytes outside of files do not count as received.
         if framing.is_within() {
             mailbox.receive(len);
         }
@@ -53,7 +53,7 @@ fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) 
         Found::Refused(byte, what) => refused(byte, what),
         Found::File(byte, bytes) => match guarded(name, || read_bytes(name, &bytes, &options.read, &Until(mailbox))) {
             Ok(cloud) => return mailbox.put(Update { channel: 0, stamp: now(), cloud: Arc::new(cloud) }),
-            // Places in a frame say nothing without where it begins.
+            // A position within a frame needs the offset of the frame.
             Err(Error::Malformed { place, what, .. }) => refused(byte, format!("in a frame, {place}: {what}")),
             Err(error) => error,
         },
@@ -63,7 +63,7 @@ fn deliver(found: Found, name: &Path, options: &LiveOptions, mailbox: &Mailbox) 
     }
 }
 
-/// Stops when nobody wants the points.
+/// Cancels once the mailbox is abandoned.
 pub(super) struct Until<'a>(pub(super) &'a Mailbox);
 
 impl Progress for Until<'_> {

@@ -1,4 +1,4 @@
-//! Where one thread leaves updates and another takes them: there is room for one of each channel.
+//! Passes updates from one thread to another, with room for one update per channel.
 
 use std::{
     collections::BTreeMap,
@@ -8,12 +8,12 @@ use std::{
 
 use crate::{Error, Next, Progress, Statistics, Update};
 
-/// Time between two looks at whether to stop waiting.
+/// Time between two checks for cancellation.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// The newest update of each channel.
 pub(super) struct Mailbox {
-    /// Whether what nobody has taken yet stays until somebody does.
+    /// Whether an update stays until it is taken. Otherwise a newer one replaces it.
     all: bool,
     state: Mutex<State>,
     changed: Condvar,
@@ -22,17 +22,18 @@ pub(super) struct Mailbox {
 #[derive(Default)]
 struct State {
     updates: BTreeMap<usize, Update>,
-    /// What was refused last, until somebody has heard of it.
+    /// The last refusal that no caller has seen yet.
     refusal: Option<Error>,
     statistics: Statistics,
-    /// Bytes of files that have come, whole or not.
+    /// Bytes of files received, complete or not.
     received: u64,
     ended: bool,
     abandoned: bool,
 }
 
 impl Mailbox {
-    /// An empty one, in which what comes takes the place of what nobody has taken yet, or waits until `all` of that is taken.
+    /// Creates an empty mailbox. With `all`, writers wait until earlier updates are taken; otherwise new updates
+    /// replace them.
     pub(super) fn new(all: bool) -> Self {
         Self { all, state: Mutex::default(), changed: Condvar::new() }
     }
@@ -41,7 +42,7 @@ impl Mailbox {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The state, where all are taken once `is_taken` says so or nothing will be taken any more.
+    /// Locks the state. With `all`, first waits until `is_taken` holds or the mailbox is abandoned.
     fn state_once(&self, is_taken: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
         let mut state = self.state();
         while self.all && !state.abandoned && !is_taken(&state) {
@@ -50,7 +51,7 @@ impl Mailbox {
         state
     }
 
-    /// Leaves an update in place of the one before of its channel.
+    /// Stores an update, which replaces an earlier one of its channel.
     pub(super) fn put(&self, update: Update) {
         let mut state = self.state_once(|state| !state.updates.contains_key(&update.channel));
         let replaced = state.updates.insert(update.channel, update).is_some();
@@ -58,7 +59,7 @@ impl Mailbox {
         self.changed.notify_all();
     }
 
-    /// Counts updates that came and were passed over.
+    /// Counts updates that arrived and were skipped.
     pub(super) fn drop_updates(&self, updates: u64) {
         self.state().statistics.dropped += updates;
     }
@@ -71,13 +72,13 @@ impl Mailbox {
         self.changed.notify_all();
     }
 
-    /// Nothing will be put any more.
+    /// Marks the end: no more updates are put.
     pub(super) fn end(&self) {
         self.state().ended = true;
         self.changed.notify_all();
     }
 
-    /// Nothing will be taken any more.
+    /// Marks the mailbox as abandoned: no more updates are taken.
     pub(super) fn abandon(&self) {
         self.state().abandoned = true;
         self.changed.notify_all();
@@ -87,7 +88,7 @@ impl Mailbox {
         self.state().abandoned
     }
 
-    /// Takes an update, waiting for it if there is none.
+    /// Takes an update, and waits up to `patience` if there is none.
     pub(super) fn take(&self, patience: Duration, progress: &dyn Progress) -> Result<Next, Error> {
         let start = Instant::now();
         let mut state = self.state();
@@ -116,7 +117,7 @@ impl Mailbox {
         }
     }
 
-    /// Counts bytes that have come of a file.
+    /// Counts received bytes of a file.
     pub(super) fn receive(&self, bytes: usize) {
         self.state().received += bytes as u64;
     }

@@ -1,10 +1,10 @@
-//! Points that come when they come: bytes from a pipe, files that others write.
+//! Live points: bytes from a pipe, and files that other programs write.
 //!
 //! # How it works
 //!
-//! A thread waits for what comes, decodes it and puts it into a [`Mailbox`], where it takes the place of what nobody has
-//! taken yet, or is left only once that is taken. So nothing queues, however slow the taker is. Should reading panic, which is a mistake of ours, that is an error
-//! of the stream like any other, which goes on with what comes next.
+//! A thread waits for data, decodes them and puts the points into a [`Mailbox`]. There they replace the update that
+//! nobody has taken yet, or, with [`LiveOptions::all`], wait until that update is taken. So nothing queues, however
+//! slow the taker is. A panic while reading, which is a bug, becomes an error of the stream, and the stream continues.
 
 mod bytes;
 mod mailbox;
@@ -21,20 +21,20 @@ use std::{
 use self::mailbox::Mailbox;
 use crate::{Error, Next, Progress, ReadOptions, Statistics, Stream, Timeline, error::message};
 
-/// Points that others send or write: a [`Stream`] without a timeline, of which the newest are at hand.
+/// Live points that others send or write: a [`Stream`] without a timeline that keeps only the newest update.
 pub struct Live {
     mailbox: Arc<Mailbox>,
 }
 
-/// How to read [`Live::bytes`].
+/// Options of [`Live::bytes`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LiveOptions {
     /// How to read a frame.
     pub read: ReadOptions,
-    /// Bytes that a frame may have; what announces more is refused. 1 GiB by default.
+    /// Maximum size of a frame in bytes. Larger frames are refused. Default 1 GiB.
     pub max_frame_bytes: usize,
-    /// Frames are read as they are taken, so that whoever writes them waits and none is dropped. Without it, which is the
-    /// default, those that nobody takes in time are.
+    /// Whether every frame is read. If true, the writer waits until frames are taken. If false, the default, frames
+    /// that nobody takes in time are dropped.
     pub all: bool,
 }
 
@@ -45,24 +45,24 @@ impl Default for LiveOptions {
 }
 
 impl Live {
-    /// PLY and PCD files one after the other, as from standard input, in pieces of any size. `name` stands in messages. What
-    /// is no file is skipped to the next header. The stamps are the times of arrival.
+    /// Reads PLY and PCD files one after the other, for instance from standard input. `name` is used in messages. Bytes
+    /// outside of files are skipped up to the next header. Stamps are times of arrival.
     ///
-    /// The thread that reads ends with the input, or at the next bytes after this was dropped.
+    /// The reading thread ends with the input, or at the next bytes after `Live` is dropped.
     ///
     /// # Errors
-    /// [`Error::Io`] if there can be no thread.
+    /// [`Error::Io`] if no thread can be started.
     pub fn bytes(input: impl Read + Send + 'static, name: &str, options: &LiveOptions) -> Result<Self, Error> {
         let (name, options) = (name.to_owned(), options.clone());
         Self::start(&name.clone(), options.all, move |mailbox| bytes::read(input, name.as_ref(), &options, mailbox))
     }
 
-    /// A file, each time it has changed, or the newest of a folder or of those that a pattern like `scans/*.ply` stands for, once
-    /// it has not changed for a tenth of a second. What is not there yet is waited for. The stamps are the times at which
-    /// that was noticed.
+    /// Watches a file, a folder, or a pattern like `scans/*.ply`. Gives the file each time it changes, or the newest
+    /// file of the folder or pattern, once it has not changed for a tenth of a second. The path need not exist yet.
+    /// Stamps are the times at which changes were noticed.
     ///
     /// # Errors
-    /// [`Error::Io`] if there can be no thread.
+    /// [`Error::Io`] if no thread can be started.
     pub fn watch(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
         let (path, options) = (path.to_owned(), options.clone());
         Self::start(&path.display().to_string(), false, move |mailbox| watch::watch(&path, &options, mailbox))
@@ -114,18 +114,18 @@ impl Drop for Live {
     }
 }
 
-/// Does something that must not end a thread without a word: a panic becomes an error.
+/// Runs `work` and turns a panic into an error, so that no thread ends silently.
 fn guarded<T>(name: &Path, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
-    // What is left half done belongs to the frame that failed, and to nobody after it.
+    // Unwind safety: state left half done belongs to the failed frame, and no later frame uses it.
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let said = panic.downcast_ref::<&str>().map(|said| (*said).to_owned());
         let said = said.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-        let what = message(&format!("reading has failed by a mistake of this program, please report it: {said}"));
+        let what = message(&format!("reading failed because of a bug in this program, please report it: {said}"));
         Err(Error::Unsupported { path: name.into(), what })
     })
 }
 
-/// Nanoseconds since 1970.
+/// Current time in nanoseconds since 1970.
 fn now() -> i64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)

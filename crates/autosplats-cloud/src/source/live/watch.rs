@@ -1,5 +1,4 @@
-//! A file that is written again, or a folder or a pattern to which files are added. Nobody tells: it is looked at now and
-//! then.
+//! Watches a file that is rewritten, or a folder or pattern to which files are added, by polling.
 
 use std::{
     cmp::Ordering,
@@ -20,10 +19,10 @@ use crate::{
     source::animation::{is_named_as_cloud, natural},
 };
 
-/// Time between two looks; what two in a row find the same is taken for whole.
+/// Time between two polls. A file that is the same in two consecutive polls counts as complete.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// A file as it was at a look.
+/// State of a file at a poll.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Seen {
     changed: SystemTime,
@@ -37,7 +36,7 @@ impl Seen {
         Some(Self { changed: data.modified().unwrap_or(SystemTime::UNIX_EPOCH), path, len: data.len() })
     }
 
-    /// The order in which files were written, by names where they were at once.
+    /// Order of writing; files of the same time are ordered by name.
     fn order(&self, other: &Self) -> Ordering {
         let names = || natural(&self.path.to_string_lossy(), &other.path.to_string_lossy());
         self.changed.cmp(&other.changed).then_with(names)
@@ -48,20 +47,20 @@ impl Seen {
     }
 }
 
-/// Watches until nobody wants the points.
+/// Watches until the mailbox is abandoned.
 pub(super) fn watch(path: &Path, options: &ReadOptions, mailbox: &Mailbox) {
     let mut known: Option<Seen> = None;
     let mut before: HashSet<Seen> = HashSet::new();
     while !mailbox.is_abandoned() {
         let files = look(path);
-        // When the newest is taken away, those before it are still those before it.
+        // If the newest file is deleted, older files must not be shown again.
         let follows = |file: &Seen| known.as_ref().is_none_or(|known| file.is_newer(known) || file.path == known.path);
-        // Of those that are whole: behind the newest of them another may always be on its way.
+        // Only complete files count; a newer one may still be in the middle of being written.
         let whole = files.iter().filter(|file| before.contains(*file) && follows(file));
         let newest = whole.max_by(|a, b| a.order(b)).filter(|newest| Some(*newest) != known.as_ref());
         if let Some(newest) = newest {
             let read = guarded(&newest.path, || read(newest, options, mailbox));
-            // What has changed meanwhile is still being written.
+            // A file that changed while it was read is still being written.
             if Seen::of(newest.path.clone()).as_ref() == Some(newest) {
                 let between =
                     |file: &&Seen| known.as_ref().is_some_and(|known| file.is_newer(known)) && newest.is_newer(file);
@@ -79,20 +78,20 @@ pub(super) fn watch(path: &Path, options: &ReadOptions, mailbox: &Mailbox) {
     }
 }
 
-/// The file, or those of the folder or the pattern that may be clouds.
+/// The file, or the files of the folder or pattern that may be clouds.
 fn look(path: &Path) -> Vec<Seen> {
     if let Some(file) = Seen::of(path.into()) {
         return vec![file];
     }
     let files: Vec<PathBuf> = match std::fs::read_dir(path) {
         Ok(entries) => entries.filter_map(|entry| Some(entry.ok()?.path())).collect(),
-        // What is no pattern either is a file that is not there yet.
+        // A name that is not a pattern either is a file that does not exist yet.
         Err(_) => path.to_str().and_then(|name| glob(name).ok()).into_iter().flatten().filter_map(Result::ok).collect(),
     };
     files.into_iter().filter(|file| is_named_as_cloud(file)).filter_map(Seen::of).collect()
 }
 
-/// Reads a file into memory first: mapped, one that is cut shorter meanwhile would end the process.
+/// Reads a file into memory first. If it were mapped and another program shortened it, the process would crash.
 fn read(file: &Seen, options: &ReadOptions, mailbox: &Mailbox) -> Result<PointCloud, Error> {
     let path = &file.path;
     check_memory(&path.display().to_string(), file.len)?;

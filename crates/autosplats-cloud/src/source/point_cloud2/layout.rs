@@ -1,4 +1,4 @@
-//! What a PointCloud2 message says of its points, checked.
+//! Parses and checks the layout of a PointCloud2 message.
 
 use std::borrow::Cow;
 
@@ -8,24 +8,24 @@ use super::{
 };
 use crate::read::{Column, MAX_COLUMNS, Scalar, numbered, shown};
 
-/// Where everything lies in a message.
+/// The layout of a message.
 pub(super) struct Layout<'a> {
     pub(super) stamp: i64,
     pub(super) frame_id: String,
-    /// Points, in all rows.
+    /// Number of points in all rows.
     pub(super) count: usize,
     pub(super) columns: Vec<Column>,
     pub(super) big_endian: bool,
-    /// The byte of the message at which the points begin.
+    /// Offset in the message at which the points begin.
     pub(super) data_at: usize,
     data: &'a [u8],
     height: usize,
-    /// Bytes of the points of a row, and from one row to the next.
+    /// Bytes of the points in a row. `row_step` counts the bytes from one row to the next.
     row: usize,
     row_step: usize,
 }
 
-/// Bytes that a field takes at least: the length of its name, offset, type and count.
+/// Smallest size of a field in bytes: length of the name, offset, type and count.
 const LEAST_FIELD: usize = 13;
 
 impl<'a> Layout<'a> {
@@ -56,7 +56,7 @@ impl<'a> Layout<'a> {
                 format!("{width} × {height} points of {step} bytes are more than any memory"),
             ));
         };
-        // Some programs send an empty message while there is nothing to see, whatever its other numbers are.
+        // Some programs send an empty message, with arbitrary other numbers, while nothing is visible.
         let empty = count == 0 || data.is_empty() && number == 0;
         let mut layout = Self {
             stamp,
@@ -84,9 +84,10 @@ impl<'a> Layout<'a> {
         Ok(layout)
     }
 
-    /// The points without the gaps that may be between rows.
+    /// The points without padding between rows.
     pub(super) fn rows(&self) -> Cow<'a, [u8]> {
-        // The step of a row is often left at 0 or as it was before points were taken out: what does not fit is not meant.
+        // Writers often leave the row step at 0, or at its value before points were removed. A step that does not fit
+        // is ignored.
         let end =
             self.height.saturating_sub(1).checked_mul(self.row_step).and_then(|start| start.checked_add(self.row));
         if self.row_step <= self.row || self.height < 2 || end.is_none_or(|end| end > self.data.len()) {
@@ -97,10 +98,10 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Bytes of a name beyond which it is none.
+/// Maximum length of a field's name in bytes.
 const MAX_NAME: usize = 1024;
 
-/// A field as the message has it.
+/// A field as the message describes it.
 struct Field<'a> {
     at: usize,
     name: Cow<'a, str>,
@@ -119,11 +120,11 @@ impl<'a> Field<'a> {
         let offset = wire.u32("a field's offset")? as usize;
         let datatype = wire.u8("a field's type")?;
         let count = wire.u32("a field's count")? as usize;
-        // Old programs say 0 where they mean one value.
+        // Old programs write 0 for one value.
         Ok(Self { at, name, offset, datatype, count: count.max(1) })
     }
 
-    /// PCL uses the last three, ROS has them since 2025.
+    /// The type of the field's values. PCL uses the last three types, ROS has them since 2025.
     fn scalar(&self) -> Option<Scalar> {
         const SCALARS: [Scalar; 11] = [
             Scalar::I8,
@@ -142,7 +143,8 @@ impl<'a> Field<'a> {
     }
 }
 
-/// The columns of the fields: all within a point of `step` bytes, and together not much larger than it.
+/// The columns of the fields. Fails if a field exceeds a point of `step` bytes, or if all fields together are much
+/// larger than a point.
 fn columns(mut fields: Wire<'_>, number: usize, step: usize) -> Result<Vec<Column>, Fault> {
     let fields_at = fields.at();
     fields.list(LEAST_FIELD, "fields")?;
@@ -166,7 +168,7 @@ fn columns(mut fields: Wire<'_>, number: usize, step: usize) -> Result<Vec<Colum
             columns.push(Column { name, scalar, offset: field.offset + index * scalar.size(), stride: step });
         }
     }
-    // A colour may be there twice, packed and as channels. More than that would be memory for nothing.
+    // A colour may appear twice, packed and as channels. More overlap would only waste memory.
     let total: usize = columns.iter().map(|column| column.scalar.size()).sum();
     if total / 2 > step {
         let what = format!("the fields are {total} bytes of a point of {step}: they lie over one another");

@@ -1,9 +1,9 @@
-//! `sensor_msgs/PointCloud2`, the message in which robots hand points around, of ROS 1 and ROS 2.
+//! `sensor_msgs/PointCloud2`, the message of points in ROS 1 and ROS 2.
 //!
 //! # How it works
 //!
-//! The message says itself where each value of a point lies, so that it is a table of columns as PLY and PCD are. All it says
-//! is checked against the bytes there are before anything is allocated.
+//! The message describes where each value of a point lies, so it is a table of columns like PLY and PCD. All its claims
+//! are checked against its actual length before anything is allocated.
 
 mod layout;
 
@@ -20,32 +20,33 @@ use crate::{
     read::{Job, Table, take_out_no_returns},
 };
 
-/// The points of a message, and what it says of them.
+/// The points of a message, with its header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Message {
-    /// The coordinate frame that the points are in.
+    /// Name of the coordinate frame of the points.
     pub frame_id: String,
-    /// When they were measured, in nanoseconds, mostly since 1970; 0 if nobody said.
+    /// Time of measurement in nanoseconds, usually since 1970; 0 if unknown.
     pub stamp: i64,
     /// The points.
     pub cloud: PointCloud,
-    /// Points at (0, 0, 0), where nothing came back, which were left out.
+    /// Number of points at (0, 0, 0), which mean no return, that were removed.
     pub no_returns: usize,
 }
 
-/// Frames that maps are in: no sensor stands at their origin.
+/// Names of map frames, whose origin is not the position of a sensor.
 const MAPS: [&str; 5] = ["map", "odom", "world", "earth", "utm"];
 
-/// Makes a cloud of a PointCloud2 message: of any layout, of either byte order, rows of an image one after the other.
+/// Converts a PointCloud2 message of any layout and byte order into a cloud. Rows of an organized cloud follow each
+/// other.
 ///
-/// Names of values become those of [`Field`](crate::Field)s as when files are read; of fields of several values each becomes
-/// one, `name_0` and so on, and those of more than 16 are left out. The points are in the message's own frame. That the
-/// sensor stood at its origin is stated unless the frame is called as maps are. `name` stands in messages: of a file, or of
-/// the topic.
+/// Values are named like those of files and become [`Field`](crate::Field)s. A field of several values becomes one per
+/// value, `name_0` and so on; fields of more than 16 values are left out. The points stay in the coordinate frame of
+/// the message. The cloud gets a scan with the sensor at the origin, unless the coordinate frame has the name of a map.
+/// `name` is used in messages: the file or the topic.
 ///
 /// # Errors
-/// [`Error::Malformed`] with the byte of the message that is wrong, and [`Error::OutOfMemory`]. What is read and what is
-/// allocated is bounded by the message's own length, whatever it claims.
+/// [`Error::Malformed`] with the offset of the fault, and [`Error::OutOfMemory`]. Memory and time are bounded by the
+/// length of the message, whatever it claims.
 pub fn decode(name: &Path, bytes: &[u8], encoding: Encoding, options: &ReadOptions) -> Result<Message, Error> {
     let job = Job { path: name, progress: &(), bytes, options, triangles: false };
     let layout = Layout::parse(bytes, encoding).map_err(|fault| job.malformed(fault.place(), &*fault.what))?;
@@ -59,7 +60,7 @@ pub fn decode(name: &Path, bytes: &[u8], encoding: Encoding, options: &ReadOptio
         let table = Table { bytes: &rows, count, big_endian: *big_endian, columns, packed_rgb: true, done: 0.0 };
         table.into_cloud(&job, &place)?
     };
-    // Even all of them: a sensor may see nothing for a while.
+    // A cloud may end up empty: a sensor may see nothing for a while.
     let no_returns = take_out_no_returns(&mut cloud, |_| !options.keep_no_returns);
     let axes = if frame_id.contains("optical") { Axes::Camera } else { Axes::ZUp };
     let mut cloud = cloud.with_axes(axes);
@@ -71,14 +72,14 @@ pub fn decode(name: &Path, bytes: &[u8], encoding: Encoding, options: &ReadOptio
     Ok(Message { frame_id: frame_id.clone(), stamp: *stamp, cloud, no_returns })
 }
 
-/// Time stamp and frame of a message, without its points.
+/// Time stamp and coordinate frame of a message, without its points.
 pub(crate) fn stamp_and_frame(bytes: &[u8], encoding: Encoding) -> Option<(i64, String)> {
     let mut wire = Wire::message(bytes, encoding).ok()?;
     let (stamp, frame) = header(&mut wire, encoding).ok()?;
     Some((stamp, frame_name(&frame)))
 }
 
-/// ROS 1 once wrote a slash before the names of frames; they are the same ones.
+/// Normalizes the name of a coordinate frame: ROS 1 put a slash before it.
 pub(crate) fn frame_name(name: &str) -> String {
     message(name.strip_prefix('/').unwrap_or(name))
 }

@@ -1,4 +1,4 @@
-//! The records of ROS 1 bags, version 2.0.
+//! Records of ROS 1 bags, version 2.0.
 
 use super::{
     chunk::Chunk,
@@ -6,10 +6,10 @@ use super::{
 };
 use crate::source::wire::{Fault, Wire};
 
-/// What files begin with.
+/// First bytes of a bag.
 pub(super) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 
-/// Bags have no state: what a record is stands in it by name.
+/// Parser of bag records. Bags need no state, because each record has named fields.
 pub(super) struct Bag;
 
 /// Kinds of records.
@@ -21,7 +21,7 @@ mod op {
     pub(super) const CONNECTION: u8 = 7;
 }
 
-/// A message's time, in two numbers, and its place.
+/// Bytes of an index entry: the time in two numbers, and the offset.
 const ENTRY: usize = 12;
 
 impl Bag {
@@ -29,10 +29,10 @@ impl Bag {
         let mut wire = Wire::plain(bytes, at);
         let header = Header(wire.bytes("a record's header")?);
         let kind = header.number::<1>(b"op").map(|[kind]| kind);
-        let kind = kind.ok_or_else(|| Fault::new(at, "a record does not say what it is; what follows is lost"))?;
+        let kind = kind.ok_or_else(|| Fault::new(at, "a record has no kind; everything after it is lost"))?;
         let connection = || {
             let number = header.number(b"conn").map(u32::from_le_bytes);
-            number.ok_or_else(|| Fault::new(at, "a record does not say which topic it is of; what follows is lost"))
+            number.ok_or_else(|| Fault::new(at, "a record names no topic; everything after it is lost"))
         };
         let len = wire.u32("a record")? as usize;
         let start = wire.at();
@@ -41,7 +41,7 @@ impl Bag {
             let compression = String::from_utf8_lossy(header.value(b"compression").unwrap_or_default()).into_owned();
             let left = wire.left();
             let cut = (len > left).then(|| {
-                Fault::new(at, format!("a chunk of {len} bytes is cut off after {left}; what follows is lost"))
+                Fault::new(at, format!("a chunk of {len} bytes is cut off after {left}; everything after it is lost"))
             });
             let data = start..start + len.min(left);
             let end = data.end;
@@ -63,7 +63,7 @@ impl Bag {
                 });
                 Record::Index(connection()?, entries.collect())
             }
-            // What each chunk holds, behind all else of a bag that was closed.
+            // Summary of a chunk. These records follow all others in a bag that was closed properly.
             op::CHUNK_INFO => Record::End,
             _ => Record::Other,
         };
@@ -71,13 +71,13 @@ impl Bag {
     }
 }
 
-/// Seconds and nanoseconds to nanoseconds.
+/// Converts seconds and nanoseconds to nanoseconds.
 fn time(raw: [u8; 8]) -> i64 {
     let [seconds, nanoseconds] = bytemuck::cast::<[u8; 8], [[u8; 4]; 2]>(raw).map(u32::from_le_bytes);
     i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds)
 }
 
-/// Values by their names.
+/// Fields of a record header by name.
 struct Header<'a>(&'a [u8]);
 
 impl<'a> Header<'a> {

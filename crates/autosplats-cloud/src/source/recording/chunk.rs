@@ -1,37 +1,37 @@
-//! Pieces of a recording, mostly compressed.
+//! Chunks of a recording, usually compressed.
 
 use std::{borrow::Cow, io::Read, ops::Range};
 
 use crate::{memory::check_memory, read::guard, source::wire::Fault};
 
-/// A run of records that is compressed as one.
+/// A sequence of records that is compressed as a whole.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
-    /// Bytes of the file that hold it, compressed.
+    /// Range of the file that holds the chunk's data, compressed.
     pub(super) data: Range<usize>,
-    /// Bytes it has unpacked, as the file claims.
+    /// Size after decompression in bytes, as claimed by the file.
     pub(super) size: u64,
-    /// CRC-32 of what it has unpacked; 0 if the file has none.
+    /// CRC-32 of the decompressed data; 0 if unknown.
     pub(super) crc: u32,
     pub(super) compression: String,
-    /// The file ends inside of it.
+    /// The fault, if the file ends inside the chunk.
     pub(super) cut: Option<Fault>,
 }
 
-/// The records of a chunk. Of one that is cut off, what can be had: perhaps not whole records.
+/// The records of a chunk. A chunk that is cut off gives what can be decompressed, perhaps not whole records.
 ///
-/// No more is allocated than there is in it, whatever it claims.
+/// Allocates no more than the chunk really contains, whatever it claims.
 pub(super) fn unpack<'a>(file: &'a [u8], chunk: &Chunk) -> Result<Cow<'a, [u8]>, String> {
     let data = file.get(chunk.data.clone()).ok_or("it does not lie within the file")?;
     if chunk.compression.is_empty() || chunk.compression == "none" {
         if chunk.size != data.len() as u64 && chunk.cut.is_none() {
-            return Err(format!("it has {} bytes and claims {}", data.len(), chunk.size));
+            return Err(format!("it has {} bytes but claims {}", data.len(), chunk.size));
         }
         check(data, chunk)?;
         return Ok(Cow::Borrowed(data));
     }
     check_memory("a chunk of the recording", chunk.size).map_err(|error| error.to_string())?;
-    // Claims beyond that are believed as far as they come true.
+    // Claims of a larger size count only as far as the data confirm them.
     let mut content = Vec::with_capacity((chunk.size as usize).min(data.len().saturating_mul(64)));
     let mut read = |decoder: &mut dyn Read| {
         let outcome = decoder.take(chunk.size).read_to_end(&mut content);
@@ -44,7 +44,7 @@ pub(super) fn unpack<'a>(file: &'a [u8], chunk: &Chunk) -> Result<Cow<'a, [u8]>,
         other => Err(format!("it is compressed by '{}', which is not read", crate::read::shown(other.as_bytes()))),
     })?;
     if content.len() as u64 != chunk.size && chunk.cut.is_none() {
-        return Err(format!("it makes {} bytes and claims {}", content.len(), chunk.size));
+        return Err(format!("it unpacks to {} bytes but claims {}", content.len(), chunk.size));
     }
     check(&content, chunk)?;
     Ok(Cow::Owned(content))
@@ -58,16 +58,16 @@ fn check(content: &[u8], chunk: &Chunk) -> Result<(), String> {
     }
 }
 
-/// Zstandard frames one after the other.
+/// Consecutive Zstandard frames.
 struct Zstd<'a> {
     data: &'a [u8],
     frame: Option<Box<ruzstd::decoding::StreamingDecoder<&'a [u8], ruzstd::decoding::FrameDecoder>>>,
 }
 
-/// A frame may ask for a window of this size, and of more if it is large itself.
+/// Maximum window of a frame in bytes. Large frames may ask for more.
 const WINDOW: u64 = 16 << 20;
 
-/// Bytes unpacked at once.
+/// Bytes decompressed at once.
 const STEP: usize = 1 << 17;
 
 impl Read for Zstd<'_> {
@@ -75,7 +75,7 @@ impl Read for Zstd<'_> {
         use ruzstd::decoding::StreamingDecoder;
         loop {
             if let Some(mut frame) = self.frame.take() {
-                // Of a frame that is cut off, no more is lost than this.
+                // A frame that is cut off loses at most this many bytes.
                 let len = buffer.len().min(STEP);
                 let read = frame.read(&mut buffer[..len])?;
                 if read > 0 || buffer.is_empty() {

@@ -14,18 +14,18 @@ use crate::{
     source::wire::ZSTD,
 };
 
-/// One file, mapped, and what is where in it.
+/// A mapped file and its index.
 pub(super) struct File {
     pub(super) path: PathBuf,
     pub(super) bytes: Bytes,
     pub(super) index: Index,
     pub(super) container: Container,
-    /// The chunk that was read last: messages are next to each other.
+    /// The chunk read last, since consecutive messages usually share a chunk.
     unpacked: Option<(usize, Result<Unpacked, String>)>,
 }
 
 enum Unpacked {
-    /// As it lies in the file.
+    /// Not compressed: the records lie in the file.
     There,
     Made(Vec<u8>),
 }
@@ -51,12 +51,12 @@ impl File {
                 job.unsupported(CONVERT)
             } else if bytes.starts_with(b"#ROSBAG") {
                 job.unsupported(
-                    "bags older than version 2.0 are not read; 'rosbag fix' or 'rosbag reindex' renews them",
+                    "bags older than version 2.0 are not supported; convert this one with 'rosbag fix' or 'rosbag reindex'",
                 )
             } else if bytes.starts_with(ZSTD) {
                 job.unsupported("the whole file is compressed; 'zstd -d' unpacks it")
             } else {
-                job.malformed("byte 0", "this begins neither an MCAP file nor a ROS 1 bag")
+                job.malformed("byte 0", "the file is neither an MCAP file nor a ROS 1 bag")
             });
         };
         let index = Index::of(&mut container, &bytes, first, progress)?;
@@ -79,7 +79,7 @@ impl File {
             Some(number) => {
                 let chunk = &index.chunks[number];
                 if unpacked.as_ref().is_none_or(|(last, _)| *last != number) {
-                    // The last one's memory is free before more is taken.
+                    // Frees the memory of the last chunk before the next one is unpacked.
                     *unpacked = None;
                     let content = unpack(bytes, chunk).map(|content| match content {
                         std::borrow::Cow::Borrowed(_) => Unpacked::There,
@@ -96,26 +96,27 @@ impl File {
         };
         match container.record(records, place.at) {
             Ok((Record::Message(number, _, data), _)) if index.numbers.get(&number) == Some(&place.topic) => Ok(data),
-            Ok(_) => Err(malformed("the index leads to something that is no message of its topic")),
+            Ok(_) => Err(malformed("the index points to something that is not a message of its topic")),
             Err(fault) => Err(malformed(&fault.what)),
         }
     }
 
-    /// The byte of the file at which a message is, or the chunk that it is in.
+    /// Offset in the file of a message, or of the chunk that contains it.
     pub(super) fn offset(&self, place: &Place) -> usize {
         place.chunk.map_or(place.at, |chunk| self.index.chunks[chunk].data.start)
     }
 }
 
-/// What databases of SQLite begin with, and what they are told.
+/// First bytes of an SQLite database. `CONVERT` is the advice for users of such files.
 const SQLITE: &[u8] = b"SQLite format 3\0";
 const CONVERT: &str =
-    "ROS 2 bags in SQLite are not read; 'ros2 bag convert' or 'mcap convert' makes an MCAP file of one";
+    "ROS 2 bags in SQLite are not supported; convert this one to MCAP with 'ros2 bag convert' or 'mcap convert'";
 
-/// What the folder of a ROS 2 bag is known by.
+/// File that identifies the folder of a ROS 2 bag.
 const METADATA: &str = "metadata.yaml";
 
-/// Whether a path is one that [`Recording::open`](super::Recording::open) is for: by its name, or as a folder by what is in it.
+/// Whether [`Recording::open`](super::Recording::open) can open a path: by the extension of a file, or by the content
+/// of a folder.
 pub fn is_recording(path: &Path) -> bool {
     path.join(METADATA).is_file() || ["mcap", "bag", "db3"].iter().any(|extension| has_extension(path, extension))
 }
@@ -124,14 +125,14 @@ fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }
 
-/// The files of a recording, and what is the matter with those of a folder that cannot be opened.
+/// The files of a recording, and messages about the files of a folder that cannot be opened.
 pub(super) struct Parts {
     pub(super) files: Vec<File>,
-    /// A line for each.
+    /// One line per file.
     pub(super) missing: Vec<String>,
 }
 
-/// A file, or all of a folder in order. Of a folder whatever can be opened is played.
+/// Opens a file, or all files of a folder in order. Files of a folder that cannot be opened are left out.
 pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Parts, Error> {
     if !path.is_dir() {
         return Ok(Parts { files: vec![File::open(path, progress)?], missing: Vec::new() });
@@ -166,7 +167,7 @@ pub(super) fn open_files(path: &Path, progress: &dyn Progress) -> Result<Parts, 
     }
 }
 
-/// The files that `metadata.yaml` lists: of YAML no more is needed than the lines of one list.
+/// The files listed in `metadata.yaml`. Parses only the lines of that list instead of YAML.
 fn parts(metadata: &str) -> Vec<String> {
     let lines = metadata.lines().skip_while(|line| line.trim() != "relative_file_paths:").skip(1);
     let items = lines.map_while(|line| line.trim().strip_prefix("- "));

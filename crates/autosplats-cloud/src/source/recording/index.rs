@@ -1,4 +1,4 @@
-//! Where the messages of a file are: what MCAP and bags have in common.
+//! The index of a recording: positions of messages, in the same form for MCAP files and bags.
 
 use std::{collections::HashMap, ops::Range};
 
@@ -14,11 +14,11 @@ use crate::{
     source::wire::{Encoding, Fault},
 };
 
-/// What a topic's messages are good for.
+/// What the messages of a topic are used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Kind {
     Points,
-    /// Transforms between frames; fixed ones hold at all times.
+    /// Transforms between coordinate frames. Fixed transforms hold at all times.
     Transforms {
         fixed: bool,
     },
@@ -35,7 +35,7 @@ pub(super) struct Topic {
 }
 
 impl Topic {
-    /// `encoding` is as the recording calls it: `ros1`, `cdr` or something else.
+    /// Creates a topic. `encoding` is the name used in the recording: `ros1`, `cdr` or another one.
     pub(super) fn new(name: &str, type_name: &str, encoding: &str) -> Self {
         let encoding = match encoding {
             "ros1" => Some(Encoding::Ros1),
@@ -54,39 +54,39 @@ impl Topic {
     }
 }
 
-/// Where a message is.
+/// Position of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
-    /// When it was recorded, in nanoseconds since 1970.
+    /// Time of recording in nanoseconds since 1970.
     pub(super) time: i64,
     pub(super) file: usize,
     pub(super) topic: usize,
     pub(super) chunk: Option<usize>,
-    /// Byte of its record, in the chunk unpacked or in the file.
+    /// Offset of the message's record, in the unpacked chunk or in the file.
     pub(super) at: usize,
 }
 
-/// A record, as far as it matters here.
+/// A record, reduced to what is needed here.
 pub(super) enum Record<'a> {
-    /// Messages of this number are of this topic.
+    /// Assigns a topic to a message number.
     Topic(u32, Topic),
     Chunk(Chunk),
-    /// Times and places, in the chunk before, of messages of this number.
+    /// Times and offsets, in the preceding chunk, of the messages with a number.
     Index(u32, Vec<(i64, usize)>),
     Message(u32, i64, &'a [u8]),
-    /// The recording was closed properly.
+    /// End of a recording that was closed properly.
     End,
     Other,
 }
 
-/// How records are written.
+/// File format of the records.
 pub(super) enum Container {
     Mcap(Mcap),
     Bag(Bag),
 }
 
 impl Container {
-    /// The container and the byte of its first record, by what the file begins with.
+    /// Detects the container from the first bytes of a file. Also returns the offset of its first record.
     pub(super) fn of(bytes: &[u8]) -> Option<(Self, usize)> {
         if bytes.starts_with(super::mcap::MAGIC) {
             Some((Self::Mcap(Mcap::default()), super::mcap::MAGIC.len()))
@@ -97,7 +97,7 @@ impl Container {
         }
     }
 
-    /// The record at a byte, and the byte behind it.
+    /// The record at an offset, and the offset of the next record.
     pub(super) fn record<'a>(&mut self, bytes: &'a [u8], at: usize) -> Result<(Record<'a>, usize), Fault> {
         match self {
             Self::Mcap(mcap) => mcap.record(bytes, at),
@@ -113,27 +113,27 @@ impl Container {
     }
 }
 
-/// All that is known of a file without its points.
+/// Everything known about a file without its points.
 #[derive(Debug, Default)]
 pub(super) struct Index {
     pub(super) topics: Vec<Topic>,
-    /// Messages of each topic, those that are not played included.
+    /// Number of messages per topic, including topics that are not played.
     pub(super) counts: Vec<u64>,
-    /// Topics by the numbers that messages have for them.
+    /// Topics by the numbers that messages use.
     pub(super) numbers: HashMap<u32, usize>,
-    /// Messages of points and of transforms, in the file's order.
+    /// Messages of points and of transforms, in file order.
     pub(super) messages: Vec<Place>,
     pub(super) chunks: Vec<Chunk>,
-    /// When the first and the last message was recorded.
+    /// Times of the first and the last message.
     pub(super) times: Option<Range<i64>>,
     /// What cannot be played, and why.
     pub(super) faults: Vec<Fault>,
 }
 
-/// Records between two looks at the caller's wish to stop.
+/// Number of records between two checks for cancellation.
 const BLOCK: usize = 1 << 12;
 
-/// Faults told one by one; the rest are counted with them.
+/// Maximum number of separately reported faults; further faults are only counted.
 const MAX_FAULTS: usize = 8;
 
 impl Index {
@@ -165,9 +165,9 @@ impl Index {
             }
         }
         if cut.is_none() && !walk.ended {
-            cut = Some(Fault::new(at, "the recording ends without an end; it was not closed or is cut off"));
+            cut = Some(Fault::new(at, "the recording has no end record; it was not closed or is cut off"));
         }
-        // What was to follow the last chunk is not there either, or not all of it.
+        // The index records after the last chunk are missing too, at least in part.
         if let Some(fault) = cut {
             if !walk.ended
                 && let Some(last) = walk.indexed.last_mut()
@@ -180,12 +180,12 @@ impl Index {
     }
 }
 
-/// What has been seen on the way through a file.
+/// State of the walk through a file.
 #[derive(Default)]
 struct Walk {
     topics: HashMap<u32, Topic>,
     chunks: Vec<Chunk>,
-    /// Messages of each chunk by their topics' numbers, if records behind the chunk say them.
+    /// Messages of each chunk by the numbers of their topics, if index records follow the chunk.
     indexed: Vec<Option<Vec<(u32, i64, usize)>>>,
     /// Messages outside of chunks.
     loose: Vec<(u32, i64, usize)>,
@@ -217,7 +217,7 @@ impl Walk {
         }
     }
 
-    /// Looks into the chunks that nothing is known of, and puts everything together.
+    /// Unpacks the chunks that have no index, and builds the index of the file.
     fn settle(mut self, container: &mut Container, bytes: &[u8], progress: &dyn Progress) -> Result<Index, Error> {
         let mut index = Index { chunks: self.chunks, faults: self.faults, ..Index::default() };
         let mut more = 0;
@@ -243,7 +243,7 @@ impl Walk {
                 }
                 Ok(())
             });
-            // That a chunk is cut has been said.
+            // A chunk that is cut off has been reported already.
             if let Err(what) = outcome.as_ref()
                 && chunk.cut.is_none()
             {
@@ -258,7 +258,7 @@ impl Walk {
 
         let mut ids: Vec<_> = self.topics.into_iter().collect();
         ids.sort_unstable_by_key(|(id, _)| *id);
-        // Several writers may have given one topic several numbers.
+        // Several writers may have numbered the same topic differently.
         let mut known: HashMap<Topic, usize> = HashMap::new();
         for (id, topic) in ids {
             let at = *known.entry(topic.clone()).or_insert_with(|| {

@@ -1,4 +1,4 @@
-//! The records of MCAP files.
+//! Records of MCAP files.
 
 use std::collections::HashMap;
 
@@ -8,16 +8,16 @@ use super::{
 };
 use crate::source::wire::{Fault, Wire};
 
-/// What files begin and end with.
+/// First and last bytes of an MCAP file.
 pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// What records before mean for those that follow: names of types by their numbers.
+/// State carried from record to record: names of message types by number.
 #[derive(Default)]
 pub(super) struct Mcap {
     schemas: HashMap<u16, String>,
 }
 
-/// Kinds of records; the others do not matter here.
+/// Kinds of records that are needed here.
 mod op {
     pub(super) const FOOTER: u8 = 2;
     pub(super) const SCHEMA: u8 = 3;
@@ -27,10 +27,10 @@ mod op {
     pub(super) const MESSAGE_INDEX: u8 = 7;
 }
 
-/// Bytes of kind and length.
+/// Bytes of a record's kind and length.
 const HEAD: usize = 9;
 
-/// A message's time in two numbers.
+/// Bytes of an index entry: time and offset.
 const ENTRY: usize = 16;
 
 impl Mcap {
@@ -42,13 +42,13 @@ impl Mcap {
         let end = usize::try_from(len).ok().filter(|len| *len <= left).map(|len| at + HEAD + len);
         let Some(end) = end else {
             let fault =
-                Fault::new(at, format!("a record of {len} bytes is cut off after {left}; what follows is lost"));
+                Fault::new(at, format!("a record of {len} bytes is cut off after {left}; everything after it is lost"));
             return if kind == op::CHUNK { chunk(bytes, at + HEAD, Some(fault)) } else { Err(fault) };
         };
         let record = &bytes[..end];
         let mut wire = Wire::plain(record, at + HEAD);
         let record = match kind {
-            0 => return Err(Fault::new(at, "zeros stand where records should; what follows is lost")),
+            0 => return Err(Fault::new(at, "there are zeros in place of records; everything after them is lost")),
             op::FOOTER => Record::End,
             op::SCHEMA => {
                 let number = wire.u16("a schema")?;
@@ -89,7 +89,7 @@ impl Mcap {
     }
 }
 
-/// A chunk whose record ends with the bytes.
+/// Parses a chunk whose record ends with `bytes`.
 fn chunk(bytes: &[u8], at: usize, cut: Option<Fault>) -> Result<(Record<'_>, usize), Fault> {
     let mut wire = Wire::plain(bytes, at);
     for _ in 0..2 {

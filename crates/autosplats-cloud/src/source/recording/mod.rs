@@ -1,11 +1,12 @@
-//! Recordings of robots: MCAP, ROS 1 bags and folders of ROS 2, played by their index.
+//! Recordings of robots: MCAP files, ROS 1 bags and folders of ROS 2 bags, played by their index.
 //!
 //! # How it works
 //!
-//! A file is mapped, and its records are walked from front to end without a look into its chunks: what follows each chunk says
-//! which messages are in it and when. That is an [`Index`](index::Index), the same for all containers. Chunks that nothing is
-//! said of, as when a file is cut off, are unpacked for it. The transforms between the sensors' frames are read at once,
-//! points only when they are played, a message at a time.
+//! A file is mapped, and its records are walked from front to end without unpacking chunks. Index records after each
+//! chunk tell which messages it contains, with their times. The result is an [`Index`](index::Index), the same for all
+//! containers. Chunks without index records, for instance in a file that is cut off, are unpacked to index them.
+//! Transforms between coordinate frames are read when the recording is opened. Points are read only when they are
+//! played, one message at a time.
 
 mod bag;
 mod chunk;
@@ -14,7 +15,7 @@ mod index;
 mod mcap;
 mod play;
 mod summary;
-#[cfg_attr(not(feature = "zenoh"), allow(dead_code, reason = "transforms are heard as they are sent over Zenoh alone"))]
+#[cfg_attr(not(feature = "zenoh"), allow(dead_code, reason = "only Zenoh receives live transforms"))]
 pub(super) mod transforms;
 
 use std::{collections::HashMap, path::Path};
@@ -37,51 +38,51 @@ use crate::{
     progress::{Part, tick},
 };
 
-/// What is played of a recording, and how.
+/// Options of [`Recording::open`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingOptions {
-    /// The topics of points to play, each a channel in this order; all of them, by name, if there are none.
+    /// Topics of points to play, each as a channel in this order. Empty: all topics with points, sorted by name.
     pub topics: Vec<String>,
-    /// The coordinate frame that all points are brought into; the topmost one that the sensors share if there is none.
+    /// Coordinate frame to transform all points into. Default `None`: the root of the tree of frames above the sensors.
     pub frame: Option<String>,
-    /// How points are read.
+    /// How to read points.
     pub read: ReadOptions,
 }
 
-/// The points of a recording, a message after the other.
+/// The points of a recording, one message after the other.
 ///
-/// Its [timeline](crate::Stream::timeline) has the times at which messages were recorded; each
-/// [update](crate::Update) has the time at which its points were measured, where the message says so.
+/// The [timeline](crate::Stream::timeline) has the times of recording. Each [update](crate::Update) has the time of
+/// measurement if its message states one.
 pub struct Recording {
     files: Vec<File>,
     options: RecordingOptions,
     summary: RecordingSummary,
-    /// Topics that are played, by name.
+    /// Topics that are played, one per channel.
     channels: Vec<String>,
-    /// Messages of points, in the order of time, and which channel each is of.
+    /// Messages of points sorted by time, with their channels.
     frames: Vec<(Place, usize)>,
     timeline: Timeline,
     transforms: Transforms,
     position: usize,
     statistics: Statistics,
-    /// Channels of which something was told that need not be told again.
+    /// Channels that have reported a note. Each channel reports only one.
     told: Vec<bool>,
 }
 
 impl Recording {
-    /// Opens an MCAP file, a ROS 1 bag or the folder of a ROS 2 bag. No points are read yet, but all transforms.
+    /// Opens an MCAP file, a ROS 1 bag or the folder of a ROS 2 bag. Reads all transforms, but no points yet.
     ///
-    /// What cannot be played, as the end of a recording that was cut off or a part that a folder lacks, is told as a
-    /// [note](Progress::note) and counted as [refused](Statistics::refused).
+    /// Parts that cannot be played, such as the end of a file that is cut off or a missing file of a folder, are
+    /// reported as [notes](Progress::note) and counted as [refused](Statistics::refused).
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Malformed`] if nothing can be played, [`Error::Unsupported`] if it has no such points, and
-    /// [`Error::Cancelled`].
+    /// [`Error::Io`], [`Error::Malformed`] if nothing can be played, [`Error::Unsupported`] if there are no points or
+    /// topics asked for are missing, and [`Error::Cancelled`].
     pub fn open(path: &Path, options: &RecordingOptions, progress: &dyn Progress) -> Result<Self, Error> {
         Self::of(path, open_files(path, &indexing(progress))?, options, progress)
     }
 
-    /// [Opens](Self::open) a recording from the bytes of a file, whose name stands in messages.
+    /// [Opens](Self::open) a recording from the bytes of a file. `name` is used in messages.
     ///
     /// # Errors
     /// Those of [`open`](Self::open).
@@ -110,7 +111,9 @@ impl Recording {
         if !options.topics.is_empty() {
             if let Some(missing) = options.topics.iter().find(|name| !channels.contains(name)) {
                 let there = channels.join(", ");
-                return Err(unsupported(format!("no points are recorded as '{missing}'; topics with points: {there}")));
+                return Err(unsupported(format!(
+                    "no topic with points is called '{missing}'; topics with points: {there}"
+                )));
             }
             channels.clone_from(&options.topics);
         }
@@ -152,7 +155,7 @@ impl Recording {
         Ok(Self { files, options, summary, channels, frames, timeline, transforms, position: 0, statistics, told })
     }
 
-    /// What is in the recording.
+    /// Summary of the recording.
     pub fn summary(&self) -> &RecordingSummary {
         &self.summary
     }
@@ -163,7 +166,7 @@ impl Recording {
     }
 }
 
-/// The frames of the channels' sensors, in their order, as the first messages that can be read say.
+/// Coordinate frames of the channels' sensors, in order of channels, from the first readable message of each.
 fn sensors(files: &mut [File], frames: &[(Place, usize)], channels: usize) -> Vec<String> {
     let mut found: Vec<Result<String, usize>> = vec![Err(0); channels];
     let mut open = channels;
@@ -188,20 +191,20 @@ fn sensors(files: &mut [File], frames: &[(Place, usize)], channels: usize) -> Ve
     found.into_iter().flatten().collect()
 }
 
-/// Part of opening that finding the messages is; the rest is reading transforms.
+/// Share of the progress of opening that indexing takes; reading transforms is the rest.
 const INDEXING: f32 = 0.5;
 
 fn indexing(progress: &dyn Progress) -> Part<'_> {
     Part { whole: progress, start: 0.0, len: INDEXING }
 }
 
-/// Messages of a topic that are looked at for the frame of its sensor.
+/// Maximum number of messages per topic that are tried to find the sensor's coordinate frame.
 const FIRST: usize = 8;
 
-/// What is in a recording, without its points.
+/// Summary of a recording, without reading points.
 ///
 /// # Errors
-/// Those of [`Recording::open`]; that there are no points is none.
+/// Those of [`Recording::open`], except that a recording without points is no error.
 pub fn describe_recording(path: &Path, progress: &dyn Progress) -> Result<RecordingSummary, Error> {
     match Recording::open(path, &RecordingOptions::default(), progress) {
         Ok(recording) => Ok(recording.summary),

@@ -1,4 +1,4 @@
-//! Messages to updates, as a stream.
+//! Plays messages as the updates of a stream.
 
 use std::time::Duration;
 

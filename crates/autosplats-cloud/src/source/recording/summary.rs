@@ -1,4 +1,4 @@
-//! What is in a recording, for people.
+//! Summary of a recording for display.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -7,20 +7,20 @@ use super::{
     index::{Kind, Topic},
 };
 
-/// What is in a recording, as far as it is known without its points.
+/// Content of a recording, as far as known without its points.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingSummary {
-    /// Container and compression: `MCAP, zstd`.
+    /// Container and compressions, for instance `MCAP, zstd`.
     pub format: String,
-    /// All topics, by name.
+    /// All topics, sorted by name.
     pub topics: Vec<RecordingTopic>,
-    /// When the first message was recorded, in nanoseconds since 1970.
+    /// Time of the first message in nanoseconds since 1970.
     pub start: i64,
-    /// From the first message to the last.
+    /// Time from the first message to the last.
     pub duration: Duration,
-    /// The coordinate frames of sensors and transforms, by name.
+    /// Coordinate frames of sensors and transforms, sorted by name.
     pub frames: Vec<String>,
-    /// The frame that points are brought into; none if no transforms are known.
+    /// Coordinate frame that points are transformed into; `None` without transforms.
     pub frame: Option<String>,
     /// What cannot be played, and why.
     pub notes: Vec<String>,
@@ -29,17 +29,17 @@ pub struct RecordingSummary {
 /// Messages of one name and type.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingTopic {
-    /// Name, as `/lidar/points`.
+    /// Name, for instance `/lidar/points`.
     pub name: String,
-    /// Type, as `sensor_msgs/msg/PointCloud2`.
+    /// Type, for instance `sensor_msgs/msg/PointCloud2`.
     pub type_name: String,
     /// Number of messages.
     pub messages: u64,
-    /// Whether they are points that can be played.
+    /// Whether the messages are points that can be played.
     pub points: bool,
 }
 
-/// Topics that a message lists.
+/// Maximum number of topics listed in a message.
 const LISTED: usize = 20;
 
 impl RecordingSummary {
@@ -85,7 +85,7 @@ impl RecordingSummary {
         self.topics.iter().filter(|topic| topic.points)
     }
 
-    /// All topics and their types, for a message.
+    /// All topics with their types, for a message.
     pub(super) fn topic_names(&self) -> String {
         let names = self.topics.iter().take(LISTED).map(|topic| format!("{} ({})", topic.name, topic.type_name));
         let more = self.topics.len().saturating_sub(LISTED);

@@ -1,4 +1,4 @@
-//! Where the frames of a robot are to each other, at any time.
+//! Transforms between the coordinate frames of a robot, at any time.
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
@@ -24,34 +24,34 @@ use crate::{
     },
 };
 
-/// A tree of frames, each within its parent as that was measured at some times.
+/// A tree of coordinate frames, each with its poses in its parent over time.
 #[derive(Debug, Default)]
 pub(in crate::source) struct Transforms {
     edges: BTreeMap<String, Edge>,
-    /// The frame that all points are brought into.
+    /// The frame that all points are transformed into.
     target: Option<String>,
 }
 
-/// A frame within its parent.
+/// A frame in its parent.
 #[derive(Debug)]
 struct Edge {
     parent: String,
-    /// The same at all times.
+    /// Whether the pose is the same at all times.
     fixed: bool,
-    /// By time.
+    /// Poses sorted by time.
     poses: VecDeque<(i64, Pose)>,
-    /// Of poses that come as they are sent.
+    /// Clock of poses that are received live.
     clock: Clock,
 }
 
-/// Maps a frame to its parent.
+/// A rigid transform from a frame to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pose {
     rotation: DQuat,
     translation: DVec3,
 }
 
-/// One pose as a message has it.
+/// One pose from a message.
 struct Sample {
     stamp: i64,
     parent: String,
@@ -59,26 +59,26 @@ struct Sample {
     pose: Pose,
 }
 
-/// Bytes that a transform takes at least: times, lengths of names, seven numbers.
+/// Smallest size of a transform in bytes: time, lengths of names, seven numbers.
 const LEAST_TRANSFORM: usize = 72;
 
-/// Chunks that are read at the same time.
+/// Number of chunks read in parallel.
 const BATCH: usize = 16;
 
-/// Poses that are heard are kept for so long, by their stamps: points come later than they were measured, by less than this.
+/// How long live poses are kept, by their stamps. Longer than the delay between measurement and arrival of points.
 const KEPT: Duration = Duration::from_secs(10);
-/// Poses of a frame that are kept at most: a thousand a second.
+/// Maximum number of live poses kept per frame: a thousand per second.
 const MOST_POSES: usize = 10_000;
-/// Frames that are known at most: whoever makes up more is no robot.
+/// Maximum number of live frames; more do not occur on robots.
 const MOST_FRAMES: usize = 4096;
 
-/// No place on Earth, nor around it, is further from another than this, in metres.
+/// Upper bound of a valid coordinate of a translation, in metres; far beyond any place on or around Earth.
 const FARTHEST: f64 = 1e12;
 
 impl Transforms {
-    /// All transforms of a recording.
+    /// Reads all transforms of a recording.
     pub(super) fn read(files: &[File], progress: &dyn Progress) -> Result<Self, Error> {
-        // Messages of one chunk after the other, so that each is unpacked once.
+        // Groups consecutive messages of one chunk, so that each chunk is unpacked once.
         let mut runs: Vec<Vec<Place>> = Vec::new();
         for (number, File { index, .. }) in files.iter().enumerate() {
             let own = index.messages.iter().filter(|place| index.topics[place.topic].kind != Kind::Points);
@@ -115,7 +115,7 @@ impl Transforms {
 
     fn insert(&mut self, fixed: bool, Sample { stamp, parent, child, pose }: Sample) {
         let edge = self.edges.entry(child).or_insert_with(|| Edge::new(parent, fixed));
-        // One that is said to be fixed and moves nevertheless, moves; of several fixed ones the last is meant.
+        // A frame with both fixed and moving transforms counts as moving. Of several fixed transforms the last counts.
         match (edge.fixed, fixed) {
             (false, true) => return,
             (true, _) => edge.poses.clear(),
@@ -125,8 +125,8 @@ impl Transforms {
         edge.poses.push_back((stamp, pose));
     }
 
-    /// Takes a message as it is sent, in any order. Of each frame the poses of the last ten seconds are kept; a clock that was
-    /// set back begins anew.
+    /// Takes a live message, in any order. Keeps the poses of the last ten seconds of each frame. Starts anew if a
+    /// clock was set back.
     pub(in crate::source) fn hear(&mut self, message: &[u8], fixed: bool, arrival: i64) -> Result<(), String> {
         let samples = parse(message, Encoding::Cdr, arrival);
         let samples = samples.map_err(|fault| format!("{}: {}", fault.place(), fault.what))?;
@@ -143,12 +143,13 @@ impl Transforms {
         Ok(())
     }
 
-    /// Whether a frame is a part of the tree.
+    /// Whether a frame is part of the tree.
     pub(in crate::source) fn knows(&self, frame: &str) -> bool {
         self.edges.contains_key(frame) || self.edges.values().any(|edge| edge.parent == frame)
     }
 
-    /// Chooses the frame that points of these sensors' frames are brought into: the wanted one, or the topmost.
+    /// Chooses the frame to transform points into: `wanted`, or else the root above the first of the `sensors` that is
+    /// part of the tree.
     pub(in crate::source) fn choose(&mut self, sensors: &[String], wanted: Option<String>) -> Result<(), String> {
         if let Some(wanted) = wanted {
             let known = self.frames(sensors);
@@ -158,7 +159,7 @@ impl Transforms {
             self.target = Some(wanted);
             return Ok(());
         }
-        // Without any transforms there is nothing to bring into one frame, nor of a sensor outside of the tree.
+        // Without transforms, and for sensors outside of the tree, there is no common frame.
         let mut inside = sensors.iter().filter(|sensor| self.knows(sensor));
         self.target = inside.find_map(|sensor| Some(self.to_root(sensor, 0)?.1.to_owned()));
         Ok(())
@@ -168,21 +169,21 @@ impl Transforms {
         self.target.as_deref()
     }
 
-    /// All frames, those of sensors included.
+    /// All frames, including those of sensors.
     pub(super) fn frames(&self, sensors: &[String]) -> Vec<String> {
         let parents = self.edges.values().map(|edge| &edge.parent);
         let all: BTreeSet<&String> = self.edges.keys().chain(parents).chain(sensors).collect();
         all.into_iter().filter(|name| !name.is_empty()).cloned().collect()
     }
 
-    /// Where points of a frame belong that were measured at a time; nothing if there is no common frame.
+    /// Transform of points of a frame measured at a time; `None` if there is no common frame.
     pub(in crate::source) fn placement(&self, frame: &str, stamp: i64) -> Option<Placement> {
         let target = self.target()?.to_owned();
         let pose = self.pose(frame, &target, stamp);
         Some(Placement { frame: frame.to_owned(), target, pose })
     }
 
-    /// Maps a frame to another as it was at a time; nothing if they do not hang together.
+    /// Transform between two frames at a time; `None` if they are not connected.
     fn pose(&self, frame: &str, target: &str, stamp: i64) -> Option<DMat4> {
         if frame == target {
             return Some(DMat4::IDENTITY);
@@ -192,7 +193,7 @@ impl Transforms {
         (root == other).then(|| down.inverse() * up)
     }
 
-    /// Maps a frame to the topmost one above it, and its name; nothing if frames go round in a circle.
+    /// Transform from a frame to its root, and the name of the root; `None` if the frames form a cycle.
     fn to_root<'a>(&'a self, frame: &'a str, stamp: i64) -> Option<(DMat4, &'a str)> {
         let (mut pose, mut frame) = (DMat4::IDENTITY, frame);
         for _ in 0..=self.edges.len() {
@@ -204,7 +205,7 @@ impl Transforms {
     }
 }
 
-/// Where points of a frame belong.
+/// A transform of points to the common frame.
 pub(in crate::source) struct Placement {
     frame: String,
     target: String,
@@ -212,10 +213,10 @@ pub(in crate::source) struct Placement {
 }
 
 impl Placement {
-    /// Brings points there; if no transforms lead there, they stay as they are, and why is told.
+    /// Transforms points. If the frames are not connected, points stay unchanged and the reason is returned.
     pub(in crate::source) fn apply(self, cloud: PointCloud) -> (PointCloud, Option<String>) {
         let Self { frame, target, pose } = self;
-        // It is all in one frame then, so that there is one answer to which way is up.
+        // All points are in one frame afterwards, so they share the up direction.
         let axes = if target.contains("optical") { Axes::Camera } else { Axes::ZUp };
         match pose {
             Some(pose) if !cloud.is_empty() => (PointCloud::merge(vec![(cloud, pose)]).with_axes(axes), None),
@@ -230,9 +231,10 @@ impl Edge {
         Self { parent, fixed, poses: VecDeque::new(), clock: Clock::default() }
     }
 
-    /// Takes a pose as it is sent.
+    /// Takes a live pose.
     fn hear(&mut self, fixed: bool, stamp: i64, pose: Pose) {
-        // As in recordings: one that is said to be fixed and moves nevertheless, moves; of several fixed ones the last is meant.
+        // As in recordings, a frame with both fixed and moving transforms counts as moving. Of several fixed transforms
+        // the last counts.
         match (self.fixed, fixed) {
             (false, true) => return,
             (true, _) => self.poses.clear(),
@@ -254,7 +256,7 @@ impl Edge {
         }
     }
 
-    /// The pose at a time, between those before and after it; the first before all, the last after.
+    /// Pose at a time, interpolated. Before the first pose it is the first, after the last it is the last.
     fn at(&self, stamp: i64) -> Pose {
         let after = self.poses.partition_point(|(time, _)| *time <= stamp);
         match (after.checked_sub(1).map(|before| self.poses[before]), self.poses.get(after)) {
@@ -277,7 +279,7 @@ impl Pose {
     }
 }
 
-/// The transforms of messages of one chunk, and whether each is fixed.
+/// The transforms in the messages of one chunk, and whether each is fixed.
 fn samples(file: &File, run: &[Place]) -> Result<Vec<(bool, Sample)>, String> {
     let File { bytes, index, .. } = file;
     let content = run[0].chunk.map(|chunk| unpack(bytes, &index.chunks[chunk])).transpose()?;
@@ -295,7 +297,7 @@ fn samples(file: &File, run: &[Place]) -> Result<Vec<(bool, Sample)>, String> {
     Ok(samples)
 }
 
-/// The transforms of a message; poses that are none are left out.
+/// The transforms of a message. Invalid poses are left out.
 fn parse(message: &[u8], encoding: Encoding, recorded: i64) -> Result<Vec<Sample>, Fault> {
     let mut wire = Wire::message(message, encoding)?;
     let mut samples = Vec::new();

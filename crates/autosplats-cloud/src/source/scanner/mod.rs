@@ -1,13 +1,13 @@
-//! Simulated scanners around something that moves, as the paper shows three of them [Paper, Figure 12].
+//! Simulated scanners around a moving surface, like the three in the paper [Paper, Figure 12].
 //!
 //! # How it works
 //!
-//! In each frame rays go out from every scanner, the same angle apart in azimuth and in elevation ([`Rays`]), and end at the
-//! first surface they meet ([`Target`]): what is hidden from a scanner is missing. Most rays meet nothing, so what there is is
-//! looked for along the rays, and not the other way round: triangles, and the parts of a scene, ask for those that may meet
-//! them. Ranges get noise, some rays return nothing, and points
-//! are put where the scanner believes to stand, which may be a little off. All of it depends on the seed, the frame, the
-//! scanner and the ray alone, so threads change nothing.
+//! In each frame every scanner sends out rays at equal steps of azimuth and elevation ([`Rays`]). Each ray ends at the
+//! first surface on its way ([`Target`]), so surfaces hidden from a scanner are missing. Most rays hit nothing.
+//! Therefore triangles and parts of a scene look up the rays that may hit them, instead of each ray searching the
+//! surface. Ranges get noise, some rays return nothing, and points are placed with the scanner's assumed pose, which
+//! may differ from the true one. Random numbers depend only on the seed, the frame, the scanner and the ray, so threads
+//! change nothing.
 
 mod rays;
 mod target;
@@ -28,31 +28,30 @@ use self::{rays::Rays, target::Target};
 use super::animation::{Frames, Surface};
 use crate::{Error, PointCloud, Progress, Scan, Timeline, memory::check_memory, progress::tick, random::Random};
 
-/// Rays of a scanner, at most.
+/// Maximum number of rays of a scanner.
 const MAX_RAYS: u64 = 1 << 28;
 
-/// Bytes of a ray's outcome, twice.
+/// Bytes of memory per ray: its result, and a copy in the cloud.
 const BYTES_PER_RAY: u64 = 64;
 
-/// A simulated scanner. Lengths are in the unit of what it looks at.
+/// A simulated scanner. Lengths are in the unit of the surface it scans.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scanner {
-    /// Where it stands, and how it is turned: maps its own frame, x right, y down and z forward, to world coordinates. A
-    /// rotation and a translation.
+    /// Pose: maps the scanner's frame (x right, y down, z forward) to world coordinates. A rotation and a translation.
     pub world_from_sensor: DMat4,
-    /// Rays in a row.
+    /// Rays per row.
     pub columns: u32,
     /// Rows of rays.
     pub rows: u32,
-    /// Angle that a row covers, and the angle from the lowest row to the highest: degrees, up to 360 and 180.
+    /// Horizontal and vertical field of view in degrees, above 0 and up to 360 and 180.
     pub fov_degrees: [f64; 2],
-    /// Standard deviation of ranges, from 0.
+    /// Standard deviation of ranges, 0 or more.
     pub noise: f64,
-    /// Part of the rays that return nothing though they met something, 0 to 1.
+    /// Share of hits that return nothing, 0 to 1.
     pub dropouts: f64,
-    /// How far from its true place it believes to stand, from 0, in a random direction.
+    /// Error of the assumed position: distance in a random direction, 0 or more.
     pub misplaced: f64,
-    /// By how much it believes to be turned otherwise than it is, degrees, about a random axis.
+    /// Error of the assumed orientation: angle about a random axis, 0 to 180 degrees.
     pub misturned_degrees: f64,
 }
 
@@ -71,18 +70,18 @@ impl Default for Scanner {
     }
 }
 
-/// How far above the horizon scanners are placed around something, degrees.
+/// Elevation of scanners placed around a surface, degrees.
 const ABOVE: f64 = 15.0;
 
-/// Room that is left at the edges of what a scanner sees.
+/// Factor on the distance of scanners, which leaves a margin around the surface.
 const ROOM: f64 = 1.1;
 
-/// Noise of the first of several scanners, as a part of the radius of what they look at; the second has twice as much.
+/// Noise of the first of several scanners, relative to the radius of the surface. The n-th scanner has n times as much.
 const NOISE: f64 = 1e-3;
 
 impl Scanner {
-    /// `count` scanners around the box from `low` to `high`, equally far apart, slightly above it and looking at its centre,
-    /// each noisier than the one before.
+    /// Places `count` scanners around the box from `low` to `high`, at equal angles and slightly above it. They look at
+    /// the centre of the box, and each is noisier than the one before.
     pub fn around(low: DVec3, high: DVec3, up: DVec3, count: usize) -> Vec<Self> {
         let up = up.normalize_or(DVec3::Z);
         let (centre, radius) = (0.5 * (low + high), (0.5 * (high - low).length()).max(f64::MIN_POSITIVE));
@@ -119,7 +118,7 @@ impl Scanner {
         within("distance of a scanner from the origin", place, 0.0, 1e9, "at most 1e9")
     }
 
-    /// The pose that it believes to have.
+    /// The assumed pose: the true pose with a random error.
     fn believed(&self, random: &mut Random) -> DMat4 {
         let (offset, axis) = (random.direction() * self.misplaced, random.direction());
         let turn = DMat4::from_axis_angle(axis, self.misturned_degrees.to_radians());
@@ -135,10 +134,10 @@ fn looking(eye: DVec3, centre: DVec3, up: DVec3) -> DMat4 {
     DMat4::from_cols(right.extend(0.0), down.extend(0.0), forward.extend(0.0), eye.extend(1.0))
 }
 
-/// A point that came back, and its colour if there are any.
+/// A measured point and its colour, if the target has colours.
 type Seen = ([f32; 3], Option<[u8; 3]>);
 
-/// What scanners see of something that moves: a channel each.
+/// Scans of a moving surface, one channel per scanner.
 pub(super) struct Scanned {
     frames: Arc<dyn Frames>,
     scanners: Vec<Scanner>,
@@ -156,7 +155,7 @@ impl Scanned {
         Ok(Self { frames, scanners, seed })
     }
 
-    /// A number of its own for everything that is random.
+    /// Random numbers for one ray of a scanner in a frame.
     fn random(&self, scanner: usize, frame: usize, ray: u64) -> Random {
         let mut mixed = Random::new(self.seed, scanner as u64);
         Random::new(Random::new(mixed.bits(), frame as u64).bits(), ray)
@@ -164,7 +163,7 @@ impl Scanned {
 
     fn scan(&self, index: usize, frame: usize, target: &Target, progress: &dyn Progress) -> Result<PointCloud, Error> {
         let scanner = &self.scanners[index];
-        // A pose is wrong in the same way in all frames.
+        // The error of the assumed pose is the same in all frames.
         let believed = scanner.believed(&mut self.random(index, usize::MAX, 0));
         let rays = Rays::new(scanner);
         let sight = target.seen_along(&rays);

@@ -1,4 +1,4 @@
-//! The rays of a scanner, and which of them may meet something.
+//! The rays of a scanner, and which of them may hit something.
 
 use std::{
     f64::consts::{FRAC_PI_2, TAU},
@@ -10,28 +10,28 @@ use rayon::prelude::*;
 
 use super::Scanner;
 
-/// Rows that are gone through by one thread, at least, and their number at most.
+/// Minimum number of rows per thread, and maximum number of bands of rows.
 const BAND: [usize; 2] = [16, 32];
 
-/// By how much windows are larger than they have to be, so that rounding loses no ray: parts of a ray's distance to the next,
-/// radians, and parts of a ball's radius.
+/// Margins of windows against rounding: a share of the angle between rays, an angle in radians, and a share of a ball's
+/// radius.
 const SLACK: [f64; 3] = [1e-3, 1e-12, 1e-6];
 
-/// Rays from one place, the same angle apart in azimuth and in elevation.
+/// Rays from one place, at equal steps of azimuth and elevation.
 pub(super) struct Rays {
     pub(super) columns: u32,
     pub(super) rows: u32,
-    /// Where they begin, in world coordinates.
+    /// Start of the rays, in world coordinates.
     pub(super) eye: DVec3,
     world_from_sensor: DMat3,
     sensor_from_world: DMat3,
-    /// Sine and cosine of the azimuth of each column, and of the elevation of each row.
+    /// Sine and cosine of the azimuth of each column. `elevations` has those of the elevation of each row.
     azimuths: Vec<(f64, f64)>,
     elevations: Vec<(f64, f64)>,
     fov: [f64; 2],
 }
 
-/// Neighbouring rays: rows, and columns in one or, where they go around the back, two runs.
+/// Neighbouring rays: a range of rows and up to two ranges of columns, two where the window crosses the back.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Window {
     rows: Range<u32>,
@@ -65,23 +65,23 @@ impl Rays {
         }
     }
 
-    /// Direction of a ray in the scanner's own frame.
+    /// Direction of a ray in the scanner's frame.
     pub(super) fn direction(&self, column: u32, row: u32) -> DVec3 {
         let ((sin, cos), (down, level)) = (self.azimuths[column as usize], self.elevations[row as usize]);
         DVec3::new(sin * level, down, cos * level)
     }
 
-    /// A direction in the scanner's own frame as one in the world.
+    /// Rotates a direction from the scanner's frame to the world.
     pub(super) fn in_world(&self, direction: DVec3) -> DVec3 {
         self.world_from_sensor * direction
     }
 
-    /// A place in the world, about the eye, in the scanner's own frame.
+    /// Rotates an offset from the eye from the world to the scanner's frame.
     pub(super) fn in_sensor(&self, from_eye: DVec3) -> DVec3 {
         self.sensor_from_world * from_eye
     }
 
-    /// Radius of a ball that holds a cube of the world in the scanner's own frame, for half sides of one.
+    /// Radius of the ball around a cube of half side 1 after the rotation to the scanner's frame.
     pub(super) fn cube_radius(&self) -> f64 {
         let DMat3 { x_axis, y_axis, z_axis } = self.sensor_from_world;
         let diagonals =
@@ -89,11 +89,11 @@ impl Rays {
         diagonals.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// The rays that may meet a ball, given in the scanner's own frame; none if no ray does.
+    /// The rays that may hit a ball, given in the scanner's frame; `None` if no ray does.
     pub(super) fn window(&self, centre: DVec3, radius: f64) -> Option<Window> {
         let distance = centre.length();
         let sine = radius * (1.0 + SLACK[2]) / distance;
-        // Written so that what is no number is everything.
+        // Written so that NaN gives all rays.
         if !(sine < 0.99) {
             return Some(Window { rows: 0..self.rows, columns: [0..self.columns, 0..0] });
         }
@@ -112,18 +112,18 @@ impl Rays {
         (!first.is_empty()).then_some(Window { rows, columns: [first, second] })
     }
 
-    /// Columns (axis 0) or rows (1) whose angles are no further than `reach` from `angle`.
+    /// Columns (axis 0) or rows (axis 1) whose angles are within `reach` of `angle`, both in radians.
     fn run(&self, axis: usize, angle: f64, reach: f64) -> Range<u32> {
         let count = [self.columns, self.rows][axis];
         let per_radian = f64::from(count) / self.fov[axis];
         let (middle, reach) =
             (angle * per_radian + 0.5 * f64::from(count) - 0.5, (reach + SLACK[1]) * per_radian + SLACK[0]);
-        // Ends beyond the first and the last are these.
+        // Clamps the ends to the first and the last ray.
         (middle - reach).ceil().max(0.0) as u32..((middle + reach).floor() + 1.0).clamp(0.0, f64::from(count)) as u32
     }
 
-    /// What `put` makes of each ray by all that have it in their window, in rows from the top; `start` where nothing has. The
-    /// order in which things are put is theirs.
+    /// Calls `put` for each ray with everything whose window contains the ray, in the order of `things`. Returns the
+    /// results row by row from the top; a ray in no window keeps `start`.
     pub(super) fn put_all<I: Sync, T: Clone + Send>(
         &self,
         things: &[(Window, I)],
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Whether a ray comes as near to a place as `radius`.
+    /// Whether a ray passes within `radius` of `centre`.
     fn meets(rays: &Rays, column: u32, row: u32, centre: DVec3, radius: f64) -> bool {
         let direction = rays.direction(column, row);
         let along = direction.dot(centre).max(0.0);
@@ -193,7 +193,7 @@ mod tests {
                 }
             }
             let len = window.map_or(0, |window| window.len());
-            // Windows of what is near a pole, or as large as all that is seen, may have many more.
+            // Windows near a pole, or as large as the whole field of view, may hold many more rays.
             let small = radius < 0.3 * centre.length() && (centre.y / centre.length()).abs() < 0.5 && view[0] > 1.0;
             assert!(!small || len <= 2 * met + 100, "{len} rays where {met} meet {radius} about {centre}, {view:?}");
         }

@@ -1,4 +1,4 @@
-//! What rays of scanners end at.
+//! The surfaces that rays of scanners hit.
 
 use std::sync::Arc;
 
@@ -10,27 +10,28 @@ use super::{
 };
 use crate::{Axes, Contents, Crs, Error, Scene, source::animation::Surface};
 
-/// Rays of a window for which a part of a scene is not cut any more.
+/// A part of a scene whose window has at most this many rays is not subdivided.
 const SMALL: u64 = 25;
 
-/// By how much more than it has to be of a ray is looked at.
+/// Relative margin on the span of a ray that is searched.
 const SLACK: f32 = 1e-6;
 
-/// A surface that can be hit.
+/// A surface that rays can hit.
 pub(super) enum Target {
     Scene(Scene),
     Mesh(Arc<Contents>, Triangles),
 }
 
-/// Where a ray ends.
+/// The end of a ray.
 pub(super) struct Hit {
     pub(super) distance: f64,
     pub(super) color: Option<[u8; 3]>,
 }
 
-/// A target as it is seen along all rays of a scanner.
+/// A target prepared for all rays of a scanner.
 pub(super) enum Sight<'a> {
-    /// From where to where each ray may meet something, if that is known; nowhere if the end comes first.
+    /// For each ray the nearest and farthest distance at which it may hit something, if known. If far is less than
+    /// near, the ray hits nothing.
     Scene(&'a Scene, Option<Vec<[f32; 2]>>),
     Mesh(&'a Contents, &'a Triangles, Vec<Nearest>),
 }
@@ -49,7 +50,7 @@ impl Target {
         })
     }
 
-    /// What positions are stored about.
+    /// Origin of the stored positions.
     pub(super) fn origin(&self) -> DVec3 {
         match self {
             Self::Scene(_) => DVec3::ZERO,
@@ -78,7 +79,7 @@ impl Target {
         }
     }
 
-    /// Looks along all rays.
+    /// Prepares the target for all rays of a scanner.
     pub(super) fn seen_along(&self, rays: &Rays) -> Sight<'_> {
         match self {
             Self::Scene(scene) => Sight::Scene(scene, spans(scene, rays)),
@@ -87,7 +88,7 @@ impl Target {
     }
 }
 
-/// From where to where each ray may meet the scene: most of them nowhere.
+/// For each ray the range of distances at which it may hit the scene. Empty for most rays.
 fn spans(scene: &Scene, rays: &Rays) -> Option<Vec<[f32; 2]>> {
     let cube_radius = rays.cube_radius();
     let mut parts: Vec<(Window, [f32; 2])> = Vec::new();
@@ -109,7 +110,7 @@ fn spans(scene: &Scene, rays: &Rays) -> Option<Vec<[f32; 2]>> {
 }
 
 impl Sight<'_> {
-    /// Whether a ray, counted row by row, may meet anything.
+    /// Whether a ray, numbered row by row, may hit anything.
     pub(super) fn may_meet(&self, ray: usize) -> bool {
         match self {
             Self::Scene(_, spans) => spans.as_ref().is_none_or(|spans| spans[ray][0] <= spans[ray][1]),
@@ -117,7 +118,8 @@ impl Sight<'_> {
         }
     }
 
-    /// Where a ray ends that may meet something, if it does; `direction` is its own, in the scanner's frame.
+    /// The hit of a ray for which [`may_meet`](Self::may_meet) holds. `direction` is the direction of the ray in the
+    /// scanner's frame.
     pub(super) fn hit(&self, rays: &Rays, ray: usize, direction: DVec3) -> Option<Hit> {
         match self {
             Self::Scene(scene, spans) => {

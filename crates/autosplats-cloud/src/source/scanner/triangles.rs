@@ -1,9 +1,9 @@
-//! Triangles that rays of a scanner end at.
+//! Intersects rays of a scanner with triangles.
 //!
-//! Rays lie in a regular grid of angles, so triangles are drawn into it as into a picture: each asks for the rays in the window
-//! of a ball around it, and of several triangles the nearest keeps a ray. Large ones are cut for that into parts whose windows
-//! are small. Boxes in a tree, walked ray by ray, took more than twice as long for a horse of 17,000 triangles: most rays of
-//! a scanner meet nothing, and in each frame there is another tree to be built.
+//! Rays form a regular grid of angles, so triangles are drawn into the grid as into an image. Each triangle tests the
+//! rays in the window of a ball around it, and each ray keeps its nearest triangle. Large triangles are cut into parts
+//! with small windows. A bounding volume hierarchy is slower: most rays hit nothing, and each frame would need a new
+//! hierarchy.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -11,34 +11,34 @@ use rayon::prelude::*;
 use super::rays::{Rays, Window};
 use crate::{Contents, Error, memory::check_memory};
 
-/// Bytes of a triangle and of the windows that ask for it.
+/// Bytes per triangle, including its windows.
 const BYTES_PER_TRIANGLE: u64 = 300;
 
-/// Rays in a window that is not worth a cut.
+/// Number of rays in a window up to which a triangle is not cut.
 const SMALL: u64 = 64;
 
-/// How often a triangle is cut in half at most; what is left then is so near that all rays may meet it.
+/// Maximum number of times a triangle is halved. Parts left after that are so near that all rays may hit them.
 const CUTS: u32 = 40;
 
-/// Parts by which products may differ from what they should be, and more than weights that count as within a triangle.
+/// Relative rounding error of the products in [`Sides`]. Larger than the slack on the weights of a hit.
 const ROUNDING: f64 = 1e-8;
 
-/// Triangles whose windows one thread finds at a time.
+/// Number of triangles per parallel task.
 const PIECE: usize = 1 << 10;
 
-/// The triangles that have an area.
+/// The triangles with an area.
 pub(super) struct Triangles(Vec<Triangle>);
 
 struct Triangle {
     corners: [u32; 3],
-    /// About the cloud's origin.
+    /// Corners relative to the cloud's origin.
     places: [DVec3; 3],
 }
 
-/// The triangle that a ray ends at.
+/// The triangle hit by a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Nearest {
-    /// Infinite if it meets none.
+    /// Distance along the ray; infinite without a hit.
     pub(super) distance: f64,
     index: u32,
 }
@@ -58,7 +58,7 @@ impl Triangles {
         if triangles.is_empty() { Err(Error::NoSurface) } else { Ok(Self(triangles)) }
     }
 
-    /// What each ray ends at, row by row; `origin` is the cloud's.
+    /// The nearest triangle of each ray, row by row. `origin` is the cloud's.
     pub(super) fn nearest(&self, rays: &Rays, origin: DVec3) -> Vec<Nearest> {
         let eye = rays.eye - origin;
         let windows = self.0.par_chunks(PIECE).enumerate().flat_map_iter(|(piece, triangles)| {
@@ -79,36 +79,36 @@ impl Triangles {
             }
             let index = sides.index;
             let Some((distance, _)) = self.0[index as usize].hit(eye, rays.in_world(direction)) else { return };
-            // An edge belongs to two triangles: the first of equals, whatever the order.
+            // An edge belongs to two triangles. At equal distance the lower index wins, in any order.
             if (distance, index) < (nearest.distance, nearest.index) {
                 *nearest = Nearest { distance, index };
             }
         })
     }
 
-    /// The corners of the triangle where a ray ends, and the weights of the second and the third.
+    /// Corners of the triangle that a ray hits, and the weights of the second and the third corner there.
     pub(super) fn place(&self, nearest: Nearest, eye: DVec3, direction: DVec3) -> ([u32; 3], [f64; 2]) {
         let triangle = &self.0[nearest.index as usize];
         (triangle.corners, triangle.hit(eye, direction).map_or([0.0; 2], |(_, weights)| weights))
     }
 }
 
-/// A triangle as the rays of one scanner see it: what all of them have in common is worked out once, so that most of those that
-/// pass by are known with a few products.
+/// A triangle as seen from one scanner: products shared by all rays, so that most misses are found with a few dot
+/// products.
 #[derive(Clone, Copy)]
 struct Sides {
     index: u32,
-    /// By the products with these of a direction its ray meets the triangle's plane, and has the weights of the second and the
-    /// third corner there.
+    /// Dot products of a ray's direction with `plane`, `second` and `third` tell whether the ray hits the plane of the
+    /// triangle, and the weights of its second and third corner there.
     plane: DVec3,
     second: DVec3,
     third: DVec3,
-    /// What rounding may make of these products.
+    /// Bound on the rounding error of these products.
     slack: f64,
 }
 
 impl Sides {
-    /// `places` are in the scanner's own frame.
+    /// Creates the products from corners in the scanner's frame.
     fn new(index: u32, [a, b, c]: [DVec3; 3]) -> Self {
         let (ab, ac) = (b - a, c - a);
         let (plane, second, third) = (ac.cross(ab), a.cross(ac), ab.cross(a));
@@ -116,17 +116,17 @@ impl Sides {
         Self { index, plane, second, third, slack }
     }
 
-    /// Whether a ray has to be looked at closely.
+    /// Whether a ray needs the exact test.
     fn may_meet(&self, direction: DVec3) -> bool {
         let plane = self.plane.dot(direction);
         let least = -(self.slack + ROUNDING * plane.abs());
-        // From behind all of them have the other sign.
+        // Seen from behind, all products have the opposite sign.
         let [second, third] = [self.second, self.third].map(|side| side.dot(direction) * plane.signum());
         second >= least && third >= least && second + third <= plane.abs() - least
     }
 }
 
-/// Finds windows with all rays that may meet a triangle, given in the scanner's own frame.
+/// Finds windows that contain all rays that may hit a triangle, given in the scanner's frame.
 fn cover(rays: &Rays, places: [DVec3; 3], cuts: u32, found: &mut impl FnMut(Window)) {
     let [a, b, c] = places;
     let middle = (a + b + c) / 3.0;
@@ -135,7 +135,7 @@ fn cover(rays: &Rays, places: [DVec3; 3], cuts: u32, found: &mut impl FnMut(Wind
     if window.len() <= SMALL || cuts == 0 {
         return found(window);
     }
-    // The longest side is cut.
+    // Halves the longest side.
     let [ab, bc, ca] = [a.distance_squared(b), b.distance_squared(c), c.distance_squared(a)];
     let [a, b, c] = if ab >= bc && ab >= ca {
         [a, b, c]
@@ -159,7 +159,7 @@ impl Triangle {
         let beside = to_origin.cross(ab);
         let [second, third, distance] =
             [to_origin.dot(across), direction.dot(beside), ac.dot(beside)].map(|part| part / determinant);
-        // Written so that values that are no numbers miss; the slack closes the seams between triangles.
+        // Written so that NaN misses. The slack closes the seams between triangles.
         let slack = 1e-9;
         let is_hit = second >= -slack && third >= -slack && second + third <= 1.0 + slack && distance > 0.0;
         is_hit.then_some((distance, [second, third]))
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use crate::{PointCloud, Scanner, random::Random};
 
-    /// Triangles of all sizes and shapes around the origin, some of them slivers, one around everything.
+    /// Triangles of all sizes and shapes around the origin, some of them slivers, and one around everything.
     fn strewn() -> Contents {
         let mut random = Random::new(1, 0);
         let mut positions = vec![[-90.0, 20.0, -80.0], [90.0, 25.0, -80.0], [0.0, 30.0, 95.0]];
@@ -195,7 +195,7 @@ mod tests {
         assert_eq!(triangles.0.len(), 301, "those without area, or without corners, are left out");
         let mut hits = 0;
         for (number, view) in [[57.0, 43.0], [360.0, 180.0], [360.0, 30.0], [3.0, 2.0]].into_iter().enumerate() {
-            // The second stands on a triangle's plane, within it.
+            // The second scanner stands inside a triangle, in its plane.
             let [a, b, c] = triangles.0[number].places;
             let eye = if number == 1 { (a + b + c) / 3.0 } else { DVec3::new(0.1, -0.2, 0.3) };
             let turn = DQuat::from_rotation_y(1.1 * number as f64);

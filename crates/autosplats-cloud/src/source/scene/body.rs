@@ -5,17 +5,17 @@ use glam::DVec3;
 use super::paint::Paint;
 use super::shape::{Shape, Similarity};
 
-/// What a solid does to the ones before it in its group, or a group to the groups before it.
+/// How a solid combines with earlier solids of its group, or a group with earlier groups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Op {
-    /// Adds to them.
+    /// Union.
     Join,
-    /// Takes away from them.
+    /// Subtraction.
     Cut,
 }
 
-/// Radius within which a seam is rounded: none where it is zero. Beyond it the seam changes nothing at all, to the last
-/// bit, which is what lets a cell of space forget all solids but the near ones.
+/// Radius within which a seam is rounded; zero for a sharp seam. Beyond the radius the seam changes no bit of the
+/// bound, so a cell of space can drop all solids but the near ones.
 #[derive(Clone, Copy, Debug)]
 struct Seam {
     radius: f64,
@@ -41,7 +41,7 @@ impl Seam {
         }
     }
 
-    /// Whether `b` changes `a` nowhere within `slack / 2` metres.
+    /// Whether `b` leaves `a` unchanged everywhere within `slack / 2` metres.
     fn spares(self, op: Op, a: f64, b: f64, slack: f64) -> bool {
         match op {
             Op::Join => b >= a + self.radius + slack,
@@ -49,7 +49,7 @@ impl Seam {
         }
     }
 
-    /// How much of the second one's paint shows where the two meet.
+    /// Share of the second solid's paint where two solids meet.
     fn blend(self, op: Op, a: f64, b: f64) -> f32 {
         let (a, b) = match op {
             Op::Join => (a, b),
@@ -68,8 +68,8 @@ struct Node {
     seam: Seam,
     paint: Paint,
     group: u16,
-    /// Solids next to each other with the same number are one chain: put together without a seam first, so that the
-    /// seam to the rest does not swell where they meet.
+    /// Adjacent solids with the same number form a chain. A chain is joined without seams first, so that its seam to
+    /// other solids does not swell at the links.
     chain: u16,
 }
 
@@ -80,16 +80,16 @@ struct Group {
     zone: usize,
 }
 
-/// Solids in order, in groups: a group is put together first and then joined to what came before.
+/// Solids in order, in groups. A group is built first and then combined with the earlier groups.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     nodes: Vec<Node>,
     groups: Vec<Group>,
-    /// Applied to every solid that is added.
+    /// Transform applied to every added solid.
     pub(super) frame: Similarity,
-    /// Given to every solid that is added.
+    /// Paint of every added solid.
     pub(super) paint: Paint,
-    /// Given to every group that is begun.
+    /// Zone of every new group.
     pub(super) zone: usize,
 }
 
@@ -98,7 +98,7 @@ impl Body {
         Self { nodes: Vec::new(), groups: Vec::new(), frame: Similarity::IDENTITY, paint, zone: 0 }
     }
 
-    /// Begins a group that will be `op`-ed to all before, with a seam of `radius`.
+    /// Starts a group that is combined with all earlier groups by `op`, with a seam of `radius`.
     pub(super) fn group(&mut self, op: Op, radius: f64) -> &mut Self {
         self.groups.push(Group { op, seam: Seam::new(radius * self.frame.scale), zone: self.zone });
         self
@@ -119,7 +119,7 @@ impl Body {
         self.add(Op::Join, radius, shape, false)
     }
 
-    /// Takes `shape` away from the group.
+    /// Subtracts `shape` from the group.
     pub(super) fn cut(&mut self, radius: f64, shape: Shape) -> &mut Self {
         self.add(Op::Cut, radius, shape, false)
     }
@@ -132,17 +132,17 @@ impl Body {
         self
     }
 
-    /// Every solid, for the cell that holds everything.
+    /// All solids, for the root cell.
     pub(super) fn all(&self) -> Vec<u16> {
         (0..u16::try_from(self.nodes.len()).expect("bodies have fewer than 65536 solids")).collect()
     }
 
-    /// Number of zones that groups name.
+    /// Number of zones.
     pub(super) fn zones(&self) -> usize {
         self.groups.iter().map(|group| group.zone + 1).max().unwrap_or(0)
     }
 
-    /// Whether a solid of `zone` is in `list`.
+    /// Whether `list` has a solid of `zone`.
     pub(super) fn touches(&self, list: &[u16], zone: usize) -> bool {
         list.iter().any(|&id| self.groups[usize::from(self.nodes[usize::from(id)].group)].zone == zone)
     }
@@ -175,12 +175,12 @@ impl Body {
         group.seam.apply(group.op, total, part)
     }
 
-    /// The list cut where the group, or the chain, changes.
+    /// Splits the list where the group or the chain changes.
     fn runs<'a>(&'a self, list: &'a [u16], key: impl Fn(&Node) -> u16 + 'a) -> impl Iterator<Item = &'a [u16]> {
         list.chunk_by(move |&a, &b| key(&self.nodes[usize::from(a)]) == key(&self.nodes[usize::from(b)]))
     }
 
-    /// Colour and zone of the surface at `p`; `world` is where `p` lies before any folding of space.
+    /// Colour and zone of the surface at `p`. `world` is the position of `p` before folding.
     pub(super) fn paint(&self, p: DVec3, world: DVec3, list: &[u16]) -> ([f32; 3], usize) {
         let mix = |a: [f32; 3], b: [f32; 3], t: f32| -> [f32; 3] { std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t) };
         let (mut total, mut total_rgb, mut zone) = (f64::INFINITY, [0.5; 3], 0);
@@ -207,8 +207,8 @@ impl Body {
         (total_rgb, zone)
     }
 
-    /// Writes to `kept` the solids of `list` that matter anywhere within `radius` of `center`, and returns the distance
-    /// bound there. With the kept ones the bound is the same to the last bit all over that ball.
+    /// Writes the solids of `list` that matter anywhere within `radius` of `center` to `kept`, and returns the distance
+    /// bound at `center`. The kept solids give the same bound, bit by bit, everywhere in that ball.
     pub(super) fn prune(&self, list: &[u16], center: DVec3, radius: f64, kept: &mut Vec<u16>) -> f64 {
         kept.clear();
         let slack = 2.0 * radius;

@@ -1,9 +1,9 @@
-//! The inside of a cathedral: a nave between two aisles, seven bays long, vaulted.
+//! The inside of a vaulted cathedral: a nave between two aisles, seven bays long.
 //!
 //! # How it works
-//! A block of stone from which the spaces are cut. Only one half bay of one side is modelled, and an end; folding space
-//! makes the rest. In that half bay x runs from the window's middle (0) to the column (3), beyond it the end of the
-//! building; y from the nave's middle outwards: column at 5, outer wall at 9.5; z is up, the floor at 0.
+//! The spaces are cut from a block of stone. The model has only one half bay of one side, and an end; folding space
+//! makes the rest. In the half bay, x goes from the middle of the window (0) to the column (3), then to the end of the
+//! building. y goes outward from the middle of the nave: column at 5, outer wall at 9.5. z is up, with the floor at 0.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -62,19 +62,19 @@ fn block(low: [f64; 3], high: [f64; 3], round: f64) -> Shape {
     Shape::Block { at: Placement::at(0.5 * (low + high)), half: 0.5 * (high - low), round }
 }
 
-/// A vault or arch that runs along x, over the middle line y, from the floor at `floor`; `spring` is above the world's 0.
+/// A vault or arch along x, centred on `y`, with its floor at `floor`. `spring` counts from z = 0.
 fn along_x(y: f64, floor: f64, half_width: f64, spring: f64, radius: f64) -> Shape {
     let at = Placement { origin: DVec3::new(0.0, y, floor), axes: DMat3::from_rotation_z(FRAC_PI_2) };
     Shape::Passage { at, half_width, spring: spring - floor, radius, half_length: END }
 }
 
-/// One that runs along y, over the bay's middle, from y = `from` to `to`.
+/// A vault or arch along y, in the middle of the bay, from y = `from` to `to`.
 fn along_y(from: f64, to: f64, floor: f64, half_width: f64, spring: f64, radius: f64) -> Shape {
     let at = Placement::at(DVec3::new(0.0, 0.5 * (from + to), floor));
     Shape::Passage { at, half_width, spring: spring - floor, radius, half_length: 0.5 * (to - from) }
 }
 
-/// The vaults' inner faces, `inset` metres into the room.
+/// Inner faces of the nave's vaults, `inset` metres into the room.
 fn nave_vault(inset: f64) -> [Shape; 2] {
     [along_x(0.0, -0.1, NAVE - inset, 10.6, 6.9 - inset), along_y(-5.2, 5.2, 9.75, 2.72 - inset, 13.3, 4.1 - inset)]
 }
@@ -86,7 +86,7 @@ fn aisle_vault(inset: f64) -> [Shape; 2] {
     ]
 }
 
-/// The stone, and the large spaces in it.
+/// The stone and the large spaces cut from it.
 fn mass(body: &mut Body) {
     body.group(Op::Join, 0.0);
     body.paint = STONE;
@@ -96,12 +96,12 @@ fn mass(body: &mut Body) {
         body.cut(0.0, vault);
     }
     body.paint = STONE;
-    // The arcade, in two orders, and the room around the columns below it.
+    // The arcade, in two orders, and the space around the columns below it.
     body.cut(0.0, along_y(ARCADE - 0.6, ARCADE + 0.6, -0.1, 2.15, 5.3, 3.0));
     body.cut(0.0, along_y(ARCADE - 0.6, ARCADE - 0.18, -0.1, 2.38, 5.3, 3.2));
     body.cut(0.0, along_y(ARCADE + 0.18, ARCADE + 0.6, -0.1, 2.38, 5.3, 3.2));
     body.cut(0.0, block([-1.0, ARCADE - 0.6, -0.1], [END, ARCADE + 0.6, 5.15], 0.0));
-    // The gallery above the arcade: niches, three to a half bay.
+    // The gallery above the arcade: three niches per half bay.
     for x in [0.5, 1.5] {
         let at = Placement::at(DVec3::new(x, NAVE, 8.95));
         body.cut(0.0, Shape::Passage { at, half_width: 0.3, spring: 0.28, radius: 0.36, half_length: 0.32 });
@@ -110,7 +110,7 @@ fn mass(body: &mut Body) {
     body.join(0.0, block([-30.0, -30.0, -0.9], [9.5, 10.9, 0.0], 0.0));
 }
 
-/// Lancets in the aisles and paired ones under the vault, with stone bars before coloured glass.
+/// Lancets in the aisles and pairs of lancets under the vault, with stone bars in front of coloured glass.
 fn windows(body: &mut Body) {
     for (wall, sill, half, spring, radius) in [(OUTER - 0.05, 1.9, 1.15, 5.0, 1.7), (5.2, 10.2, 1.35, 13.0, 2.1)] {
         body.group(Op::Cut, 0.02);
@@ -122,13 +122,13 @@ fn windows(body: &mut Body) {
         body.paint = Paint::Glass;
         let glass = wall + 0.42;
         body.join(0.0, block([-2.0, glass, sill - 0.2], [2.0, glass + 0.3, spring + 2.2], 0.0));
-        // Only behind the opening; elsewhere it is inside the wall.
+        // The bars are visible only in the opening; the rest lies inside the wall.
         body.group(Op::Join, 0.01);
         body.paint = TRIM;
         let bar = glass - 0.06;
         let p = |x: f64, z: f64| DVec3::new(x, bar, z);
         body.join(0.01, Shape::cone(p(0.0, sill), p(0.0, spring + 0.55), 0.075, 0.07));
-        // Two small pointed arches, and a ring with leaves over them.
+        // Two small pointed arches, with a ring and leaves above them.
         let small = 0.5 * half;
         for side in [-1.0, 1.0] {
             let turn = |angle: f64| {
@@ -152,7 +152,7 @@ fn windows(body: &mut Body) {
     }
 }
 
-/// Ribs: slabs that stand in the vault's diagonals and across it, from which slightly smaller vaults are cut.
+/// Ribs: slabs along the diagonals of the vault and across it, from which slightly smaller vaults are cut.
 fn ribs(body: &mut Body) {
     let upright = |a: DVec2, b: DVec2, thick: f64, low: f64, high: f64| {
         let middle = 0.5 * (a + b);
@@ -284,7 +284,7 @@ fn column(body: &mut Body) {
     body.join(0.0, square(0.66, 5.1, 5.4, 0.0));
 }
 
-/// Benches on either side of the middle aisle; mirrored, they stand back to back.
+/// Benches on either side of the middle aisle. Mirroring puts them back to back.
 fn pews(body: &mut Body) {
     for x in [0.5, 1.5, 2.5] {
         body.group(Op::Join, 0.0);
@@ -301,7 +301,7 @@ fn pews(body: &mut Body) {
     }
 }
 
-/// The end: steps, an altar with its cross and candles, and a rose window over a blind arcade.
+/// The end: steps, an altar with cross and candles, and a rose window above a blind arcade.
 fn end(body: &mut Body) {
     let rose = DVec3::new(END, 0.0, 11.6);
     let facing = |origin: DVec3| Placement::along(origin, DVec3::X, DVec3::Y);

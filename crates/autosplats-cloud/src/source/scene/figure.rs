@@ -28,7 +28,7 @@ pub(super) fn scene(phase: f64) -> Model {
     Model { tree, points: Points::Strewn(vec![1.0]) }
 }
 
-/// A small horse on the head of a large one, as many points on each.
+/// A small horse on the head of a large one, with as many points on each.
 pub(super) fn two_scales() -> Model {
     let mut body = Body::new(SKIN);
     let frame = |origin: DVec3, turn: f64, scale: f64| Similarity {
@@ -45,7 +45,7 @@ pub(super) fn two_scales() -> Model {
 }
 
 fn dancer(body: &mut Body, phase: f64) {
-    // At phase 0 one leg is already raised, which makes the better picture.
+    // At phase 0 one leg is already raised, for a livelier pose.
     let a = TAU * (phase + 0.19);
     let (sway, cosine) = a.sin_cos();
     let pelvis = DVec3::new(0.055 * sway, 0.01 * cosine, 0.935 + 0.018 * (2.0 * a).cos());
@@ -82,14 +82,14 @@ fn dancer(body: &mut Body, phase: f64) {
 
 fn legs(body: &mut Body, pelvis: DVec3, hips: DMat3, sway: f64) {
     for side in [-1.0, 1.0] {
-        // The free leg is the one the hips move away from.
+        // The free leg is the one that the hips move away from.
         let lift = (-side * sway).max(0.0).powi(2);
         let hip = pelvis + hips * DVec3::new(side * 0.09, 0.0, -0.03);
         let ground = DVec3::new(side * (0.085 + 0.03 * lift), 0.02, 0.085);
         let raised = DVec3::new(side * 0.14, 0.15, 0.26);
         let target = ground.lerp(raised, lift);
         let (knee, ankle) = reach(hip, target, 0.43, 0.425, DVec3::new(side * (0.12 + 0.35 * lift), -1.0, 0.3 * lift));
-        // Where the thigh presses through the skirt, it is cloth that shows.
+        // The thigh presses through the skirt, so it has the colour of cloth.
         body.paint = CLOTH;
         body.join(0.06, Shape::cone(hip, knee, 0.088, 0.054));
         body.paint = SKIN;
@@ -214,7 +214,7 @@ fn hair(body: &mut Body, at: Placement, a: f64) {
     body.join(0.0, Shape::Ellipsoid { at: cap, radii: DVec3::new(0.08, 0.092, 0.084) });
     let face = Placement { origin: p(0.0, -0.085, -0.02), axes: at.axes };
     body.cut(0.012, Shape::Ellipsoid { at: face, radii: DVec3::new(0.066, 0.075, 0.1) });
-    // Combed back from a parting into a bun.
+    // Hair combed back from a parting into a bun.
     let bun = p(0.0, 0.122, 0.085);
     for i in 0..9 {
         for side in [-1.0, 1.0] {

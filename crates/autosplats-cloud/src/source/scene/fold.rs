@@ -1,21 +1,22 @@
-//! Space folded onto a part of itself, so that a building is modelled once per half bay.
+//! Folds space onto a part of itself, so that a building is modelled once per half bay.
 
 use glam::DVec3;
 
-/// How world space maps to the space a body is modelled in.
+/// Maps world space to the space of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Fold {
-    /// Not at all.
+    /// The identity.
     None,
-    /// Mirrored at y = 0, at x = 0, and at every bay's middle and end. A bay is `2 * half_bay` long, x = 0 is the middle
-    /// of one. From `last`, the middle of the last bay, outwards nothing is folded any more: there the ends are.
+    /// Mirrored at y = 0, at x = 0, and at the middle and end of every bay. A bay is `2 * half_bay` long, and x = 0 is
+    /// the middle of one. Outward of `last`, the middle of the last bay, space is not folded, since the ends of the
+    /// building are there.
     ///
-    /// Mirroring never brings anything nearer than it looks, so a distance bound in folded space is one in the world.
+    /// Mirroring never brings surfaces nearer than they look, so a distance bound in folded space holds in the world.
     Bays { half_bay: f64, last: f64 },
 }
 
 impl Fold {
-    /// Folded position, and the signs with which directions follow.
+    /// Folded position, and the signs by which directions are multiplied.
     #[inline]
     pub(super) fn apply(self, p: DVec3) -> (DVec3, DVec3) {
         match self {
@@ -30,7 +31,7 @@ impl Fold {
         }
     }
 
-    /// Folds lie on cell borders from this level of the tree on.
+    /// Level of the tree from which on folds lie on cell borders.
     pub(super) fn least_level(self) -> u32 {
         match self {
             Self::None => 0,
@@ -38,7 +39,7 @@ impl Fold {
         }
     }
 
-    /// The world's box, of which the cube at `min` with sides of `size` is the folded image.
+    /// Box in the world whose folded image is the cube at `min` with side `size`.
     pub(super) fn bounds(self, min: DVec3, size: f64) -> (DVec3, DVec3) {
         match self {
             Self::None => (min, min + DVec3::splat(size)),

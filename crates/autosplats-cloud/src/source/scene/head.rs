@@ -16,7 +16,7 @@ pub(super) struct Looks {
     pub(super) brows: Paint,
 }
 
-/// Joins a bald head, 23 cm high, to the group. Its middle is at the placement's origin, it looks along local -y.
+/// Joins a bald head, 23 cm high, to the group. The placement's origin is its centre; it looks along local -y.
 pub(super) fn head(body: &mut Body, at: Placement, looks: Looks) {
     let p = |x: f64, y: f64, z: f64| at.world(DVec3::new(x, y, z));
     let egg = |x: f64, y: f64, z: f64, radii: [f64; 3]| {
@@ -33,7 +33,7 @@ pub(super) fn head(body: &mut Body, at: Placement, looks: Looks) {
         body.join(0.025, egg(side * 0.044, -0.056, -0.02, [0.022, 0.02, 0.018]));
         body.join(0.016, Shape::cone(q(0.012, -0.082, 0.026), q(0.05, -0.062, 0.025), 0.0125, 0.01));
         body.cut(0.016, egg(side * 0.031, -0.093, 0.004, [0.019, 0.013, 0.010]));
-        // Ear: a rim, a lobe and what is between.
+        // Ear: a rim, a lobe and the part between.
         body.strand(
             0.004,
             &[

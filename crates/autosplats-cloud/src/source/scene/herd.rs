@@ -13,7 +13,7 @@ use super::{Model, Points};
 /// Strides per period of the animation.
 const STRIDES: f64 = 4.0;
 
-/// Where each horse runs (x, y), which way it turns off the x axis, its size, the phase of its stride and its coat.
+/// Position (x, y) of each horse, its rotation from the x axis, its size, the phase of its stride and its coat.
 const HERD: [(f64, f64, f64, f64, f64, Coat); 13] = [
     (3.1, -1.9, -0.06, 1.02, 0.00, Coat::BAY),
     (3.9, 0.1, 0.02, 1.04, 0.37, Coat::BLACK),
@@ -43,6 +43,6 @@ pub(super) fn scene(phase: f64) -> Model {
         horse(&mut body, Gait::Gallop((STRIDES * phase + start).rem_euclid(1.0)), coat);
     }
     let tree = Octree::new(body, Fold::None, DVec3::new(-8.0, -8.0, -4.0), 16.0, 9);
-    // The meadow needs fewer points than what runs on it.
+    // The meadow needs fewer points than the horses.
     Model { tree, points: Points::Strewn(vec![0.22, 0.78]) }
 }

@@ -13,9 +13,9 @@ use super::shape::{Placement, Shape};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coat {
     fur: Paint,
-    /// Mane, tail.
+    /// Colour of mane and tail.
     hair: Paint,
-    /// Lower legs.
+    /// Colour of the lower legs.
     legs: Paint,
     muzzle: Paint,
 }
@@ -48,8 +48,8 @@ pub(super) enum Gait {
     Gallop(f64),
 }
 
-/// Adds a horse as groups of its own: 1.6 m high at the withers, hooves on z = 0, looking along x. Returns, in the
-/// body's world, the top of its head.
+/// Adds a horse as separate groups: 1.6 m high at the withers, hooves on z = 0, facing x. Returns the top of its head
+/// in world coordinates.
 pub(super) fn horse(body: &mut Body, gait: Gait, coat: Coat) -> DVec3 {
     let stride = match gait {
         Gait::Standing => 0.0,
@@ -69,7 +69,7 @@ pub(super) fn horse(body: &mut Body, gait: Gait, coat: Coat) -> DVec3 {
     for side in [-1.0, 1.0] {
         let (fore, hind) = match gait {
             Gait::Standing => (None, None),
-            // Left and right follow each other closely, hind before fore.
+            // Left and right follow each other closely, hind legs before forelegs.
             Gait::Gallop(phase) => {
                 let lag = if side > 0.0 { 0.0 } else { 0.11 };
                 (Some((phase - 0.46 - lag).rem_euclid(1.0)), Some((phase - lag).rem_euclid(1.0)))
@@ -107,7 +107,7 @@ fn barrel(body: &mut Body, at: Placement) {
     }
 }
 
-/// Adds the neck; returns poll and nose.
+/// Adds the neck. Returns the poll and the nose.
 fn neck(body: &mut Body, at: Placement, moving: f64, beat: f64) -> (DVec3, DVec3) {
     let nod = moving * 0.05 * (beat + 2.2).sin();
     let still = (DVec3::new(0.98, 0.0, 1.98), DVec3::new(1.36, 0.0, 1.55));
@@ -126,7 +126,7 @@ fn neck(body: &mut Body, at: Placement, moving: f64, beat: f64) -> (DVec3, DVec3
     (poll, nose)
 }
 
-/// Where a hoof is in its stride: forward of the middle, above the ground, and how far it is folded back.
+/// Position of a hoof in its stride: forward of the middle, above the ground, and how far it is folded back.
 fn step(phase: Option<f64>, reach: f64, lift: f64) -> (f64, f64, f64) {
     const STANCE: f64 = 0.28;
     match phase {
@@ -141,7 +141,7 @@ fn step(phase: Option<f64>, reach: f64, lift: f64) -> (f64, f64, f64) {
     }
 }
 
-/// A foot to be added once the legs are done: a group of its own, because its sole is cut flat.
+/// A foot to add after the legs, in a group of its own, because its sole is cut flat.
 #[derive(Clone, Copy, Debug)]
 struct Hoof {
     fetlock: DVec3,

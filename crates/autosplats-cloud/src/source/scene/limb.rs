@@ -1,4 +1,4 @@
-//! Joints, hands and feet, for everything that walks.
+//! Joints, hands and feet.
 
 use std::f64::consts::TAU;
 
@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::body::Body;
 use super::shape::{Placement, Shape};
 
-/// Where the joint between two bones of length `upper` and `lower` comes to lie when they reach from `from` to `to`, bent
-/// towards `pole`; and where the far end then is, nearer than `to` if that is out of reach.
+/// Inverse kinematics of two bones of length `upper` and `lower` from `from` to `to`, bent towards `pole`. Returns the
+/// joint and the far end, which is nearer than `to` if `to` is out of reach.
 pub(super) fn reach(from: DVec3, to: DVec3, upper: f64, lower: f64, pole: DVec3) -> (DVec3, DVec3) {
     let far = (to - from).length().clamp((upper - lower).abs() * 1.05 + 1e-6, (upper + lower) * 0.995);
     let along = (to - from).normalize_or(DVec3::NEG_Z);
@@ -18,17 +18,17 @@ pub(super) fn reach(from: DVec3, to: DVec3, upper: f64, lower: f64, pole: DVec3)
     (from + along * x + side * y, from + along * far)
 }
 
-/// How a hand is held.
+/// Pose of a hand.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hand {
     pub(super) wrist: DVec3,
-    /// Along the fingers.
+    /// Direction of the fingers.
     pub(super) forward: DVec3,
-    /// Out of the palm.
+    /// Direction out of the palm.
     pub(super) palm: DVec3,
-    /// Towards the thumb: +1 if that is `forward` cross `palm`, else -1.
+    /// Side of the thumb: +1 in the direction of `forward` × `palm`, else -1.
     pub(super) thumb: f64,
-    /// How far the fingers close, 0 to 1.
+    /// How far the fingers are closed, 0 to 1.
     pub(super) curl: f64,
 }
 
@@ -75,7 +75,7 @@ pub(super) fn foot(body: &mut Body, ankle: DVec3, forward: DVec3, down: DVec3) {
     }
 }
 
-/// A smooth bump that repeats: `0` at phase 0, `1` at a half.
+/// A smooth periodic bump: 0 at phase 0, 1 at phase 0.5.
 pub(super) fn pulse(phase: f64) -> f64 {
     0.5 - 0.5 * (TAU * phase).cos()
 }

@@ -1,10 +1,10 @@
-//! Made-up scenes with an exact ground truth: clouds to show, to measure and to test with, at any size.
+//! Generated scenes with an exact ground truth, of any number of points: for demonstrations, measurements and tests.
 //!
 //! # How it works
-//! A scene is a body of solids (`shape`, `body`) whose distance bound is cut into cells (`octree`). From the same bound
-//! come the points, evenly strewn (`sample`) or scanned from within (`scan`), and the true surface that
-//! [`Scene::trace`] reports. Everything is a function of name, time and count: the same input gives the same bytes,
-//! whatever the number of threads.
+//! A scene is a body of solids (`shape`, `body`) with a distance bound, subdivided into cells (`octree`). The bound
+//! yields the points, sampled evenly (`sample`) or scanned from inside (`scan`), and the true surface for
+//! [`Scene::trace`]. Everything is a function of name, time and count: the same input gives the same bytes, whatever
+//! the number of threads.
 
 mod body;
 mod cathedral;
@@ -34,9 +34,9 @@ pub use self::name::parse_count;
 use self::octree::Octree;
 use crate::{Axes, Error, PointCloud};
 
-/// A made-up scene: a closed surface known exactly, at one moment of its animation. Metres, z up.
+/// A generated scene: a closed surface, known exactly, at one moment of its animation. In metres, z up.
 ///
-/// Every animation repeats after [`Scene::PERIOD`].
+/// Animations repeat every [`Scene::PERIOD`] seconds.
 #[derive(Clone, Debug)]
 pub struct Scene {
     kind: Kind,
@@ -44,61 +44,61 @@ pub struct Scene {
     model: OnceLock<Arc<Model>>,
 }
 
-/// The surface and how points are to be taken from it.
+/// The surface, and how to take points from it.
 #[derive(Debug)]
 struct Model {
     tree: Octree,
     points: Points,
 }
 
-/// Where a scene's points come from.
+/// Origin of a scene's points.
 #[derive(Debug)]
 enum Points {
-    /// Strewn evenly over each zone, which gets this share of the points.
+    /// Sampled evenly on each zone. The values are the zones' shares of the points.
     Strewn(Vec<f64>),
-    /// Scanned from these places.
+    /// Scanned from these positions.
     Scanned(Vec<DVec3>),
 }
 
-/// Where a ray meets the true surface of a scene.
+/// Intersection of a ray with the true surface of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Metres from the ray's origin.
+    /// Distance from the origin of the ray, in metres.
     pub distance: f64,
     /// Unit normal, pointing out of the solid.
     pub normal: DVec3,
-    /// Colour, sRGB 0 to 1, as the points there have it.
+    /// Colour of the points there, sRGB, 0 to 1.
     pub rgb: [f32; 3],
 }
 
-/// Where to look at a scene from.
+/// A view of a scene, in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// The eye.
+    /// Position of the eye.
     pub eye: DVec3,
-    /// What is in the middle of the picture.
+    /// Point in the middle of the image.
     pub look_at: DVec3,
-    /// What is up in the picture.
+    /// Up direction of the image.
     pub up: DVec3,
-    /// Vertical angle of view, degrees.
+    /// Vertical field of view, degrees.
     pub fov_degrees: f64,
 }
 
 impl Scene {
-    /// Every animation repeats after this many seconds.
+    /// Period of all animations, in seconds.
     pub const PERIOD: f64 = 2.0;
 
-    /// The most points a scene can be asked for.
+    /// Maximum number of points of a scene.
     pub const MAX_COUNT: usize = 1_000_000_000;
 
-    /// The scenes there are, each with a line that describes it.
+    /// All scenes: name and one-line description.
     pub fn names() -> impl Iterator<Item = (&'static str, &'static str)> {
         Kind::ALL.into_iter().map(|kind| (kind.name(), kind.about()))
     }
 
-    /// Reads `NAME[:COUNT][@SECONDS]`, with or without `scene:` before it, and returns the scene and the count, or the
-    /// scene's own default. COUNT is a number with an optional k, m or g for thousands, millions or billions: `546K`,
-    /// `1.5M`.
+    /// Parses `NAME[:COUNT][@SECONDS]`, with or without the prefix `scene:`. Returns the scene and the number of
+    /// points, by default the scene's own. COUNT is a number with an optional k, m or g for thousands, millions or
+    /// billions: `546K`, `1.5M`.
     ///
     /// # Errors
     /// [`Error::UnknownScene`] and [`Error::BadScene`].
@@ -112,12 +112,12 @@ impl Scene {
         self.kind.name()
     }
 
-    /// Seconds into the animation.
+    /// Time of the animation, in seconds.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// Whether the scene looks different at different times.
+    /// Whether the scene changes with time.
     pub fn is_animated(&self) -> bool {
         self.kind.is_animated()
     }
@@ -129,7 +129,7 @@ impl Scene {
         Self { kind: self.kind, seconds, model }
     }
 
-    /// Makes the surface now, for this scene and all its clones.
+    /// Builds the surface now, and shares it with all clones made afterwards.
     pub(crate) fn prepare(&self) {
         self.model();
     }
@@ -147,8 +147,8 @@ impl Scene {
         })
     }
 
-    /// `count` coloured points on the surface. `progress` is told how much is done, 0 to 1, from any thread, and ends
-    /// the work by returning false.
+    /// Samples `count` coloured points on the surface. `progress` gets the completed fraction, 0 to 1, from any thread,
+    /// and cancels by returning false.
     ///
     /// # Errors
     /// [`Error::BadScene`] if `count` is above [`Self::MAX_COUNT`] or memory does not suffice, and
@@ -158,7 +158,7 @@ impl Scene {
         if count > Self::MAX_COUNT {
             return Err(refuse("a scene has at most 1G points"));
         }
-        // Asking first turns a lack of memory into an error; the zeroed vectors below would abort instead.
+        // A failed reservation becomes an error. The zeroed vectors below would abort the process instead.
         if Vec::<[u8; 15]>::new().try_reserve_exact(count).is_err() {
             return Err(refuse("not enough memory for so many points"));
         }
@@ -174,14 +174,14 @@ impl Scene {
         PointCloud::new(DVec3::ZERO, positions).with_axes(Axes::ZUp).with_colors(colors)
     }
 
-    /// First place where a ray meets the surface, from outside or from within a solid.
+    /// First intersection of a ray with the surface, from outside or from within a solid.
     pub fn trace(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let tree = &self.model().tree;
         let crossing = tree.trace(origin, direction, 0.0..f64::INFINITY)?;
         Some(Hit { distance: crossing.distance, normal: tree.normal(&crossing), rgb: tree.rgb(&crossing) })
     }
 
-    /// The same from some distance to another, in which all lies that the ray meets; distance and colour alone.
+    /// Like [`trace`](Self::trace), but searches only the distances `within`, and returns only distance and colour.
     pub(crate) fn trace_within(
         &self,
         origin: DVec3,
@@ -193,18 +193,19 @@ impl Scene {
         Some((crossing.distance, tree.rgb(&crossing)))
     }
 
-    /// Cubes that together hold all the surface, from large to small: `visit` gets the middle, half a side, and whether there are
-    /// no smaller ones within, and says whether to go on with these. Returns whether there are such cubes.
+    /// Visits cubes that together contain the whole surface, from large to small. `visit` gets the centre, half the
+    /// side, and whether the cube has no smaller cubes inside, and returns whether to visit those. Returns whether the
+    /// scene has such cubes.
     pub(crate) fn cubes(&self, visit: &mut dyn FnMut(DVec3, f64, bool) -> bool) -> bool {
         self.model().tree.cubes(visit)
     }
 
-    /// Signed distance bound: zero on the surface, negative inside, never farther than the surface is.
+    /// Signed distance bound: zero on the surface, negative inside, and never larger than the true distance.
     pub fn distance(&self, position: DVec3) -> f64 {
         self.model().tree.distance(position)
     }
 
-    /// A good place to look from.
+    /// A view that shows the scene well.
     pub fn view(&self) -> View {
         self.kind.view()
     }

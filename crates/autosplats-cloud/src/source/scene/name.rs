@@ -1,11 +1,11 @@
-//! `NAME[:COUNT][@SECONDS]`, and what the names stand for.
+//! Parses `NAME[:COUNT][@SECONDS]`, and describes the scenes.
 
 use glam::DVec3;
 
 use super::{Scene, View};
 use crate::Error;
 
-/// The scenes there are.
+/// The scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Figure,
@@ -64,14 +64,14 @@ impl Kind {
     }
 }
 
-/// Takes `[scene:]NAME[:COUNT][@SECONDS]` apart.
+/// Parses `[scene:]NAME[:COUNT][@SECONDS]`.
 pub(super) fn parse(text: &str) -> Result<(Kind, usize, f64), Error> {
     let bad = |why: &str| Error::BadScene { given: text.into(), why: why.into() };
     let rest = text.strip_prefix("scene:").unwrap_or(text);
     let (rest, seconds) = match rest.split_once('@') {
         Some((rest, seconds)) => {
             let seconds = seconds.trim().parse().ok().filter(|s: &f64| s.is_finite());
-            (rest, seconds.ok_or_else(|| bad("after @ comes a time in seconds, like @0.25"))?)
+            (rest, seconds.ok_or_else(|| bad("@ needs a time in seconds, as in @0.25"))?)
         }
         None => (rest, 0.0),
     };
@@ -83,19 +83,20 @@ pub(super) fn parse(text: &str) -> Result<(Kind, usize, f64), Error> {
     let kind = kind.ok_or_else(|| Error::UnknownScene { given: name.into(), known: known() })?;
     let count = match count {
         Some(count) => {
-            parse_count(count).ok_or_else(|| bad("a count is a number from 1 to 1G, like 5000, 546K or 1.5M"))?
+            parse_count(count).ok_or_else(|| bad("the count must be a number from 1 to 1G, like 5000, 546K or 1.5M"))?
         }
         None => kind.default_count(),
     };
     Ok((kind, count, seconds))
 }
 
-/// One line per scene, for the error message.
+/// One line per scene, for error messages.
 fn known() -> String {
     Kind::ALL.map(|kind| format!("\n  {:<11} {}", kind.name(), kind.about())).concat()
 }
 
-/// A number of points as people type it: `1000`, `546K`, `1.5M`, `1g`; nothing if it is none, or not within 1 to 1G.
+/// Parses a number of points as people type it: `1000`, `546K`, `1.5M`, `1g`. `None` if the text is not a number from 1
+/// to 1G.
 pub fn parse_count(text: &str) -> Option<usize> {
     let text = text.trim();
     let (number, unit) = match text.char_indices().last()? {

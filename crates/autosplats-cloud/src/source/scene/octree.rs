@@ -1,10 +1,10 @@
-//! Space cut into cells that know which solids matter in them, and rays through those cells.
+//! Cells of space with the solids that matter in each, and rays through the cells.
 //!
 //! # How it works
-//! A cell whose centre is farther from the surface than its corners are from the centre is empty and a ray crosses it in
-//! one step. Every other cell is cut in eight, each with the shorter list of solids that still matter there, until the
-//! list is short or the cell is small. In such a cell a ray advances by the distance bound until the sign changes, and
-//! the root is then polished by regula falsi.
+//! If the centre of a cell is farther from the surface than from its corners, the cell is empty and a ray crosses it in
+//! one step. Every other cell is cut into eight, each with the shorter list of solids that still matter in it, until
+//! the list is short or the cell is small. In such a cell a ray advances by the distance bound until the sign changes.
+//! Regula falsi then refines the root.
 
 use std::ops::Range;
 
@@ -14,18 +14,18 @@ use rayon::prelude::*;
 use super::body::Body;
 use super::fold::Fold;
 
-/// Lists this short are not worth another cut, unless the cell is large.
+/// Cells with lists of at most this length are not cut, unless the cell is large.
 const SHORT_LIST: usize = 4;
 
-/// Level down to which a table takes the place of the tree.
+/// Level of the lookup table that replaces the upper levels of the tree.
 const TOP: u32 = 5;
 const MASK: u32 = (1 << TOP) - 1;
 
 #[derive(Clone, Copy, Debug)]
 enum Cell {
-    /// Index of the first of eight children, in the order of their bits z, y, x.
+    /// Index of the first of eight children, ordered by the bits z, y, x.
     Branch(u32),
-    /// Distance bound at the middle, negative inside.
+    /// Distance bound at the centre, negative inside.
     Empty(f64),
     Surface {
         first: u32,
@@ -33,7 +33,7 @@ enum Cell {
     },
 }
 
-/// A cell through which the surface may pass.
+/// A cell that the surface may cross.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leaf {
     pub(super) min: DVec3,
@@ -52,11 +52,12 @@ pub(super) struct Octree {
     depth: u32,
     cells: Vec<Cell>,
     lists: Vec<u16>,
-    /// For each cube of level [`TOP`], in order of z, y, x: the deepest cell that holds it, and that cell's level.
+    /// For each cube of level [`TOP`], ordered by z, y, x: the deepest cell that contains the cube, and the level of
+    /// that cell.
     top: Vec<(u32, u32)>,
 }
 
-/// A part of the cells under construction.
+/// Part of the cells during construction.
 struct Builder<'a> {
     body: &'a Body,
     fold: Fold,
@@ -66,9 +67,9 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Makes `cell` of the cube at `min`, in which only the solids of `list` matter.
+    /// Builds `cell` from the cube at `min`, in which only the solids of `list` matter.
     fn cut(&mut self, cell: usize, min: DVec3, size: f64, level: u32, list: &[u16]) {
-        // A hair more than half the diagonal: normals are taken from a little outside of the cell.
+        // Slightly more than half the diagonal, because normals are computed from slightly outside the cell.
         let radius = 0.8661 * size + 1e-5;
         let mut kept = Vec::with_capacity(list.len());
         let distance = self.body.prune(list, min + DVec3::splat(0.5 * size), radius, &mut kept);
@@ -90,13 +91,13 @@ impl Builder<'_> {
     }
 }
 
-/// Where a ray met the surface.
+/// Intersection of a ray with the surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crossing {
     pub(super) distance: f64,
     /// Position before folding.
     pub(super) world: DVec3,
-    /// Position after folding, and the signs that the fold gave the axes.
+    /// Position after folding. `signs` are the signs of the axes after folding.
     pub(super) folded: DVec3,
     pub(super) signs: DVec3,
     first: u32,
@@ -104,10 +105,10 @@ pub(super) struct Crossing {
 }
 
 impl Octree {
-    /// Cuts the cube at `min` with sides of `size`, which must hold the whole body, down to `size / 2^depth`.
+    /// Subdivides the cube at `min` with side `size`, which must contain the whole body, down to `size / 2^depth`.
     pub(super) fn new(body: Body, fold: Fold, min: DVec3, size: f64, depth: u32) -> Self {
         let all = body.all();
-        // The first two levels are always cut; what is below each of their 64 cells is built in parallel.
+        // The first two levels are always cut. The contents of their 64 cells are built in parallel.
         let parts = (0..64_usize).into_par_iter().map(|i| {
             let mut part = Builder { body: &body, fold, depth, cells: vec![Cell::Empty(0.0)], lists: Vec::new() };
             let low = min + 0.5 * size * corner(i / 8) + 0.25 * size * corner(i % 8);
@@ -120,7 +121,7 @@ impl Octree {
         cells.resize(9 + 64, Cell::Empty(0.0));
         let mut lists = Vec::new();
         for (i, (part, part_lists)) in parts.into_iter().enumerate() {
-            // A part's cell 0 has its place already; the others follow at the end.
+            // Cell 0 of a part already has its place; the other cells are appended.
             let (cells_before, lists_before) = (cells.len() as u32 - 1, lists.len() as u32);
             let mut moved = part.into_iter().map(|cell| match cell {
                 Cell::Branch(children) => Cell::Branch(children + cells_before),
@@ -153,7 +154,7 @@ impl Octree {
         &self.body
     }
 
-    /// The cells the surface may pass through, each where it lies in folded space.
+    /// The cells that the surface may cross, in folded space.
     pub(super) fn leaves(&self) -> Vec<Leaf> {
         let mut leaves = Vec::new();
         let mut stack = vec![(0_usize, self.min, self.size)];
@@ -163,7 +164,7 @@ impl Octree {
                 Cell::Surface { first, len } => leaves.push(Leaf { min, size, first, len }),
                 Cell::Branch(children) => {
                     let half = 0.5 * size;
-                    // Reversed, so that they leave the stack in order.
+                    // Reversed, so that the stack returns them in order.
                     stack.extend((0..8).rev().map(|i| (children as usize + i, min + half * corner(i), half)));
                 }
             }
@@ -176,7 +177,7 @@ impl Octree {
         &self.lists[leaf.first as usize..(leaf.first + leaf.len) as usize]
     }
 
-    /// The cell around `p` (folded): its low corner, its size and what it is.
+    /// The cell around the folded position `p`: low corner, size and content.
     #[inline]
     fn find(&self, p: DVec3) -> (DVec3, f64, Cell) {
         let steps = f64::from(1_u32 << self.depth);
@@ -194,7 +195,7 @@ impl Octree {
         (self.min + corner * unit, unit * f64::from(1_u32 << bit), self.cells[cell])
     }
 
-    /// Signed distance bound at `p`, from the whole body where no cell has a list.
+    /// Signed distance bound at `p`. In cells without a list, computed from the whole body.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
         let (p, _) = self.fold.apply(p);
         match self.find(p) {
@@ -205,15 +206,15 @@ impl Octree {
         }
     }
 
-    /// Where `p` lies in the space the body is modelled in.
+    /// Position of `p` in the folded space of the body.
     #[cfg(test)]
     pub(super) fn folded(&self, p: DVec3) -> DVec3 {
         self.fold.apply(p).0
     }
 
-    /// Every place where the bound changes sign within `to` metres along the ray, nearest first, as long as `more` asks for
-    /// more; at its begin the bound is `start`. Returns the last such place and true, or a bound with the sign that there is at
-    /// the end.
+    /// Calls `more` with every distance, in increasing order, where the bound changes sign within `to` metres along the
+    /// ray. Stops when `more` returns false. `start` is the bound at the origin. Returns the last crossing and true if
+    /// stopped, or else a bound with the sign at the end, and false.
     fn crossings(
         &self,
         leaf: Leaf,
@@ -224,10 +225,10 @@ impl Octree {
         more: &mut dyn FnMut(f64) -> bool,
     ) -> (f64, bool) {
         let list = self.list(&leaf);
-        // Steps never get smaller than this, so that grazing rays get on. All that is missed are chords shorter than it.
+        // A minimum step keeps grazing rays moving. Only chords shorter than the step are missed.
         let least = 5e-3 * leaf.size;
         let (mut t, mut f) = (0.0, start);
-        // What is further away than the way that is left is not on it.
+        // A surface farther away than the remaining distance cannot be hit.
         while f.abs() < to - t {
             let next = (t + f.abs() + least).min(to);
             let g = self.body.distance(origin + direction * next, list);
@@ -242,7 +243,7 @@ impl Octree {
         (f, false)
     }
 
-    /// A bit for every octant of `leaf`, in the order of [`corner`], that the surface may pass through.
+    /// Bits of the octants of `leaf`, ordered as in [`corner`], that the surface may cross.
     pub(super) fn octants(&self, leaf: &Leaf) -> u8 {
         let quarter = 0.25 * leaf.size;
         let near = |i: &usize| {
@@ -252,10 +253,10 @@ impl Octree {
         (0..8).filter(near).fold(0, |bits, i| bits | 1 << i)
     }
 
-    /// Calls `hit` with the distance of every place where the surface crosses the line that enters `leaf` at `origin`
-    /// and leaves it after `to` metres.
+    /// Calls `hit` with the distance of every crossing of the surface with the line that enters `leaf` at `origin` and
+    /// leaves after `to` metres.
     pub(super) fn crossings_in(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, to: f64, hit: &mut dyn FnMut(f64)) {
-        // Most cells' lines meet nothing, which their middle tells at once.
+        // Most lines meet nothing, and the bound at their middle shows that at once.
         let list = self.list(leaf);
         if self.body.distance(origin + direction * (0.5 * to), list).abs() > 0.5 * to {
             return;
@@ -266,7 +267,8 @@ impl Octree {
         });
     }
 
-    /// Cubes around the surface, from large to small; see [`Scene::cubes`](super::Scene::cubes). Folded space has none.
+    /// Visits cubes around the surface, from large to small; see [`Scene::cubes`](super::Scene::cubes). Returns false
+    /// in folded space.
     pub(super) fn cubes(&self, visit: &mut dyn FnMut(DVec3, f64, bool) -> bool) -> bool {
         let mut stack = vec![(0_usize, self.min, 0.5 * self.size)];
         while let Some((cell, min, half)) = stack.pop().filter(|_| self.fold == Fold::None) {
@@ -285,7 +287,7 @@ impl Octree {
         self.fold == Fold::None
     }
 
-    /// First place where the ray crosses the surface, from either side; all that it meets lies `within` some distances.
+    /// First crossing of the ray with the surface, from either side. Searches only the distances `within`.
     pub(super) fn trace(&self, origin: DVec3, direction: DVec3, within: Range<f64>) -> Option<Crossing> {
         let direction = direction.try_normalize()?;
         let (low, high) = self.fold.bounds(self.min, self.size);
@@ -323,39 +325,39 @@ impl Octree {
                         return Some(crossing(value));
                     }
                     was_inside = Some(value < 0.0);
-                    // As far as the surface is away, there are no cells to be looked into.
+                    // Cells nearer than the surface can be skipped.
                     to = to.max(start.abs());
                 }
                 Cell::Empty(distance) => {
                     was_inside = Some(distance < 0.0);
-                    // The way out of the cell, or out of the ball around its middle that holds no surface.
+                    // Skips the cell, or the ball around its centre that contains no surface.
                     let away = (p - min - DVec3::splat(0.5 * size)).length();
                     to = to.max(distance.abs() - away);
                 }
                 Cell::Branch(_) => unreachable!("find ends at a leaf"),
             }
-            // A ray in a plane of the fold leaves a cell as soon as it is in it: steps get longer until they lead out.
+            // A ray in a plane of the fold leaves each cell at once, so steps grow until they lead out of the plane.
             least_step = if to > nudge { nudge } else { (2.0 * least_step).min(1e-4 * self.size) };
             t += to + least_step;
         }
         None
     }
 
-    /// Outward unit normal where a ray crossed the surface.
+    /// Outward unit normal at a crossing.
     pub(super) fn normal(&self, at: &Crossing) -> DVec3 {
         let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
         self.gradient(at.folded, list) * at.signs
     }
 
-    /// Direction in which the bound grows fastest, by central differences.
+    /// Gradient direction of the bound, by central differences.
     pub(super) fn gradient(&self, p: DVec3, list: &[u16]) -> DVec3 {
         const STEP: f64 = 2e-6;
         let slope = |axis: DVec3| self.body.distance(p + axis * STEP, list) - self.body.distance(p - axis * STEP, list);
         DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z)
     }
 
-    /// `|n.x| + |n.y| + |n.z|` of the normal `n` at a place on the surface. One-sided differences do: what is a
-    /// thousandth off in a density, nobody sees.
+    /// `|n.x| + |n.y| + |n.z|` of the normal `n` at a surface point. One-sided differences are accurate enough for a
+    /// sampling density.
     pub(super) fn slant(&self, p: DVec3, list: &[u16]) -> f64 {
         const STEP: f64 = 1e-6;
         let here = self.body.distance(p, list);
@@ -363,14 +365,14 @@ impl Octree {
         DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize_or(DVec3::Z).abs().element_sum()
     }
 
-    /// Colour where a ray crossed the surface.
+    /// Colour at a crossing.
     pub(super) fn rgb(&self, at: &Crossing) -> [f32; 3] {
         let list = &self.lists[at.first as usize..(at.first + at.len) as usize];
         self.body.paint(at.folded, at.world, list).0
     }
 }
 
-/// Which child of its parent the cell at this bit of the coordinates is.
+/// Index of a cell among its siblings, from this bit of the coordinates.
 #[inline]
 fn child_at(x: u32, y: u32, z: u32, bit: u32) -> u32 {
     (((z >> bit) & 1) << 2) | (((y >> bit) & 1) << 1) | ((x >> bit) & 1)
@@ -380,28 +382,28 @@ fn corner(child: usize) -> DVec3 {
     DVec3::new((child & 1) as f64, (child >> 1 & 1) as f64, (child >> 2 & 1) as f64)
 }
 
-/// Distances at which a ray enters and leaves a box, the first not below zero.
+/// Distances at which a ray enters and leaves a box; the first is at least zero.
 fn clip(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
     let inverse = direction.recip();
     let (a, b) = ((low - origin) * inverse, (high - origin) * inverse);
-    // A ray in a face's plane makes 0/0 here; f64's own min and max let the other operand win.
+    // A ray in the plane of a face makes 0/0 here; `min` and `max` of `f64` then return the other operand.
     let start = a.x.min(b.x).max(a.y.min(b.y)).max(a.z.min(b.z)).max(0.0);
     let end = a.x.max(b.x).min(a.y.max(b.y)).min(a.z.max(b.z));
     (start < end).then_some((start, end))
 }
 
-/// Distance at which a ray from within a cube leaves it; `inverse` is one over its direction.
+/// Distance at which a ray from inside a cube leaves it. `inverse` is the reciprocal of the direction.
 #[inline]
 fn leave(min: DVec3, size: f64, p: DVec3, inverse: DVec3) -> f64 {
     let p = p - min;
     let side = |p: f64, inverse: f64| {
-        // Parallel to this side: infinite, or 0/0 in its plane, which min below passes over.
+        // For a ray parallel to this side: infinite, or 0/0 in its plane, which `min` below ignores.
         if inverse > 0.0 { (size - p) * inverse } else { -p * inverse }
     };
     f64::INFINITY.min(side(p.x, inverse.x)).min(side(p.y, inverse.y)).min(side(p.z, inverse.z)).max(0.0)
 }
 
-/// The root between two places of opposite sign, by regula falsi with the Illinois rule.
+/// Root between two places of opposite sign, by regula falsi with the Illinois rule.
 fn polish(f: impl Fn(f64) -> f64, (mut a, mut fa): (f64, f64), (mut b, mut fb): (f64, f64)) -> f64 {
     for _ in 0..60 {
         if fb.abs() < 1e-11 || (b - a).abs() < 1e-12 {
@@ -413,7 +415,7 @@ fn polish(f: impl Fn(f64) -> f64, (mut a, mut fa): (f64, f64), (mut b, mut fb): 
         }
         let ft = f(t);
         if (ft < 0.0) == (fb < 0.0) {
-            // The same end stays twice in a row: halve its weight, or convergence is linear.
+            // The same end is kept twice in a row: halve its weight, because convergence would be linear otherwise.
             fa *= 0.5;
         } else {
             (a, fa) = (b, fb);

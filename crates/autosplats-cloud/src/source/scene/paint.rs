@@ -1,13 +1,13 @@
-//! Colours: what each part is made of, as a function of place alone. No light is painted in.
+//! Colours of materials, as functions of position only. They contain no light.
 
 use glam::DVec3;
 
-/// What a part is made of.
+/// A material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Paint {
     /// One colour, sRGB 0 to 255.
     Plain(u8, u8, u8),
-    /// A colour with soft clouds of lighter and darker, `grain` metres across.
+    /// A colour with soft variations, `grain` metres across.
     Mottled { rgb: [u8; 3], grain: f64, depth: f32 },
     /// Weathered marble with veins, darker in the low parts.
     Marble,
@@ -41,7 +41,7 @@ impl Paint {
                 scale(base, 0.95 + 0.1 * clouds(p, 0.25))
             }
             Self::Tiles => {
-                // Turned by 45 degrees, with a border line between tiles.
+                // Rotated by 45 degrees, with a line between tiles.
                 let (u, v) = ((p.x + p.y) / 0.72, (p.x - p.y) / 0.72);
                 let (iu, iv) = (u.floor(), v.floor());
                 let edge = (u - iu - 0.5).abs().max((v - iv - 0.5).abs());
@@ -86,7 +86,7 @@ fn scale(rgb: [f32; 3], by: f32) -> [f32; 3] {
     rgb.map(|c| c * by)
 }
 
-/// Soft noise, 0 to 1, with features `grain` metres across.
+/// Value noise, 0 to 1, with features `grain` metres across.
 fn clouds(p: DVec3, grain: f64) -> f32 {
     let q = p / grain;
     let base = q.floor();
@@ -98,7 +98,7 @@ fn clouds(p: DVec3, grain: f64) -> f32 {
     lerp(lerp(edge(0, 0), edge(1, 0), t.y), lerp(edge(0, 1), edge(1, 1), t.y), t.z)
 }
 
-/// A fixed number in 0..1 for a lattice point.
+/// A fixed pseudo-random number from 0 to 1 for a lattice point.
 pub(super) fn lattice(x: i64, y: i64, z: i64) -> f32 {
     let mut h = (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)

@@ -19,7 +19,7 @@ pub(super) fn pedestal(body: &mut Body) {
     };
     body.paint = STONE;
     body.group(Op::Join, 0.0);
-    // Bottom up; a rounding of half the height makes a torus of a slab.
+    // From bottom to top. A rounding of half the height turns a slab into a torus.
     for (half, low, high, round) in [
         (0.62, 0.0, 0.11, 0.006),
         (0.575, 0.11, 0.165, 0.026),
@@ -44,8 +44,8 @@ pub(super) fn pedestal(body: &mut Body) {
     };
     body.join(0.004, round(0.47, 0.94, 0.985, 0.02));
     body.join(0.004, round(0.44, 0.98, 1.0, 0.004));
-    // Four sides: local x to the right, z out of the side's face. All stone is taken away before anything is carved
-    // on it, because a cut reaches only what is in the group already.
+    // Four sides: local x to the right, z out of the face. All stone is removed before anything is carved, because a
+    // cut affects only solids already in the group.
     let sides = [0.0, 1.0, 2.0, 3.0].map(|quarter: f64| {
         let (sin, cos) = (0.25 * TAU * quarter).sin_cos();
         let (out, right) = (DVec3::new(sin, -cos, 0.0), DVec3::new(cos, sin, 0.0));
@@ -64,7 +64,7 @@ pub(super) fn pedestal(body: &mut Body) {
     }
 }
 
-/// What is carved in the sunk panel of a side: a wreath with a rosette, between lines of an inscription.
+/// The carving in the panel of a side: a wreath with a rosette, between lines of an inscription.
 fn panel(body: &mut Body, at: &dyn Fn(f64, f64, f64) -> Placement, turn: i32) {
     body.group(Op::Join, 0.003);
     let ground = 0.42;
@@ -95,7 +95,7 @@ fn panel(body: &mut Body, at: &dyn Fn(f64, f64, f64) -> Placement, turn: i32) {
         }
         body.join(0.003, Shape::ball(at(0.0, 0.5, ground + 0.008).origin, 0.018));
         for side in [-1.0, 1.0] {
-            // Scrolls to either side of the wreath.
+            // Scrolls on either side of the wreath.
             let points = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0].map(|k: f64| {
                 let (sin, cos) = (0.72 * k).sin_cos();
                 let radius = 0.075 - 0.0055 * k;

@@ -1,12 +1,11 @@
-//! Points strewn over a body's surface, evenly by area.
+//! Samples points on a body's surface, evenly by area.
 //!
 //! # How it works
-//! Every cell the surface may pass through is pierced by random lines along one of the three axes. Such lines meet a
-//! piece of surface with normal `n` in proportion to `|n.x| + |n.y| + |n.z|`, so keeping a crossing with one over that
-//! makes the density exactly even: no shell, no projection, no correction for curvature. Cells are drawn by the area of
-//! their faces. Points come in blocks that each have their own random stream, so threads change nothing. A block sends
-//! its lines cell after cell, which is four times faster than at random, and gets a few more crossings than it needs, of
-//! which it drops random ones.
+//! Every cell that the surface may cross is pierced by random lines along one of the three axes. Such lines meet a
+//! piece of surface with normal `n` in proportion to `|n.x| + |n.y| + |n.z|`. Keeping a crossing with the inverse of
+//! that makes the density exactly even, without a shell, projection or correction for curvature. Cells are drawn by the
+//! area of their faces. Each block of points has its own random stream, so threads change nothing. A block visits cells
+//! in order, which is faster than at random. It gets a few more crossings than it needs and drops random ones.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -19,11 +18,11 @@ use crate::random::Random;
 /// Points per random stream.
 const BLOCK: usize = 16384;
 
-/// Reports progress, 0 to 1, and says whether to go on.
+/// Takes the completed fraction, 0 to 1, and returns whether to continue.
 pub(super) type Progress<'a> = &'a (dyn Fn(f32) -> bool + Sync);
 
-/// Fills `positions` and `colors` by blocks, in parallel. `block` gets the index of its first point and returns false
-/// when it cannot fill them. Returns whether all was filled.
+/// Fills `positions` and `colors` block by block, in parallel. `block` gets the index of its first point and returns
+/// false if it cannot fill the block. Returns whether all blocks are filled.
 pub(super) fn by_blocks(
     positions: &mut [[f32; 3]],
     colors: &mut [[u8; 3]],
@@ -45,11 +44,11 @@ pub(super) fn by_blocks(
     !stop.into_inner()
 }
 
-/// The cells of one zone, and how likely each is drawn.
+/// The cells of one zone, with their probabilities.
 struct Zone {
-    /// Each with a bit for every one of its eight octants that the surface may pass through.
+    /// Each cell with a bit for each of its octants that the surface may cross.
     leaves: Vec<(Leaf, u8)>,
-    /// Sums of face areas up to and including each cell.
+    /// Running sums of the cells' face areas.
     sums: Vec<f64>,
 }
 
@@ -69,7 +68,8 @@ impl Zone {
         Self { leaves, sums }
     }
 
-    /// Calls `visit` with about `lines` cells, drawn by the area of their faces and evenly spread over them.
+    /// Calls `visit` for about `lines` cells, drawn in proportion to the area of their faces and evenly spread over
+    /// them.
     fn draw<'a>(&'a self, lines: usize, random: &mut Random, visit: &mut dyn FnMut(&'a (Leaf, u8), &mut Random)) {
         let Some(total) = self.sums.last() else { return };
         let mut at = 0;
@@ -82,10 +82,10 @@ impl Zone {
         }
     }
 
-    /// `need` points of this zone, or fewer if it has no surface.
+    /// Samples `need` points of this zone, or fewer if the zone has no surface.
     fn fill(&self, tree: &Octree, zone: usize, need: usize, random: &mut Random) -> Vec<Painted> {
         let mut points = Vec::new();
-        // Lines per point: a guess that is corrected by what the lines before have met.
+        // Lines per point: a guess, corrected by the crossings found so far.
         let (mut lines, mut met) = (0, 0);
         while points.len() < need && lines < 1000 * need {
             let missing = need - points.len();
@@ -104,7 +104,8 @@ impl Zone {
     }
 }
 
-/// Strews points over the surface, `shares[zone]` of them over each zone. Returns false when cancelled.
+/// Samples the surface with a share `shares[zone]` of the points on each zone. Returns false if cancelled or if a zone
+/// has no surface.
 pub(super) fn strew(
     tree: &Octree,
     shares: &[f64],
@@ -113,7 +114,7 @@ pub(super) fn strew(
     progress: Progress<'_>,
 ) -> bool {
     let zones: Vec<_> = (0..tree.body().zones()).map(|zone| Zone::new(tree, zone)).collect();
-    // How many of the first `count` points lie in zones up to and including `zone`.
+    // Number of points among the first `count` that lie in zones up to and including `zone`.
     let upto = |count: usize, zone: usize| {
         let share = if zone + 1 == zones.len() { 1.0 } else { shares[..=zone].iter().sum::<f64>() };
         (count as f64 * share).round() as usize
@@ -150,7 +151,7 @@ fn pierce(tree: &Octree, (leaf, octants): &(Leaf, u8), zone: usize, random: &mut
         origin[other] += leaf.size * at;
         octant |= u8::from(at >= 0.5) << other;
     }
-    // The line passes two octants, often through neither of which the surface goes.
+    // The line crosses two octants. Often the surface crosses neither.
     let near = octants >> octant & 1 > 0;
     let far = octants >> (octant | 1 << axis) & 1 > 0;
     let length = match (near, far) {
@@ -174,7 +175,7 @@ fn pierce(tree: &Octree, (leaf, octants): &(Leaf, u8), zone: usize, random: &mut
     });
 }
 
-/// sRGB bytes, with a little of the variation that any sensor has.
+/// Converts to sRGB bytes, with a little sensor noise.
 pub(super) fn quantize(rgb: [f32; 3], random: &mut Random) -> [u8; 3] {
     let gain = 255.0 * (1.0 + 0.03 * (random.unit() as f32 - 0.5));
     rgb.map(|c| (c * gain + 0.5).clamp(0.0, 255.0) as u8)

@@ -1,4 +1,4 @@
-//! A simulated laser scan: what scanners standing in a scene would record.
+//! A simulated laser scan from positions inside a scene.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -8,11 +8,11 @@ use super::octree::Octree;
 use super::sample::{Progress, by_blocks, quantize};
 use crate::random::Random;
 
-/// Lowest elevation a scanner sees: below, its own tripod is in the way.
+/// Lowest elevation of a ray, in radians; the tripod hides everything below.
 const LOWEST: f64 = -60.0 / 180.0 * std::f64::consts::PI;
 
-/// Scans the inside of a closed scene from each of `stations`, an equal part of the points from each: rays a constant
-/// angle apart in azimuth and elevation, jittered within that angle. Returns false when cancelled.
+/// Scans the inside of a closed scene, with an equal share of the points from each of `stations`. Rays are jittered
+/// within equal steps of azimuth and elevation. Returns false if cancelled or if rays leave the scene.
 pub(super) fn scan(
     tree: &Octree,
     stations: &[DVec3],
@@ -21,7 +21,7 @@ pub(super) fn scan(
     progress: Progress<'_>,
 ) -> bool {
     let per_station = positions.len().div_ceil(stations.len()).max(1);
-    // One vertical profile after the other while the head turns, as such scanners do.
+    // The scanner measures one vertical profile after another while its head turns.
     let profile = ((per_station as f64 * (FRAC_PI_2 - LOWEST) / TAU).sqrt().ceil() as usize).max(1);
     by_blocks(positions, colors, progress, |first, points, colors| {
         for (i, (point, color)) in (first..).zip(points.iter_mut().zip(colors)) {

@@ -1,11 +1,11 @@
-//! The solids that bodies are made of, each as a signed distance bound.
+//! The solids of bodies, each as a signed distance bound.
 //!
-//! A bound `f` is zero on the surface, negative inside, and changes by at most one metre per metre. That one property is
-//! what pruning, tracing and sampling rest on: `|f(p)|` metres around `p` hold no surface.
+//! A bound `f` is zero on the surface, negative inside, and changes by at most one metre per metre. Pruning, tracing
+//! and sampling rely on this property: there is no surface within `|f(p)|` metres of `p`.
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// A position and three orthonormal axes: where a solid with its own axes stands.
+/// Pose of a solid: a position and three orthonormal axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placement {
     pub(super) origin: DVec3,
@@ -13,12 +13,12 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    /// Axes parallel to the world's.
+    /// A pose with axes parallel to the world's.
     pub(super) const fn at(origin: DVec3) -> Self {
         Self { origin, axes: DMat3::IDENTITY }
     }
 
-    /// Local z along `up`, local x as near to `side` as that allows.
+    /// A pose with local z along `up` and local x as close to `side` as possible.
     pub(super) fn along(origin: DVec3, up: DVec3, side: DVec3) -> Self {
         let z = up.normalize();
         let fallback = z.any_orthonormal_vector();
@@ -31,13 +31,13 @@ impl Placement {
         DVec3::new(self.axes.x_axis.dot(p), self.axes.y_axis.dot(p), self.axes.z_axis.dot(p))
     }
 
-    /// The world position of a local one.
+    /// World position of a local position.
     pub(super) fn world(&self, p: DVec3) -> DVec3 {
         self.origin + self.axes * p
     }
 }
 
-/// A turned, moved and evenly scaled copy of space, applied to solids as they are added to a body.
+/// A rotation, translation and uniform scale, applied to solids when they are added to a body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Similarity {
     pub(super) placement: Placement,
@@ -56,7 +56,7 @@ impl Similarity {
     }
 }
 
-/// Two spheres and the cone that touches both.
+/// Two spheres and the cone tangent to both.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RoundCone {
     a: DVec3,
@@ -72,7 +72,7 @@ pub(super) struct RoundCone {
 impl RoundCone {
     fn new(a: DVec3, b: DVec3, radius_a: f64, radius_b: f64) -> Self {
         let axis = if a.distance_squared(b) > 1e-12 { b - a } else { DVec3::Z * 1e-6 };
-        // One sphere must not swallow the other: no cone touches both then.
+        // If one sphere contained the other, no cone would be tangent to both.
         let limit = 0.95 * axis.length();
         let radius_b = radius_b.max(radius_a - limit);
         let radius_a = radius_a.max(radius_b - limit);
@@ -86,7 +86,7 @@ impl RoundCone {
         let p = p - self.a;
         let y = p.dot(self.axis);
         let z = y - self.length2;
-        // Everything is kept times length2, so that one division by it suffices.
+        // All terms are scaled by `length2`, so that one division by it suffices.
         let x2 = (p * self.length2 - self.axis * y).length_squared();
         let y2 = y * y.abs() * self.length2;
         let z2 = z * z.abs() * self.length2;
@@ -105,37 +105,38 @@ impl RoundCone {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape {
     RoundCone(RoundCone),
-    /// Half axes along the placement's.
+    /// `radii` are the half axes along the axes of the pose.
     Ellipsoid {
         at: Placement,
         radii: DVec3,
     },
-    /// Half sides, edges rounded by `round` without growing.
+    /// `half` are half the sides. Edges are rounded by `round` without growing the block.
     Block {
         at: Placement,
         half: DVec3,
         round: f64,
     },
-    /// Axis along local z, edges rounded by `round` without growing.
+    /// Axis along local z. Edges are rounded by `round` without growing the cylinder.
     Cylinder {
         at: Placement,
         radius: f64,
         half_height: f64,
         round: f64,
     },
-    /// Axis along local z.
+    /// A torus with its axis along local z.
     Ring {
         at: Placement,
         major: f64,
         minor: f64,
     },
-    /// Everything on the side that `normal` points away from.
+    /// The half space opposite to `normal`.
     HalfSpace {
         normal: DVec3,
         offset: f64,
     },
-    /// A passage along local y over the floor z = 0: walls at x = ±`half_width` up to `spring`, above them two arcs of
-    /// `radius`, pointed where that exceeds the half width. `half_length` to either side of the origin.
+    /// A passage along local y over the floor z = 0, `half_length` to either side of the origin. Walls stand at x =
+    /// ±`half_width` up to `spring`. Above them are two arcs of `radius`, which form a pointed arch if `radius` exceeds
+    /// `half_width`.
     Passage {
         at: Placement,
         half_width: f64,
@@ -143,7 +144,7 @@ pub(super) enum Shape {
         radius: f64,
         half_length: f64,
     },
-    /// A rolling meadow: a disc of `radius` about the origin, one half metre thick.
+    /// A rolling meadow: a disc of `radius` about the origin, half a metre thick.
     Meadow {
         radius: f64,
     },
@@ -195,7 +196,8 @@ impl Shape {
         match self {
             Self::RoundCone(cone) => cone.distance(p),
             Self::Ellipsoid { at, radii } => {
-                // Distance in the space where it is the unit ball, times the least stretch: never too far.
+                // Distance in the space where the ellipsoid is the unit ball, times the smallest radius: never too
+                // large.
                 ((at.local(p) / *radii).length() - 1.0) * radii.min_element()
             }
             Self::Block { at, half, round } => {
@@ -220,7 +222,7 @@ impl Shape {
                 across.max(-p.z).max(p.y.abs() - half_length)
             }
             Self::Meadow { radius } => {
-                // The waves' steepest slope is below 0.16; the factor makes that one metre per metre again.
+                // The slope of the waves is below 0.16; the factor restores a change of at most one metre per metre.
                 let top = (p.z - meadow_height(p.x, p.y)) * 0.98;
                 top.max(-0.5 - p.z).max(p.truncate().length() - radius)
             }
@@ -228,7 +230,7 @@ impl Shape {
     }
 }
 
-/// Height of the meadow: flat to within a hand's breadth.
+/// Height of the meadow in metres: flat to about a hand's width.
 pub(super) fn meadow_height(x: f64, y: f64) -> f64 {
     0.06 * ((0.9 * x + 0.5 * y).sin() + (1.1 * y - 0.4 * x + 1.0).sin())
         + 0.012 * ((3.1 * x + 0.7).sin() * (2.7 * y).cos())

@@ -1,4 +1,4 @@
-//! A robed statue on its pedestal: relief at every scale from the pose down to single curls.
+//! A robed statue on its pedestal, with relief at every scale from the pose down to single curls.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ use super::{Model, Points};
 
 const STONE: Paint = Paint::Marble;
 
-/// Where the joints are, for a figure 1.75 m high.
+/// Positions of the joints of a figure 1.75 m high.
 const WAIST: DVec3 = DVec3::new(0.012, 0.0, 1.10);
 const CHEST: DVec3 = DVec3::new(0.0, 0.0, 1.30);
 const NECK: DVec3 = DVec3::new(-0.008, 0.02, 1.475);
@@ -44,12 +44,12 @@ fn figure(body: &mut Body) {
     curls(body, at);
 }
 
-/// A number in -1..1 that looks random but is always the same.
+/// A fixed pseudo-random number from -1 to 1.
 fn whim(i: i32, salt: i64) -> f64 {
     f64::from(lattice(i64::from(i), salt, 77)) * 2.0 - 1.0
 }
 
-/// The long robe: a body under cloth, and the folds that fall from the girdle to the feet.
+/// The long robe: a body under cloth, with folds from the girdle to the feet.
 fn robe(body: &mut Body) {
     let egg = |x: f64, y: f64, z: f64, radii: [f64; 3]| Shape::Ellipsoid {
         at: Placement::at(DVec3::new(x, y, z)),
@@ -78,7 +78,7 @@ fn robe(body: &mut Body) {
             let (s, c) = (angle + lag).sin_cos();
             DVec3::new(rx * c, 0.015 + ry * s, z)
         };
-        // Over the free leg, front left, folds part to either side.
+        // The folds part over the free leg, front left.
         let part = (-(angle - 4.25) * (angle - 4.25) * 3.0).exp();
         let deep = 0.75 + 0.35 * whim(i, 2);
         let push = -0.07 * part;
@@ -92,7 +92,7 @@ fn robe(body: &mut Body) {
         ];
         body.strand(0.02, &points);
     }
-    // Where the cloth breaks on the ground.
+    // Cloth that breaks on the ground.
     for i in 0..22 {
         let angle = TAU * (f64::from(i) + 0.4 * whim(i, 8)) / 22.0;
         let (sin, cos) = angle.sin_cos();
@@ -108,7 +108,7 @@ fn robe(body: &mut Body) {
         body.group(Op::Join, 0.012);
         foot(body, ankle, forward, DVec3::NEG_Z);
     }
-    // The blouse above the girdle: thin folds that gather under the chest, and the girdle itself.
+    // The blouse above the girdle, with thin folds that gather under the chest, and the girdle itself.
     body.group(Op::Join, 0.012);
     for i in 0..26 {
         let angle = TAU * (f64::from(i) + 0.35 * whim(i, 10)) / 26.0;
@@ -151,7 +151,7 @@ fn mantle(body: &mut Body) {
         ];
         body.strand(0.008, &points);
     }
-    // What hangs down in front of the right hip, over the bundle.
+    // Cloth that hangs in front of the right hip, over the bundle.
     for i in 0..6 {
         let s = f64::from(i) / 5.0;
         let x = -0.21 + 0.12 * s;
@@ -164,7 +164,7 @@ fn mantle(body: &mut Body) {
         body.strand(0.014, &points);
     }
     body.group(Op::Join, 0.02);
-    // A sheet behind the ridges, so that there is cloth between them.
+    // A sheet behind the ridges, which fills the gaps between them.
     for side in [-0.6, 0.0, 0.6] {
         let p = |spread: f64, y: f64, z: f64| DVec3::new(side * spread, y, z);
         let sheet = [
@@ -178,7 +178,7 @@ fn mantle(body: &mut Body) {
     for i in 0..15 {
         let s = f64::from(i) / 14.0 * 2.0 - 1.0;
         let wave = 0.012 * whim(i, 21);
-        // Ridge and hollow in turn.
+        // Ridges and hollows alternate.
         let ridge = if i % 2 == 0 { 0.014 } else { -0.010 };
         let points = [
             (DVec3::new(0.165 * s, 0.055, 1.45 + 0.015 * (1.0 - s * s)), 0.022),
@@ -206,7 +206,7 @@ fn arms(body: &mut Body) {
         body.group(Op::Join, 0.03);
         body.join(0.0, Shape::cone(shoulder, elbow, 0.054, 0.042));
         body.join(0.03, Shape::cone(elbow, wrist, 0.04, 0.026));
-        // The sleeve, gathered in rings of cloth and hanging open at the elbow.
+        // The sleeve, gathered in rings of cloth and open at the elbow.
         body.group(Op::Join, 0.010);
         let along = (elbow - shoulder).normalize();
         for i in 0..9 {
@@ -270,7 +270,7 @@ fn staff_and_finial(body: &mut Body, foot: DVec3) {
     for z in [0.02, 0.06, 1.80, 1.835, 1.87] {
         body.join(0.004, Shape::Ring { at: Placement::at(p(z)), major: 0.017, minor: 0.0085 });
     }
-    // An orb between leaves, and a cone of pine on top.
+    // An orb between leaves, with a pine cone on top.
     body.join(0.008, Shape::ball(p(1.955), 0.05));
     for i in 0..8 {
         let (sin, cos) = (TAU * f64::from(i) / 8.0).sin_cos();
@@ -296,7 +296,7 @@ fn staff_and_finial(body: &mut Body, foot: DVec3) {
     }
 }
 
-/// Short curls all over, each a coil, and a wreath of laurel around them.
+/// Short coiled curls all over, with a laurel wreath around them.
 fn curls(body: &mut Body, at: Placement) {
     const CURLS: i32 = 150;
     body.group(Op::Join, 0.004);
@@ -309,7 +309,7 @@ fn curls(body: &mut Body, at: Placement) {
         let angle = 2.399_963 * f64::from(i);
         let r = (1.0 - z * z).max(0.0).sqrt();
         let out = DVec3::new(r * angle.cos(), r * angle.sin(), z);
-        // Not over the face and the ears.
+        // The face and the ears stay free.
         let forehead = out.y < -0.25 && z < 0.45 - 0.5 * out.x.abs();
         let ear = out.x.abs() > 0.72 && out.y < 0.35 && z < 0.08;
         if forehead || ear {

@@ -1,4 +1,4 @@
-//! The scenes are ground truth for everything else, so they are held to more than looks here.
+//! Tests of the scenes, which are the ground truth for other tests.
 
 use std::sync::LazyLock;
 
@@ -30,7 +30,7 @@ fn all() -> impl Iterator<Item = &'static Scene> {
     SCENES.iter()
 }
 
-/// A place from which the scene is to be seen: outside of it, or inside the building.
+/// A position that sees the scene: outside of it, or inside the building.
 fn eye(scene: &Scene, random: &mut Random) -> DVec3 {
     match &scene.model().points {
         Points::Scanned(stations) => stations[random.below(stations.len())],
@@ -81,7 +81,7 @@ fn every_point_lies_on_the_surface_that_rays_meet() {
             let p = cloud.world_position(i);
             let off = scene.distance(p).abs();
             assert!(off < TOLERANCE, "{} point {i} at {p}: {off} m off the surface", scene.name());
-            // A ray straight at it ends there, unless something stands before it from both sides.
+            // A ray straight at the point ends there, unless something covers the point from both sides.
             let slope = |axis: DVec3| scene.distance(p + axis * 1e-5) - scene.distance(p - axis * 1e-5);
             let normal = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize();
             seen += usize::from([normal, -normal].into_iter().any(|side| {
@@ -102,7 +102,7 @@ fn normals_are_unit_and_face_the_eye() {
             hits += 1;
             assert!((hit.normal.length() - 1.0).abs() < 1e-9, "{}: normal {}", scene.name(), hit.normal);
             assert!(hit.distance > 0.0, "{}: {} m", scene.name(), hit.distance);
-            // Only in a crease, where two normals are equally right, may the difference quotient pick the far one.
+            // Only in a crease, where two normals are equally valid, may the difference quotient give the far one.
             wrong += usize::from(hit.normal.dot(direction) > 1e-3);
         }
         assert!(hits > 2000, "{}: only {hits} rays hit", scene.name());
@@ -128,7 +128,7 @@ fn cells_change_no_hit() {
                 continue;
             }
             checked += 1;
-            // Along the ray, a bound below a micrometre may still be some way off where the ray grazes.
+            // Where the ray grazes, a bound below a micrometre may still be some way off along the ray.
             assert!(found > t - 1e-5 && f(0.5 * (t + found)) < 1e-4, "{}: {found} m for {t} m", scene.name());
         }
         assert!(checked > 30, "{}: only {checked} rays were checked", scene.name());
@@ -138,7 +138,7 @@ fn cells_change_no_hit() {
 #[test]
 fn rays_in_a_plane_of_the_fold_arrive() {
     let cathedral = scene("cathedral");
-    // Half a bay is folded at x = -6, the aisles at y = 0.
+    // Space is folded at x = -6 (half a bay) and at y = 0 (the aisles).
     for (origin, plane) in [(DVec3::new(-6.0, 0.3, 1.75), DVec3::X), (DVec3::new(-4.7, 0.0, 1.75), DVec3::Y)] {
         for step in 0..32 {
             let (sin, cos) = (0.2 * f64::from(step)).sin_cos();
@@ -195,7 +195,7 @@ fn names_counts_and_times_are_read() {
 
 #[test]
 fn points_are_strewn_evenly() {
-    // A ball and a block far from it, tilted against the cells. Expected counts follow from the areas alone.
+    // A ball, and a block far from it that is rotated against the cells. Expected counts follow from the areas.
     let (radius, half) = (0.7, DVec3::new(0.9, 0.5, 0.25));
     let turned = Placement::along(DVec3::new(-1.1, -1.2, -1.3), DVec3::new(0.3, 0.5, 0.8), DVec3::new(1.0, -0.2, 0.1));
     let center = DVec3::new(1.03, 1.01, 1.02);
@@ -227,7 +227,7 @@ fn points_are_strewn_evenly() {
         }
     }
     for (i, (&n, &mean)) in counts.iter().zip(&expected).enumerate() {
-        // Five standard deviations of a Poisson count; the fixed seed decides once and for all.
+        // Five standard deviations of a Poisson count, with a fixed seed.
         assert!((f64::from(n) - mean).abs() < 5.0 * mean.sqrt(), "patch {i}: {n} points for {mean:.0}");
     }
 }
@@ -235,7 +235,7 @@ fn points_are_strewn_evenly() {
 #[test]
 fn both_scales_get_as_many_points() {
     let cloud = sample(&scene("two-scales"), 10_000);
-    // The large one's ears end below 2.2 m; the small one stands between them from 2.08 m on, grey as stone.
+    // The ears of the large horse end below 2.2 m. The small horse, grey as stone, stands between them from 2.08 m on.
     let grey = |c: &&[u8; 3]| c[0].abs_diff(c[2]) < 14 && c[0] > 90;
     let small = cloud.colors().map_or(0, |colors| colors.iter().filter(grey).count());
     assert!((4000..=5000).contains(&small), "{small} of 10000 points are grey");
@@ -253,7 +253,7 @@ fn what_is_animated_moves_stays_closed_and_repeats() {
         for seconds in [0.0, 0.21, 1.13] {
             let scene = scene.at(seconds);
             for (eye, direction) in rays(&scene, 100) {
-                // A line that goes in comes out again.
+                // A ray that enters a solid must leave it.
                 let (mut t, mut inside) = (0.0, false);
                 while let Some(hit) = scene.trace(eye + direction * t, direction) {
                     t += hit.distance + 1e-6;
