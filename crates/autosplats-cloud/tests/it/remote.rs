@@ -209,14 +209,14 @@ fn it_says_why_nothing_comes() {
     let live = live(port, "points");
     told("nothing", &live, "connected, but nobody publishes /points, nor anything else");
     let _image = rmw_token(&there, "image", "sensor_msgs::msg::dds_::Image_", 1);
-    let only = "connected, but nobody publishes /points; topics there are, none of them of points: /image";
+    let only = "connected, but nobody publishes /points; known topics, none of them with points: /image";
     told("an image", &live, only);
     let _others = [bridge_token(&there, "rear/points"), bridge_token(&there, "front/points")];
-    let others = "connected, but nobody publishes /points; topics there are: /front/points, /rear/points";
+    let others = "connected, but nobody publishes /points; known topics: /front/points, /rear/points";
     told("others", &live, others);
     let wrong = rmw_token(&there, "points", "sensor_msgs::msg::dds_::LaserScan_", 2);
     let scan =
-        "connected, but /points has no points: it is of sensor_msgs/msg/LaserScan, not of sensor_msgs/msg/PointCloud2";
+        "connected, but /points has no points: its type is sensor_msgs/msg/LaserScan, not sensor_msgs/msg/PointCloud2";
     told("a scan", &live, scan);
     drop(wrong);
     let right = rmw_token(&there, "points", "sensor_msgs::msg::dds_::PointCloud2_", 3);
@@ -234,7 +234,7 @@ fn it_says_why_nothing_comes() {
         told.waiting.as_ref().is_some_and(|why| why.ends_with("something else answers there"))
     });
     let unknown = live_at("zenoh://no-such-machine.invalid/points");
-    until(&unknown, "unknown", |told| told.waiting.as_ref().is_some_and(|why| why.contains("no machine is known as")));
+    until(&unknown, "unknown", |told| told.waiting.as_ref().is_some_and(|why| why.contains("no machine is called")));
 }
 
 fn live_at(url: &str) -> Remote {

@@ -1,41 +1,41 @@
-//! Where live points come from: `zenoh://HOST:PORT/TOPIC?domain=N`.
+//! Addresses of live points: `zenoh://HOST:PORT/TOPIC?domain=N`.
 
 use super::frames::TRANSFORMS;
 use crate::Error;
 
-/// What begins an address of live points.
+/// Prefix of an address of live points.
 pub(super) const PREFIX: &str = "zenoh://";
-/// What it looks like, for messages.
+/// Form of an address, for messages.
 const FORM: &str = "zenoh://HOST:PORT/TOPIC?domain=N, where HOST, :PORT and ?domain=N may be left out";
-/// Where routers listen if nobody says otherwise.
+/// Default port of Zenoh routers.
 const PORT: u16 = 7447;
-/// The type of message as rmw_zenoh writes it into keys.
+/// Type of PointCloud2 messages in the keys of rmw_zenoh.
 pub(super) const POINTS: &str = "sensor_msgs::msg::dds_::PointCloud2_";
 
-/// The type of messages of transforms.
+/// Type of messages of transforms in the keys of rmw_zenoh.
 const TRANSFORM: &str = "tf2_msgs::msg::dds_::TFMessage_";
 
-/// An address, taken apart.
+/// A parsed address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Address {
-    /// As it was given.
+    /// The address as given.
     pub(super) url: String,
-    /// Name or number of the machine and its port; whoever is on the local network if there is none.
+    /// Name or IP address of the machine, and its port; `None` to search the local network.
     pub(super) host: Option<(String, u16)>,
-    /// Without a slash before it; empty if none was named.
+    /// Topic without a leading slash; empty if none is named.
     pub(super) topic: String,
-    /// The ROS domain; any if there is none.
+    /// ROS domain; `None` for any.
     pub(super) domain: Option<u32>,
 }
 
 impl Address {
     pub(super) fn parse(url: &str) -> Result<Self, Error> {
         let bad = |what: String| Error::Remote { address: crate::error::message(url), what };
-        let rest = url.strip_prefix(PREFIX).ok_or_else(|| bad(format!("it must be {FORM}")))?;
+        let rest = url.strip_prefix(PREFIX).ok_or_else(|| bad(format!("the address must be {FORM}")))?;
         let (rest, query) = rest.split_once('?').map_or((rest, None), |(rest, query)| (rest, Some(query)));
         let domain = match query.map(|query| query.strip_prefix("domain=").and_then(|number| number.parse().ok())) {
             Some(None) => {
-                return Err(bad("behind the question mark only domain=N is understood, as in ?domain=0".into()));
+                return Err(bad("only domain=N may follow the question mark, as in ?domain=0".into()));
             }
             Some(domain) => domain,
             None => None,
@@ -45,24 +45,24 @@ impl Address {
         let host = if authority.is_empty() {
             None
         } else {
-            Some(host(authority).ok_or_else(|| bad(format!("'{authority}' is no host and port; it must be {FORM}")))?)
+            Some(host(authority).ok_or_else(|| bad(format!("'{authority}' is no host; the form is {FORM}")))?)
         };
         if topic.contains(char::is_control) {
-            return Err(bad("no name of a topic has line breaks or the like in it".into()));
+            return Err(bad("the name of a topic must not contain control characters".into()));
         }
         if let Err(error) = zenoh::key_expr::KeyExpr::new(if topic.is_empty() { "**" } else { topic }) {
             let why = crate::error::message(&error.to_string());
-            return Err(bad(format!("'{topic}' is no name of a topic, nor a pattern with * and ** of some: {why}")));
+            return Err(bad(format!("'{topic}' is neither the name of a topic nor a pattern with * and **: {why}")));
         }
         Ok(Self { url: url.into(), host, topic: topic.into(), domain })
     }
 
-    /// What zenoh connects to.
+    /// The endpoint that Zenoh connects to.
     pub(super) fn endpoint(&self) -> Option<String> {
         self.host.as_ref().map(|(host, port)| format!("tcp/{host}:{port}"))
     }
 
-    /// Whether several topics may be meant.
+    /// Whether several topics may match.
     pub(super) fn is_pattern(&self) -> bool {
         self.topic.contains('*')
     }
@@ -72,22 +72,22 @@ impl Address {
         format!("/{}", self.topic)
     }
 
-    /// The domain as a part of a key.
+    /// The domain as a component of a key.
     pub(super) fn domain_key(&self) -> String {
         self.domain.map_or_else(|| "*".into(), |domain| domain.to_string())
     }
 
-    /// The keys under which points of the topic are heard: as rmw_zenoh names it, of which type it is included, and as the bridge
-    /// from DDS does, which is the bare name. A pattern of bare names would fetch messages of all types, so
-    /// that those are found by what their publishers declare.
+    /// The keys to subscribe to for points of the topic: the key of rmw_zenoh, which includes the type, and that of the
+    /// bridge from DDS, which is the bare name. A pattern of bare names would match messages of all types. Such topics
+    /// are found through the declarations of their publishers instead.
     pub(super) fn keys(&self) -> Vec<String> {
         let Self { topic, .. } = self;
         let typed = format!("{}/{topic}/{POINTS}/*", self.domain_key());
         if self.is_pattern() { vec![typed] } else { vec![typed, topic.clone()] }
     }
 
-    /// The keys under which the transforms of its robots are heard, named in the same two ways: those beside the topic and those
-    /// of all namespaces around it, as far as they are no pattern. None without a topic.
+    /// The keys of transforms for the topic, in both forms: those beside the topic and those of all namespaces around
+    /// it, up to the first wildcard. Empty without a topic.
     pub(super) fn transform_keys(&self) -> Vec<String> {
         let domain = self.domain_key();
         let named = |name: String| [format!("{domain}/{name}/{TRANSFORM}/*"), name];
@@ -95,9 +95,9 @@ impl Address {
         names.flat_map(named).collect()
     }
 
-    /// The keys to ask for transforms that do not change and were sent before anybody listened, since ROS has their publishers
-    /// keep them: in the cache of Zenoh's advanced publisher, of rmw_zenoh and the bridge from 1.3 on, or before that in
-    /// one that is asked with the session before the key, by the bridge with a name of its own as well.
+    /// The keys to query for fixed transforms that were sent before the subscription, which ROS publishers keep. rmw_zenoh
+    /// and the bridge, from 1.3 on, keep them in the cache of Zenoh's advanced publisher. Older versions use a cache whose
+    /// queries have the session before the key, and the bridge adds a prefix of its own.
     pub(super) fn history_keys(&self) -> Vec<String> {
         let domain = self.domain_key();
         let [_, fixed] = TRANSFORMS;
@@ -114,7 +114,7 @@ impl Address {
         self.namespaces().into_iter().flat_map(asked).collect()
     }
 
-    /// What stands before the names of topics in the namespaces that the topic is in: nothing, then `robot/`, and so on.
+    /// Prefixes of topic names in the namespaces that contain the topic: empty, then `robot/`, and so on.
     fn namespaces(&self) -> Vec<String> {
         if self.topic.is_empty() {
             return Vec::new();
@@ -125,7 +125,7 @@ impl Address {
     }
 }
 
-/// Host and port; an IPv6 address is in brackets.
+/// Parses host and port. IPv6 addresses are in brackets.
 fn host(authority: &str) -> Option<(String, u16)> {
     let (host, port) = match authority.rsplit_once(':') {
         Some((host, port)) if !port.ends_with(']') => (host, port.parse().ok().filter(|&port| port > 0)?),

@@ -1,27 +1,28 @@
-//! Where the sensors of robots are, as the robots say, and the frame that their points are brought into.
+//! Coordinate frames of robots, and the common frame of their points.
 //!
 //! # How it works
 //!
-//! Each robot, a ROS domain and a namespace in it, has a tree of frames of its own, of what is published as `tf` and `tf_static`
-//! there. Which frame is the common one is decided once, for the first points that come: who changes it later would
-//! have points that are kept jump. So these wait a moment for transforms, which come in any order, if anybody publishes some.
+//! Each robot, which is a ROS domain and a namespace in it, has its own tree of frames from the `tf` and `tf_static`
+//! published there. The common frame is chosen once, for the first points that arrive; a later change would make the
+//! points already shown jump. Transforms arrive in any order, so the first points wait a moment for them if anybody
+//! publishes transforms.
 
 use std::collections::BTreeMap;
 
 use super::graph::Topic;
 use crate::source::recording::transforms::{Placement, Transforms};
 
-/// What ROS calls topics of transforms: of those that change, and of those that do not.
+/// Names of the ROS topics of moving and of fixed transforms.
 pub(super) const TRANSFORMS: [&str; 2] = ["tf", "tf_static"];
-/// Robots whose transforms are known at most.
+/// Maximum number of robots with transforms.
 const MOST_ROBOTS: usize = 64;
 
 /// The transforms of all robots.
 #[derive(Debug, Default)]
 pub(super) struct Frames {
-    /// The frame that points are to be brought into, if it was named.
+    /// The frame asked for, if any.
     wanted: Option<String>,
-    /// By domain and namespace; a namespace begins and ends with a slash.
+    /// Transforms by domain and namespace. A namespace begins and ends with a slash.
     robots: BTreeMap<(Option<u32>, String), Transforms>,
 }
 
@@ -30,41 +31,41 @@ impl Frames {
         Self { wanted, ..Self::default() }
     }
 
-    /// Whether there are any transforms.
+    /// Whether there are no transforms.
     pub(super) fn is_empty(&self) -> bool {
         self.robots.is_empty()
     }
 
-    /// Takes a message, or says what is wrong with it.
+    /// Takes a message of transforms. Returns the reason if it is refused.
     pub(super) fn hear(&mut self, topic: &Topic, message: &[u8], arrival: i64) -> Result<(), String> {
         let Topic { name, domain, .. } = topic;
         let [moving, fixed] = TRANSFORMS.map(|own| name.strip_suffix(own));
         let (Some(namespace), fixed) = (moving.or(fixed), fixed.is_some()) else { return Ok(()) };
         let key = (*domain, namespace.to_owned());
         if self.robots.len() >= MOST_ROBOTS && !self.robots.contains_key(&key) {
-            return Err(format!("there are transforms of {MOST_ROBOTS} other robots already; name fewer topics"));
+            return Err(format!("there are transforms of {MOST_ROBOTS} other robots already; choose fewer topics"));
         }
         let known = self.robots.contains_key(&key);
         let heard = self.robots.entry(key.clone()).or_default().hear(message, fixed, arrival);
         if heard.is_err() && !known {
-            // What says nothing makes no robot.
+            // A message without valid transforms creates no robot.
             self.robots.remove(&key);
         }
         heard
     }
 
-    /// Where points of a sensor's frame belong that were measured at a time. Nothing if no transforms say anything of them; an
-    /// error if a frame was asked for that nobody knows.
+    /// Transform of points of a sensor measured at a time. `None` if no transforms concern the sensor. Fails if the
+    /// frame asked for is unknown.
     pub(super) fn placement(&mut self, topic: &Topic, frame: &str, stamp: i64) -> Result<Option<Placement>, String> {
         let Self { wanted, robots } = self;
-        // The innermost namespace is its own robot's, if that knows the sensor.
+        // The innermost namespace whose transforms know the sensor belongs to its robot.
         let own = robots.iter_mut().filter(|((domain, namespace), transforms)| {
             *domain == topic.domain && topic.name.starts_with(namespace.as_str()) && transforms.knows(frame)
         });
         let Some((_, transforms)) = own.max_by_key(|((_, namespace), _)| namespace.len()) else {
             return match wanted {
                 Some(wanted) if wanted != frame => {
-                    Err(format!("no transforms of '{frame}' have come, which '{wanted}' would need"))
+                    Err(format!("no transforms from '{frame}' to '{wanted}' have arrived"))
                 }
                 _ => Ok(None),
             };
@@ -84,7 +85,7 @@ mod tests {
         Topic { name: name.into(), domain, ..Topic::default() }
     }
 
-    /// A message that says how far to the right of `parent` the frame `child` is.
+    /// A message with `child` at a distance of `right` along x of `parent`.
     fn message(parent: &str, child: &str, right: f64) -> Vec<u8> {
         let mut bytes = vec![0, 1, 0, 0, 1, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0];
         for name in [parent, child] {
@@ -92,7 +93,7 @@ mod tests {
             bytes.extend((name.len() as u32 + 1).to_le_bytes());
             bytes.extend([name.as_bytes(), b"\0"].concat());
         }
-        // Numbers are aligned from behind the first four bytes.
+        // Numbers are aligned relative to the end of the four header bytes.
         bytes.resize((bytes.len() - 4).next_multiple_of(8) + 4, 0);
         [right, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].iter().for_each(|number| bytes.extend(number.to_le_bytes()));
         bytes

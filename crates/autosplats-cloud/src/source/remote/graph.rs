@@ -1,9 +1,9 @@
-//! Who publishes what, as publishers declare it.
+//! Publishers and their topics, as the publishers declare them.
 //!
 //! # How it works
 //!
-//! Nodes of rmw_zenoh and the bridge from DDS hold up a *token* for each of their publishers, a key with name and type of
-//! its topic in it, which vanishes with them:
+//! Nodes with rmw_zenoh and the bridge from DDS declare a *token* for each of their publishers. A token is a key with
+//! the name and type of the topic, and disappears with the publisher:
 //!
 //! ```text
 //! @ros2_lv/DOMAIN/SESSION/NODE/ID/MP/ENCLAVE/NAMESPACE/NODE/TOPIC/TYPE/HASH/QOS   rmw_zenoh; % is a slash
@@ -15,35 +15,35 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{address::Address, frames::TRANSFORMS};
 
-/// The type of a PointCloud2 message as ROS writes it.
+/// Type of PointCloud2 messages in ROS notation.
 pub(super) const POINT_CLOUD: &str = "sensor_msgs/msg/PointCloud2";
-/// Tokens that are remembered: as many as large fleets have publishers.
+/// Maximum number of stored tokens, enough for large fleets.
 const MAX_TOKENS: usize = 20_000;
-/// Bytes of a key: Zenoh allows more, ROS does not use them.
+/// Maximum length of a key in bytes. Zenoh allows longer keys, but ROS does not use them.
 const MAX_KEY: usize = 1024;
-/// Topics that a message names.
+/// Maximum number of topics listed in a message.
 const NAMED: usize = 5;
 
 /// A topic and its publishers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Topic {
-    /// As ROS writes it, with a slash at the beginning.
+    /// Name in ROS notation, with a leading slash.
     pub name: String,
-    /// Of its messages, as in `sensor_msgs/msg/PointCloud2`; empty if nobody says.
+    /// Type of the messages, for instance `sensor_msgs/msg/PointCloud2`; empty if unknown.
     pub kind: String,
-    /// The ROS domain; none behind a bridge.
+    /// ROS domain; `None` behind a bridge.
     pub domain: Option<u32>,
-    /// Publishers that say so; 0 if there are only messages.
+    /// Number of declared publishers; 0 if only messages were seen.
     pub publishers: usize,
 }
 
 impl Topic {
-    /// Whether its messages have points.
+    /// Whether the messages contain points.
     pub fn has_points(&self) -> bool {
         self.kind == POINT_CLOUD
     }
 
-    /// What a key says that messages are sent under.
+    /// Topic from the key of a message.
     pub(super) fn of_key(key: &str) -> Self {
         let typed = key.rsplit_once('/').and_then(|(rest, _hash)| rest.rsplit_once('/'));
         if let Some((rest, kind)) = typed
@@ -55,7 +55,7 @@ impl Topic {
         Self { name: format!("/{key}"), ..Self::default() }
     }
 
-    /// What a token says of a publisher.
+    /// Topic from the token of a publisher.
     fn of_token(token: &str) -> Option<Self> {
         let parts: Vec<&str> = token.split('/').collect();
         let (name, kind, domain) = match *parts {
@@ -71,31 +71,31 @@ impl Topic {
     }
 }
 
-/// A type as ROS writes it, of one as DDS does: `a::msg::dds_::B_` is `a/msg/B`.
+/// Converts a type from DDS notation to ROS notation: `a::msg::dds_::B_` to `a/msg/B`.
 fn ros_type(kind: &str) -> String {
     let kind = kind.replace("::dds_::", "::").replace("::", "/");
     kind.strip_suffix('_').unwrap_or(&kind).to_owned()
 }
 
-/// Whether a key can be kept and shown.
+/// Whether a key may be stored and displayed.
 pub(super) fn is_name(key: &str) -> bool {
     key.len() <= MAX_KEY && !key.contains(char::is_control)
 }
 
-/// All publishers that are known of.
+/// All known publishers.
 #[derive(Debug, Default)]
 pub(super) struct Graph {
     publishers: BTreeMap<String, Topic>,
 }
 
 impl Graph {
-    /// The keys of tokens of publishers.
+    /// The keys of the publishers' tokens.
     pub(super) fn keys(address: &Address) -> [String; 3] {
         let domain = address.domain_key();
         [format!("@ros2_lv/{domain}/*/*/*/MP/**"), "@/*/@ros2_lv/MP/**".into(), "@ros2_lv/*/MP/**".into()]
     }
 
-    /// A token is there.
+    /// Adds a token.
     pub(super) fn insert(&mut self, token: &str) {
         if self.publishers.len() < MAX_TOKENS
             && is_name(token)
@@ -105,7 +105,7 @@ impl Graph {
         }
     }
 
-    /// A token is gone.
+    /// Removes a token.
     pub(super) fn remove(&mut self, token: &str) {
         self.publishers.remove(token);
     }
@@ -114,13 +114,13 @@ impl Graph {
         self.publishers.len()
     }
 
-    /// How many publish transforms, of whatever robot.
+    /// Number of publishers of transforms, of any robot.
     pub(super) fn transforms(&self) -> usize {
         let last = |topic: &Topic| topic.name.rsplit('/').next().is_some_and(|name| TRANSFORMS.contains(&name));
         self.publishers.values().filter(|topic| last(topic)).count()
     }
 
-    /// All topics, those of points first, then by name.
+    /// All topics: topics of points first, then sorted by name.
     pub(super) fn topics(&self) -> Vec<Topic> {
         let mut topics: BTreeMap<(bool, &str, &str, Option<u32>), usize> = BTreeMap::new();
         for topic in self.publishers.values() {
@@ -135,14 +135,14 @@ impl Graph {
         topics.into_iter().map(topic).collect()
     }
 
-    /// The publishers of points that an address means.
+    /// The publishers of points that match an address.
     fn wanted<'a>(&'a self, address: &'a Address) -> impl Iterator<Item = &'a Topic> {
         let domain =
             move |topic: &Topic| topic.domain.is_none() || address.domain.is_none() || topic.domain == address.domain;
         self.named(address).filter(move |topic| topic.has_points() && domain(topic))
     }
 
-    /// The publishers of topics of the name that an address has.
+    /// The publishers of topics whose name matches an address.
     fn named<'a>(&'a self, address: &'a Address) -> impl Iterator<Item = &'a Topic> {
         let pattern = zenoh::key_expr::KeyExpr::new(&*address.topic).ok();
         let matches = move |topic: &Topic| {
@@ -152,22 +152,22 @@ impl Graph {
         self.publishers.values().filter(move |topic| matches(topic))
     }
 
-    /// Whether somebody publishes what an address means.
+    /// Whether any publisher of points matches an address.
     pub(super) fn has(&self, address: &Address) -> bool {
         self.wanted(address).next().is_some()
     }
 
-    /// The bare keys of what an address means that is published by a bridge.
+    /// The bare keys of matching topics published by a bridge.
     pub(super) fn bridged(&self, address: &Address) -> BTreeSet<String> {
         let bare = self.wanted(address).filter(|topic| topic.domain.is_none());
         bare.map(|topic| topic.name.trim_start_matches('/').to_owned()).collect()
     }
 
-    /// Why nobody publishes what an address means.
+    /// Why no publisher matches an address.
     pub(super) fn why_not(&self, address: &Address) -> String {
         let wanted = address.shown_topic();
         if let Some(other) = self.named(address).find(|topic| !topic.has_points() && !address.is_pattern()) {
-            return format!("{wanted} has no points: it is of {}, not of {POINT_CLOUD}", other.kind);
+            return format!("{wanted} has no points: its type is {}, not {POINT_CLOUD}", other.kind);
         }
         let topics = self.topics();
         let points = topics.iter().filter(|topic| topic.has_points()).count();
@@ -176,7 +176,7 @@ impl Graph {
         names.dedup();
         let more = names.len().saturating_sub(NAMED);
         names.truncate(NAMED);
-        let what = if points > 0 { "topics there are" } else { "topics there are, none of them of points" };
+        let what = if points > 0 { "known topics" } else { "known topics, none of them with points" };
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         match *names {
             [] => format!("nobody publishes {wanted}, nor anything else"),
@@ -198,7 +198,7 @@ mod tests {
             "@ros2_lv/0/7f3a/0/13/MP/%/%/talker/%image/sensor_msgs::msg::dds_::Image_/RIHS01_d31d/::,:,:,:,,",
             "@/1a2b/@ros2_lv/MP/robot§points/sensor_msgs§msg§PointCloud2/:::",
             "@ros2_lv/1a2b/MP/tf/tf2_msgs§msg§TFMessage/:::",
-            // Neither publishers nor tokens.
+            // Tokens that are not of publishers, and keys that are not tokens.
             "@ros2_lv/0/7f3a/0/14/MS/%/%/talker/%x/sensor_msgs::msg::dds_::PointCloud2_/RIHS01_9198/::,:,:,:,,",
             "@ros2_lv/0/7f3a/0/0/NN/%/%/talker",
             "@ros2_lv/x/7f3a/0/13/MP/%/%/talker/%image/a/b/c",
@@ -248,11 +248,11 @@ mod tests {
         assert_eq!(graph.bridged(&address("**")?), BTreeSet::from(["robot/points".into()]), "behind a bridge");
         assert_eq!(
             graph.why_not(&address("points")?),
-            "nobody publishes /points; topics there are: /front/points, /robot/points",
+            "nobody publishes /points; known topics: /front/points, /robot/points",
             "only those of points"
         );
         assert!(
-            graph.why_not(&address("image")?).starts_with("/image has no points: it is of sensor_msgs/msg/Image"),
+            graph.why_not(&address("image")?).starts_with("/image has no points: its type is sensor_msgs/msg/Image"),
             "another type"
         );
         assert!(Graph::default().why_not(&address("a")?).ends_with("nor anything else"), "nothing at all");

@@ -2,10 +2,11 @@
 //!
 //! # How it works
 //!
-//! Opening and closing wait for the network, so that a thread of its own does both and whoever takes points never waits for it.
-//! It asks again until somebody answers. From then on Zenoh itself asks again when the connection is lost; the
-//! thread only watches who is there, follows what bridges begin to publish, and asks for the transforms that were sent before it
-//! listened: whenever others come, and then less and less often, since a publisher may declare itself before it has any.
+//! Opening and closing wait for the network. A separate thread does both, so the caller that takes points never waits
+//! for the network. The thread retries until a connection is open; then Zenoh itself reconnects when the connection is
+//! lost. From then on the thread watches who is connected and subscribes to new topics of bridges. The thread also asks
+//! for transforms that were sent before the subscription: whenever others connect, and then at growing intervals, since
+//! a publisher may declare itself before it has transforms.
 
 use std::{
     collections::BTreeMap,
@@ -26,25 +27,26 @@ use zenoh::{
 
 use super::{address::Address, graph::Graph, state::Shared};
 
-/// Between two attempts to open a connection.
+/// Time between two attempts to open a connection.
 const RETRY: Duration = Duration::from_secs(1);
-/// Between two looks at who is there.
+/// Time between two checks of the connection.
 const LOOK: Duration = Duration::from_millis(100);
-/// For an answer to what was sent before; the first pause until it is asked again, and the longest.
+/// How long to wait for the answer to a query for earlier transforms.
 const HISTORY: Duration = Duration::from_secs(5);
+/// First and longest pause between two queries for earlier transforms.
 const ASK_AGAIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(32)];
-/// For an answer to why nobody answers.
+/// Timeout of the connection attempt that finds why nobody answers.
 const PROBE: Duration = Duration::from_secs(1);
-/// What nodes of rmw_zenoh connect to, since they do not call out on the network.
+/// Router that nodes with rmw_zenoh connect to, since they do not announce themselves on the network.
 const OWN_ROUTER: &str = "tcp/localhost:7447";
 
-/// Begins to hear what an address means, until it is [stopped](Shared::stop).
+/// Starts the thread for an address, which runs until [`Shared::stop`].
 pub(super) fn start(address: Address, shared: Arc<Shared>) -> io::Result<()> {
     let work = move || {
-        // A mistake of ours must not end the connection without a word.
+        // A bug must not end the connection silently.
         if catch_unwind(AssertUnwindSafe(|| run(&address, &shared))).is_err() {
             let mut state = shared.lock();
-            let why = "the thread of the connection has failed by a mistake of this program, please report it";
+            let why = "the thread of the connection failed because of a bug in this program, please report it";
             state.refuse(why.into());
             (state.connection.connected, state.connection.fault) = (false, Some(why.into()));
         }
@@ -62,12 +64,12 @@ fn run(address: &Address, shared: &Arc<Shared>) {
             return;
         }
     };
-    // Before the first message can come.
+    // Before the first message can arrive.
     look(&session, shared);
     let mut heard = BTreeMap::new();
-    // Kept as long as they are to be heard.
+    // Subscriptions to tokens and transforms; dropping them unsubscribes.
     let mut tokens = Vec::new();
-    // Points last, so that whatever else there is to be known of them comes no later.
+    // Points come last, so that transforms and tokens known about them arrive no later.
     let declared = Graph::keys(address).iter().try_for_each(|key| {
         tokens.push(watch(&session, key, shared)?);
         Ok(())
@@ -99,7 +101,7 @@ fn run(address: &Address, shared: &Arc<Shared>) {
         let asked = if asks { address.history_keys() } else { Vec::new() };
         for key in asked {
             if let Err(error) = ask(&session, key, shared) {
-                shared.lock().refuse(format!("transforms cannot be asked for: {error}"));
+                shared.lock().refuse(format!("earlier transforms cannot be queried: {error}"));
             }
         }
         for key in wanted {
@@ -110,17 +112,17 @@ fn run(address: &Address, shared: &Arc<Shared>) {
     }
 }
 
-/// Who is there?
+/// Updates who is connected.
 fn look(session: &Session, shared: &Shared) {
     let info = session.info();
     let others = info.routers_zid().wait().chain(info.peers_zid().wait()).collect();
     shared.lock().others(others);
 }
 
-/// What holds subscriptions.
+/// Subscriptions to points by key.
 type Heard = BTreeMap<String, Subscriber<()>>;
 
-/// Subscribes to messages.
+/// Subscribes to points.
 fn hear(session: &Session, key: String, shared: &Arc<Shared>, heard: &mut Heard) -> zenoh::Result<()> {
     let shared = shared.clone();
     let put = move |sample: Sample| {
@@ -143,12 +145,12 @@ fn hear_transforms(session: &Session, key: &str, shared: &Arc<Shared>) -> zenoh:
     session.declare_subscriber(key.to_owned()).callback(put).wait()
 }
 
-/// When to ask for what was sent before.
+/// Decides when to ask for transforms sent earlier.
 #[derive(Default)]
 struct History {
-    /// How often others came and how many publish transforms, when that was last known.
+    /// Number of connections and of publishers of transforms at the last check.
     others: (u64, usize),
-    /// When it was asked last, and the pause until it is asked again.
+    /// Time of the last query, and the pause until the next.
     asked: Option<(Instant, Duration)>,
 }
 
@@ -168,7 +170,7 @@ impl History {
     }
 }
 
-/// Asks all who keep transforms for them.
+/// Asks all caches of transforms for their content.
 fn ask(session: &Session, key: String, shared: &Arc<Shared>) -> zenoh::Result<()> {
     let shared = shared.clone();
     let answered = move |reply: Reply| {
@@ -176,12 +178,12 @@ fn ask(session: &Session, key: String, shared: &Arc<Shared>) -> zenoh::Result<()
             shared.hear(sample.key_expr().as_str(), sample.payload());
         }
     };
-    // Of several publishers of one key every answer counts, and each comes under the key itself.
+    // All answers to a query count. Each arrives under the key of its message, which differs from the query's key.
     let asked = session.get(key).target(QueryTarget::All).consolidation(ConsolidationMode::None);
     asked.accept_replies(ReplyKeyExpr::Any).timeout(HISTORY).callback(answered).wait()
 }
 
-/// Subscribes to tokens of publishers, those included that are there already.
+/// Subscribes to the tokens of publishers, including existing ones.
 fn watch(session: &Session, key: &str, shared: &Arc<Shared>) -> zenoh::Result<Subscriber<()>> {
     let shared = shared.clone();
     let seen = move |sample: Sample| {
@@ -194,7 +196,7 @@ fn watch(session: &Session, key: &str, shared: &Arc<Shared>) -> zenoh::Result<Su
     session.liveliness().declare_subscriber(key.to_owned()).history(true).callback(seen).wait()
 }
 
-/// Connects, or says why that cannot be.
+/// Connects, or returns why that fails.
 fn open(address: &Address) -> Result<Session, String> {
     let config = config(address).map_err(|error| error.to_string())?;
     zenoh::open(config).wait().map_err(|error| match &address.host {
@@ -203,7 +205,7 @@ fn open(address: &Address) -> Result<Session, String> {
     })
 }
 
-/// A client of the host that is named; otherwise a peer that finds others and listens to nobody it did not find.
+/// Configuration: a client of the given host, or a peer that searches for others and accepts no connections.
 fn config(address: &Address) -> zenoh::Result<Config> {
     let mut config = Config::default();
     let (mode, endpoint) = match address.endpoint() {
@@ -224,11 +226,11 @@ fn config(address: &Address) -> zenoh::Result<Config> {
     Ok(config)
 }
 
-/// Zenoh only says that it cannot connect.
+/// Why a host cannot be reached, since Zenoh does not tell.
 fn why_unreachable(host: &str, port: u16) -> String {
     let bare = host.trim_start_matches('[').trim_end_matches(']');
     let Some(first) = (bare, port).to_socket_addrs().ok().and_then(|mut addresses| addresses.next()) else {
-        return format!("no machine is known as '{host}'");
+        return format!("no machine is called '{host}'");
     };
     match TcpStream::connect_timeout(&first, PROBE) {
         Ok(_) => "something else answers there".into(),

@@ -1,14 +1,15 @@
-//! Remote points of ROS 2 over Zenoh: nodes that run rmw_zenoh, or any behind the bridge from DDS.
+//! Live points of ROS 2 over Zenoh, from nodes with rmw_zenoh or behind the bridge from DDS.
 //!
 //! # How it works
 //!
-//! A [`Remote`] subscribes to a topic in the two ways it may be named. Zenoh's threads put each message into the one place that its
-//! channel has, so that the newest wins and nothing queues; it is decoded when it is [taken](crate::Stream::next), so
-//! that what nobody takes costs next to nothing. A thread of ours holds the connection (`link.rs`), and what publishers declare
-//! of themselves (`graph.rs`) says why nothing comes, if nothing does. Where sensors are, robots say by transforms (`frames.rs`),
-//! so that all points are in one frame as those of recordings are.
+//! A [`Remote`] subscribes to a topic under both of its possible keys. Zenoh's threads store only the newest message of
+//! each channel, so nothing queues. A message is decoded when it is [taken](crate::Stream::next), so messages that
+//! nobody takes cost next to nothing. A separate thread holds the connection (`link.rs`). What publishers declare about
+//! themselves (`graph.rs`) explains why nothing arrives, if so. Robots publish transforms of their sensors
+//! (`frames.rs`), which bring all points into one coordinate frame, as in recordings.
 //!
-//! Zenoh is licensed under EPL-2.0 or Apache-2.0, at our choice. It asks for Rust 1.75, and what it needs for 1.88.
+//! Zenoh is licensed under EPL-2.0 or Apache-2.0, at our choice. Zenoh asks for Rust 1.75, but its dependencies for
+//! 1.88.
 
 mod address;
 mod frames;
@@ -36,75 +37,77 @@ use super::{
 };
 use crate::{Error, Progress, ReadOptions};
 
-/// Between two questions whether to stop.
+/// Time between two checks for cancellation.
 const ASK: Duration = Duration::from_millis(50);
 
-/// Between two looks at whether transforms have come.
+/// Time between two checks for transforms.
 const SETTLE: Duration = Duration::from_millis(10);
 
-/// What is heard of robots, and how.
+/// Options of [`Remote::open`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RemoteOptions {
-    /// The coordinate frame that all points are brought into; those that cannot be are refused. If there is none, the topmost that
-    /// is known of the first sensor, a second after its first points. So long these wait for transforms, or 0.3 s if nobody
-    /// publishes any.
+    /// Coordinate frame to transform all points into. Points that cannot be transformed are refused. Default `None`:
+    /// the root of the tree of frames above the first sensor, as known one second after the first points. The first
+    /// points wait that second for transforms, or 0.3 s if nobody publishes any.
     pub frame: Option<String>,
-    /// How points are read.
+    /// How to read points.
     pub read: ReadOptions,
 }
 
-/// Whether a name is an address of live points, right or wrong.
+/// Whether a name has the form of an address of live points, valid or not.
 pub fn is_remote(name: &str) -> bool {
     name.starts_with(address::PREFIX)
 }
 
-/// Points as sensors send them.
+/// Live points of ROS 2 over Zenoh.
 ///
-/// Each topic is a [channel](Update::channel), counted as they are first heard. Stamps are those that the messages have, or when
-/// they came if they have none. They are handed on as they come, older ones behind newer ones too.
+/// Each topic is a [channel](Update::channel), numbered in order of first messages. Stamps are those of the messages,
+/// or times of arrival for messages without a stamp. Messages are passed on as they arrive, even older ones after newer
+/// ones.
 ///
-/// Points are brought into one frame by what is published as `tf` and `tf_static`, in the namespaces around their topic as well;
-/// those of a sensor of which no transforms are known stay in its own. Between two transforms a pose is interpolated, after
-/// the last it is the last.
+/// Transforms published as `tf` and `tf_static`, also in the namespaces around the topic, bring points into one
+/// coordinate frame. Poses are interpolated between transforms, and constant after the last one. Points of a sensor
+/// without transforms stay in their own frame.
 pub struct Remote {
     address: Address,
     options: RemoteOptions,
     shared: Arc<Shared>,
-    /// Channels of which something was told that need not be told again.
+    /// Channels that have reported a note about points without a return, or about missing transforms. Each is reported
+    /// once.
     told: Vec<[bool; 2]>,
 }
 
 impl Remote {
-    /// Begins to listen to `zenoh://HOST:PORT/TOPIC?domain=N`.
+    /// Subscribes to `zenoh://HOST:PORT/TOPIC?domain=N`, without waiting for a connection.
     ///
-    /// The port is 7447 if none is named, and without a host whoever is found on the local network is asked, a router on
-    /// this machine included. The topic may be a pattern, where `*` is one part of a name and `**` any number. Without a domain
-    /// it is any.
+    /// - Without PORT, the port is 7447.
+    /// - Without HOST, peers and routers on the local network are searched, including a router on this machine.
+    /// - TOPIC may be a pattern, in which `*` stands for one component of a name and `**` for any number of them.
+    /// - Without `domain`, all ROS domains match.
     ///
-    /// Nothing is waited for: nobody needs to be there yet, and who goes away may come back. What is the matter is in
-    /// [`Statistics::waiting`].
+    /// Publishers may start later, leave and come back. [`Statistics::waiting`] tells why nothing arrives.
     ///
     /// # Errors
-    /// [`Error::Remote`] if the address makes no sense or names no topic.
+    /// [`Error::Remote`] if the address is invalid or names no topic.
     pub fn open(url: &str, options: &RemoteOptions) -> Result<Self, Error> {
         let address = Address::parse(url)?;
         if address.topic.is_empty() {
-            let what = "no topic is named; name one behind the host, as in zenoh://HOST/points, or ** for all".into();
+            let what = "the topic is missing; add one after the host, as in zenoh://HOST/points, or ** for all".into();
             return Err(Error::Remote { address: url.into(), what });
         }
         let shared = Arc::new(Shared::default());
         shared.lock().frames = Frames::new(options.frame.as_deref().map(frame_name));
         link::start(address.clone(), shared.clone())
-            .map_err(|error| Error::Remote { address: url.into(), what: format!("no thread can be had: {error}") })?;
+            .map_err(|error| Error::Remote { address: url.into(), what: format!("cannot start thread: {error}") })?;
         Ok(Self { address, options: options.clone(), shared, told: Vec::new() })
     }
 
-    /// The topic of each channel heard so far.
+    /// The topic of each channel so far.
     pub fn channels(&self) -> Vec<String> {
         self.shared.lock().channels.iter().map(|channel| channel.topic.name.clone()).collect()
     }
 
-    /// Decodes a message; one that is none is counted.
+    /// Decodes a message. Returns `None` and counts a refusal if that fails.
     fn update(&mut self, channel: usize, message: &Message, progress: &dyn Progress) -> Option<Update> {
         let topic = self.shared.lock().channels[channel].topic.clone();
         let (name, bytes) = (&topic.name, message.payload.to_bytes());
@@ -126,7 +129,7 @@ impl Remote {
             Err(missing) => (decoded.cloud, Some(missing)),
         };
         let mut state = self.shared.lock();
-        // In another frame than was asked for they would be in the way of those in that one.
+        // Points in a frame other than the one asked for would mix with points in that frame.
         if let (Some(missing), Some(_)) = (&missing, &self.options.frame) {
             let why = format!("{name}: {missing}");
             let is_first = state.unplaced.as_ref().is_none_or(|(other, _)| channel <= *other);

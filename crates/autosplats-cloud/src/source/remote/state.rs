@@ -1,4 +1,5 @@
-//! What the network's threads and the one that takes points share: of each channel the newest message, and who is there.
+//! State shared by Zenoh's threads and the thread that takes points: the newest message of each channel, and the state
+//! of the connection.
 
 use std::{
     sync::{Condvar, Mutex, MutexGuard, PoisonError},
@@ -14,40 +15,41 @@ use super::{
 };
 use crate::Statistics;
 
-/// Sensors of one connection: whoever makes up more has nothing to show.
+/// Maximum number of channels of one connection; more do not occur.
 const MAX_CHANNELS: usize = 64;
-/// Time without a message that is worth telling.
+/// Time without a message after which the silence is reported.
 const SILENCE: Duration = Duration::from_secs(5);
-/// How long the first points wait for a sign that somebody publishes transforms, and if so for these: those of a robot come at
-/// least every second.
+/// How long the first points wait for a sign that somebody publishes transforms.
 const SIGNS: Duration = Duration::from_millis(300);
+/// How long the first points wait for transforms if somebody publishes them; robots send them at least every second.
 const SETTLING: Duration = Duration::from_secs(1);
 
-/// State and its lock.
+/// The state and its lock.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
     state: Mutex<State>,
     changed: Condvar,
 }
 
-/// What is there.
+/// The state.
 #[derive(Debug, Default)]
 pub(super) struct State {
     pub(super) channels: Vec<Channel>,
-    /// The channel that is asked first, so that none waits behind a faster one.
+    /// Channel to ask first, so that no channel waits behind a faster one.
     turn: usize,
     pub(super) statistics: Statistics,
     pub(super) graph: Graph,
     pub(super) frames: Frames,
     pub(super) connection: Connection,
-    /// The first channel whose points cannot be brought into the frame that was asked for, and why, before any others could.
+    /// The first channel whose points cannot be transformed into the frame asked for, and the reason. Set only until
+    /// other points can be.
     pub(super) unplaced: Option<(usize, String)>,
-    /// When the first message came, and the last.
+    /// Time of the first message. `heard` is the time of the last.
     first: Option<Instant>,
     heard: Option<Instant>,
-    /// Whether to listen to all that is sent.
+    /// Whether to listen to all messages.
     pub(super) listen: bool,
-    /// Nobody takes points any more.
+    /// Whether nobody takes points any more.
     pub(super) stop: bool,
 }
 
@@ -58,23 +60,23 @@ pub(super) struct Channel {
     newest: Option<Message>,
 }
 
-/// A message as it came.
+/// A message as received.
 #[derive(Debug)]
 pub(super) struct Message {
     pub(super) payload: ZBytes,
-    /// When it came, in nanoseconds since 1970.
+    /// Time of arrival in nanoseconds since 1970.
     pub(super) arrival: i64,
 }
 
-/// Whether anybody is at the other end.
+/// State of the connection.
 #[derive(Debug, Default)]
 pub(super) struct Connection {
     pub(super) connected: bool,
-    /// Times that others came.
+    /// Number of times that others connected.
     pub(super) times: u64,
-    /// Who was there last.
+    /// The others connected last.
     others: Vec<ZenohId>,
-    /// Why nobody is.
+    /// Why nobody is connected.
     pub(super) fault: Option<String>,
 }
 
@@ -83,7 +85,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Transforms came.
+    /// Takes transforms.
     pub(super) fn hear(&self, key: &str, payload: &ZBytes) {
         if is_name(key) {
             let topic = Topic::of_key(key);
@@ -95,11 +97,11 @@ impl Shared {
         }
     }
 
-    /// A message came, which takes the place of the one before that nobody took.
+    /// Stores a message in place of the previous one of its channel.
     pub(super) fn put(&self, key: &str, payload: ZBytes) {
         let arrival = now();
         if !is_name(key) {
-            return self.lock().refuse("a message under a name that is none".into());
+            return self.lock().refuse("a message with an invalid key".into());
         }
         let topic = Topic::of_key(key);
         let mut state = self.lock();
@@ -110,12 +112,12 @@ impl Shared {
         let now = Instant::now();
         (state.first, state.heard) = (state.first.or(Some(now)), Some(now));
         drop(state);
-        // Megabytes are freed here, while nobody waits for the lock.
+        // Frees megabytes after the lock is released.
         drop(replaced);
         self.changed.notify_all();
     }
 
-    /// The newest message of the next channel that has one, for which it waits no longer than `patience`.
+    /// Takes the newest message of the next channel that has one, and waits up to `patience` for it.
     pub(super) fn take(&self, patience: Duration) -> Option<(usize, Message)> {
         let waited = self.changed.wait_timeout_while(self.lock(), patience, |state| {
             state.channels.iter().all(|channel| channel.newest.is_none())
@@ -128,7 +130,7 @@ impl Shared {
         Some((channel, state.channels[channel].newest.take()?))
     }
 
-    /// Waits, unless nobody takes points any more: then it says so.
+    /// Waits up to `patience`, and returns whether nobody takes points any more.
     pub(super) fn stopped(&self, patience: Duration) -> bool {
         let waited = self.changed.wait_timeout_while(self.lock(), patience, |state| !state.stop);
         waited.unwrap_or_else(PoisonError::into_inner).0.stop
@@ -140,37 +142,37 @@ impl Shared {
     }
 }
 
-/// Nanoseconds since 1970.
+/// Current time in nanoseconds since 1970.
 fn now() -> i64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 impl State {
-    /// Whether the first points have not come, or still wait for the transforms of their robot.
+    /// Whether the first points have not arrived, or still wait for the transforms of their robot.
     pub(super) fn is_settling(&self) -> bool {
         let known = !self.frames.is_empty() || self.graph.transforms() > 0;
         let patience = if known { SETTLING } else { SIGNS };
         self.first.is_none_or(|first| first.elapsed() < patience)
     }
 
-    /// A new channel.
+    /// Adds a channel.
     fn channel(&mut self, topic: Topic) -> Option<usize> {
         if self.channels.len() == MAX_CHANNELS {
-            self.refuse(format!("{}: there are {MAX_CHANNELS} other topics already; name fewer", topic.name));
+            self.refuse(format!("{}: there are {MAX_CHANNELS} other topics already; choose fewer", topic.name));
             return None;
         }
         self.channels.push(Channel { topic, newest: None });
         Some(self.channels.len() - 1)
     }
 
-    /// Counts what cannot be shown.
+    /// Counts a refusal.
     pub(super) fn refuse(&mut self, why: String) {
         self.statistics.refused += 1;
         self.statistics.last_refusal = Some(crate::error::message(&why));
     }
 
-    /// Who is at the other end now.
+    /// Updates who is connected.
     pub(super) fn others(&mut self, others: Vec<ZenohId>) {
         let Connection { connected, times, others: before, fault } = &mut self.connection;
         let lost = !*connected && !before.is_empty();
@@ -186,7 +188,7 @@ impl State {
         }
     }
 
-    /// Why nothing comes, in a line; nothing if something does.
+    /// Why nothing arrives, in one line; `None` if something does.
     pub(super) fn waiting(&self, address: &Address) -> Option<String> {
         let silence = self.heard.map(|heard| heard.elapsed());
         if !self.connection.connected {
@@ -210,7 +212,7 @@ impl State {
 }
 
 impl Topic {
-    /// Whether it is the same sensor's.
+    /// Whether both topics are of the same sensor.
     fn same(&self, other: &Self) -> bool {
         self.domain == other.domain && self.name == other.name
     }

@@ -1,4 +1,4 @@
-//! Which topics there are.
+//! Lists topics.
 
 use std::{
     collections::BTreeMap,
@@ -19,24 +19,24 @@ use crate::{
     point_cloud2::{self, Encoding},
 };
 
-/// Once something was found, so long without anything new is the end.
+/// The search ends when something is found and nothing new appears for this long.
 const QUIET: Duration = Duration::from_millis(700);
-/// Between two looks.
+/// Time between two checks.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// The topics that are published at `zenoh://HOST:PORT/?domain=N`, those of points first, then by name.
+/// The topics published at `zenoh://HOST:PORT/?domain=N`: topics of points first, then sorted by name.
 ///
-/// It takes no longer than `patience`, and less if somebody is found earlier. Publishers that do not declare themselves, as
-/// none of ROS are, are only looked for if nobody else is there, by listening to all that is sent.
+/// Waits up to `patience`, and less if publishers are found earlier. Publishers that do not declare themselves, unlike
+/// those of ROS, are searched only if no others are found, by listening to all messages.
 ///
 /// # Errors
-/// [`Error::Remote`] if the address makes no sense or nobody is there.
+/// [`Error::Remote`] if the address is invalid or nobody answers.
 pub fn topics(url: &str, patience: Duration) -> Result<Vec<Topic>, Error> {
     let address = Address::parse(url)?;
     let address = Address { topic: String::new(), ..address };
     let failed = |what| Error::Remote { address: crate::error::message(url), what };
     let shared = Arc::new(Shared::default());
-    link::start(address.clone(), shared.clone()).map_err(|error| failed(format!("no thread can be had: {error}")))?;
+    link::start(address.clone(), shared.clone()).map_err(|error| failed(format!("cannot start thread: {error}")))?;
     let found = find(&address, &shared, patience);
     shared.stop();
     found.map_err(failed)
@@ -47,7 +47,7 @@ fn find(address: &Address, shared: &Shared, patience: Duration) -> Result<Vec<To
     let (mut known, mut changed) = (0, begin);
     while begin.elapsed() < patience {
         let mut state = shared.lock();
-        // Those who declare themselves do so at once.
+        // Publishers that declare themselves do so at once.
         let nobody = state.connection.connected && state.graph.len() == 0;
         state.listen |= nobody && begin.elapsed() > patience / 2;
         let now = state.graph.len() + state.channels.len();
@@ -63,8 +63,8 @@ fn find(address: &Address, shared: &Shared, patience: Duration) -> Result<Vec<To
     if !state.connection.connected {
         let why = state.waiting(address).unwrap_or_default();
         let remedy = match address.host {
-            Some(_) => "start one there (ros2 run rmw_zenoh_cpp rmw_zenohd, or zenohd), or name another port",
-            None => "start one (ros2 run rmw_zenoh_cpp rmw_zenohd, or zenohd), or name its host: zenoh://HOST/",
+            Some(_) => "start one there (ros2 run rmw_zenoh_cpp rmw_zenohd, or zenohd), or give another port",
+            None => "start one (ros2 run rmw_zenoh_cpp rmw_zenohd, or zenohd), or give its host: zenoh://HOST/",
         };
         return Err(format!("{why}; {remedy}"));
     }
@@ -75,7 +75,7 @@ fn find(address: &Address, shared: &Shared, patience: Duration) -> Result<Vec<To
     while !heard.is_empty()
         && let Some((channel, message)) = shared.take(Duration::ZERO)
     {
-        // More come while these are decoded, of topics told already and of new ones.
+        // More messages, also of new topics, may arrive while these are decoded.
         let Some(mut topic) = heard.remove(&channel) else { continue };
         let bytes = message.payload.to_bytes();
         let decoded = point_cloud2::decode(Path::new(&topic.name), &bytes, Encoding::Cdr, &ReadOptions::default());
